@@ -5,6 +5,7 @@ A scene is a name, the path of a .toml file, its tables as a dict, or one that w
 """
 
 from tribodyn.geometry.surface import HeightMap
+from tribodyn.workflows.studies.convergence import Converged, converge
 from tribodyn.workflows.studies.curves.backbones import SceneBackbone, backbone
 from tribodyn.workflows.studies.curves.decay import Decay, ring_down
 from tribodyn.workflows.studies.curves.folds import FoldsFound, folds
@@ -21,7 +22,7 @@ from tribodyn.workflows.studies.many.table import StudyTable
 from tribodyn.workflows.studies.measured.compare import Compared, compare
 from tribodyn.workflows.studies.supports import Supports, supports
 from tribodyn.workflows.studies.surfaces import FaceAsperities, asperities
-from tribodyn.workflows.studies.trades import Converged, Traded, converge, trade
+from tribodyn.workflows.studies.trades import Traded, trade
 from tribodyn.workflows.studies.variation import Variation, vary
 from tribodyn.workflows.studies.verification import Comparison
 from tribodyn.workflows.studies.worn_states import WornStates, verify_states

@@ -15,8 +15,9 @@ from cyclopts import Parameter
 from tests.proof.cases.blade.commands import blade
 from tests.proof.cases.leaf_seal.commands import leaf
 from tests.proof.cases.rig.commands import rig
+from tests.proof.words import PICTURE, aside
 from tribodyn.workflows.command import exits
-from tribodyn.workflows.command.words import PICTURE, Flag, Json, Overrides, aside, make_room, quantity
+from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, quantity
 
 
 def bench(

@@ -10,6 +10,7 @@ import pytest
 
 import tribodyn as td
 from tests.helpers.coarse_scenes import BLADE, RIG
+from tests.helpers.fits import predict
 from tests.helpers.pages import ROOT, fences
 from tests.proof.problems import cycle_at
 from tribodyn.workflows.command import main as cli
@@ -20,7 +21,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file
-from tribodyn.workflows.studies.fits.fit_file import Known, Task, predict
+from tribodyn.workflows.studies.fits.fit_file import Known, Task
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
 
 BEAM = (

@@ -11,11 +11,12 @@ import pytest
 
 import tribodyn as td
 from tests.helpers.command import leave
+from tests.helpers.fits import predict
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import posterior
-from tribodyn.workflows.studies.fits.fit_file import Asked, predict
+from tribodyn.workflows.studies.fits.fit_file import Asked
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
 

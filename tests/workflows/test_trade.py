@@ -15,6 +15,7 @@ from tribodyn.workflows.errors.limit import limit_of
 from tribodyn.workflows.errors.trade_table import Trade, TradeRow
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import convergence as converge
+from tribodyn.workflows.studies.trades import Traded
 
 SMALL = (
     "geometry.n_length=4",
@@ -88,7 +89,7 @@ def test_the_table_survives_its_file(table: Trade, tmp_path: Path) -> None:
     path = tmp_path / "trade.json"
     trade_table.save(table, path)
     again = trade_table.load(path)
-    assert trade.as_records(again) == trade.as_records(table)
+    assert Traded(again, None).record() == Traded(table, None).record()
     assert json.loads(path.read_text())["key"] == table.key
     path.write_text("[]")
     with pytest.raises(ValueError, match="no trade table of this version"):
@@ -216,9 +217,9 @@ def test_the_grid_that_is_needed_is_the_first_from_which_all_are_good() -> None:
     needed = study.needed("peak_m")
     assert needed is not None
     assert needed.setting == "n=7"
-    assert study.needed("peak_m", 1e-4) is None
-    text = converge.as_text([study])
+    assert replace(study, rows=rows[:2]).needed("peak_m") is None
+    text = "\n".join(converge.Converged((study,)).lines())
     assert "1 % on amplitude needs n=7 (49 pairs) or finer; the limit is known to 0.1 %" in text
     assert "the grid of the scene, n=7 (49 pairs), is good for 1 % on all: amplitude 0.8 %" in text
     poor = replace(study, rows=(grid_row(3, 0.03, own=True), *rows[1:]))
-    assert "n=3 (9 pairs), misses 1 % on amplitude: amplitude 3 %" in converge.as_text([poor])
+    assert "n=3 (9 pairs), misses 1 % on amplitude: amplitude 3 %" in "\n".join(converge.Converged((poor,)).lines())

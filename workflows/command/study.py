@@ -5,6 +5,7 @@ from __future__ import annotations
 from cyclopts import App
 
 from tribodyn.workflows.command.word import word
+from tribodyn.workflows.studies.convergence import converge
 from tribodyn.workflows.studies.derivatives import derivatives
 from tribodyn.workflows.studies.fits.fit_file import identify, posterior
 from tribodyn.workflows.studies.forces import forces
@@ -13,7 +14,7 @@ from tribodyn.workflows.studies.many.optimum import optimise
 from tribodyn.workflows.studies.many.study import grid
 from tribodyn.workflows.studies.measured.compare import compare
 from tribodyn.workflows.studies.supports import supports
-from tribodyn.workflows.studies.trades import converge, trade
+from tribodyn.workflows.studies.trades import trade
 from tribodyn.workflows.studies.variation import vary
 
 app = App(name="study")

@@ -1,8 +1,7 @@
-"""What the words of the command `tribodyn` share: common options, quantities on the command line, lines of output."""
+"""What the words of the command `tribodyn` share: common options, quantities on the command line, room for output."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -13,18 +12,8 @@ Overrides = Annotated[
     tuple[str, ...],
     Parameter(name="--set", negative=(), consume_multiple=False, help="Change a key of the scene: section.key=value."),
 ]
-Changes = Annotated[tuple[str, ...], Parameter(name="--change", negative=(), consume_multiple=False)]
-Start = Annotated[str | None, Parameter(name="--from")]
-Stop = Annotated[str | None, Parameter(name="--to")]
 Json = Annotated[bool, Parameter(name="--json", negative=(), help="Print JSON for machines.")]
 Flag = Annotated[bool, Parameter(negative=())]
-PICTURE = (".png", ".pdf", ".svg")
-
-
-def aside(sentence: str, share: float | None = None) -> None:
-    """Progress of a study, beside what it prints; shares of a stage are not shown."""
-    if share is None:
-        print(sentence, file=sys.stderr, flush=True)
 
 
 def quantity(name: str, text: str, unit: str) -> float:

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import replace
 
 from tribodyn.workflows.errors.cost import Measured, measure
 from tribodyn.workflows.errors.ladders import Parameter, Setting, chosen, parameters_of, study_of
 from tribodyn.workflows.errors.limit import limit_of
-from tribodyn.workflows.errors.trade_table import (
-    ANSWERED,
-    NAMES,
-    QUANTITIES,
-    Trade,
-    TradeRow,
-    known_of,
-)
-from tribodyn.workflows.result.summary import plain
+from tribodyn.workflows.errors.trade_table import QUANTITIES, Trade, TradeRow, known_of
 from tribodyn.workflows.scene import scene_file
 
 BASE = "base"
@@ -133,38 +124,3 @@ def judged(rows: Sequence[TradeRow]) -> list[TradeRow]:
         replace(row, errors={n: error(row, n) for n in QUANTITIES}, doubts={n: doubt(row, n) for n in QUANTITIES})
         for row in rows
     ]
-
-
-def as_records(trade: Trade) -> list[dict[str, Any]]:
-    """The rows for JSON, with the observed orders of their parameter."""
-    orders = {parameter: {name: trade.order(parameter, name) for name in QUANTITIES} for parameter in trade.parameters}
-    return [{**plain(asdict(row)), "scene": trade.scene, "order": orders[row.parameter]} for row in trade.rows]
-
-
-def as_text(trade: Trade) -> str:
-    """The table for people: errors in per cent of the limit of each parameter; behind ~ the doubt in it."""
-    lines = [f"{'parameter':15} {'setting':46} {'seconds':>7} {'MB':>6} " + " ".join(f"{name:>16}" for name in NAMES)]
-    for parameter in trade.parameters:
-        for row in trade.of(parameter):
-            cells = [_cell(row, name) for name in QUANTITIES]
-            head = f"{parameter:15} {row.setting[:46]:46} {row.seconds:7.2f} {row.memory / 1e6:6.0f} "
-            lines.append(head + " ".join(f"{cell:>16}" for cell in cells) + _failure(row))
-        orders = [trade.order(parameter, name) for name in QUANTITIES]
-        if any(order is not None for order in orders):
-            cells = ["" if order is None else f"order {order:.1f}" for order in orders]
-            lines.append(f"{parameter:15} {'':46} {'':7} {'':6} " + " ".join(f"{cell:>16}" for cell in cells))
-    lines.append(f"every parameter alone on {trade.scene} with {'; '.join(trade.base) or 'nothing changed'}")
-    lines.append("errors from where the parameter tends to, behind ~ the doubt in that")
-    return "\n".join(lines)
-
-
-def _cell(row: TradeRow, quantity: str) -> str:
-    error, doubt = row.errors[quantity], row.doubts[quantity]
-    if error is None or doubt is None:
-        return ""
-    known = f"{100 * error:+.3g}" if error else "0"
-    return f"{known} ~{100 * doubt:.2g} %" if doubt else f"{known} %"
-
-
-def _failure(row: TradeRow) -> str:
-    return "" if row.outcome == ANSWERED else f"  {row.outcome}"

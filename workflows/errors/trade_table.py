@@ -47,12 +47,6 @@ class TradeRow:
     outcome: str
     tunable: bool
 
-    @property
-    def worst(self) -> float:
-        """Largest relative error of all quantities; inf where the setting failed."""
-        known = [abs(error) for error in self.errors.values() if error is not None]
-        return max(known, default=0.0) if self.outcome == ANSWERED else float("inf")
-
 
 @dataclass(frozen=True)
 class Trade:

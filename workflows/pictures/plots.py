@@ -39,7 +39,7 @@ def draw(result: Result, folder: Path, formats: Sequence[str] = ("png",), dpi: i
 def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
     """The figures that a result has data for, by name."""
     worn = result.wear_steps > 0
-    mapped = result.patch is not None and len(result.patch.faces) > 0 and has_states(result)
+    mapped = len(result.patch.faces) > 0 and has_states(result)
     every: list[tuple[str, Callable[[Result], Figure], bool]] = [
         ("frf", response, result.response is not None or result.wear is not None),
         ("control", controlled, result.response is not None and result.response.controlled),
@@ -179,7 +179,6 @@ def preload_against_cycles(result: Result) -> Figure:
 def depth_against_cycles(result: Result) -> Figure:
     """Largest, mean and smallest wear depth of the patch, and the worn part of its area, against cycles."""
     wear, patch = _wear(result), result.patch
-    assert patch is not None
     with axes_of(7.2, 5.6, rows=2) as (figure, (axes, below)):
         scale_cycles = cycle_axis(axes, wear)
         unit, scale = length_unit(wear.depth.max())
@@ -209,7 +208,6 @@ def worn_area(depth: np.ndarray, area: np.ndarray) -> np.ndarray:
 def energy_against_cycles(result: Result) -> Figure:
     """Energy per cycle against cycles, and worn volume against accumulated energy."""
     wear, patch = _wear(result), result.patch
-    assert patch is not None
     with axes_of(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
         scale_cycles = cycle_axis(upper, wear)
         _course(upper, scale_cycles, wear, wear.energy.sum(1), BLUE)
@@ -223,7 +221,6 @@ def energy_against_cycles(result: Result) -> Figure:
 def status_against_cycles(result: Result) -> Figure:
     """Share of the patch in each contact status, against cycles."""
     wear, patch = _wear(result), result.patch
-    assert patch is not None
     with axes_of() as (figure, axes):
         scale = cycle_axis(axes, wear)
         shares = [100 * (wear.status == bits) @ patch.area / patch.area.sum() for bits in STATUS]
@@ -295,7 +292,7 @@ def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
     Raises  ValueError where no loops are kept, or for a pair that there is not
     """
     loops, patch = result.loops, result.patch
-    if loops is None or patch is None:
+    if loops is None:
         raise ValueError("the result holds no hysteresis loops: its scene needs a contact and pictures.plots = true")
     states, size = [state_of(result, int(row)) for row in loops.row], loop_size(result)
     largest = dict.fromkeys(int(np.argmax(one)) for one in size.sum(axis=2))

@@ -36,7 +36,7 @@ class Layout:
     """Layout of pictures.
 
     font, line : points of all text and of all curves
-    dpi : dots per inch of figures, film_dpi : of films, report_dpi : of figures in a report
+    dpi : dots per inch of figures, film_dpi : of films
     narrowest : inches of a figure of maps, below which a legend of all states does not fit
     column, least : inches of a column of views, and of the narrowest figure of them
     view : pixels of a view of the part, book : of an opened contact, apart : of bodies drawn apart, wheel : of a wheel
@@ -55,7 +55,6 @@ class Layout:
     font: float = 10.0
     line: float = 1.3
     film_dpi: int = 100
-    report_dpi: int = 110
     narrowest: float = 5.6
     column: float = 3.4
     least: float = 6.0

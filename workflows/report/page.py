@@ -196,8 +196,7 @@ def _inspection(result: Result) -> str:
                 continue
             shown = ", ".join(_number(v) for v in np.asarray(value).tolist()[:6]) if many else _number(value)
             rows.append((label, shown))
-    if result.patch is not None:
-        rows.append(("area of the contact / mm²", f"{1e6 * result.patch.area.sum():.5g}"))
+    rows.append(("area of the contact / mm²", f"{1e6 * result.patch.area.sum():.5g}"))
     return _table(rows)
 
 

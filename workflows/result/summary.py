@@ -74,8 +74,6 @@ def size_of(result: Result) -> float:
 def by_joint(result: Result) -> dict[str, dict[str, Any]]:
     """What each named contact carries and loses; see `summary`."""
     patch, wear = result.patch, result.wear
-    if patch is None:
-        return {}
     found: dict[str, dict[str, Any]] = {}
     for name, pairs in result.facts.pairs_of_joints.items():
         area = patch.area[pairs]
@@ -133,18 +131,12 @@ def _life_share(result: Result) -> float:
 
 
 def _wear(result: Result) -> dict[str, Any]:
-    names = ["depth_max_m", "depth_mean_m", "cycles", "separated_cycles", "life_cycles"]
-    names += [
-        "unstable_cycles",
-        "first_lift_cycles",
-        "first_loss_cycles",
-        "energy_J",
-        "volume_m3",
-        "surface_volumes_m3",
-        "hbm_solves",
-    ]
+    names = [
+        "depth_max_m", "depth_mean_m", "cycles", "separated_cycles", "life_cycles", "unstable_cycles",
+        "first_lift_cycles", "first_loss_cycles", "energy_J", "volume_m3", "surface_volumes_m3", "hbm_solves",
+    ]  # fmt: skip
     wear, patch = result.wear, result.patch
-    if wear is None or patch is None or not len(wear.cycles):
+    if wear is None or not len(wear.cycles):
         return dict.fromkeys(names)
     depth, cycles = result.depth_after(-1), result.cycles_after(-1)
     volume, split = float(depth @ patch.area), result.facts.share_of_body_1

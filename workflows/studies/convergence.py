@@ -9,8 +9,10 @@ carried to each coarser one, so that differences can be mapped.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from os import fspath
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -26,7 +28,10 @@ from tribodyn.workflows.errors.ladders import Ladder, Setting, study_of, study_p
 from tribodyn.workflows.errors.limit import Limit
 from tribodyn.workflows.errors.trade_table import ANSWERED, NAMES, QUANTITIES
 from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, ORANGE, STYLE
+from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
+from tribodyn.workflows.studies.files import write_files
 
 WANTED = 0.01
 FLAT = 1e-6  # area over the mean one of a triangle that is no part of a map
@@ -65,27 +70,49 @@ class Study:
     limits: dict[str, Limit]
     measured: tuple[Measured, ...]
 
-    def needed(self, quantity: str, wanted: float = WANTED) -> GridRow | None:
+    def needed(self, quantity: str) -> GridRow | None:
         """The coarsest grid from which on every grid is within the wanted error, however its nodes are placed."""
         found = None
         for row in reversed(self.rows):
             error = row.worst[quantity]
-            if error is not None and error > wanted:
+            if error is not None and error > WANTED:
                 break
             found = found if error is None else row
         return found
 
 
-def run(scene: str, overrides: Sequence[str], most: float, say: Callable[[str], None]) -> tuple[Study, ...]:
-    """Every ladder of the scene's study, up to grids of `most` nodes along the patch.
+@dataclass(frozen=True)
+class Converged:
+    """Studies of the grids of a scene."""
 
+    studies: tuple[Study, ...]
+
+    def record(self) -> list[dict[str, Any]]:
+        """For machines."""
+        return [{"scene": s.scene, "ladder": s.ladder, **asdict(row)} for s in self.studies for row in s.rows]
+
+    def lines(self) -> list[str]:
+        """For people: tables, limits with their orders, the grid that a wanted accuracy needs, the scene's judged."""
+        return [line for study in self.studies for line in _lines(study)]
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write a picture of each."""
+        return write_files(folder, {}, {f"converge_{one.scene}_{one.ladder}": picture(one) for one in self.studies})
+
+
+def converge(scene: AnyPath, *, most: float = 99, overrides: Overrides = (), progress: Report = None) -> Converged:
+    """Refine the contact grid and the mesh until the answers settle, and say which grid a per cent needs.
+
+    scene : name of a scene with a study of its grids
+    most : finest grid, in nodes along the patch
     Raises  ValueError for a scene whose study has no ladders, or fewer than three grids
     """
-    file = scene_file.read(scene)
-    study = study_of(file)
-    if not study.ladders:
+    name, texts, say = fspath(scene), override_texts(overrides), reporter(progress).say
+    file = scene_file.read(name)
+    ladders = study_of(file).ladders
+    if not ladders:
         raise ValueError(f"{file.name} has no study of its grids: name them under [converge] in {study_path(file)}")
-    return tuple(_climb(scene, ladder, (*ladder.base, *overrides), most, say) for ladder in study.ladders)
+    return Converged(tuple(_climb(name, ladder, (*ladder.base, *texts), most, say) for ladder in ladders))
 
 
 def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: Callable[[str], None]) -> Study:
@@ -178,32 +205,22 @@ def map_difference(coarse: Measured, fine: Measured) -> float:
     return float(np.sqrt(coarse.area @ off**2 / size)) if size > 0 else 0.0
 
 
-def as_records(studies: Sequence[Study]) -> list[dict[str, Any]]:
-    """Rows for JSON."""
-    return [{"scene": s.scene, "ladder": s.ladder, **asdict(row)} for s in studies for row in s.rows]
-
-
-def as_text(studies: Sequence[Study]) -> str:
-    """Tables for people, limits with their orders, the grid that a wanted accuracy needs, the scene's grid judged."""
-    lines = []
-    for study in studies:
-        shown = [q for q in QUANTITIES if q in study.limits]
-        width = max(len(study.ladder), *(len(row.setting) for row in study.rows))
-        lines.append(_line(study.ladder.ljust(width), "pairs", "seconds", [_name(q) for q in shown], "map"))
-        for row in study.rows:
-            maps = "" if row.map_difference is None else f"{100 * row.map_difference:.1f} %"
-            failed = "" if row.outcome == ANSWERED else f"  {row.outcome}"
-            cells = [_cell(row, q) for q in shown]
-            seconds = f"{row.seconds:.1f}"
-            lines.append(_line(row.setting.ljust(width), str(row.pairs), seconds, cells, maps + failed))
-        limits = [f"{(one := study.limits[q]).value:.5g} ({_order(one)})" for q in shown]
-        lines.append(_line("limit".ljust(width), "", "", limits, ""))
-        lines.append("in brackets: error; of the worst placement of the nodes, with the doubt in the limit")
-        for q in shown:
-            known = f"the limit is known to {100 * study.limits[q].doubt:.2g} %"
-            lines.append(f"{100 * WANTED:g} % on {_name(q)} needs {_grid(study.needed(q))}; {known}")
-        lines += [_judgement(row, shown) for row in study.rows if row.own]
-    return "\n".join(lines)
+def _lines(study: Study) -> Iterator[str]:
+    shown = [q for q in QUANTITIES if q in study.limits]
+    width = max(len(study.ladder), *(len(row.setting) for row in study.rows))
+    yield _line(study.ladder.ljust(width), "pairs", "seconds", [_name(q) for q in shown], "map")
+    for row in study.rows:
+        maps = "" if row.map_difference is None else f"{100 * row.map_difference:.1f} %"
+        failed = "" if row.outcome == ANSWERED else f"  {row.outcome}"
+        cells = [_cell(row, q) for q in shown]
+        yield _line(row.setting.ljust(width), str(row.pairs), f"{row.seconds:.1f}", cells, maps + failed)
+    limits = [f"{(one := study.limits[q]).value:.5g} ({_order(one)})" for q in shown]
+    yield _line("limit".ljust(width), "", "", limits, "")
+    yield "in brackets: error; of the worst placement of the nodes, with the doubt in the limit"
+    for q in shown:
+        known = f"the limit is known to {100 * study.limits[q].doubt:.2g} %"
+        yield f"{100 * WANTED:g} % on {_name(q)} needs {_grid(study.needed(q))}; {known}"
+    yield from (_judgement(row, shown) for row in study.rows if row.own)
 
 
 def _line(setting: str, pairs: str, seconds: str, cells: Sequence[str], maps: str) -> str:

@@ -1,21 +1,20 @@
-"""What the settings of a scene cost and are worth, and the grids that settle its answers, as studies."""
+"""What the settings of a scene cost and are worth, as a study."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from os import fspath
 from pathlib import Path
 from typing import Any
 
 from tribodyn.workflows.errors import choice, trade_table
 from tribodyn.workflows.errors import trade as measured
-from tribodyn.workflows.errors.trade_table import Trade
+from tribodyn.workflows.errors.trade_table import ANSWERED, NAMES, QUANTITIES, Trade, TradeRow
+from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
-from tribodyn.workflows.studies import convergence as grids
 from tribodyn.workflows.studies import trade_figure
-from tribodyn.workflows.studies.files import write_files
 
 
 @dataclass(frozen=True)
@@ -27,11 +26,27 @@ class Traded:
 
     def record(self) -> list[dict[str, Any]]:
         """For machines."""
-        return measured.as_records(self.table)
+        trade, names = self.table, QUANTITIES
+        orders = {parameter: {name: trade.order(parameter, name) for name in names} for parameter in trade.parameters}
+        return [{**plain(asdict(row)), "scene": trade.scene, "order": orders[row.parameter]} for row in trade.rows]
 
     def lines(self) -> list[str]:
-        """For people."""
-        return [measured.as_text(self.table), *choice.advice(self.table)]
+        """For people: errors in per cent of the limit of each parameter, behind ~ the doubt in it; what to use."""
+        trade = self.table
+        lines = [_line("parameter", "setting", "seconds", "MB", NAMES)]
+        for parameter in trade.parameters:
+            for row in trade.of(parameter):
+                cells = [_cell(row, name) for name in QUANTITIES]
+                failure = "" if row.outcome == ANSWERED else f"  {row.outcome}"
+                spent, memory = f"{row.seconds:.2f}", f"{row.memory / 1e6:.0f}"
+                lines.append(_line(parameter, row.setting[:46], spent, memory, cells) + failure)
+            orders = [trade.order(parameter, name) for name in QUANTITIES]
+            if any(order is not None for order in orders):
+                cells = ["" if order is None else f"order {order:.1f}" for order in orders]
+                lines.append(_line(parameter, "", "", "", cells))
+        lines.append(f"every parameter alone on {trade.scene} with {'; '.join(trade.base) or 'nothing changed'}")
+        lines.append("errors from where the parameter tends to, behind ~ the doubt in that")
+        return [*lines, *choice.advice(trade)]
 
     @property
     def files(self) -> list[Path]:
@@ -70,30 +85,13 @@ def trade(
     return Traded(found, place)
 
 
-@dataclass(frozen=True)
-class Converged:
-    """Studies of the grids of a scene."""
-
-    studies: tuple[grids.Study, ...]
-
-    def record(self) -> list[dict[str, Any]]:
-        """For machines."""
-        return grids.as_records(self.studies)
-
-    def lines(self) -> list[str]:
-        """For people."""
-        return [grids.as_text(self.studies)]
-
-    def write(self, folder: Path) -> list[Path]:
-        """Write a picture of each."""
-        pictures = {f"converge_{one.scene}_{one.ladder}": grids.picture(one) for one in self.studies}
-        return write_files(folder, {}, pictures)
+def _line(parameter: str, setting: str, seconds: str, memory: str, cells: Sequence[str]) -> str:
+    return f"{parameter:15} {setting:46} {seconds:>7} {memory:>6} " + " ".join(f"{cell:>16}" for cell in cells)
 
 
-def converge(scene: AnyPath, *, most: float = 99, overrides: Overrides = (), progress: Report = None) -> Converged:
-    """Refine the contact grid and the mesh until the answers settle, and say which grid a per cent needs.
-
-    scene : name of a scene with a study of its grids
-    most : finest grid, in nodes along the patch
-    """
-    return Converged(grids.run(fspath(scene), override_texts(overrides), most, reporter(progress).say))
+def _cell(row: TradeRow, quantity: str) -> str:
+    error, doubt = row.errors[quantity], row.doubts[quantity]
+    if error is None or doubt is None:
+        return ""
+    known = f"{100 * error:+.3g}" if error else "0"
+    return f"{known} ~{100 * doubt:.2g} %" if doubt else f"{known} %"

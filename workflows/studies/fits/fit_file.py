@@ -338,11 +338,6 @@ def _si(key: str, value: Quantity, units: tuple[str, ...]) -> tuple[float, str]:
     raise SceneError(f"{key}: {problem}")
 
 
-def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
-    """(n_measured,) what a scene says to each measured number, to a curve at each of its points."""
-    return Answers(file, bench.model(file)).all_to(measured)
-
-
 Side = tuple[str, float, "Answers", "Answers"]
 
 
@@ -420,7 +415,7 @@ class Answers:
             if known.of in ("life", "work"):
                 return self._wear(known)
             if known.of == "preload" and known.at is None:
-                return self._at_rest()
+                return self.model.balance.preload(self._rest)
             point = self._point(known.at or Place(peak=1.0), known.load)
         except SolveFailed as failure:
             raise SolveFailed(f"measured.{name}: {failure}") from None
@@ -438,9 +433,6 @@ class Answers:
             raise ValueError(f"there is no mode {mode}: the model has {reduced.system.n_dof}")
         springs = joints.contact_stiffness(self.file.scene, reduced) if stuck else None
         return float(linear_modes(reduced, springs, mode)[0][mode - 1])
-
-    def _at_rest(self) -> float:
-        return self.model.balance.preload(self._rest)
 
     @cached_property
     def _rest(self) -> State:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import importlib.util
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
+from tribodyn.workflows.result.whole_file import replacing
 from tribodyn.workflows.studies.many import life_picture, pictures
 from tribodyn.workflows.studies.many.distributions import si
 from tribodyn.workflows.studies.many.task import ENDS, SINGLE, Row
@@ -182,13 +182,12 @@ def write(found: StudyTable, folder: Path) -> tuple[Path, Path]:
     Returns the first two
     """
     paths = folder / "study.csv", folder / "study.h5"
-    fresh = [path.with_suffix(f"{path.suffix}.new") for path in paths]
-    with fresh[0].open("w", encoding="utf-8", newline="") as file:
+    with replacing(paths[0]) as new, new.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(found.columns)
         for i in range(len(found.columns[RUN])):
             writer.writerow([_cell(column[i]) for column in found.columns.values()])
-    with h5py.File(fresh[1], "w") as hdf:
+    with replacing(paths[1]) as new, h5py.File(new, "w") as hdf:
         hdf.attrs["format"], hdf.attrs["study"] = "tribodyn study 1", found.name
         for name, column in found.columns.items():
             kind = h5py.string_dtype() if column.dtype.kind == "O" else column.dtype
@@ -199,21 +198,14 @@ def write(found: StudyTable, folder: Path) -> tuple[Path, Path]:
                 data.dims[0].attach_scale(hdf[RUN])
             if name in found.varied:
                 data.attrs["varied"] = 1
-    for new, path in zip(fresh, paths, strict=True):
-        os.replace(new, path)
     if importlib.util.find_spec("pyarrow") is not None:
-        _write_parquet(found, folder / "study.parquet")
+        import pyarrow
+        from pyarrow import parquet
+
+        columns = {name: pyarrow.array(column.tolist(), from_pandas=True) for name, column in found.columns.items()}
+        with replacing(folder / "study.parquet") as new:
+            parquet.write_table(pyarrow.table(columns), new)
     return paths
-
-
-def _write_parquet(found: StudyTable, path: Path) -> None:
-    import pyarrow
-    from pyarrow import parquet
-
-    columns = {name: pyarrow.array(column.tolist(), from_pandas=True) for name, column in found.columns.items()}
-    fresh = path.with_suffix(".parquet.new")
-    parquet.write_table(pyarrow.table(columns), fresh)
-    os.replace(fresh, path)
 
 
 def _cell(value: Any) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from tribodyn.workflows.command.words import Overrides, aside, make_room, quantity
+from tests.proof.words import aside
+from tribodyn.workflows.command.words import Overrides, make_room, quantity
 
 
 def blade(

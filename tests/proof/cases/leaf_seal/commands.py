@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from typing import Literal
 
-from tribodyn.workflows.command.words import Flag, Json, aside, make_room
+from tests.proof.words import aside
+from tribodyn.workflows.command.words import Flag, Json, make_room
 
 
 def leaf(

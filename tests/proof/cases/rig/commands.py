@@ -6,7 +6,8 @@ import json
 from pathlib import Path
 from typing import Literal
 
-from tribodyn.workflows.command.words import Changes, Flag, Json, Overrides, aside, make_room
+from tests.proof.words import Changes, aside
+from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room
 
 
 def rig(
