@@ -275,3 +275,12 @@ def test_the_parts_of_all_scenes_can_be_stored() -> None:
             here, there = bench.reduced.at_harmonic(h), kept.at_harmonic(h)
             np.testing.assert_array_equal(here[0].stiffness, there[0].stiffness)
             np.testing.assert_array_equal(here[1], there[1])
+
+
+def test_a_grid_whose_rows_have_no_peak_says_so() -> None:
+    status = np.array(["complete", "complete"], object)
+    columns = {"run": np.arange(1, 3), "status": status, "load": np.ones(2), "peak_hz_first": np.full(2, np.nan)}
+    with pytest.raises(ValueError, match="none of 2 complete rows has a peak inside the range"):
+        td.studies.StudyTable("flat", columns, ("load",)).plot()
+    with pytest.raises(ValueError, match="no run is complete"):
+        td.studies.StudyTable("none", columns | {"status": np.array(["failed"] * 2, object)}, ("load",)).plot()
