@@ -319,7 +319,7 @@ class Gradient:
             return np.zeros((len(self.quantities), balance.contact.n_pair))
         step, gap = RULES.of_gap * float(np.abs(self.state.x).max()), balance.contact.gap
         above, below = (replace(self.own, contact=balance.contact.with_gap(gap + side)) for side in (step, -step))
-        return self.by_pairs(Change("gap", step, above, below))
+        return (self.moves_to(above) - self.moves_to(below)) / (2 * step)
 
     @cached_property
     def own(self) -> Posed:
@@ -399,10 +399,6 @@ class Gradient:
             up = (8 * (up - down) - (far[0] - far[1])) / 12
             down = -up
         return up / change.step, -down / change.step
-
-    def by_pairs(self, change: Change) -> np.ndarray:
-        """(n_quantity, n_pair) dq / dp of a parameter of the contact, were it changed at each pair alone."""
-        return (self.moves_to(change.above) - self.moves_to(change.below)) / (2 * change.step)
 
 
 @dataclass(frozen=True)
