@@ -221,7 +221,7 @@ def test_friction_is_found_again_from_a_measured_curve(tmp_path):
 def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path):
     """Friction and the length of a body; the faces open by a map, which the trials have as a run has it."""
     rows = [f"{x},{y},0.01,{2e-9 * (x > 0.08)}" for x in (0.05, 0.07, 0.09, 0.1) for y in (0.0, 0.02)]
-    (tmp_path / "open.csv").write_text("\n".join(["x,y,z,opening", *rows]), encoding="utf-8")
+    (tmp_path / "open.csv").write_text("\n".join(rows), encoding="utf-8")
     scene = tmp_path / "blocks.toml"
     scene.write_text(BLOCKS.replace('t1 = "x"', 't1 = "x"\ngap_map = "open.csv"'), encoding="utf-8")
     own = ("harmonics.kept=[0, 1]", "harmonics.samples=32", "response.points=6")
@@ -236,5 +236,8 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
     found = td.studies.identify(scene, task, overrides=own).found
     assert found.values == pytest.approx([0.38], rel=1e-3)
     assert found.rms < 1e-3
-    several = scene_file.read(scene, own).mesh_scene
-    assert fit_file.value_of(several, "bodies.lower.length") == pytest.approx(0.1)
+    file = scene_file.read(scene, own)
+    opened = modelling.build(file, None, Progress()).reduced.interface.gap
+    np.testing.assert_allclose(Bench().plain(file).interface.gap, opened, rtol=0, atol=1e-20)
+    assert np.ptp(opened) > 1e-9
+    assert fit_file.value_of(file.mesh_scene, "bodies.lower.length") == pytest.approx(0.1)

@@ -28,7 +28,7 @@ LATE: Any = {
     "response": {"frequency", "references", "points", "method", "stability", "bounds", "options"},
 }  # fmt: skip
 """What a scene may change without another part or reduction."""
-OF_STRESS = ("contact", "contacts", "loads")  # ... but not where a wheel spins: its stress is that of its contact at rest
+OF_STRESS = ("contact", "contacts", "loads")  # ... but not where a wheel spins, whose stress has its contact at rest
 
 
 def early_of(scene: MeshScene) -> str:
