@@ -282,5 +282,5 @@ def test_runs_without_a_peak_have_nothing_to_draw() -> None:
     """Complete runs, none of which has a number that is drawn."""
     runs = {"run": np.arange(2.0), FRICTION: np.array([0.2, 0.3]), "status": np.array(["complete"] * 2)}
     bare = {**runs, "peak_hz_first": np.full(2, np.nan)}
-    assert not pictures.possible(SimpleNamespace(columns=bare))  # type: ignore[arg-type]
-    assert pictures.possible(SimpleNamespace(columns={**runs, "peak_hz_first": np.array([np.nan, 900.0])}))  # type: ignore[arg-type]
+    assert not pictures.shown(SimpleNamespace(columns=bare))  # type: ignore[arg-type]
+    assert pictures.shown(SimpleNamespace(columns={**runs, "peak_hz_first": np.array([np.nan, 900.0])}))  # type: ignore[arg-type]

@@ -60,8 +60,7 @@ class Bench:
         if self.part is None or self.reduced is None or early != self.early:
             self.part, self.reduced = self._shared(file)
             self.early = early
-        interface = self.reduced.interface
-        gap = interface.gap
+        interface, gap = self.reduced.interface, self.reduced.interface.gap
         if scene.surfaces is not None or any(joint.gap_map is not None for joint in scene.joints.values()):
             gap = gap + self._opening(file)
         if opening is not None:

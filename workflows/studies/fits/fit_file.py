@@ -319,9 +319,8 @@ def value_of(scene: MeshScene, key: str) -> float | None:
     Raises  SceneError for a key that is not a number
     """
     table: Any = scene.model_dump()
-    for part in (table.get("geometry"), *table.get("bodies", {}).values()):
-        if part is not None:
-            part |= part["parameters"]
+    for part in filter(None, (table.get("geometry"), *table.get("bodies", {}).values())):
+        part |= part["parameters"]
     for word in key.split("."):
         table = table.get(word) if isinstance(table, dict) else None
     if table is not None and (isinstance(table, bool) or not isinstance(table, (int, float))):

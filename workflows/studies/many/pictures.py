@@ -30,20 +30,15 @@ SHOWN = {
 }
 
 
-def possible(found: StudyTable) -> bool:
-    """Whether a run has anything to draw."""
-    return bool(_there(found))
-
-
-def _there(found: StudyTable) -> dict[str, str]:
+def shown(found: StudyTable) -> dict[str, str]:
+    """Columns that a run has a number in, with their labels; empty where there is nothing to draw."""
     columns = found.columns
     return {name: label for name, label in SHOWN.items() if name in columns and np.isfinite(columns[name]).any()}
 
 
 def panes(found: StudyTable) -> Figure:
     """Peak, amplitude, depth and life, as far as there are any, against the keys; rank correlation in each title."""
-    there = _there(found)
-    if not there:
+    if not (there := shown(found)):
         raise ValueError(f"{found.name}: no run has a peak, a depth or a life, there is nothing to draw")
     influence = found.influence()
     with mpl.rc_context(STYLE):
