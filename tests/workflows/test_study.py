@@ -10,6 +10,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -277,10 +278,9 @@ def test_the_parts_of_all_scenes_can_be_stored() -> None:
             np.testing.assert_array_equal(here[1], there[1])
 
 
-def test_a_grid_whose_rows_have_no_peak_says_so() -> None:
-    status = np.array(["complete", "complete"], object)
-    columns = {"run": np.arange(1, 3), "status": status, "load": np.ones(2), "peak_hz_first": np.full(2, np.nan)}
-    with pytest.raises(ValueError, match="none of 2 complete rows has a peak inside the range"):
-        td.studies.StudyTable("flat", columns, ("load",)).plot()
-    with pytest.raises(ValueError, match="no run is complete"):
-        td.studies.StudyTable("none", columns | {"status": np.array(["failed"] * 2, object)}, ("load",)).plot()
+def test_runs_without_a_peak_have_nothing_to_draw() -> None:
+    """Complete runs, none of which has a number that is drawn."""
+    runs = {"run": np.arange(2.0), FRICTION: np.array([0.2, 0.3]), "status": np.array(["complete"] * 2)}
+    bare = {**runs, "peak_hz_first": np.full(2, np.nan)}
+    assert not pictures.shown(SimpleNamespace(columns=bare))  # type: ignore[arg-type]
+    assert pictures.shown(SimpleNamespace(columns={**runs, "peak_hz_first": np.array([np.nan, 900.0])}))  # type: ignore[arg-type]
