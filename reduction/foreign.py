@@ -115,10 +115,6 @@ class ForeignMatrices:
     def _rows(self) -> dict[tuple[int, int], int]:
         return {label: row for row, label in enumerate(self.labels or ())}
 
-    def node_dofs(self, nodes: Sequence[int], components: Sequence[int | str] = (1, 2, 3)) -> np.ndarray:
-        """(n_node, n_component) rows of the components of nodes, for `contact`."""
-        return np.array([[self.dof((node, component)) for component in components] for node in nodes])
-
     def facts(self) -> MatrixFacts:
         """What the matrices by themselves say about their structure, without damping, loads and contacts.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -168,6 +169,12 @@ class BranchBuilder:
         """Keep the first points only."""
         del self.value[n_point:], self.x[n_point:], self.points[n_point:]
         self.folds = [i for i in self.folds if i < n_point]
+
+    def tell(self, on_point: Callable[[int, int], None] | None, stop: float, most: int) -> None:
+        """Call `on_point`, where there is one, with points done and points expected at the present pace."""
+        if on_point is not None:
+            done, share = len(self.value), abs(self.value[-1] - self.value[0]) / abs(stop - self.value[0])
+            on_point(done, max(done, min(most, round(done / max(share, 1e-3)))))
 
     def finish(self, end: Outcome[BranchEnd]) -> Branch:
         """The branch; `end` says why it ends where it ends."""

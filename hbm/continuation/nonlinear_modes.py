@@ -104,11 +104,6 @@ class Backbone:
         """(n_point,) largest acceleration of the chosen output in the first harmonic [m/s2]."""
         return self.omega**2 * self.first_harmonic
 
-    @property
-    def reference_frequency(self) -> float:
-        """Frequency of the mode at rest [Hz]."""
-        return self.reference_omega / (2 * np.pi)
-
 
 _Solved = tuple[Point, Outcome[SolveEnd], int]
 

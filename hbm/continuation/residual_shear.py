@@ -62,10 +62,6 @@ class ResponseBounds:
         """Least and largest vibration amplitude of an output, see `hbm.continuation.branch.amplitude` [m]."""
         return self._range(amplitude(self.response[:, self.output_names.index(output)]))
 
-    def static_range(self, output: str) -> tuple[float, float]:
-        """Least and largest static displacement of an output [m]."""
-        return self._range(self.response[:, self.output_names.index(output), 0])
-
     def energy_range(self) -> tuple[float, float]:
         """Least and largest friction work per cycle [J]."""
         return self._range(self.energy)

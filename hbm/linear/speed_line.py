@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tribodyn.hbm.excitation import Excitation
@@ -29,26 +31,17 @@ def compliance_of(
 class LineCompliance(ContactCompliance):
     """Contact compliance along a line of speeds; what does not ask for a frequency is that of the model itself."""
 
-    def __init__(
-        self,
-        model: ReducedModel,
-        stiffness: np.ndarray,
-        basis: HarmonicBasis,
-        excitation: Excitation,
-        omega_max: float,
-        wanted: float | None = None,
-    ):
-        super().__init__(model, stiffness, basis, excitation, omega_max, wanted)
-        self._made_of = model, stiffness, basis, excitation, omega_max, wanted
+    def __init__(self, model: ReducedModel, *made_of: Any):
+        super().__init__(model, *made_of)
+        self._model, self._made_of = model, made_of
         self._there: dict[float, tuple[ReducedModel, ContactCompliance]] = {}
 
     def there(self, omega: float) -> tuple[ReducedModel, ContactCompliance]:
         """Model and compliance at the speed that belongs to a frequency [rad/s]."""
         if omega not in self._there:
-            model, springs, basis, excitation, omega_max, wanted = self._made_of
-            assert model.along is not None
-            fast = model.along(omega)
-            self._there[omega] = fast, ContactCompliance(fast, springs, basis, excitation, omega_max, wanted)
+            assert self._model.along is not None
+            fast = self._model.along(omega)
+            self._there[omega] = fast, ContactCompliance(fast, *self._made_of)
             if len(self._there) > KEPT:
                 del self._there[next(iter(self._there))]
         model, compliance = self._there[omega]

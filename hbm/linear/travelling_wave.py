@@ -18,17 +18,11 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 def at_sector(
     basis: HarmonicBasis, coefficients: np.ndarray, engine_order: int, n_sectors: int, sector: int
 ) -> np.ndarray:
-    """Coefficients (..., n_coeff) of another sector from those of sector 0: displacement, force, output."""
-    return basis.shift(coefficients, -2 * np.pi * (engine_order * sector % n_sectors) / n_sectors)
+    """Coefficients (..., n_coeff) of another sector from those of sector 0: displacement, force, output.
 
-
-def left_face(basis: HarmonicBasis, coefficients: np.ndarray, engine_order: int, n_sectors: int) -> np.ndarray:
-    """What the left contact of a sector sees, in the frame of the sector on its left, from what its right one sees.
-
-    The contact on the left of sector n is the one on the right of sector n + 1: wear, preload and energy are equal, the
-    force on the sector is opposite (3.17)
+    The left contact of a sector is the right one of sector 1 in the frame of that sector; the force on it is opposite.
     """
-    return at_sector(basis, coefficients, engine_order, n_sectors, 1)
+    return basis.shift(coefficients, -2 * np.pi * (engine_order * sector % n_sectors) / n_sectors)
 
 
 def on_wheel(excitation: Excitation, engine_order: int, n_sectors: int, shown: int | None = None) -> Excitation:

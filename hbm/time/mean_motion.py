@@ -26,7 +26,6 @@ from tribodyn.hbm.time.time_step import Moving
 class MeanRules:
     """When a motion counts as the same, or as periodic."""
 
-    repeated: float = 1e-2  # distance of two states, relative to the vibration, up to which the motion has come back
     periodic: float = 1e-5  # drift over a period, relative, of a motion that counts as periodic
     # standard errors by which the means of two blocks may differ and still be those of one motion
     same_scatter: float = 2.0
@@ -64,10 +63,6 @@ class MeanMotion:
 
     energy : (n_pair,) friction work per period [J]; normal_force : (n_pair,) [N], zero where the law has none
     seen : mean of what was asked of every period; amplitude : (n_output,) [m]
-    off : largest difference of a mean displacement from what harmonic 0 prescribes [m]; zero without one
-    apart : share of the time in which no pair carries a force
-    works : (n_period,) friction work of the last periods of a block [J]
-    repeats : periods of the loads after which the motion comes back, 0 where it does not within a block
     spread : standard deviation of the work of a period, over its mean; error : standard error of that mean, relative
     settled : whether the motion came to rest in its statistics; periods : marched in all
     """
@@ -76,10 +71,6 @@ class MeanMotion:
     normal_force: np.ndarray
     seen: np.ndarray
     amplitude: np.ndarray
-    off: float
-    apart: float
-    works: np.ndarray
-    repeats: int
     spread: float
     error: float
     settled: bool
@@ -141,10 +132,8 @@ class Follower:
             found, spent = self._periodic(stepper)
             if found is not None:
                 one = time_integration.motion_of(stepper, found, spent, CONVERGED)
-                off = float(np.abs(one.off).max(initial=0.0))
-                means = one.energy, _normal(balance, one), see(one), one.amplitude, off, _apart(one)
-                works = np.full(self.options.block, one.energy.sum())
-                return MeanMotion(*means, works, 1, spread=0.0, error=0.0, settled=True, periods=spent)
+                means = one.energy, _normal(balance, one), see(one), one.amplitude
+                return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
         settled = self._settled(balance, stepper, see)
         self._regular = settled.settled and settled.spread <= self.options.accuracy
         return replace(settled, periods=settled.periods + spent)
@@ -177,7 +166,7 @@ class Follower:
         search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
         rows: list[tuple[Any, ...]] = []
         work: list[float] = []
-        states: list[np.ndarray] = []
+        off: list[np.ndarray] = []
         first: int | None = None
         for block in range(1, o.most_blocks + 1):
             for _ in range(o.block):
@@ -185,37 +174,20 @@ class Follower:
                 one = time_integration.motion_of(stepper, found, search.periods, CONVERGED, motion)
                 motion = found.end
                 work.append(float(one.energy.sum()))
-                states = [*states[-o.block :], found.image]
-                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude, one.off, _apart(one)))
-            if block > 1 and first is None and self._same(np.array(work[-2 * o.block :])):
-                off = np.array([row[4] for row in rows[-o.block :]])
-                if self._held(stepper, off):
-                    first = len(work) - o.block  # in the block before more of the transient is left
+                off.append(one.off)
+                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
+            same = block > 1 and first is None and self._same(np.array(work[-2 * o.block :]))
+            if same and self._held(stepper, np.array(off[-o.block :])):
+                first = len(work) - o.block  # in the block before more of the transient is left
             if first is not None and _standard_error(np.array(work[first:])) <= o.accuracy:
                 break
         self._motion = motion
         kept = slice(len(rows) // 2 if first is None else first, None)
         late = np.array(work[kept])
-        energy, normal, seen, amplitude, off, apart = (
-            np.mean(column, axis=0) for column in zip(*rows[kept], strict=True)
-        )
+        energy, normal, seen, amplitude = (np.mean(column, axis=0) for column in zip(*rows[kept], strict=True))
         whole, error = float(late.mean()), _standard_error(late)
         spread = float(late.std() / whole) if whole > 0 else 0.0
-        back = (search.vector.apart(state, states[-1]) <= RULES.repeated * found.size for state in states[-2::-1])
-        return MeanMotion(
-            energy=energy,
-            normal_force=normal,
-            seen=seen,
-            amplitude=amplitude,
-            off=float(np.abs(off).max(initial=0.0)),
-            apart=float(apart),
-            works=np.array(work[-o.block :]),
-            repeats=next((n for n, same in enumerate(back, 1) if same), 0),
-            spread=spread,
-            error=error,
-            settled=first is not None,
-            periods=len(work),
-        )
+        return MeanMotion(energy, normal, seen, amplitude, spread, error, settled=first is not None, periods=len(work))
 
     def _same(self, work: np.ndarray) -> bool:
         """Whether two blocks of periods show one motion."""
@@ -253,11 +225,6 @@ def _normal(balance: HarmonicBalance, motion: PeriodicMotion) -> np.ndarray:
         return np.zeros(balance.contact.n_pair)
     normal: np.ndarray = motion.force[:, components.index("n")].mean(axis=1)
     return normal
-
-
-def _apart(motion: PeriodicMotion) -> float:
-    """Share of a period in which no pair carries a force."""
-    return float(np.mean(~motion.force.any(axis=(0, 1))))
 
 
 def _standard_error(work: np.ndarray) -> float:

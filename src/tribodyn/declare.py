@@ -83,6 +83,7 @@ TYPES = ("int", "float")  # fields of other types, such as how Newton's method i
 def read(path: Path, kind: str = "Parameters") -> tuple[Number, ...]:
     """The numbers that the class `kind` of a Python file declares, in their order; the file is not run.
 
+    A class of a file beside it, as in `class Parameters(rough.Parameters)`, has declared its own before.
     kind : "Parameters" of a part or a law, "Options" of a continuation
 
     Raises  ValueError where the file cannot be read as Python
@@ -94,7 +95,8 @@ def read(path: Path, kind: str = "Parameters") -> tuple[Number, ...]:
     found = next((node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == kind), None)
     if found is None:
         return ()
-    numbers = []
+    beside = [base.value for base in found.bases if isinstance(base, ast.Attribute) and base.attr == kind]
+    numbers = [one for name in beside for one in read(path.with_name(f"{ast.unparse(name)}.py"), kind)]
     for node, after in zip(found.body, [*found.body[1:], None], strict=True):
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) in TYPES:
             numbers.append(_number(ast.unparse(node.target), node, _text(after)))

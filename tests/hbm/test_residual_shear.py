@@ -42,7 +42,8 @@ def test_a_stuck_oscillator_against_its_closed_form(transitions, tolerance):
     assert bounds.converged.all()
     assert bounds.stuck.all()
     assert bounds.shear[:, 0, 0] == pytest.approx([2 * 0.4 / 5, -room, room], abs=tolerance)
-    assert bounds.static_range("mass") == pytest.approx(((0.4 - room) / 3, (0.4 + room) / 3), abs=tolerance)
+    static = bounds.response[:, 0, 0]
+    assert (static.min(), static.max()) == pytest.approx(((0.4 - room) / 3, (0.4 + room) / 3), abs=tolerance)
     assert bounds.amplitude_range("mass") == pytest.approx((vibration, vibration), abs=tolerance)
     assert bounds.energy_range() == pytest.approx((0, 0), abs=tolerance)
 

@@ -121,10 +121,10 @@ def test_left_face_gets_what_the_right_one_of_the_neighbour_gives(sectors):
         reaction["left"].append(left @ residual)
     given = {face: basis.to_real(np.stack(f, axis=-1)) for face, f in reaction.items()}
     assert given["right"] == pytest.approx(force, abs=1e-7 * np.abs(force).max())
-    on_left = waves.left_face(basis, force, order, small.N)
+    on_left = waves.at_sector(basis, force, order, small.N, 1)
     assert given["left"] == pytest.approx(on_left, abs=1e-7 * np.abs(force).max())
     # preload and dissipation do not know from which side they are seen
-    x_left = waves.left_face(basis, flat, order, small.N)
+    x_left = waves.at_sector(basis, flat, order, small.N, 1)
     work = basis.work_per_cycle(force, flat)
     assert basis.work_per_cycle(on_left, x_left) == pytest.approx(work, rel=1e-9, abs=1e-12)
     assert on_left[:, 0] == pytest.approx(force[:, 0])
@@ -142,7 +142,7 @@ def test_shear_and_pressure_over_the_wheel_balance(sectors):
         R = np.linalg.matrix_power(turn, n)
         on_right = -np.einsum("pck,pcx->pxk", local[n], interface.frames @ R.T)
         ahead = np.linalg.matrix_power(turn, n + 1)
-        from_left = waves.at_sector(one.basis, waves.left_face(one.basis, state.cycle.force, 2, small.N), 2, small.N, n)
+        from_left = waves.at_sector(one.basis, state.cycle.force, 2, small.N, n + 1)
         on_left = np.einsum("pck,pcx->pxk", from_left, interface.frames @ ahead.T)
         for pushed, where in ((on_right, interface.points @ R.T), (on_left, interface.points @ ahead.T)):
             total = total + pushed.sum(axis=0)

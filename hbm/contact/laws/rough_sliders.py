@@ -13,13 +13,12 @@ Source  Porter and Brake, MSSP 192 (2023) 110210, its tangent model (TAN); the n
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numba
 import numpy as np
 
-from tribodyn.declare import number
 from tribodyn.hbm.contact.asperity import Asperity, asperity, tangential_ratio
 from tribodyn.hbm.contact.bed_cycle import deepest_of
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
@@ -37,28 +36,8 @@ AREA, CURVE = 5, 13
 PRESSED = CURVE + 5 + 4 * (ROWS + 1)
 
 
-@dataclass(frozen=True)
-class Parameters:
+class Parameters(rough.Parameters):
     """The law's own numbers."""
-
-    friction: float = number("", low=0.0)
-    """Coulomb coefficient."""
-    area: float = number("m2", default=1.0, above=0.0)
-    """Area that a pair stands for; a scene gives each pair its own."""
-    young: float = number("Pa", above=0.0)
-    """Young's modulus of both bodies."""
-    poisson: float = number("", low=0.0, high=0.5)
-    """Poisson's ratio of both bodies."""
-    radius: float = number("m", above=0.0)
-    """Effective radius of the asperities: half the radius of two alike."""
-    yield_stress: float = number("Pa", default=0.0, low=0.0)
-    """Yield stress; 0 for asperities that never yield."""
-    tangent_modulus: float = number("Pa", default=0.0, low=0.0)
-    """Slope of stress over strain beyond yield."""
-    pressure: float = number("Pa", default=1e7, above=0.0)
-    """Mean pressure at which the springs of the stuck contact are taken until the preload is known."""
-    deepest: float = number("m", default=0.0, low=0.0)
-    """Deepest approach that is tabulated; the largest gap of the table by default."""
 
 
 def tabulated(parameters: ContactParameters) -> np.ndarray:

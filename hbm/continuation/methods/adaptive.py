@@ -94,10 +94,9 @@ def follow(
     options = options or Options()
     sweep = _begin(parameter.of(problem), start, stop, options)
     while (end := sweep.advance()) is None:
-        if on_point is not None:
-            _tell(on_point, sweep.builder, start, stop, options)
-    if on_point is not None and end.kind is BranchEnd.REACHED:
-        _tell(on_point, sweep.builder, start, stop, options)
+        sweep.builder.tell(on_point, stop, options.max_points)
+    if end.kind is BranchEnd.REACHED:
+        sweep.builder.tell(on_point, stop, options.max_points)
     return sweep.builder.finish(end)
 
 
@@ -109,14 +108,6 @@ def _begin(path: Parameter, start: float, stop: float, options: Options) -> _Swe
     if first is None or not first.converged:
         first = solve_along_load(*path.place(start), options.newton)
     return _Sweep(path, options, first, start, stop)
-
-
-def _tell(
-    on_point: Callable[[int, int], None], builder: BranchBuilder, start: float, stop: float, options: Options
-) -> None:
-    done = len(builder.value)
-    share = abs(builder.value[-1] - start) / abs(stop - start)
-    on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
 
 
 def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:

@@ -115,10 +115,7 @@ def follow(
     options = options or Options()
     walk = _begin(parameter.of(problem), start, stop, options)
     while (end := walk.advance()) is None:
-        if on_point is not None:
-            done = len(walk.builder.value)
-            share = abs(walk.builder.value[-1] - start) / abs(stop - start)
-            on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
+        walk.builder.tell(on_point, stop, options.max_points)
     return walk.builder.finish(end)
 
 
