@@ -1,6 +1,7 @@
 """What friction does
 
-The same scene with several coefficients of friction.
+The same scene with several coefficients of friction. With 0.3 the beam swings by 32 mm, more than a tenth of
+its length, which no linear model describes: `show` then warns.
 """
 
 import tribodyn as td
@@ -14,7 +15,7 @@ COARSE = {
     "verdict.enabled": False,
 }
 
-frictions, peaks = (0.2, 0.3, 0.4, 0.5, 0.6), []
+frictions, peaks = (0.4, 0.45, 0.5, 0.55), []
 for friction in frictions:
     result = td.run("beam", overrides=COARSE | {"wear": None, "contact.friction": friction})
     peaks.append(1e3 * result.summary()["peak_m"][0])

@@ -113,9 +113,20 @@ def test_the_check_is_what_ci_runs() -> None:
 def test_pictures_and_links_are_there() -> None:
     for page in pages():
         said = re.sub(r"`[^`\n]*`", "", page.read_text(encoding="utf-8"))
-        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", said, re.S):
-            if "://" not in target:
-                assert (page.parent / target).exists(), (name(page), target)
+        for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", said, re.S):
+            if "://" in target:
+                continue
+            there = page.parent / target if target else page
+            assert there.exists(), (name(page), target)
+            if anchor and there.suffix == ".md":
+                assert anchor in anchors(there), (name(page), target, anchor)
+
+
+def anchors(page: Path) -> set[str]:
+    """What a link may name in a page: its headings, written as GitHub and MyST do (conf.py: myst_heading_anchors)."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#{1,3} (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def test_readme_is_short() -> None:

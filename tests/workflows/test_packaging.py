@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 
 import tribodyn
 
@@ -43,6 +46,30 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     subprocess.run([sys.executable, *words], check=True, capture_output=True)
     (found,) = made.glob("*.whl")
     return found
+
+
+def test_recipe_container_and_citation_agree_with_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    recipe = yaml.safe_load((ROOT / "recipe/recipe.yaml").read_text(encoding="utf-8"))
+    renamed = {"python-gmsh": "gmsh", "matplotlib-base": "matplotlib"}
+    run = [line.split(" ") for line in recipe["requirements"]["run"]]
+    assert ["python", project["requires-python"]] in run
+    assert sorted(renamed.get(name, name) + least for name, least in run if name != "python") == sorted(
+        project["dependencies"]
+    )
+    assert recipe["build"]["python"]["entry_points"] == [f"tribodyn = {project['scripts']['tribodyn']}"]
+    about = recipe["about"]
+    assert (recipe["context"]["version"], about["license"], about["summary"]) == (
+        project["version"],
+        project["license"],
+        project["description"],
+    )
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert [str(citation[key]) for key in ("version", "license")] == [project["version"], project["license"]]
+    script = (ROOT / "tribodyn").read_text(encoding="utf-8")
+    libraries = re.search(r'^libraries="(.*)"$', script, re.MULTILINE)
+    assert libraries
+    assert f"--no-install-recommends {libraries[1]} " in (ROOT / "Dockerfile").read_text(encoding="utf-8")
 
 
 def test_a_wheel_holds_one_package_with_every_file(wheel: Path) -> None:
