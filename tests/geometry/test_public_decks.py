@@ -12,6 +12,12 @@ from tests.helpers.small_decks import archive, bricks, bulk, by_calculix, cut, f
 from tribodyn.geometry.sources import read
 
 N = (12, 4, 2)
+
+
+def double(x: np.ndarray) -> np.ndarray:
+    return straight(x) * [1, 1, 2]
+
+
 STEEL = "*MATERIAL, NAME=EL\n*ELASTIC\n 210000.0, .3\n*DENSITY\n7.8E-9\n*SOLID SECTION, ELSET=ALL, MATERIAL=EL\n"
 FIX = "*BOUNDARY\nFOOT, 1\nFOOT, 2\nFOOT, 3\n"
 TIP = sorted(n for n, x in enumerate(cut(N, straight)[0], 1) if x[0] == 100.0)
@@ -107,6 +113,15 @@ def test_a_set_of_supports_that_the_case_control_does_not_select_holds_nothing(t
     "name", [name for name, (ending, _, refused) in DECKS.items() if ending == "inp" and not refused]
 )
 def test_what_is_read_has_the_frequencies_of_calculix(name: str, tmp_path: Path) -> None:
-    # 20 nodes there, 27 here: the equation leaves out our nodes inside faces, the tie is by nodes there, mortar here
-    text, rtol = DECKS[name][1], 1.5e-2 if name in ("equation", "tie") else 5e-3
+    # 20 nodes there, 27 here: an equation over a face leaves our middles of it free, and the support of the
+    # tied pair ends in a corner where the stress has no bound; both errors are of first order in the element size
+    text, rtol = DECKS[name][1], {"equation": 1.2e-2, "tie": 1.3e-2}.get(name, 5e-3)
     np.testing.assert_allclose(frequencies(text, 4, tmp_path), by_calculix(text, 4, tmp_path), rtol=rtol)
+
+
+def test_a_tie_of_equal_meshes_makes_one_body(tmp_path: Path) -> None:
+    one = (12, 4, 4)
+    lower = [n for n, x in enumerate(cut(one, double)[0], 1) if x[0] == 0 and x[2] <= 10]
+    held = "*NSET, NSET=LOWER\n" + "".join(f"{n},\n" for n in lower) + STEEL + FIX.replace("FOOT", "LOWER")
+    whole = frequencies(bricks(one, double) + held, 4, tmp_path)
+    np.testing.assert_allclose(frequencies(DECKS["tie"][1], 4, tmp_path), whole, rtol=1e-6)
