@@ -153,14 +153,14 @@ class Posed:
 class Change:
     """A parameter p of some name: the problem a step above and a step below it.
 
-    smooth : whether no corner is looked for, which a step as long as this would show where there is none
+    twice : the same by two steps, for a difference of order four, which a system near its own resonance needs
     """
 
     name: str
     step: float
     above: Posed
     below: Posed
-    smooth: bool = False
+    twice: tuple[Posed, Posed] | None = None
 
 
 @dataclass(frozen=True)
@@ -393,10 +393,11 @@ class Gradient:
 
     def by(self, change: Change) -> tuple[np.ndarray, np.ndarray]:
         """One-sided derivatives of the quantities above and below a parameter, both (n_quantity,)."""
-        sides = (change.above, change.below)
-        up, down = (self.moves_to(side).sum(axis=1) + self.structure_to(side) for side in sides)
-        if change.smooth:
-            up, down = (up - down) / 2, (down - up) / 2
+        sides = (change.above, change.below, *(change.twice or ()))
+        up, down, *far = (self.moves_to(side).sum(axis=1) + self.structure_to(side) for side in sides)
+        if far:  # no corner is looked for within so long a step
+            up = (8 * (up - down) - (far[0] - far[1])) / 12
+            down = -up
         return up / change.step, -down / change.step
 
 

@@ -24,7 +24,7 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 STEP = 1e-5  # relative, of a number that acts on contact, loads or damping alone
-REBUILT = 1e-4  # the same of one with which the model is reduced anew, whose rounding is larger
+REBUILT = 1e-3  # the same of one with which the model is reduced anew, whose rounding is larger
 OF_CONTACT = ("tangential_stiffness", "normal_stiffness")
 
 
@@ -91,9 +91,12 @@ class Varying:
 
     def change(self, key: str, value: float) -> Change:
         """The problems a step above and below a value of a key."""
-        long = self._settles or self.anew(key)
-        step = (REBUILT if long else STEP) * abs(value)
-        return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), long)
+        if self._settles or self.anew(key):
+            step = REBUILT * abs(value)
+            far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
+        else:
+            step, far = STEP * abs(value), None
+        return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far)
 
     def posed(self, key: str, value: float) -> Posed:
         """The problem with another value of a key; nothing is solved but what the preload comes to rest in."""

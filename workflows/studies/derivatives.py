@@ -147,7 +147,7 @@ def derivatives(
     """Show what peak, energy and preload of a response depend on: exact derivatives by every number of the scene.
 
     The response is solved once: an adjoint gives the derivatives by all numbers together. Numbers with which the model
-    is reduced anew, such as the stiffness of one body of several, take two reductions each.
+    is reduced anew, such as the stiffness of one body of several, take four reductions each.
 
     scene : name of a scene or a .toml file
     at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too
