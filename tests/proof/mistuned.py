@@ -11,6 +11,7 @@ import numpy as np
 
 from tests.helpers.wheel_scene import WHEEL
 from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import patterns
@@ -80,7 +81,8 @@ def from_dense(
     n = blades.wheel.n_sectors
     alike, own = wheel.whole([1.0] * n), wheel.whole([float(1 + one) for one in pattern.stiffness])
     system = replace(own.model.system, damping=alike.model.system.damping)
-    dense = replace(own, model=replace(own.model, system=system))
+    model, load = replace(own.model, system=system), own.excitation
+    dense = HarmonicBalance.of(model, own.contact.joints, own.basis, load, blades.wheel.wave.omega_max)
     heights = []
     for balance in (blades.balance(pattern), dense):
         solution = newton.solve(balance, omega, x, EXACT)
