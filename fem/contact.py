@@ -134,7 +134,7 @@ class ContactFaces:
         if found is None:
             return None
         partner, opening = nodes[found[0]], found[1]
-        quads = one.shape[1] == 9
+        quads = one.shape[1] != 6
         of_facet = slice(0, 4) if quads else slice(0, 3) if self.vertices_only else slice(3, 6)
         place = np.searchsorted(face.nodes, one[:, of_facet])
         there = {tuple(row) for row in np.sort(two[:, of_facet], axis=1).tolist()}

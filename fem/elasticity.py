@@ -22,7 +22,7 @@ from tribodyn.fem.material import AnyMaterial, Material
 def assemble(mesh: Any, material: Any, order: int = 5) -> tuple[csr_matrix, csr_matrix]:
     """Mass and stiffness over all nodes, DOF = node * 3 + component; reference points of an assembly have none.
 
-    mesh : scikit-fem MeshHex2 or MeshTet2, or an assembly of such
+    mesh : scikit-fem MeshHex2 or MeshTet2, MeshHex1 with linear reduced elements, or an assembly of such
     material : one for the whole mesh, or subdomain name -> material; of an assembly one, or body name -> these
     order : quadrature order
     Returns M [kg], K [N/m], each (3 n_node, 3 n_node), symmetric to the last bit
@@ -43,10 +43,14 @@ def _assemble(
     kinds, _ = of_elements(mesh, material)
     isotropic = all(isinstance(one, Material) for one in kinds)
     rho = densities(mesh, material)
-    if any(isinstance(one, Material) and one.linear_reduced for one in kinds):
-        if len(kinds) > 1:
-            raise ValueError('material: a mesh with elements = "linear_reduced" has one material')
+    reduced = [isinstance(one, Material) and one.linear_reduced for one in kinds]
+    if any(reduced):
+        if not all(reduced):
+            raise ValueError('material: elements = "linear_reduced" is for all materials of a mesh, or for none')
         return _linear_reduced(mesh, material)
+    if nodes.shape[1] == 8:
+        raise ValueError("the hexahedra have eight nodes, which lock in bending: raise the element order, or take them "
+                         'as elements = "linear_reduced"')  # fmt: skip
     if isotropic:
         lam, mu, _ = per_element(mesh, material)
     else:
@@ -66,8 +70,8 @@ def _assemble(
 
 
 def _linear_reduced(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> tuple[csr_matrix, csr_matrix]:
-    lam, mu, rho = (np.tile(values, 8) for values in per_element(mesh, material))
     cells, gradient, volume, hourglass = linear_reduced.elements(mesh)
+    lam, mu, rho = (np.tile(values, len(cells) // mesh.nelements) for values in per_element(mesh, material))
     stiffness = stiffness_blocks(gradient[:, None], volume[:, None], lam, mu)
     stiffness += (mu[:, None, None] * hourglass)[..., None, None] * np.eye(3)
     lumped = (rho * volume / 8)[:, None, None, None, None] * np.eye(8)[None, :, :, None, None]

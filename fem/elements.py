@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
-from skfem import MeshHex2, MeshTet2
+from skfem import MeshHex1, MeshTet2
 from skfem.quadrature import get_quadrature
 
 
@@ -20,14 +20,14 @@ def coordinates(mesh: Any) -> np.ndarray:
 
 
 def connectivity(mesh: Any) -> np.ndarray:
-    """Nodes of the elements (n_element, 27 or 10), in scikit-fem's local order.
+    """Nodes of the elements (n_element, 27, 10 or 8), in scikit-fem's local order.
 
-    Raises  ValueError where the mesh is not of 27-node hexahedra or 10-node tetrahedra
+    Raises  ValueError where the mesh is not of 27-node or 8-node hexahedra or 10-node tetrahedra
     """
-    if not isinstance(mesh, MeshHex2 | MeshTet2):
+    if not isinstance(mesh, MeshHex1 | MeshTet2):  # MeshHex2 is a MeshHex1
         raise ValueError(
-            f"the mesh is a {type(mesh).__name__}, but elasticity needs second-order hexahedra (MeshHex2) or "
-            "tetrahedra (MeshTet2); raise the element order of the geometry"
+            f"the mesh is a {type(mesh).__name__}, but elasticity needs hexahedra or second-order tetrahedra "
+            "(MeshTet2); raise the element order of the geometry"
         )
     return np.asarray(mesh.dofs.element_dofs.T)
 

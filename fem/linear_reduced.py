@@ -1,4 +1,4 @@
-"""Linear hexahedra with reduced integration: eight of them on the nodes of each 27-node one.
+"""Linear hexahedra with reduced integration: those of a first-order mesh, or eight on the nodes of each 27-node one.
 
 The gradient is the mean over the element, hourglass modes have a stiffness of HOURGLASS times the shear modulus, and
 the mass is lumped: what explicit programs and many published models have. They are softer than the 27-node element.
@@ -21,16 +21,17 @@ MODES = np.array([SIGNS[:, 1] * SIGNS[:, 2], SIGNS[:, 0] * SIGNS[:, 2], SIGNS[:,
 
 def elements(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Nodes (n, 8), mean gradient (n, 3, 8) [1/m] and volume (n,) [m3] of the linear elements of a mesh; n goes through
-    all 27-node ones eight times.
+    all 27-node ones eight times, through 8-node ones once.
 
     The fourth, (n, 8, 8) [m], times the shear modulus and a unit matrix (3, 3), holds hourglass modes
     Raises  ValueError for a mesh of other elements
     """
     nodes = connectivity(mesh)
-    if nodes.shape[1] != 27:
+    if nodes.shape[1] == 10:
         raise ValueError('material: elements = "linear_reduced" needs hexahedra, and the mesh has tetrahedra')
-    reference = np.asarray(mesh.elem().doflocs).reshape(27, 3)
-    corners = [np.array(at) / 2 + (1 + SIGNS) / 4 for at in product((0, 1), repeat=3)]
+    reference = np.asarray(mesh.elem().doflocs).reshape(-1, 3)
+    side = 2 if nodes.shape[1] == 27 else 1  # linear elements along an edge of one of the mesh
+    corners = [(np.array(at) + (1 + SIGNS) / 2) / side for at in product(range(side), repeat=3)]
     own = [[int(np.abs(reference - corner).max(axis=1).argmin()) for corner in eight] for eight in corners]
     cells = np.concatenate([nodes[:, eight] for eight in own])
     x = coordinates(mesh)[cells]

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex2
+from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex1
 from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
@@ -74,7 +74,7 @@ class Side:
     @property
     def corners(self) -> int:
         """Corners of a facet: 4 or 3."""
-        return 4 if self.nodes.shape[1] == 9 else 3
+        return 4 if self.nodes.shape[1] in (9, 4) else 3
 
     @property
     def length(self) -> float:
@@ -85,10 +85,11 @@ class Side:
     def bulge(self) -> float:
         """How far mid-side and middle nodes lie off the plane and the straight edges of their corners, relative."""
         n = self.corners
-        edges = self.points[:, n : 2 * n] - (self.points[:, :n] + np.roll(self.points[:, :n], -1, axis=1)) / 2
+        middles = self.points[:, n : 2 * n]
+        edges = middles - (self.points[:, :n] + np.roll(self.points[:, :n], -1, axis=1))[:, : middles.shape[1]] / 2
         off = np.einsum("fkx,fx->fk", self.points - self.centre[:, None], self.normal)
         size = np.linalg.norm(self.points[:, 1] - self.points[:, 0], axis=1)
-        return float((np.maximum(np.abs(edges).max(axis=(1, 2)), np.abs(off).max(axis=1)) / size).max())
+        return float((np.maximum(np.abs(edges).max(axis=(1, 2), initial=0.0), np.abs(off).max(axis=1)) / size).max())
 
 
 def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> Side:
@@ -99,7 +100,7 @@ def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> S
     points, inner = coordinates(mesh)[nodes], piece.mesh.p[:, piece.mesh.t[:, piece.mesh.f2t[0, own]]].mean(axis=1).T
     if rotation is not None:
         points, inner = points @ rotation.T, inner @ rotation.T
-    n = 4 if isinstance(piece.mesh, MeshHex2) else 3
+    n = 4 if isinstance(piece.mesh, MeshHex1) else 3
     centre = points[:, :n].mean(axis=1)
     middle = np.tile(np.full((2, 1), 0.5 if n == 4 else 1 / 3), len(nodes))
     _, slopes = tabulate(points.shape[1], middle)
@@ -241,7 +242,7 @@ def _outline(of: Side, curved: bool) -> np.ndarray:
     """Points (n_facet, m, 3) around each facet: its corners, and more where edges are curved."""
     n = of.corners
     corners, middles = of.points[:, :n], of.points[:, n : 2 * n]
-    if not curved:
+    if not curved or not middles.shape[1]:
         return corners
     t = np.arange(MORTAR.edge_pieces)[:, None] / MORTAR.edge_pieces
     following = np.roll(corners, -1, axis=1)
@@ -291,7 +292,7 @@ def _place(points: np.ndarray, at: np.ndarray, e: np.ndarray) -> np.ndarray:
     points : (n, k, 3) facets; at : (n, 3); e : (n, 2, 3). Far outside a facet its map at the middle is taken as linear
     """
     k = points.shape[1]
-    xi = np.full((2, len(at)), 0.5 if k == 9 else 1 / 3)
+    xi = np.full((2, len(at)), 0.5 if k in (9, 4) else 1 / 3)
     first = None
     open_ = np.arange(len(at))
     for _ in range(25):

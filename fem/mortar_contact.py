@@ -81,7 +81,7 @@ def mortar_halves(
         of[quad]
         for i, of in enumerate(one.nodes)
         if shared.covered[i] > 0 and not (n == 3 and whole[i])
-        for quad in (NINE_NODE_QUADS if whole[i] else [np.arange(n)])
+        for quad in (NINE_NODE_QUADS if whole[i] and len(of) == 9 else [np.arange(n)])
     ]
     if n == 3 and whole.any():
         polygons += list(side_polygons(one.nodes[whole, :3], one.nodes[whole, 3:]))

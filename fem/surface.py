@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex2
+from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex1, MeshHex2
 from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
@@ -63,7 +63,7 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     if sides:
         polygons = side_polygons(corners, local)
     else:
-        polygons = local if vertices_only else local[:, NINE_NODE_QUADS].reshape(-1, 4)
+        polygons = local[:, NINE_NODE_QUADS].reshape(-1, 4) if face_nodes.shape[1] == 9 else local
     return Surface(nodes, coordinates(mesh)[nodes], normals, area, polygons)
 
 
@@ -122,15 +122,17 @@ def outside(mesh: Any, facets: np.ndarray) -> None:
 
 
 def facet_nodes(mesh: Any, facets: np.ndarray) -> np.ndarray:
-    """Nodes of the facets (n_facet, 9 or 6): corners in cyclic order, then mid-sides, then the middle."""
+    """Nodes of the facets (n_facet, 9, 6 or 4): corners in cyclic order, then mid-sides, then the middle."""
     piece, facets = piece_of_facets(mesh, facets)
     return piece.node + _facet_nodes(piece.mesh, facets)
 
 
 def _facet_nodes(mesh: Any, facets: np.ndarray) -> np.ndarray:
-    connectivity(mesh)
-    parts = [mesh.facets[:, facets], mesh.dofs.edge_dofs[0][mesh.f2e[:, facets]]]
-    if isinstance(mesh, MeshHex2):
+    n = connectivity(mesh).shape[1]
+    parts = [mesh.facets[:, facets]]
+    if n > 8:
+        parts.append(mesh.dofs.edge_dofs[0][mesh.f2e[:, facets]])
+    if n == 27:
         parts.append(mesh.dofs.facet_dofs[:, facets])
     return np.vstack(parts).T
 
@@ -142,9 +144,9 @@ def face_integrals(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -
     """
     piece, facets = piece_of_facets(mesh, facets)
     mesh = piece.mesh
-    hexahedra = isinstance(mesh, MeshHex2)
-    geometry = ElementQuad2() if hexahedra else ElementTriP2()
+    hexahedra = isinstance(mesh, MeshHex1)
     linear: Any = ElementQuad1() if hexahedra else ElementTriP1()
+    geometry: Any = ElementQuad2() if isinstance(mesh, MeshHex2) else linear if hexahedra else ElementTriP2()
     X, w = get_quadrature(geometry, 6)  # exact for a shape function times the normal of a flat face
     nodes, points = _facet_nodes(mesh, facets), coordinates(mesh)
     slopes = np.stack([_tabulate(geometry.lbasis(X, a)[1]) for a in range(nodes.shape[1])])  # n_a, 2, n_q

@@ -42,7 +42,7 @@ def read_with_notes(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, 
     kinds = [f.name for f in fields(Deck) if getattr(raw.deck, f.name)]
     left = [f"its {', '.join(kinds)}: bring it as [decks.NAME] to use them"] if kinds else []
     unused = [f"not used: {clause}" for clause in (*raw.unused, *lost, *left)]
-    return body.mesh, body.node_sets, (*sources.done(raw, {"the mesh": body}), *unused)
+    return body.mesh, body.node_sets, (*sources.raised(raw), *sources.done(raw, {"the mesh": body}), *unused)
 
 
 @dataclass(frozen=True)

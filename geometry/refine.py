@@ -29,6 +29,25 @@ def halved(mesh: Any, node_sets: Mapping[str, np.ndarray], times: int = 1) -> tu
     return mesh, dict(node_sets)
 
 
+def corners_alone(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[Any, Groups]:
+    """A mesh of hexahedra with straight edges as one of 8-node ones (MeshHex1); a corner keeps its number.
+
+    Raises  ValueError, which names the body, for tetrahedra or curved elements
+    """
+    if not isinstance(mesh, MeshHex2):
+        raise ValueError(f"elements = \"linear_reduced\" needs hexahedra, and body '{name}' has tetrahedra")
+    n, points = mesh.nvertices, np.asarray(mesh.doflocs)
+    middle = points[:, mesh.edges].mean(axis=1)
+    off = np.abs(points[:, mesh.dofs.edge_dofs[0]] - middle).max(axis=0)
+    if (off > 1e-6 * np.linalg.norm(np.ptp(points[:, mesh.edges], axis=1), axis=0)).any():
+        raise ValueError(
+            f"elements = \"linear_reduced\" needs elements of first order, and body '{name}' has curved ones"
+        )
+    plain: Any = MeshHex(points[:, :n].copy(), mesh.t, sort_t=False)
+    plain = plain.with_boundaries(mesh.boundaries or {}).with_subdomains(mesh.subdomains or {})
+    return plain, {key: np.asarray(of)[np.asarray(of) < n] for key, of in node_sets.items()}
+
+
 def _once(mesh: Any, node_sets: Mapping[str, np.ndarray]) -> tuple[Any, Groups]:
     hexahedra = isinstance(mesh, MeshHex2)
     n_vertex = int(mesh.t.max()) + 1

@@ -41,7 +41,7 @@ class Source:
     bodies : name -> body; parts of the file that share no nodes, see `solid.bodies`
     deck : materials, ties, loads and supports that the file gives; empty for a mesh
     points : name -> (3,) reference points that belong to no element [m]
-    notes : sentences on what was done to it, such as elements raised to second order
+    notes : sentences on what was done to it; raised : on elements of first order that were raised to second
     unused : clauses that name what was found and is not used
     refused : name -> clause of what is not carried over and would change stiffness, mass, support or load
     counts : group of nodes -> body -> how many of its nodes the file lists there, before edge nodes were added
@@ -51,6 +51,7 @@ class Source:
     deck: Deck
     points: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    raised: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
@@ -71,7 +72,8 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
         for group, rows in raw.nodes.items()
     }
     unused = (*raw.unused, *lost(raw, built))
-    return Source(built, raw.deck, raw.points_of_reference, done(raw, built), unused, counts, raw.refused)
+    said = done(raw, built), raised(raw)
+    return Source(built, raw.deck, raw.points_of_reference, *said, unused, counts, raw.refused)
 
 
 def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> RawMesh:
@@ -128,14 +130,17 @@ def lost(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
     return tuple(clauses)
 
 
+def raised(raw: RawMesh) -> tuple[str, ...]:
+    """The sentence on elements of first order, where there are some."""
+    low = [cells for cells in raw.cells if is_first_order(cells.kind)]
+    count = sum(len(cells.nodes) for cells in low)
+    names = " and ".join(sorted({common_name(cells.kind) for cells in low}))
+    return (f"{count} {names} of first order are computed as second order, with straight edges",) if low else ()
+
+
 def done(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
     """Sentences on what was done to a file on the way to bodies."""
     notes = list(raw.notes)
-    low = [cells for cells in raw.cells if is_first_order(cells.kind)]
-    if low:
-        count = sum(len(cells.nodes) for cells in low)
-        names = " and ".join(sorted({common_name(cells.kind) for cells in low}))
-        notes.append(f"{count} {names} of first order are computed as second order, with straight edges")
     for name, body in built.items():
         if body.cut:
             notes.append(f"the elements of {name} were cut into {body.mesh.nelements} tetrahedra, as their kinds mix")

@@ -35,7 +35,8 @@ class ComplianceRules:
     preconditioned_share: float = 0.1
     most_coarse: int = 1000
     fewest_coarse: int = 8
-    unbalanced: float = 1e-7  # of the static loads, on a motion that nothing resists, taken for rounding
+    # of the static loads, on a motion that nothing resists, taken for rounding: decks give coordinates in seven digits
+    unbalanced: float = 1e-5
 
 
 RULES = ComplianceRules()

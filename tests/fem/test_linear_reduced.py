@@ -47,6 +47,16 @@ def test_a_uniform_strain_has_its_exact_energy():
     assert 0.5 * u @ K @ u == pytest.approx(volume * density, rel=1e-3)
 
 
+def test_eight_node_hexahedra_are_those_on_the_nodes_of_a_27_node_mesh():
+    """A mesh of first order and one of second order with the same nodes have the same matrices."""
+    fine = skfem.MeshHex.init_tensor(*[np.linspace(0, size, 5) for size in (1.0, 0.7, 0.5)])
+    coarse = skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor(*[np.linspace(0, s, 3) for s in (1.0, 0.7, 0.5)]))
+    order = [int(np.linalg.norm(coordinates(coarse) - x, axis=1).argmin()) for x in coordinates(fine)]
+    dofs = (3 * np.array(order)[:, None] + np.arange(3)).ravel()
+    for own, other in zip(assemble(fine, REDUCED), assemble(coarse, REDUCED), strict=True):
+        assert abs(own - other[dofs][:, dofs]).max() < 1e-10 * abs(own).max()
+
+
 def test_tetrahedra_are_refused():
     tets = skfem.MeshTet2.from_mesh(skfem.MeshTet())
     with pytest.raises(ValueError, match="needs hexahedra"):

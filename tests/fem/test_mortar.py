@@ -17,10 +17,11 @@ STEEL = Material(210e9, 0.3, 7860.0)
 L = np.linspace
 
 
-def block(x, y, z, tets=False, bend=0.0):
+def block(x, y, z, tets=False, bend=0.0, linear=False):
     """A block with its bottom and top named, bent to z + bend (x - 0.3)^2, which second order represents exactly."""
-    grid = skfem.MeshTet if tets else skfem.MeshHex
-    mesh = (skfem.MeshTet2 if tets else skfem.MeshHex2).from_mesh(grid.init_tensor(x, y, z))
+    mesh = (skfem.MeshTet if tets else skfem.MeshHex).init_tensor(x, y, z)
+    if not linear:
+        mesh = (skfem.MeshTet2 if tets else skfem.MeshHex2).from_mesh(mesh)
     height = mesh.p[2][mesh.facets]
     low, high = (np.flatnonzero(np.abs(height - at).max(axis=0) < 1e-9) for at in (z[0], z[-1]))
     locations = mesh.doflocs.copy()
@@ -32,6 +33,20 @@ def pair(tets, bend=0.0, gap=0.0, lower=(6, 5)):
     upper = block(L(0, 1, 4), L(0, 1, 4), L(gap, 0.3, 2), False, bend)
     under = block(L(0, 1, lower[0]), L(0, 1, lower[1]), L(-0.4, 0, 2), tets, bend)
     return Assembly([Body("upper", upper, {}, STEEL), Body("lower", under, {}, STEEL)])
+
+
+def test_contacts_of_eight_node_hexahedra_carry_constant_tractions():
+    upper = block(L(0, 1, 4), L(0, 1, 4), L(0, 0.3, 2), linear=True)
+    for linear in (True, False):
+        under = block(L(0, 1, 6), L(0, 1, 5), L(-0.4, 0, 2), linear=linear)
+        both = Assembly([Body("upper", upper, {}, STEEL), Body("lower", under, {}, STEEL)])
+        interface, B_2 = halves(both, "upper.bottom", "lower.top")
+        assert interface.area.sum() == pytest.approx(1.0, rel=1e-12)
+        pressure = np.zeros((interface.n_pair, 3))
+        pressure[:, 2] = interface.area
+        for face, B in (("upper.bottom", interface.B), ("lower.top", -B_2)):
+            consistent = -Pressure(face).vector(both, both.node_sets, None)
+            assert np.abs(B.T @ pressure.ravel() - consistent).max() < 1e-12 * np.abs(consistent).max()
 
 
 def halves(of, first, second, **more):

@@ -82,6 +82,24 @@ def test_a_deck_is_the_structure_that_the_same_tables_by_hand_make(tmp_path: Pat
     np.testing.assert_allclose(brought.system.loads["decks.lap"], by_hand, atol=1e-9 * np.abs(by_hand).max())
 
 
+def test_hexahedra_of_first_order_may_stay_what_they_are(tmp_path: Path) -> None:
+    """An eighth of the nodes, softer than second order, and towards it as the elements are halved."""
+    asked = DECK + 'use = ["ties", "supports"]\n'
+    best = part(asked + "halved = 1\n", tmp_path)
+    found = []
+    for halved in (1, 2):
+        reduced = part(f'{asked}halved = {halved}\nelements = "linear_reduced"\n', tmp_path)
+        found.append(modes(reduced.system.stiffness, reduced.system.mass, 3)[0])
+        assert len(reduced.points) < len(best.points) * (1, 8)[halved - 1] / 3
+    exact = modes(best.system.stiffness, best.system.mass, 3)[0]
+    errors = [np.abs(omega / exact - 1).max() for omega in found]
+    assert errors[1] < errors[0] / 2
+    assert errors[1] < 0.1
+    file = scene_file.parse(asked + 'elements = "linear_reduced"\n' + REST, "scene.toml", (), tmp_path)
+    notes = [note for deck in bodies.of_decks(file.scene, tmp_path).values() for note in deck.notes]
+    assert not any("second order" in note for note in notes)
+
+
 def test_an_equation_of_a_deck_holds(tmp_path: Path) -> None:
     of = part(DECK, tmp_path)
     u = of.field(factorise(of.system.stiffness).solve(of.system.loads["decks.lap"]))

@@ -77,6 +77,19 @@ def _read(path: Path, unit: str, stamp: int) -> read.Source:
     return read.read(path, unit)
 
 
+def said(source: read.Source, table: Table) -> tuple[str, ...]:
+    """Sentences on what was done to a deck."""
+    return source.notes if table.elements == "linear_reduced" else (*source.raised, *source.notes)
+
+
+def as_computed(mesh: Any, node_sets: dict[str, np.ndarray], table: Table, body: str) -> tuple[Any, Any]:
+    """Mesh and node sets of a body in the elements that its table asks for.
+
+    Raises  ValueError, which names the body, where it has others than those can stand for
+    """
+    return refine.corners_alone(mesh, node_sets, body) if table.elements == "linear_reduced" else (mesh, node_sets)
+
+
 class _Carrying:
     """One deck on its way into a structure."""
 
@@ -105,7 +118,7 @@ class _Carrying:
         self.made.clamps += [Clamp(group, axes) for group, axes in self.table.fixed_axes.items()]
         left = [f"{self.source.refused[name]}, by ignore" for name in self.table.ignore]
         unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes, *left)]
-        self.made.notes = [f"decks.{self.name}: {sentence}" for sentence in (*self.source.notes, *unused)]
+        self.made.notes = [f"decks.{self.name}: {sentence}" for sentence in (*said(self.source, self.table), *unused)]
         return self.made
 
     def _refuse(self) -> None:
@@ -136,6 +149,7 @@ class _Carrying:
                 rules[face] = rule.rule
         mesh, node_sets = picking.with_faces(found.mesh, found.node_sets, rules)
         mesh, node_sets = refine.halved(mesh, node_sets, self.table.halved)
+        mesh, node_sets = as_computed(mesh, node_sets, self.table, name)
         made = material(self.deck, name, mesh, self.table, self.materials, self.name)
         for group in {*node_sets, *(mesh.boundaries or {})}:
             kept = self.faces if group in (mesh.boundaries or {}) else self.sets
@@ -313,6 +327,9 @@ def material(
     if (count > 1).any():
         many = int((count > 1).sum())
         raise ValueError(f"the sections of body '{name}' overlap in {many} elements: correct them")
+    if table.elements == "linear_reduced":
+        given = {group: _reduced(one, name) for group, one in given.items()}
+        materials = {key: _reduced(one, name) for key, one in materials.items() if key == table.material}
     if (count == 1).all():
         return given if len(given) > 1 else next(iter(given.values()))
     if table.material is None:
@@ -323,6 +340,13 @@ def material(
     if not given:
         return materials[table.material]
     raise ValueError(f"the deck gives a part of body '{name}' no material: give all its elements a section")
+
+
+def _reduced(one: AnyMaterial, body: str) -> Material:
+    """A material whose elements are linear with reduced integration."""
+    if not isinstance(one, Material):
+        raise ValueError(f"elements = \"linear_reduced\" is for isotropic materials, and body '{body}' has another")
+    return replace(one, linear_reduced=True)
 
 
 def _solid(one: deck.DeckMaterial, group: str, materials: Mapping[str, AnyMaterial]) -> AnyMaterial:

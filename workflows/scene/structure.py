@@ -100,6 +100,9 @@ class DeckTable(Table):
     """Material of the scene for elements to which the deck gives none."""
     halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0
     """How many times every element of its bodies is cut into eight of half the size, its shape kept."""
+    elements: Literal["quadratic", "linear_reduced"] = "quadratic"
+    """How its hexahedra of first order are computed: raised to second order, or as they are with reduced integration
+    and hourglass stiffness (C3D8R), which is softer and has an eighth of the nodes."""
     fixed: tuple[str, ...] = ()
     """Groups "body.group" that are clamped besides."""
     fixed_axes: dict[str, str] = Field(default_factory=dict)

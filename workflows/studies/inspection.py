@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -139,6 +139,7 @@ def inspect(
     density: Annotated[float | None, quantity("kg/m3")] = None,
     modes: int = 0,
     free: bool = False,
+    elements: Literal["quadratic", "linear_reduced"] = "quadratic",
     overrides: Overrides = (),
     progress: Progress | None = None,
 ) -> Inspection:
@@ -151,6 +152,7 @@ def inspect(
     density : density likewise, such as "7860 kg/m3"
     modes : number of natural frequencies to compute, free of contact; what a deck or a scene says joins and holds
     free : of the bodies of a file by themselves, each free in space
+    elements : how hexahedra of first order of a file are computed: raised to second order, or with reduced integration
     Raises  ValueError: what cannot be, one sentence
     """
     if modes < 0:
@@ -159,27 +161,29 @@ def inspect(
         raise ValueError("--young and --density go together: give both or none")
     material = None if young is None or density is None else Material(young, poisson, density)
     if Path(what).suffix.lower() in sources.ENDINGS:
-        return _of_file(Path(what), unit, material, modes, free, progress or Progress())
-    if unit != "m" or material is not None:
-        raise ValueError("--unit, --young, --poisson and --density are for files: a scene has its own")
+        return _of_file(Path(what), unit, elements, material, modes, free, progress or Progress())
+    if unit != "m" or material is not None or elements != "quadratic":
+        raise ValueError("--unit, --young, --poisson, --density and --elements are for files: a scene has its own")
     return _of_scene(read_scene(what, overrides), modes, progress or Progress())
 
 
 def _of_file(
-    path: Path, unit: str, material: Material | None, n_modes: int, free: bool, progress: Progress
+    path: Path, unit: str, elements: Any, material: Material | None, n_modes: int, free: bool, progress: Progress
 ) -> Inspection:
     with progress.stage("reading"):
         source = decks.source(path, unit)
     named = {"given": material} if material is not None else {}
-    table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=next(iter(named), None))
+    material_name = next(iter(named), None)
+    table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=material_name, elements=elements)
     solids, lacking = [], ""
     for name, body in source.bodies.items():
+        mesh, node_sets = decks.as_computed(body.mesh, dict(body.node_sets), table, name)
         try:
-            made = decks.material(source.deck, name, body.mesh, table, named)
+            made = decks.material(source.deck, name, mesh, table, named)
         except ValueError as sentence:  # no or no whole material
             made, lacking = None, str(sentence)
-        solids.append(Solid(name, body.mesh, body.node_sets, made))
-    found = measured(solids, (f"{sentence}" for sentence in source.notes), source.unused)
+        solids.append(Solid(name, mesh, node_sets, made))
+    found = measured(solids, decks.said(source, table), source.unused)
     pairs, apart, remarks = pairs_of(source)
     ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
     found = replace(found, pairs=pairs, refused=(*ignored, *apart))
