@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from tests.helpers.wheel_scene import WHEEL
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import patterns
@@ -28,6 +29,7 @@ STATES = {
     ),
     "stuck": ("contact.friction=5.0", "response.frequency=['560 Hz', '720 Hz']", "loads.harmonic.wave.value='0.1 N'"),
 }
+WITHIN = 1e-4  # of the dense wheel
 EXACT = newton.NewtonOptions(tolerance=1e-10)
 
 
@@ -35,40 +37,101 @@ EXACT = newton.NewtonOptions(tolerance=1e-10)
 class Group:
     """Patterns of one damping and one state of the contacts.
 
-    solved : patterns whose highest peak is found; failed : the sentence of each other one, by number
-    dense_error : largest relative difference of blade amplitudes at a peak from the dense wheel, nan if none was asked
+    solved : patterns whose highest peak is found, with contacts in this state
+    failed : the sentence of each that is refused, by number
+    other : what the contacts of a peak do instead of what the state asks, by number
+    slipping : least share of pairs that slip in a cycle at a peak, of all patterns
+    compared : patterns that were solved on the dense wheel too
+    dense_error : largest relative difference of blade amplitudes at their peaks, nan where none was compared
+    seconds : of processor for each pattern, without the dense wheel
     """
 
     damping: str
     state: str
     solved: int
     failed: dict[int, str]
+    other: dict[int, str]
+    slipping: float
+    compared: int
     dense_error: float
+    seconds: float
+
+    @property
+    def count(self) -> int:
+        """Patterns that were tried."""
+        return self.solved + len(self.failed) + len(self.other)
+
+    def wrong(self, dense: int) -> bool:
+        """Whether a pattern is not solved or not in the state, or one of the first `dense` not as on the dense wheel.
+
+        Never false where nothing was compared
+        """
+        return self.solved < self.count or self.compared < max(dense, 1) or not self.dense_error <= WITHIN
 
     def line(self) -> str:
         """For people."""
-        said = "".join(f"\n    pattern {number}: {sentence}" for number, sentence in self.failed.items())
-        of = self.solved + len(self.failed)
-        return f"{self.damping:7} {self.state:9} {self.solved} of {of} solved, dense {self.dense_error:.1e}{said}"
+        said = "".join(f"\n    pattern {n}: {why}" for n, why in sorted({**self.failed, **self.other}.items()))
+        return (
+            f"{self.damping:7} {self.state:9} {self.solved:4} of {self.count:4} solved, {self.slipping:4.0%} of pairs "
+            f"slip, {self.compared} dense within {self.dense_error:.1e}, {self.seconds:.2g} s each{said}"
+        )
 
 
-def groups(count: int, dense: int, states: tuple[str, ...] = tuple(STATES)) -> Iterator[Group]:
+def is_in(state: str, status: np.ndarray) -> bool:
+    """Whether contacts with status bits (n_pair,) over a cycle are open, slipping (at least one), or all stuck."""
+    if state == "slipping":
+        return bool((status & SLIPS).any())
+    return bool((status == (SEPARATES if state == "open" else STICKS)).all())
+
+
+def run(count: int, dense: int, aside: Callable[[str], None], states: Sequence[str] = tuple(STATES)) -> list[Group]:
+    """All groups, each told as it comes; `count` patterns of each, the first `dense` on the dense wheel too."""
+    found = []
+    for group in groups(count, dense, states):
+        aside(group.line())
+        found.append(group)
+    return found
+
+
+def as_records(found: Sequence[Group]) -> list[dict[str, object]]:
+    """For machines."""
+    return [asdict(group) | {"dense_error": group.dense_error if group.compared else None} for group in found]
+
+
+def groups(count: int, dense: int, states: Sequence[str] = tuple(STATES)) -> Iterator[Group]:
     """Solve `count` patterns of each damping and state, and compare the first `dense` of each with the dense wheel."""
     for damping in DAMPING:
         for state in states:
             asked = (*STATES[state], f"damping.modal='{damping}'")
             blades = patterns.Blades.of(scene_file.parse(WHEEL + DIFFER, "wheel.toml", asked, Path()))
-            wheel, failed, errors = wheels.build(blades.file), dict[int, str](), [np.nan]
+            wheel, errors, seconds = wheels.build(blades.file), [np.nan], 0.0
+            failed, other, slipping = dict[int, str](), dict[int, str](), [np.nan]
             for number in range(1, count + 1):
-                pattern = blades.pattern(number)
+                pattern, start = blades.pattern(number), time.process_time()
                 try:
                     point, _ = blades.peak(pattern)
                 except (ValueError, RuntimeError, np.linalg.LinAlgError) as error:
                     failed[number] = f"{type(error).__name__}: {error}"
                     continue
-                if number <= dense:
+                finally:
+                    seconds += time.process_time() - start
+                status = point.state.cycle.status
+                slipping.append(float(((status & SLIPS) != 0).mean()))
+                if not is_in(state, status):
+                    other[number] = f"contacts have status {sorted(set(status.tolist()))}"
+                elif number <= dense:
                     errors.append(from_dense(wheel, blades, pattern, point.state.omega, point.state.x))
-            yield Group(damping, state, count - len(failed), failed, float(np.fmax.reduce(errors)))
+            yield Group(
+                damping,
+                state,
+                count - len(failed) - len(other),
+                failed,
+                other,
+                float(np.fmin.reduce(slipping)),
+                len(errors) - 1,
+                float(np.fmax.reduce(errors)),
+                seconds / count,
+            )
 
 
 def from_dense(
@@ -91,8 +154,3 @@ def from_dense(
         rows = [balance.compliance.output_names.index(f"response@{k}") for k in range(n)]
         heights.append(amplitude(balance.outputs(solution.state)[rows]))
     return float(np.abs(heights[0] - heights[1]).max() / heights[1].max())
-
-
-if __name__ == "__main__":
-    for group in groups(int(sys.argv[1]), int(sys.argv[2])):
-        print(group.line(), flush=True)
