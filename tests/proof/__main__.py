@@ -285,6 +285,32 @@ def ablations(
     print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else proof.as_text(rows))
 
 
+def mistuned(*, count: int = 100, dense: int = 3, as_json: Json = False) -> None:
+    """Solve mistuned wheels at 0.05, 0.1 and 0.5 % damping with open, slipping and stuck contacts.
+
+    Exit code 3 where a pattern is not solved, its contacts do not do what they should, or its blades differ from those
+    of the wheel assembled without symmetry by more than 1e-4.
+
+    Parameters
+    ----------
+    count
+        Patterns of each of the nine settings.
+    dense
+        The first ones of each that are solved on the wheel without symmetry too.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import mistuned as proof
+
+    if not 1 <= dense <= count:
+        raise ValueError(f"--count {count} --dense {dense}: give at least 1 pattern, and at most as many dense")
+    found = proof.run(count, dense, aside)
+    print(json.dumps(proof.as_records(found), indent=2) if as_json else "\n".join(group.line() for group in found))
+    wrong = sum(group.wrong(dense) for group in found)
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(found)} settings of mistuned wheels are wrong, see the table")
+
+
 def motion(
     scene: str, *, at: str | None = None, overrides: Overrides = (), out: Path | None = None, as_json: Json = False
 ) -> None:
@@ -348,6 +374,7 @@ for word in (
     ablations,
     fuzz,
     damage,
+    mistuned,
     motion,
     wear_steps,
     blade,
