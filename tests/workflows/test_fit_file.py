@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import tomllib
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,8 +23,10 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file
+from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
 from tribodyn.workflows.studies.fits.fit_file import Known, Task, predict
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
+from tribodyn.workflows.studies.measured.measurement import Run
 
 BEAM = (
     "harmonics.kept=[0, 1]",
@@ -241,3 +245,17 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
     np.testing.assert_allclose(Bench().plain(file).interface.gap, opened, rtol=0, atol=1e-20)
     assert np.ptp(opened) > 1e-9
     assert fit_file.value_of(file.mesh_scene, "bodies.lower.length") == pytest.approx(0.1)
+
+
+def test_errors_that_are_given_go_before_those_of_a_curve():
+    """A resonance has the standard errors of its fit, which say nothing of what a model leaves out."""
+    at, none = np.ones(1), np.full(1, np.nan)
+    run = Run("1", "force", 80 * at, 1e-4 * at + 0j, none, 2e-3 * at, np.array([[1e-5, 1e-2]]))
+    measured: Any = SimpleNamespace(kind="backbone", runs=(run,))
+    for given, errors in (
+        ({}, [1e-5, 1e-2]),
+        ({"error": 0.15}, [1e-5, 0.15]),
+        ({"frequency_error": 3e-3}, [3e-3, 1e-2]),
+    ):
+        numbers = CurveTarget("curve", Curve.model_validate({"file": "a.csv", **given}), measured).numbers()
+        assert [one.error for one in numbers] == errors
