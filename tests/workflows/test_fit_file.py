@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import tomllib
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,8 +24,10 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file
+from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
 from tribodyn.workflows.studies.fits.fit_file import Known, Task
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
+from tribodyn.workflows.studies.measured.measurement import Run
 
 BEAM = (
     "harmonics.kept=[0, 1]",
@@ -220,25 +224,41 @@ def test_friction_is_found_again_from_a_measured_curve(tmp_path):
 
 
 def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path):
-    """Friction and the length of a body; the faces open by a map, which the trials have as a run has it."""
+    """The stiffness of a stuck joint; the faces open by a map, which the trials have as a run has it."""
     rows = [f"{x},{y},0.01,{2e-9 * (x > 0.08)}" for x in (0.05, 0.07, 0.09, 0.1) for y in (0.0, 0.02)]
     (tmp_path / "open.csv").write_text("\n".join(rows), encoding="utf-8")
     scene = tmp_path / "blocks.toml"
     scene.write_text(BLOCKS.replace('t1 = "x"', 't1 = "x"\ngap_map = "open.csv"'), encoding="utf-8")
     own = ("harmonics.kept=[0, 1]", "harmonics.samples=32", "response.points=6")
-    true = td.run(scene, overrides=(*own, "contacts.lap.friction=0.38", "verdict.enabled=false")).response
+    true = td.run(
+        scene, overrides=(*own, "contacts.lap.tangential_stiffness=130 N/um", "verdict.enabled=false")
+    ).response
     w, x = true.omega, true.response[:, 0, 1] - 1j * true.response[:, 0, 2]
     columns = {"frequency_Hz": w / (2 * np.pi), "acceleration_m_s2": w**2 * np.abs(x), "control": ["force"] * len(w)}
     write_columns(columns, tmp_path / "sweep.csv")
     task = {
-        "parameters": {"mu": {"keys": ["contacts.lap.friction"], "low": 0.2, "high": 0.8}},
+        "parameters": {"kt": {"keys": ["contacts.lap.tangential_stiffness"], "low": "60 N/um", "high": "200 N/um"}},
         "curves": {"sweep": {"file": str(tmp_path / "sweep.csv")}},
     }
     found = td.studies.identify(scene, task, overrides=own).found
-    assert found.values == pytest.approx([0.38], rel=1e-3)
+    assert found.values == pytest.approx([130.0], rel=1e-3)
     assert found.rms < 1e-3
     file = scene_file.read(scene, own)
     opened = modelling.build(file, None, Progress()).reduced.interface.gap
     np.testing.assert_allclose(Bench().plain(file).interface.gap, opened, rtol=0, atol=1e-20)
     assert np.ptp(opened) > 1e-9
     assert fit_file.value_of(file.mesh_scene, "bodies.lower.length") == pytest.approx(0.1)
+
+
+def test_errors_that_are_given_go_before_those_of_a_curve():
+    """A resonance has the standard errors of its fit, which say nothing of what a model leaves out."""
+    at, none = np.ones(1), np.full(1, np.nan)
+    run = Run("1", "force", 80 * at, 1e-4 * at + 0j, none, 2e-3 * at, np.array([[1e-5, 1e-2]]))
+    measured: Any = SimpleNamespace(kind="backbone", runs=(run,))
+    for given, errors in (
+        ({}, [1e-5, 1e-2]),
+        ({"error": 0.15}, [1e-5, 0.15]),
+        ({"frequency_error": 3e-3}, [3e-3, 1e-2]),
+    ):
+        numbers = CurveTarget("curve", Curve.model_validate({"file": "a.csv", **given}), measured).numbers()
+        assert [one.error for one in numbers] == errors

@@ -29,8 +29,8 @@ class Curve(Table):
 
     file : beside the file of the fit; facts : what it does not say, as for `compare`
     resonance : take each run of a response as a point of a backbone; control : the runs that are meant, all by default
-    error, frequency_error : relative standard deviations where the file has none, of damping or of a response's
-        amplitude, and of the frequency of a backbone
+    error, frequency_error : relative standard deviations of damping or of a response's amplitude, and of the frequency
+        of a backbone; where they are given they go before those of the file or of the fit of a resonance
     weight : of all its points together with the other numbers
     """
 
@@ -74,7 +74,8 @@ class CurveTarget:
         """Every point as a measured number, see `values`."""
         found = []
         for run in self.measured.runs:
-            errors = np.where(np.isfinite(run.errors), run.errors, [self.table.frequency_error, self.table.error])
+            own = np.isfinite(run.errors) & [k not in self.table.model_fields_set for k in ("frequency_error", "error")]
+            errors = np.where(own, run.errors, [self.table.frequency_error, self.table.error])
             for kind, (values, column, unit) in self._columns(run).items():
                 for x, value, error in zip(self._places(run), values, errors[:, column], strict=True):
                     weight = self.table.weight * FULL / float(error)
@@ -95,8 +96,6 @@ class CurveTarget:
         """(n,) what a scene says to the numbers; raises SolveFailed where it does not reach a point."""
         pairs = beside(file, model, self.measured, Progress())
         found = np.concatenate([v for one in pairs for v, *_ in self._columns(one.computed).values()])
-        if not np.isfinite(found).all():
-            raise SolveFailed(
-                f"curves.{self.name}: the scene does not reach {np.sum(~np.isfinite(found))} of its points"
-            )
+        if away := np.sum(~np.isfinite(found)):
+            raise SolveFailed(f"curves.{self.name}: the scene does not reach {away} of its points")
         return found
