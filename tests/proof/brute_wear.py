@@ -143,7 +143,7 @@ def life(one: Drawn, share: float = DEPTH) -> tuple[float | None, float]:
     depth, u, v, slider = np.zeros(PAIRS), np.zeros(n), np.zeros(n), np.zeros((PAIRS, 2))
     fixed = (np.linalg.inv(one.mass), one.stiffness, one.damping, still, shaken, one.omega, one.k_t, one.k_n, one.mu)
     cycles, first, before, lifts = 0.0, 0.0, 0.0, 0.0
-    largest = 0.0
+    largest, taken = 0.0, 0.0
     for block in range(BLOCKS):
         _march(*fixed, depth, u, v, slider, SETTLE * (4 if block == 0 else 1), steps)
         work, preload, opened = _march(*fixed, depth, u, v, slider, MEAN, steps)
