@@ -22,7 +22,7 @@ from tribodyn.workflows.scene.scene_file import parse
 
 PAIRS, FREE = 2, 4
 SETTLE, MEAN = 40, 20  # cycles of a block: left out, and averaged
-DEPTH = 0.02  # largest depth of a block over the largest clearance that the static load closes
+DEPTH = 0.02  # largest depth of a block over the farthest that the loads move a pair without contact
 FALL = 0.1  # of the preload in one block, expected from the block before
 BLOCKS = 500
 COEFFICIENT = 2e-15  # [m3/J]
@@ -116,7 +116,8 @@ kept = [0, 1, 2, 3, 4, 5]
 [wear]
 coefficient = {COEFFICIENT}
 at = {{ frequency = {hertz} }}
-max_steps = 80
+rule = "error_controlled"
+max_steps = 150
 lost_below = {LIFE_SHARE}
 """
 
@@ -176,7 +177,9 @@ def life(one: Drawn, finer: int = 1) -> Brute:
     n = len(one.mass)
     still, shaken = np.zeros(n), np.zeros(n)
     still[[2, 5]], shaken[8] = one.static, one.shaken
-    clearance = float(np.linalg.solve(one.stiffness, still)[[2, 5]].max())
+    dynamic = one.stiffness - one.omega**2 * one.mass + 1j * one.omega * one.damping
+    free = np.linalg.solve(one.stiffness, still) + abs(np.linalg.solve(dynamic, shaken))
+    reach = float(free[[2, 5]].max())
     stiff = one.stiffness + np.eye(n) * max(one.k_n, one.k_t)
     fastest = float(np.sqrt(np.linalg.eigvals(np.linalg.solve(one.mass, stiff)).real.max()))
     steps = finer * max(400, int(2 * np.pi * fastest / one.omega / 0.15))
@@ -197,10 +200,10 @@ def life(one: Drawn, finer: int = 1) -> Brute:
             low = max(preload, 1e-3 * LIFE_SHARE * first)
             part = np.log(before / (LIFE_SHARE * first)) / np.log(before / low)
             return Brute(float(cycles - taken * (1 - part)), "", first, most, block)
-        if not rate.max() > 1e-9 * COEFFICIENT * one.mu * preload * clearance / AREA:
+        if not rate.max() > 1e-9 * COEFFICIENT * one.mu * preload * reach / AREA:
             left = f"nothing slips any more with {preload / first:.2g} of the preload left"
             return Brute(None, left, first, most, block)
-        stride = DEPTH / finer * clearance / float(rate.max())
+        stride = DEPTH / finer * reach / float(rate.max())
         if block and preload < before:
             stride = min(stride, FALL / finer * taken / np.log(before / preload))
         bend = 0.5 * stride / taken if block else 0.0
