@@ -169,6 +169,18 @@ def _march(inverse, by_u, by_v, still, shaken, omega, k_t, k_n, mu, depth, u, v,
     return work / cycles, normal_sum / (cycles * steps), opened / (cycles * steps)
 
 
+def _stuck(one: Drawn, still: np.ndarray) -> np.ndarray:
+    """Displacement (n,) [m] under the static load, its friction springs without a slip: what no path has changed."""
+    u = still
+    for _ in range(2**PAIRS):
+        springs = np.zeros(len(u))
+        for p in range(PAIRS):
+            if u[3 * p + 2] > 0:
+                springs[3 * p : 3 * p + 3] = one.k_t, one.k_t, one.k_n
+        u = np.linalg.solve(one.stiffness + np.diag(springs), still)
+    return u
+
+
 def life(one: Drawn, finer: int = 1) -> Brute:
     """Cycles until LIFE_SHARE of the first preload is left. finer : by how much blocks and time steps are smaller.
 
@@ -176,7 +188,7 @@ def life(one: Drawn, finer: int = 1) -> Brute:
     """
     n = len(one.mass)
     still, shaken = np.zeros(n), np.zeros(n)
-    still[[2, 5]], shaken[8] = one.static, one.shaken
+    still[[2, 5]], shaken[8] = one.static / PAIRS, one.shaken
     dynamic = one.stiffness - one.omega**2 * one.mass + 1j * one.omega * one.damping
     free = np.linalg.solve(one.stiffness, still) + abs(np.linalg.solve(dynamic, shaken))
     reach = float(free[[2, 5]].max())
@@ -186,7 +198,7 @@ def life(one: Drawn, finer: int = 1) -> Brute:
     inverse = np.linalg.inv(one.mass)
     fixed = (inverse, inverse @ one.stiffness, inverse @ one.damping, inverse @ still, inverse @ shaken)
     fixed = (*fixed, one.omega, one.k_t, one.k_n, one.mu)
-    depth, u, v, slider = np.zeros(PAIRS), np.zeros(n), np.zeros(n), np.zeros((PAIRS, 2))
+    depth, u, v, slider = np.zeros(PAIRS), _stuck(one, still), np.zeros(n), np.zeros((PAIRS, 2))
     _march(*fixed, depth, u, v, slider, 4 * SETTLE, steps)
     cycles, first, before, most, taken = 0.0, 0.0, 0.0, 0.0, 0.0
     earlier = np.zeros(PAIRS)
