@@ -63,7 +63,7 @@ class Row:
 
     @property
     def outcome(self) -> str:
-        """"held", "violated", "no life" where it ends neither way, or what else keeps the two from being compared."""
+        """ "held", "violated", "no life" where it ends neither way, or what else keeps the two from being compared."""
         if self.brute.cycles is None or self.doubt is None:
             return "no life" if self.value is None else "no life in time"
         if self.value is None:
@@ -239,7 +239,9 @@ def run(scenes: int, say: Callable[[str], None], first: int = 0) -> list[Row]:
                 result, model = scoreboard.solved(file)
                 said = verdict.judge(file, model, result, Progress()).statements["life"]
                 preload = float(result.wear.preload[0]) / brute.first
-                row = replace(row, value=said.value, error=said.error, stated=said.stated, reason=said.reason, preload=preload)
+                row = replace(
+                    row, value=said.value, error=said.error, stated=said.stated, reason=said.reason, preload=preload
+                )
             except (ValueError, RuntimeError) as refusal:
                 row = replace(row, reason=str(refusal))
         rows.append(row)
