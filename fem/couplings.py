@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import coo_matrix, csr_matrix, eye_array, kron
+from scipy.sparse import coo_matrix, csr_matrix, eye_array, hstack, kron
 from scipy.sparse.linalg import splu
 
 from tribodyn.fem.constraints import Following, named
@@ -79,9 +79,9 @@ class Tie:
             spread = csr_matrix((np.ones(len(rest)), (np.arange(len(rest)), rest)), shape=(len(rest), n))
             right = csr_matrix(right - csr_matrix(D[tied][:, rest]) @ spread)
         columns = np.unique(right.nonzero()[1])
-        dense = solve.solve(right[:, columns].toarray())
-        dense[np.abs(dense) < SMALL] = 0.0
-        scalar = coo_matrix(dense)
+        pieces = np.array_split(columns, 1 + len(columns) // 256)  # all at once fill the memory, and are slower
+        solved = (solve.solve(right[:, some].toarray()) for some in pieces)
+        scalar = hstack([coo_matrix(np.where(np.abs(x) < SMALL, 0.0, x)) for x in solved], format="coo")
         moved = csr_matrix((scalar.data, (scalar.row, columns[scalar.col])), shape=(len(tied), n))
         dofs = (tied[:, None] * 3 + np.arange(3)).ravel()
         return Following(dofs, csr_matrix(kron(moved, np.eye(3), format="csr")), self.what)

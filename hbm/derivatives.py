@@ -319,7 +319,7 @@ class Gradient:
             return np.zeros((len(self.quantities), balance.contact.n_pair))
         step, gap = RULES.of_gap * float(np.abs(self.state.x).max()), balance.contact.gap
         above, below = (replace(self.own, contact=balance.contact.with_gap(gap + side)) for side in (step, -step))
-        return self.by_pairs(Change("gap", step, above, below))
+        return (self.moves_to(above) - self.moves_to(below)) / (2 * step)
 
     @cached_property
     def own(self) -> Posed:
@@ -400,10 +400,6 @@ class Gradient:
             down = -up
         return up / change.step, -down / change.step
 
-    def by_pairs(self, change: Change) -> np.ndarray:
-        """(n_quantity, n_pair) dq / dp of a parameter of the contact, were it changed at each pair alone."""
-        return (self.moves_to(change.above) - self.moves_to(change.below)) / (2 * change.step)
-
 
 @dataclass(frozen=True)
 class Derivatives:
@@ -414,7 +410,7 @@ class Derivatives:
         such as grazing or first slip: one-sided derivatives differ, and `slopes` is their mean
     above, below : (n_quantity, n_parameter) one-sided derivatives at a fixed frequency
     by_frequency : (n_quantity,) dq / d omega at fixed parameters [1/(rad/s)], zero along a peak
-    pairs : parameter -> (n_quantity, n_pair) dq / dp were it changed at each pair alone; "gap" among them [1/m]
+    by_gap : (n_quantity, n_pair) dq / d gap of each pair [1/m]
     state : the solution; solves : of the balance that were spent
     """
 
@@ -426,44 +422,53 @@ class Derivatives:
     above: np.ndarray
     below: np.ndarray
     by_frequency: np.ndarray
-    pairs: Mapping[str, np.ndarray]
+    by_gap: np.ndarray
     state: State
     solves: int
 
 
-def _explicit(gradient: Gradient, changes: Sequence[Change], by_pair: Sequence[str]) -> tuple[np.ndarray, ...]:
-    """At a fixed frequency: dq / dp (n_quantity, n_column) of the changes, of the gap of every pair and of changes
-    `by_pair`, pair by pair; one-sided derivatives of the changes.
+def _explicit(gradient: Gradient, changes: Sequence[Change]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """At a fixed frequency: dq / dp (n_quantity, n_change + n_pair) of the changes and of the gap of every pair;
+    one-sided derivatives of the changes.
     """
     both = np.reshape([gradient.by(change) for change in changes], (len(changes), 2, len(gradient.quantities)))
     above, below = both[:, 0].T, both[:, 1].T
-    each = [gradient.by_pairs(change) for change in changes if change.name in by_pair]
-    return np.concatenate([(above + below) / 2, gradient.by_gap(), *each], axis=1), above, below
+    return np.concatenate([(above + below) / 2, gradient.by_gap()], axis=1), above, below
+
+
+@dataclass(frozen=True)
+class _Peak:
+    """How a peak moves: from the state to where its slope vanishes [rad/s], and with every column of `_explicit`."""
+
+    left: float
+    moves: np.ndarray
 
 
 def _gathered(
-    balance: HarmonicBalance,
     gradient: Gradient,
     changes: Sequence[Change],
-    by_pair: Sequence[str],
-    names: Sequence[str],
-    values: np.ndarray,
-    columns: np.ndarray,
-    sides: tuple[np.ndarray, np.ndarray],
-    by_frequency: np.ndarray,
     solves: int,
+    peak_of: Callable[[float], _Peak] | None = None,
 ) -> Derivatives:
-    n, n_pair = len(changes), balance.contact.n_pair
-    named = ["gap", *(change.name for change in changes if change.name in by_pair)]
-    pairs = {name: columns[:, n + i * n_pair : n + (i + 1) * n_pair] for i, name in enumerate(named)}
-    above, below = sides
+    """At the frequency of a gradient's state, or along the peak: peak_of takes the slope of A^2 / 2 at the state."""
+    columns, above, below = _explicit(gradient, changes)
+    names, values = [q.name for q in gradient.quantities], np.array([q.value for q in gradient.quantities])
+    by_frequency = gradient.by_frequency()
+    if peak_of is not None:
+        peak = peak_of(values[0] * by_frequency[0])
+        omega = gradient.state.omega + peak.left
+        columns = np.concatenate([peak.moves[None] / (2 * np.pi), columns + by_frequency[:, None] * peak.moves])
+        values = np.concatenate([[omega / (2 * np.pi)], values + by_frequency * peak.left])
+        names, by_frequency = ["frequency", *names], np.zeros(len(values))
+        above, below = (np.concatenate([np.zeros((1, len(changes))), side]) for side in (above, below))
+    n = len(changes)
     steps = np.array([change.step for change in changes])
     moved = np.abs(above + below) * steps
     seen = np.maximum(moved, RULES.seen * moved.max(axis=1, initial=0.0, keepdims=True))
     corner = (2 * np.abs(above - below) * steps > RULES.corner * seen).any(axis=0)
     return Derivatives(
         tuple(names), values, tuple(change.name for change in changes), columns[:, :n], corner, above, below,
-        by_frequency, pairs, gradient.state, solves,
+        by_frequency, columns[:, n:], gradient.state, solves,
     )  # fmt: skip
 
 
@@ -480,32 +485,17 @@ def at_frequency(
     state: State,
     output: str,
     changes: Sequence[Change],
-    by_pair: Sequence[str] = (),
     worn: Mapping[str, float] | None = None,
     options: NewtonOptions | None = None,
 ) -> Derivatives:
     """Derivatives at the fixed frequency of a state, from which it is solved more exactly.
 
-    output : whose amplitude and phase are quantities; changes : the parameters; by_pair : names of those that are
-        parameters of each pair, whose derivatives are wanted pair by pair; worn : see `quantities`
+    output : whose amplitude and phase are quantities; changes : the parameters; worn : see `quantities`
     Raises  NoDerivative at a fold, or where the state is not solved
     """
     state = _solved(balance, state.omega, state.x, options)
     gradient = Gradient(balance, state, tuple(quantities(balance, state, output, worn)))
-    columns, *sides = _explicit(gradient, changes, by_pair)
-    names, values = zip(*((q.name, q.value) for q in gradient.quantities), strict=True)
-    return _gathered(
-        balance,
-        gradient,
-        changes,
-        by_pair,
-        names,
-        np.array(values),
-        columns,
-        (sides[0], sides[1]),
-        gradient.by_frequency(),
-        1,
-    )
+    return _gathered(gradient, changes, 1)
 
 
 @single
@@ -514,39 +504,33 @@ def at_peak(
     state: State,
     output: str,
     changes: Sequence[Change],
-    by_pair: Sequence[str] = (),
     worn: Mapping[str, float] | None = None,
     options: NewtonOptions | None = None,
 ) -> Derivatives:
     """Derivatives along the resonance peak beside a state, its frequency [Hz] the first quantity; see `at_frequency`.
 
+    Values are those of the peak itself: one Newton step on its condition from the state, which is `RULES.at_peak` away.
     Raises  NoDerivative where no slope vanishes beside the state, as at a fold
     """
     here, width, solves = _peak(balance, state, output, options)
     state = here.solution.state
     gradient = Gradient(balance, state, tuple(quantities(balance, state, output, worn)))
-    columns, above, below = _explicit(gradient, changes, by_pair)
-    by_frequency = gradient.by_frequency()
-    curvature, mixed = 0.0, np.zeros(columns.shape[1])
-    step = RULES.along * width
-    for side in (-step, step):
-        omega = state.omega + side
-        near_state = _solved(balance, omega, here.predict(omega), options)
-        near = Gradient(balance, near_state, (quantities(balance, near_state, output)[0],))
-        size = near.quantities[0].value / (2 * side)
-        curvature += size * near.by_frequency()[0]
-        mixed += size * _explicit(near, changes, by_pair)[0][0]
-    if not curvature < 0:
-        raise NoDerivative("the response has no maximum beside this point")
-    moves = -mixed / curvature
-    columns = np.concatenate([moves[None] / (2 * np.pi), columns + by_frequency[:, None] * moves])
-    names = ["frequency", *(q.name for q in gradient.quantities)]
-    values = np.array([state.omega / (2 * np.pi), *(q.value for q in gradient.quantities)])
-    unknown = np.full((1, len(changes)), 0.0)
-    sides = (np.concatenate([unknown, above]), np.concatenate([unknown, below]))
-    return _gathered(
-        balance, gradient, changes, by_pair, names, values, columns, sides, np.zeros(len(names)), solves + 2
-    )
+
+    def peak_of(slope: float) -> _Peak:
+        curvature, mixed = 0.0, 0.0
+        step = RULES.along * width
+        for side in (-step, step):
+            omega = state.omega + side
+            near_state = _solved(balance, omega, here.predict(omega), options)
+            near = Gradient(balance, near_state, (quantities(balance, near_state, output)[0],))
+            size = near.quantities[0].value / (2 * side)
+            curvature += size * near.by_frequency()[0]
+            mixed += size * _explicit(near, changes)[0][0]
+        if not curvature < 0:
+            raise NoDerivative("the response has no maximum beside this point")
+        return _Peak(-slope / curvature, -np.asarray(mixed) / curvature)
+
+    return _gathered(gradient, changes, solves + 2, peak_of)
 
 
 def _slope(balance: HarmonicBalance, state: State, output: str) -> Slope:

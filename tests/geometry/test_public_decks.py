@@ -107,7 +107,6 @@ def test_a_set_of_supports_that_the_case_control_does_not_select_holds_nothing(t
     "name", [name for name, (ending, _, refused) in DECKS.items() if ending == "inp" and not refused]
 )
 def test_what_is_read_has_the_frequencies_of_calculix(name: str, tmp_path: Path) -> None:
-    text = DECKS[name][1]
-    np.testing.assert_allclose(
-        frequencies(text, 4, tmp_path), by_calculix(text, 4, tmp_path), rtol=1.5e-2
-    )  # 20 nodes there, 27 here
+    # 20 nodes there, 27 here: the equation leaves out our nodes inside faces, the tie is by nodes there, mortar here
+    text, rtol = DECKS[name][1], 1.5e-2 if name in ("equation", "tie") else 5e-3
+    np.testing.assert_allclose(frequencies(text, 4, tmp_path), by_calculix(text, 4, tmp_path), rtol=rtol)

@@ -11,6 +11,7 @@ import pytest
 import tribodyn as td
 from tests.helpers.coarse_scenes import BLADE, RIG
 from tests.helpers.pages import ROOT, fences
+from tests.helpers.structures import BLOCKS
 from tests.proof.problems import cycle_at
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result.columns import write_columns
@@ -215,3 +216,28 @@ def test_friction_is_found_again_from_a_measured_curve(tmp_path):
     task["curves"]["sweep"]["control"] = "response"
     with pytest.raises(td.SceneError, match=r"curves\.sweep: no run has control = response"):
         td.studies.identify(base[0], task, overrides=base[1])
+
+
+def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path):
+    """Friction and the length of a body; the faces open by a map, which the trials have as a run has it."""
+    rows = [f"{x},{y},0.01,{2e-9 * (x > 0.08)}" for x in (0.05, 0.07, 0.09, 0.1) for y in (0.0, 0.02)]
+    (tmp_path / "open.csv").write_text("\n".join(rows), encoding="utf-8")
+    scene = tmp_path / "blocks.toml"
+    scene.write_text(BLOCKS.replace('t1 = "x"', 't1 = "x"\ngap_map = "open.csv"'), encoding="utf-8")
+    own = ("harmonics.kept=[0, 1]", "harmonics.samples=32", "response.points=6")
+    true = td.run(scene, overrides=(*own, "contacts.lap.friction=0.38", "verdict.enabled=false")).response
+    w, x = true.omega, true.response[:, 0, 1] - 1j * true.response[:, 0, 2]
+    columns = {"frequency_Hz": w / (2 * np.pi), "acceleration_m_s2": w**2 * np.abs(x), "control": ["force"] * len(w)}
+    write_columns(columns, tmp_path / "sweep.csv")
+    task = {
+        "parameters": {"mu": {"keys": ["contacts.lap.friction"], "low": 0.2, "high": 0.8}},
+        "curves": {"sweep": {"file": str(tmp_path / "sweep.csv")}},
+    }
+    found = td.studies.identify(scene, task, overrides=own).found
+    assert found.values == pytest.approx([0.38], rel=1e-3)
+    assert found.rms < 1e-3
+    file = scene_file.read(scene, own)
+    opened = modelling.build(file, None, Progress()).reduced.interface.gap
+    np.testing.assert_allclose(Bench().plain(file).interface.gap, opened, rtol=0, atol=1e-20)
+    assert np.ptp(opened) > 1e-9
+    assert fit_file.value_of(file.mesh_scene, "bodies.lower.length") == pytest.approx(0.1)

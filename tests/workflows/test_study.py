@@ -10,6 +10,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -275,3 +276,11 @@ def test_the_parts_of_all_scenes_can_be_stored() -> None:
             here, there = bench.reduced.at_harmonic(h), kept.at_harmonic(h)
             np.testing.assert_array_equal(here[0].stiffness, there[0].stiffness)
             np.testing.assert_array_equal(here[1], there[1])
+
+
+def test_runs_without_a_peak_have_nothing_to_draw() -> None:
+    """Complete runs, none of which has a number that is drawn."""
+    runs = {"run": np.arange(2.0), FRICTION: np.array([0.2, 0.3]), "status": np.array(["complete"] * 2)}
+    bare = {**runs, "peak_hz_first": np.full(2, np.nan)}
+    assert not pictures.shown(SimpleNamespace(columns=bare))  # type: ignore[arg-type]
+    assert pictures.shown(SimpleNamespace(columns={**runs, "peak_hz_first": np.array([np.nan, 900.0])}))  # type: ignore[arg-type]

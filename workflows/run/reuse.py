@@ -16,22 +16,22 @@ from filelock import FileLock
 from tribodyn.fem.part import Part
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run import modelling, part_reduction
-from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene
 
+_JOINT = {"law", "tangential_stiffness", "normal_stiffness", "friction", "punch"}
 LATE: Any = {
     "scene": True, "damping": True, "harmonics": True, "wear": True, "solver": True, "pictures": True, "surfaces": True,
     "loads": {"static": {"__all__": {"value", "pressure"}}, "harmonic": {"__all__": {"value", "pressure", "phase"}}},
     "prescribed": {"__all__": {"displacement"}},
-    "contact": {"law", "tangential_stiffness", "normal_stiffness", "friction", "punch"},
+    "contact": _JOINT, "contacts": {"__all__": _JOINT},
     "response": {"frequency", "references", "points", "method", "stability", "bounds", "options"},
 }  # fmt: skip
 """What a scene may change without another part or reduction."""
-OF_STRESS = ("contact", "loads")  # ... but not where a wheel spins: its stress is that of its contact at rest
+OF_STRESS = ("contact", "contacts", "loads")  # ... but not where a wheel spins, whose stress has its contact at rest
 
 
-def early_of(scene: PartScene) -> str:
+def early_of(scene: MeshScene) -> str:
     """What a part and its reduction are made of: equal texts, equal models."""
     spins = scene.wheel is not None and scene.wheel.speed > 0
     along = scene.wheel is not None and scene.wheel.along_speed  # its speeds are those of the response
@@ -55,15 +55,14 @@ class Bench:
 
     def plain(self, file: SceneFile, opening: np.ndarray | None = None) -> ReducedModel:
         """The reduced model, not damped, with nothing prescribed; opening : (n_pair,) added to its gaps [m]."""
-        scene = file.part_scene
+        scene = file.mesh_scene
         early = early_of(scene)
         if self.part is None or self.reduced is None or early != self.early:
             self.part, self.reduced = self._shared(file)
             self.early = early
-        interface = self.reduced.interface
-        gap = interface.gap
-        if scene.surfaces is not None:
-            gap = gap + self._waviness(file)
+        interface, gap = self.reduced.interface, self.reduced.interface.gap
+        if scene.surfaces is not None or any(joint.gap_map is not None for joint in scene.joints.values()):
+            gap = gap + self._opening(file)
         if opening is not None:
             gap = gap + opening
         return replace(self.reduced, interface=replace(interface, gap=gap))
@@ -80,18 +79,17 @@ class Bench:
         part, reduced = pickle.loads(self.store.read_bytes())
         return part, reduced
 
-    def _waviness(self, file: SceneFile) -> np.ndarray:
-        surfaces = file.part_scene.surfaces
-        assert surfaces is not None
+    def _opening(self, file: SceneFile) -> np.ndarray:
         assert self.part is not None
-        key = (self.early, surfaces.model_dump_json(), file.folder)
+        key = (self.early, file.mesh_scene.model_dump_json(include={"surfaces"}), file.folder)
         if key != self.measured[0]:
-            self.measured = (key, surface_gap(surfaces, self.part.interface, file.folder).gap)
+            opened, _ = modelling.with_surfaces(file.mesh_scene, self.part, file.folder)
+            self.measured = (key, opened.interface.gap - self.part.interface.gap)
         return self.measured[1]
 
     def model(self, file: SceneFile, opening: np.ndarray | None = None) -> modelling.Model:
         """The nonlinear problem of a scene; opening : (n_pair,) added to its gaps, such as a wear depth [m]."""
-        scene, plain = file.part_scene, self.plain(file, opening)
+        scene, plain = file.mesh_scene, self.plain(file, opening)
         assert self.part is not None
         reduced = part_reduction.with_prescribed(scene, self.part, modelling.damped(scene, plain))
         return modelling.make_model(scene, self.part, reduced)
@@ -99,7 +97,7 @@ class Bench:
 
 def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
     """A part and its reduction, not damped, with nothing prescribed."""
-    scene = file.part_scene
+    scene = file.mesh_scene
     with TemporaryDirectory() as folder:
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
     part = modelling.make_part(scene, mesh, node_sets, file.folder)

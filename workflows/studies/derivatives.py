@@ -56,8 +56,8 @@ class ResponseDerivatives:
         f, size = self.found, self._size
         rows = {key: f.slopes[:, i] * value / size for i, (key, value) in enumerate(self.at.items())}
         for joint, pairs in self.joints.items():
-            if f.pairs["gap"][:, pairs].any():
-                rows[f"gap of {joint}, by um"] = f.pairs["gap"][:, pairs].sum(axis=1) * 100 * MICROMETRE / size
+            if f.by_gap[:, pairs].any():
+                rows[f"gap of {joint}, by um"] = f.by_gap[:, pairs].sum(axis=1) * 100 * MICROMETRE / size
         first = f.names.index("amplitude")
         return dict(sorted(rows.items(), key=lambda row: -abs(row[1][first])))
 
@@ -185,7 +185,7 @@ def of_scene(file: SceneFile, at: float | None, only: tuple[str, ...], report: A
         take = exact.at_peak if at is None else exact.at_frequency
         worn = wear_run.coefficients(file.scene)
         try:
-            found = take(balance, state, settings.OUTPUT, changes, (), worn, options)
+            found = take(balance, state, settings.OUTPUT, changes, worn, options)
         except NoDerivative as reason:
             raise SolveFailed(f"{file.name} has no derivatives here: {reason}") from None
     return ResponseDerivatives(

@@ -31,7 +31,7 @@ from tribodyn.workflows.run.reuse import Bench, early_of
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
@@ -180,7 +180,7 @@ def identify(
 def best(file: SceneFile, task: Task, progress: Progress) -> Fit:
     """The fit of a scene that was read."""
     looked = _Looking(file, task, progress)
-    own = {name: value_of(file.part_scene, one.keys[0]) for name, one in task.parameters.items()}
+    own = {name: value_of(file.mesh_scene, one.keys[0]) for name, one in task.parameters.items()}
     before = {name: value for name, value in own.items() if value is not None}
     known = before if len(before) == len(looked.parameters) else None
     with threadpool_limits(1):
@@ -230,7 +230,7 @@ class _Looking:
         if both:
             raise SceneError(f"predict.{min(both)}: a measured number has this name, give another one")
         self.file, self._task, self._progress = file, task, progress
-        self.parameters = [parameter(name, one, self.file.part_scene) for name, one in task.parameters.items()]
+        self.parameters = [parameter(name, one, self.file.mesh_scene) for name, one in task.parameters.items()]
         self.measured = [
             Measured(name, _si(f"measured.{name}.value", known.value, (MEASURED_IN[known.of],))[0],
                      MEASURED_IN[known.of], known.weight, known.error)
@@ -283,7 +283,7 @@ class _Looking:
     def _beside(self, values: Mapping[str, float]) -> Answers:
         """The scene with other values, of which nothing is solved yet."""
         file = self.file.changed(*self.changes(values))
-        same = early_of(file.part_scene) == self._bench.early
+        same = early_of(file.mesh_scene) == self._bench.early
         return Answers(file, (self._bench if same else Bench()).model(file))
 
     @staticmethod
@@ -295,7 +295,7 @@ class _Looking:
             raise SceneError(f"parameters.{name}.prior: {error}") from None
 
 
-def parameter(name: str, looked: Looked, scene: PartScene) -> Parameter:
+def parameter(name: str, looked: Looked, scene: MeshScene) -> Parameter:
     """A number that is looked for, in SI units."""
     low, unit = _si(f"parameters.{name}.low", looked.low, UNITS)
     same = (unit,) if isinstance(looked.low, str) else UNITS
@@ -313,13 +313,14 @@ def parameter(name: str, looked: Looked, scene: PartScene) -> Parameter:
     return Parameter(name, low, high, starts, unit, ratio)
 
 
-def value_of(scene: PartScene, key: str) -> float | None:
+def value_of(scene: MeshScene, key: str) -> float | None:
     """The number of a scene at a key "section.key" in SI units; None for a key that is left out.
 
     Raises  SceneError for a key that is not a number
     """
     table: Any = scene.model_dump()
-    table["geometry"] |= table["geometry"]["parameters"]
+    for part in filter(None, (table.get("geometry"), *table.get("bodies", {}).values())):
+        part |= part["parameters"]
     for word in key.split("."):
         table = table.get(word) if isinstance(table, dict) else None
     if table is not None and (isinstance(table, bool) or not isinstance(table, (int, float))):

@@ -30,14 +30,16 @@ SHOWN = {
 }
 
 
+def shown(found: StudyTable) -> dict[str, str]:
+    """Columns that a run has a number in, with their labels; empty where there is nothing to draw."""
+    columns = found.columns
+    return {name: label for name, label in SHOWN.items() if name in columns and np.isfinite(columns[name]).any()}
+
+
 def panes(found: StudyTable) -> Figure:
     """Peak, amplitude, depth and life, as far as there are any, against the keys; rank correlation in each title."""
-    there = {
-        name: label for name, label in SHOWN.items()
-        if name in found.columns and np.isfinite(found.columns[name]).any()
-    }  # fmt: skip
-    if not there:
-        raise ValueError(f"{found.name}: no run is complete, there is nothing to draw")
+    if not (there := shown(found)):
+        raise ValueError(f"{found.name}: no run has a peak, a depth or a life, there is nothing to draw")
     influence = found.influence()
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(3.4 * len(found.varied) + 0.8, 2.6 * len(there) + 0.3), layout="constrained")

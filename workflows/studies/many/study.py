@@ -136,7 +136,7 @@ def run(
 
 def draw(study: Study, found: StudyTable, folder: Path) -> None:
     """Pictures of a study, as far as its runs make any."""
-    if found.count("complete"):
+    if pictures.shown(found):
         found.plot().savefig(folder / "study.png")
         if pictures.parallel_possible(found):
             found.plot_parallel().savefig(folder / "parallel.png")
