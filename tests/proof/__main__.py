@@ -352,11 +352,8 @@ def wear(*, scenes: int = 12, as_json: Json = False) -> None:
     from tests.proof import brute_wear
 
     rows = brute_wear.run(scenes, aside)
-    print(
-        json.dumps([{**asdict(row), "outcome": row.outcome} for row in rows], indent=2)
-        if as_json
-        else brute_wear.as_text(rows)
-    )
+    records = [{**asdict(row), "outcome": row.outcome} for row in rows]
+    print(json.dumps(records, indent=2) if as_json else brute_wear.as_text(rows))
     if broken := sum(row.outcome == "violated" for row in rows):
         raise RuntimeError(f"{broken} stated lives are violated, see the table")
 

@@ -238,10 +238,9 @@ def run(scenes: int, say: Callable[[str], None], first: int = 0) -> list[Row]:
                 file = parse(one.text(), "brute.toml", (), Path(place))
                 result, model = scoreboard.solved(file)
                 said = verdict.judge(file, model, result, Progress()).statements["life"]
-                preload = float(result.wear.preload[0]) / brute.first
-                row = replace(
-                    row, value=said.value, error=said.error, stated=said.stated, reason=said.reason, preload=preload
-                )
+                row = replace(row, value=said.value, error=said.error, stated=said.stated, reason=said.reason)
+                if result.wear is not None:
+                    row = replace(row, preload=float(result.wear.preload[0]) / brute.first)
             except (ValueError, RuntimeError) as refusal:
                 row = replace(row, reason=str(refusal))
         rows.append(row)
