@@ -16,10 +16,10 @@ def test_lives_of_two_scenes_hold_in_time() -> None:
     assert [row.doubt for row in rows] == pytest.approx([0.0, 0.0], abs=0.01)
     assert {row.outcome for row in rows} <= {"held", "not stated"}
     for row in rows:
-        assert row.value is not None
-        assert row.error is not None
-        wrong = replace(row, stated=True, value=(1.1 + 2 * row.error) * row.value)
+        assert row.brute.cycles is not None
+        wrong = replace(row, stated=True, error=0.05, value=1.2 * row.brute.cycles)
         assert wrong.outcome == "violated"
+        assert replace(wrong, value=1.04 * row.brute.cycles).outcome == "held"
 
 
 def test_a_scene_that_sticks_has_no_life_and_says_why() -> None:
