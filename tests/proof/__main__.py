@@ -364,6 +364,27 @@ def wear_steps(scene: str, *, overrides: Overrides = (), out: Path | None = None
     print(json.dumps(shown.as_records(table), indent=2) if as_json else shown.as_text(table))
 
 
+def wear(*, scenes: int = 12, as_json: Json = False) -> None:
+    """Compare lives of random scenes that slip and lift with brute force, every block of cycles integrated in time.
+
+    Exit code 3 where a true error is above the stated one.
+
+    Parameters
+    ----------
+    scenes
+        How many are drawn.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import brute_wear
+
+    rows = brute_wear.run(scenes, aside)
+    records = [{**asdict(row), "outcome": row.outcome} for row in rows]
+    print(json.dumps(records, indent=2) if as_json else brute_wear.as_text(rows))
+    if broken := sum(row.outcome == "violated" for row in rows):
+        raise RuntimeError(f"{broken} stated lives are violated, see the table")
+
+
 app = cyclopts.App(name="prove", help="Proofs of tribodyn: speed, extremes, faults, errors of unseen scenes.")
 for word in (
     bench,
@@ -376,6 +397,7 @@ for word in (
     damage,
     mistuned,
     motion,
+    wear,
     wear_steps,
     blade,
     leaf,
