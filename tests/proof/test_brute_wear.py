@@ -9,6 +9,7 @@ import pytest
 from tests.proof import brute_wear
 
 
+@pytest.mark.slow
 def test_lives_of_two_scenes_hold_in_time() -> None:
     rows = brute_wear.run(2, lambda line: None, first=1)
     assert all(row.brute.opened > 0.5 for row in rows)

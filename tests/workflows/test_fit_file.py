@@ -241,7 +241,7 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
         "curves": {"sweep": {"file": str(tmp_path / "sweep.csv")}},
     }
     found = td.studies.identify(scene, task, overrides=own).found
-    assert found.values == pytest.approx([130.0], rel=1e-3)
+    assert found.values == pytest.approx([130e6], rel=1e-3)
     assert found.rms < 1e-3
     file = scene_file.read(scene, own)
     opened = modelling.build(file, None, Progress()).reduced.interface.gap
