@@ -10,7 +10,9 @@ import pytest
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part
+from tribodyn.workflows.pictures import view
 from tribodyn.workflows.run import bodies, modelling
+from tribodyn.workflows.run.description import part_mesh
 from tribodyn.workflows.scene import scene_file
 
 LAP = (Path(__file__).parents[1] / "geometry" / "decks" / "lap.inp").read_text()
@@ -95,6 +97,10 @@ def test_hexahedra_of_first_order_may_stay_what_they_are(tmp_path: Path) -> None
     errors = [np.abs(omega / exact - 1).max() for omega in found]
     assert errors[1] < errors[0] / 2
     assert errors[1] < 0.1
+    drawn = part_mesh(reduced)
+    assert drawn is not None
+    assert drawn.kind == "hexahedron"
+    assert view.grid_of(drawn).volume == pytest.approx(4e-6, rel=1e-9)
     file = scene_file.parse(asked + 'elements = "linear_reduced"\n' + REST, "scene.toml", (), tmp_path)
     notes = [note for deck in bodies.of_decks(file.scene, tmp_path).values() for note in deck.notes]
     assert not any("second order" in note for note in notes)

@@ -26,7 +26,12 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.structure import StructureScene
 
-VTK_KIND = {27: ("hexahedron27", "triquadratic_hexahedron"), 10: ("tetra10", "quadratic_tetra")}
+# nodes of an element -> points in whose order VTK has them, of which it has the first; VTK's name
+VTK_KIND = {
+    27: ("hexahedron27", "triquadratic_hexahedron"),
+    10: ("tetra10", "quadratic_tetra"),
+    8: ("hexahedron27", "hexahedron"),
+}
 PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "h5py", "pydantic")
 SEED = 0  # of every random start vector and probe in the packages used
 
@@ -102,7 +107,7 @@ def part_mesh(part: Part) -> PartMesh | None:
     for piece in pieces(part.mesh):
         cells = piece.mesh.dofs.element_dofs.T
         reference, kind = VTK_KIND[cells.shape[1]]
-        to_vtk = permutation(piece.mesh.elem.doflocs, REFERENCE_POINTS[reference])
+        to_vtk = permutation(piece.mesh.elem.doflocs, REFERENCE_POINTS[reference][: cells.shape[1]])
         found.append((kind, piece.node + cells[:, to_vtk]))
     if len({kind for kind, _ in found}) > 1:
         return None
