@@ -8,7 +8,7 @@ from time import process_time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak, OperatingPoint
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.workflows.errors.trade_table import ANSWERED, QUANTITIES
 from tribodyn.workflows.run import curve, memory, modelling, pipeline, settings, wear_run
@@ -66,7 +66,7 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
                 else:
                     depth = depth_at(worn, life)
                     values["depth_m"], values["life_cycles"] = float(depth.max()), life
-        except RuntimeError as failure:
+        except (RuntimeError, NoPeak) as failure:
             outcome = str(failure)
     spent, needed = process_time() - clock, memory.peak()
     flat = (interface.points - interface.points.mean(axis=0)) @ interface.frames.mean(axis=0)[:2].T
