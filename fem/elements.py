@@ -1,6 +1,6 @@
 """Element geometry in batches: shape functions, gradients and weights at the quadrature points.
 
-Nodes are the columns of the second-order mesh's `doflocs`; a displacement DOF is node * 3 + component (x, y, z).
+Nodes are the columns of the mesh's `doflocs`; a displacement DOF is node * 3 + component (x, y, z).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from skfem.quadrature import get_quadrature
 
 
 def coordinates(mesh: Any) -> np.ndarray:
-    """Coordinates of all second-order nodes (n_node, 3) [m]."""
+    """Coordinates of all nodes (n_node, 3) [m]."""
     return np.asarray(mesh.doflocs.T)
 
 

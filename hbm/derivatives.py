@@ -411,7 +411,7 @@ class Derivatives:
     above, below : (n_quantity, n_parameter) one-sided derivatives at a fixed frequency
     by_frequency : (n_quantity,) dq / d omega at fixed parameters [1/(rad/s)], zero along a peak
     by_gap : (n_quantity, n_pair) dq / d gap of each pair [1/m]
-    state : the solution; solves : of the balance that were spent
+    state : solved, along a peak beside it; solves : of the balance that were spent
     """
 
     names: tuple[str, ...]

@@ -96,7 +96,8 @@ def read(path: Path, kind: str = "Parameters") -> tuple[Number, ...]:
     if found is None:
         return ()
     beside = [base.value for base in found.bases if isinstance(base, ast.Attribute) and base.attr == kind]
-    numbers = [one for name in beside for one in read(path.with_name(f"{ast.unparse(name)}.py"), kind)]
+    files = [path.with_name(f"{ast.unparse(name)}.py") for name in beside]
+    numbers = [one for file in files if file.is_file() for one in read(file, kind)]
     for node, after in zip(found.body, [*found.body[1:], None], strict=True):
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) in TYPES:
             numbers.append(_number(ast.unparse(node.target), node, _text(after)))

@@ -223,6 +223,17 @@ def test_friction_is_found_again_from_a_measured_curve(tmp_path):
         td.studies.identify(base[0], task, overrides=base[1])
 
 
+def test_residual_flexibility_is_that_beside_the_springs_of_each_trial():
+    """What a reduction without masters leaves out depends on the contact springs; a trial with others has its own."""
+    own = (*BEAM, "harmonics.kept=[0, 1]", "reduction.method=residual_flexibility")
+    bench, found = Bench(), []
+    for stiffness in ("470 N/um", "200 N/um"):
+        file = scene_file.read("beam_thesis", (*own, f"contact.tangential_stiffness={stiffness}"))
+        found.append(bench.plain(file).residual.stiffness)
+        np.testing.assert_array_equal(found[-1], Bench().plain(file).residual.stiffness)
+    assert not np.array_equal(*found)
+
+
 def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path):
     """The stiffness of a stuck joint; the faces open by a map, which the trials have as a run has it."""
     rows = [f"{x},{y},0.01,{2e-9 * (x > 0.08)}" for x in (0.05, 0.07, 0.09, 0.1) for y in (0.0, 0.02)]

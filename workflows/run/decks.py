@@ -79,7 +79,8 @@ def _read(path: Path, unit: str, stamp: int) -> read.Source:
 
 def said(source: read.Source, table: Table) -> tuple[str, ...]:
     """Sentences on what was done to a deck."""
-    return source.notes if table.elements == "linear_reduced" else (*source.raised, *source.notes)
+    corners = ("its hexahedra are computed on their eight corners, with reduced integration",)
+    return (*(corners if table.elements == "linear_reduced" else source.raised), *source.notes)
 
 
 def as_computed(mesh: Any, node_sets: dict[str, np.ndarray], table: Table, body: str) -> tuple[Any, Any]:
@@ -329,7 +330,6 @@ def material(
         raise ValueError(f"the sections of body '{name}' overlap in {many} elements: correct them")
     if table.elements == "linear_reduced":
         given = {group: _reduced(one, name) for group, one in given.items()}
-        materials = {key: _reduced(one, name) for key, one in materials.items() if key == table.material}
     if (count == 1).all():
         return given if len(given) > 1 else next(iter(given.values()))
     if table.material is None:
@@ -338,7 +338,8 @@ def material(
             f'name one of the scene with decks.{deck_name}.material = "name"'
         )
     if not given:
-        return materials[table.material]
+        own = materials[table.material]
+        return _reduced(own, name) if table.elements == "linear_reduced" else own
     raise ValueError(f"the deck gives a part of body '{name}' no material: give all its elements a section")
 
 
