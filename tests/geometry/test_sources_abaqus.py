@@ -25,7 +25,7 @@ def test_instances_are_bodies_in_their_places(lap):
     np.testing.assert_allclose(first.p.max(axis=1), [0.02, 0.01, 0.01])
     np.testing.assert_allclose(second.p.min(axis=1), [-0.01, 0.0, 0.01], atol=1e-12)  # moved up, then turned about z
     np.testing.assert_allclose(second.p.max(axis=1), [0.0, 0.02, 0.02], atol=1e-12)
-    assert any("16" not in said and "4 hexahedra of first order" in said for said in lap.notes)
+    assert any("16" not in said and "4 hexahedra of first order" in said for said in lap.raised)
 
 
 def test_sets_and_surfaces_are_where_the_deck_puts_them(lap):
