@@ -90,7 +90,7 @@ def _problem() -> Callable[[str], HarmonicBalance]:
     """The beam scene's balance for chosen harmonics; mesh and reduction are made once."""
     file = scene_file.read("beam_thesis", ())
     with limited(1):
-        model = modelling.build(file, None, Progress())
+        model = modelling.build(file, Progress())
     reduced, unworn = model.reduced, model.balance
 
     def of(harmonics: str) -> HarmonicBalance:

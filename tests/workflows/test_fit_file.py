@@ -255,7 +255,7 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
     assert found.values == pytest.approx([130e6], rel=1e-3)
     assert found.rms < 1e-3
     file = scene_file.read(scene, own)
-    opened = modelling.build(file, None, Progress()).reduced.interface.gap
+    opened = modelling.build(file, Progress()).reduced.interface.gap
     np.testing.assert_allclose(Bench().plain(file).interface.gap, opened, rtol=0, atol=1e-20)
     assert np.ptp(opened) > 1e-9
     assert fit_file.value_of(file.mesh_scene, "bodies.lower.length") == pytest.approx(0.1)

@@ -172,7 +172,7 @@ def matrix_scene(folder: Path, *overrides: str) -> scene_file.SceneFile:
 def test_the_static_part_is_there_where_a_static_load_is_and_nowhere_else(tmp_path: Path) -> None:
     file = matrix_scene(tmp_path, "harmonics.kept=[1, 3]")
     with pytest.raises(ValueError, match="load 'press' acts in harmonic 0, which is not kept"):
-        modelling.build(file, tmp_path, Progress())
+        modelling.build(file, Progress())
     file = matrix_scene(tmp_path, "harmonics.kept=[1, 3]", "loads.static=")
     result = pipeline.run(file, tmp_path, Progress())
     assert result.response is not None

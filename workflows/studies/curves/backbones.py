@@ -233,7 +233,7 @@ def backbone(
     published = published_backbone(file)
     others = {text: file.changed(*(part.strip() for part in text.split(";") if part.strip())) for text in changes}
     with limited(file.scene.solver.threads):
-        model = modelling.build(file, None, report)
+        model = modelling.build(file, report)
         found = along(file, model.balance, asked, report)
     if not found.converged.any():
         raise SolveFailed(f"the backbone {found.end}")
@@ -273,7 +273,7 @@ def _changed(
             if _early(other) == _early(file):
                 balance = modelling.make_model(other.scene, model.part, model.reduced).balance
             else:
-                balance = modelling.build(other, None, progress).balance
+                balance = modelling.build(other, progress).balance
             there = along(other, balance, asked, progress)
         if not there.converged.any():
             raise SolveFailed(f"the backbone with {text} {there.end}")

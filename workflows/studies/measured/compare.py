@@ -234,7 +234,7 @@ def compare(
         found = {}
         for change, file in files.items():
             with limited(file.scene.solver.threads):
-                model = modelling.build(file, None, report)
+                model = modelling.build(file, report)
                 measured.near(file.scene, model.part)
                 found[change] = beside(file, model, measured, report)
     except ValueError as trouble:
