@@ -86,6 +86,7 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
     """From the scene's own zero, where a relative step would have no length; against the rig's own preload."""
     made = []
     original = modelling.make_mesh
+    monkeypatch.setenv("TRIBODYN_CACHE", "off")
     monkeypatch.setattr(modelling, "make_mesh", lambda *args: made.append(1) or original(*args))
     task = Task.model_validate(
         {
