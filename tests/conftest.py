@@ -17,7 +17,7 @@ ROOMS = ("geometry", "fem", "reduction", "hbm", "workflows", "properties", "proo
 PROCESSES = ("subprocess", "multiprocessing")  # a test module that imports one of them starts processes
 LONG = (  # more than 20 s of processor each, the longest first
     "test_pages", "test_report", "test_rig", "test_scene_leaf_seal", "test_scene_brb", "test_scene_blade",
-    "test_own_part", "test_accuracy", "test_run", "test_blade_study", "test_study", "test_turbine", "test_extremes",
+    "test_own_part", "test_run", "test_blade_study", "test_study", "test_turbine", "test_extremes",
     "test_wear_rules", "test_only_what_is_needed", "test_verification", "test_pictures", "test_wear_steps",
 )  # fmt: skip
 TESTS = Path(__file__).parent

@@ -87,9 +87,12 @@ def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) ->
 def folder() -> Path | None:
     """Where entries lie, None where nothing is kept."""
     given = os.environ.get(FOLDER)
-    if given is None:
+    if given is not None:
+        return None if given in ("", "off") else Path(given)
+    try:
         return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tribodyn"
-    return None if given in ("", "off") else Path(given)
+    except RuntimeError:  # a user without a home
+        return None
 
 
 def _key(file: SceneFile, early: dict[str, Any], *more: bytes) -> str:
