@@ -120,7 +120,7 @@ def _head(named: Sequence[tuple[str, Result]]) -> str:
     for name, result in named:
         given, seconds = result.provenance, result.summary()["seconds"]
         started = given.get("started", "")[:16].replace("T", " ")
-        rows.append((name, given["versions"].split(",")[0], started, f"{result.state}, {seconds:.0f} s"))
+        rows.append((name, given.get("versions", "").split(",")[0], started, f"{result.state}, {seconds:.0f} s"))
         pictures += [_embedded(kind, make) for kind, make in _renders(result).items() if kind == HEADING]
     title = _title(named[0][1]) if len(named) == 1 else ", ".join(name for name, _ in named)
     table = _table(rows, ("scene", "program", "started", "state"))
