@@ -23,7 +23,7 @@ import numpy as np
 from filelock import FileLock
 
 from tribodyn.fem.part import Part
-from tribodyn.hbm.threads import usable
+from tribodyn.hbm.threads import limited, usable
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.version import package_version
 from tribodyn.workflows.run import joints, part_reduction
@@ -33,8 +33,9 @@ from tribodyn.workflows.scene.schema import MeshScene
 
 FOLDER = "TRIBODYN_CACHE"  # variable of the environment: another folder, or "off"
 ROOM = 4e9  # bytes of all entries: ten of the Brake-Reuss beam, the largest scene that comes along
-PACKAGES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio", "pypardiso", "mkl", "pymetis", "pyamg")
-INCLUDES = re.compile(rb"^[ \t]*\*?(include|merge)\b", re.IGNORECASE | re.MULTILINE)
+PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "pypardiso", "mkl", "pymetis", "pyamg")
+CODE = code()  # of what this process has loaded: sources may change before it makes anything
+INCLUDES = re.compile(rb"^[ \t]*\*?[ \t]*(include|merge)\b|shapefromfile", re.IGNORECASE | re.MULTILINE)
 LATE: Any = {
     "scene": True, "damping": True, "harmonics": True, "preload": True, "backbone": True, "wear": True, "solver": True,
     "pictures": True, "surfaces": True, "verdict": True, "motion": True, "mistuning": True, "flow": True,
@@ -68,7 +69,7 @@ def part(file: SceneFile, make: Callable[[], Part]) -> Part:
     """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
     early = json.loads(early_of(file.mesh_scene))
     del early["reduction"]
-    return _kept(lambda: _key(file, early), make)
+    return _kept(file, lambda: _key(file, early), make)
 
 
 def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) -> ReducedModel:
@@ -81,7 +82,7 @@ def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) ->
             springs = joints.contact_stiffness(scene, joints.unreduced(whole)).tobytes()
         return _key(file, json.loads(early_of(scene)), springs, np.asarray(interface.gap, float).tobytes())
 
-    return _kept(key, make)
+    return _kept(file, key, make)
 
 
 def folder() -> Path | None:
@@ -104,7 +105,7 @@ def _key(file: SceneFile, early: dict[str, Any], *more: bytes) -> str:
     if any(_reads_others(path, path.stat().st_mtime_ns) for path in named.values()):
         return ""
     versions = (platform.python_version(), platform.machine(), *map(package_version, PACKAGES))
-    own = (early, digests(early, file.folder), usable(file.scene.solver.threads), code(), versions, more)
+    own = (early, digests(early, file.folder), usable(file.scene.solver.threads), CODE, versions, more)
     return hashlib.sha256(repr(own).encode()).hexdigest()
 
 
@@ -113,8 +114,12 @@ def _reads_others(path: Path, changed: int) -> bool:
     return path.suffix == ".py" or INCLUDES.search(path.read_bytes()) is not None
 
 
-def _kept(key_of: Callable[[], str], make: Callable[[], T]) -> T:
-    room = folder()
+def _kept(file: SceneFile, key_of: Callable[[], str], make: Callable[[], T]) -> T:
+    with limited(file.scene.solver.threads):  # who makes it: another count rounds differently
+        return _kept_in(folder(), key_of, make)
+
+
+def _kept_in(room: Path | None, key_of: Callable[[], str], make: Callable[[], T]) -> T:
     key = "" if room is None else key_of()
     if room is None or not key:
         return make()
@@ -122,7 +127,7 @@ def _kept(key_of: Callable[[], str], make: Callable[[], T]) -> T:
     try:
         room.mkdir(mode=0o700, parents=True, exist_ok=True)
         lock.acquire()  # released by the system where its holder is killed
-    except OSError:
+    except (OSError, NotImplementedError):  # or a disk that cannot lock
         return make()
     try:
         found: T | None = _read(path)
