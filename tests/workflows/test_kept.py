@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.structures import BLOCKS
+from tests.helpers.structures import BLOCKS, STACK
 from tribodyn.workflows.run import kept, modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -127,10 +127,21 @@ def own_mesh(folder: Path) -> tuple[str, str, tuple[str, ...], Path]:
     return text, "own.toml", tuple(one for one in TINY if not one.startswith("geometry")), folder
 
 
-def test_bodies_are_kept_too(made: list[str], tmp_path: Path) -> None:
-    for friction in ("0.3", "0.4"):
-        file = scene_file.parse(BLOCKS, "blocks.toml", (f"contacts.lap.friction={friction}",), tmp_path)
-        modelling.build(file, Progress())
+@pytest.mark.parametrize(
+    ("text", "change"),
+    [
+        (BLOCKS, "contacts.lap.friction=0.4"),
+        (BLOCKS, "loads.static.press.pressure=1 MPa"),
+        (
+            BLOCKS + '[wear]\nlaw = "energy"\ncoefficient = "1e4 um3/J"\nstep = "5 %"\n',
+            "contacts.lap.wear.coefficient=2e4 um3/J",
+        ),
+        (STACK, "bolts.m8.preload=6 kN"),
+    ],
+)
+def test_bodies_are_kept_too(made: list[str], tmp_path: Path, text: str, change: str) -> None:
+    for overrides in ((), (change,)):
+        modelling.build(scene_file.parse(text, "bodies.toml", overrides, tmp_path), Progress())
     assert made == ALL
 
 
