@@ -11,9 +11,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-# Multiplications up to which OpenBLAS takes the operands as they lie. Beyond, it copies the matrix first, which takes as
-# long again where few rows meet it; 4 or 8 of them take less than 3 or 7. Measured: 172 us for 7 rows times 507 x 702,
-# 111 us for 8 in pieces; other libraries lose nothing. Narrower pieces are slower again
+# Multiplications up to which OpenBLAS takes the operands as they lie. Beyond, it copies the matrix first, which takes
+# as long again where few rows meet it, and 4 or 8 of them take less than 3 or 7. Measured: 172 us for 7 rows times
+# 507 x 702, 117 us for 8 in pieces. Pieces narrower than the second number are slower again
 AS_IT_LIES, NARROW = 1_000_000, 64
 
 

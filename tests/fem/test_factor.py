@@ -54,7 +54,9 @@ def test_few_rows_are_those_of_the_whole_solution(solver: str) -> None:
     force, every = np.zeros((400, 3)), np.random.default_rng(2).normal(size=(400, 2))
     force[few[:4], :2] = np.random.default_rng(3).normal(size=(4, 2))
     for _ in range(2):
-        assert np.allclose(solve_few(made, force)[few], np.linalg.solve(K.toarray(), force)[few], rtol=1e-10, atol=1e-14)
+        assert np.allclose(
+            solve_few(made, force)[few], np.linalg.solve(K.toarray(), force)[few], rtol=1e-10, atol=1e-14
+        )
         assert np.allclose(made.solve(every), np.linalg.solve(K.toarray(), every), rtol=1e-10, atol=1e-13)
 
 

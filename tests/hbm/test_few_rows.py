@@ -10,7 +10,9 @@ from tribodyn.hbm.linear.all_harmonics import few_rows
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
-@pytest.mark.parametrize("shape", [(1, 30, 40), (2, 507, 1020), (3, 507, 701), (7, 507, 702), (11, 300, 513), (63, 800, 90)])
+@pytest.mark.parametrize(
+    "shape", [(1, 30, 40), (2, 507, 1020), (3, 507, 701), (7, 507, 702), (11, 300, 513), (63, 800, 90)]
+)
 def test_pieces_are_the_product(kind: type, shape: tuple[int, int, int]) -> None:
     rng = np.random.default_rng(0)
     k, n, m = shape

@@ -140,6 +140,7 @@ def _work(balance: HarmonicBalance, calls: dict[str, int]) -> tuple[Work, ...]:
         Work("Krylov product", calls["__call__"], x.w0_single.nbytes + 2 * x.b_single.nbytes + core, nearly),
     )
 
+
 def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
     """The table: 0+1 and 0+3 when quick, else 0+5 too; on one thread."""
     plans = [("0+1", (8, 3)), ("0+3", (2, 2))] if quick else [("0+1", (10, 4)), ("0+3", (4, 2)), ("0+5", (3, 1))]
@@ -151,7 +152,7 @@ def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
         say(f"harmonics {harmonics}")
         with limited(1):
             rows.append(_measure(problem(harmonics), harmonics, windows, machine))
-        say(_line(rows[-1]))  # what is measured is not lost where a later row is ended
+        say(f"{_line(rows[-1])}\n{_limit(rows[-1])}")  # what is measured is not lost where a later row is ended
     return rows
 
 
@@ -311,7 +312,7 @@ def _limit(r: Timing) -> str:
     return (
         f"roofline {r.harmonics}: {counts} a point, {read / 1e6:.0f} MB, {flops / 1e6:.0f} MFlop: "
         f"{1e3 * r.roofline / r.points:.2f} of {1e3 * point:.2f} ms, {r.roofline / r.seconds:.0%}. "
-        f"Products take {r.products:.0%} of the time, {r.roofline / (r.products * r.seconds):.0%} of it their roofline; "
+        f"Products take {r.products:.0%} of the time, {r.roofline / (r.products * r.seconds):.0%} of it their limit; "
         f"contact law {r.contact:.0%}; the rest, {1 - r.products - r.contact:.0%}, is between: factors of the cores, "
         "preconditioner, orthogonalisation, calls from Python"
     )
