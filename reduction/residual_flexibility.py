@@ -88,9 +88,12 @@ class ResidualFlexibility:
         return np.asfortranarray(self.B.T @ force)
 
     def at_most(self, force: np.ndarray, moved: np.ndarray) -> float:
-        """What |k^1/2 R f| is at most over |k^1/2 x|, Euclidean, for x (n_contact, k): from `left_out` alone."""
+        """What |k^1/2 R f| is at most over |k^1/2 x|, Euclidean, for x (n_contact, k): from `left_out` alone.
+
+        Infinite for a force where there is no spring
+        """
         root = np.sqrt(self.stiffness)[:, None]
-        pushed = np.divide(force, root, out=np.zeros_like(force), where=root > 0)
+        pushed = np.divide(force, root, out=np.where(force == 0.0, 0.0, np.inf), where=root > 0)
         return self.left_out * float(np.linalg.norm(pushed) / (np.linalg.norm(root * moved) or 1.0))
 
     @cached_property

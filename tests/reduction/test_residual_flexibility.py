@@ -143,6 +143,8 @@ def test_what_a_solve_does_not_ask_for_is_below_its_tolerance(beam, monkeypatch:
     root = np.sqrt(springs.ravel())[:, None]
     share = np.linalg.norm(root * moved) / np.linalg.norm(root * x)
     assert 0.1 * rest.at_most(force, x) < share < rest.at_most(force, x)
+    one_row = np.eye(75)[:, :1]
+    assert replace(rest, stiffness=springs.ravel() * (1 - one_row[:, 0])).at_most(one_row, x[:, :1]) == np.inf
     plain = type(rest).apply
     monkeypatch.setattr(type(rest), "apply", lambda self, f: (asked.append(1), plain(self, f))[1])
     start = newton.solve_from_rest(balance, OMEGA, NewtonOptions(tolerance=1e-8)).state.x
