@@ -124,12 +124,12 @@ def nearly_displaced(force, w0, b, b_turned, ratio, has_static, real, imag, pivo
             still += np.dot(rows, w0[start:stop])
     y = modal(pushed[:n_coeff].astype(np.float64), 0, ratio, has_static, real, imag, pivots, static)
     moved = np.dot(y.astype(b.dtype), b_turned)
+    if len(w0):
+        moved += still[:n_coeff]
     out = np.empty((n, n_coeff))
     for i in range(n):
         for c in range(n_coeff):
             out[i, c] = moved[c, i]
-            if len(w0):
-                out[i, c] += still[c, i]
     return out
 
 
