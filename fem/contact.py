@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix, vstack
+from scipy.sparse import block_diag, csr_matrix, eye_array, kron, vstack
 
 from tribodyn.fem.constraints import named
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames, unit
@@ -28,6 +28,7 @@ class ContactFaces:
     gap : opening before loading [m], one or (n_pair,); None takes that of the geometry between two faces, interference
         negative, and 0 to the ground
     vertices_only : no pairs at mid-side and mid-face nodes; without, six-node faces have theirs at mid-side nodes only
+    face_centres : one pair at the centre of each polygon between nodes, moved and opened by the mean of its corners
     plane : (3,) direction in which every pair closes, across a plane ground that touches the nearest of them
     inclination : of the plane about t1, by the right hand [rad], so small that it does not change the direction. The
         gap of a pair is its distance from the plane along that direction: what the face is bowed, what the plane leans
@@ -45,6 +46,7 @@ class ContactFaces:
     components: Sequence[str] = COMPONENTS
     gap: float | np.ndarray | None = None
     vertices_only: bool = False
+    face_centres: bool = False
     plane: Sequence[float] | None = None
     inclination: float = 0.0
     pairing: str = "auto"
@@ -68,6 +70,10 @@ class ContactFaces:
         Where the second face is a neighbour's B is the half of the first alone
         Raises  ValueError for an unknown or empty face, a t1 along the normal, a gap of the wrong length
         """
+        nodes = self._between_nodes(mesh)
+        return self._at_centres(nodes) if self.face_centres else nodes
+
+    def _between_nodes(self, mesh: Any) -> ContactInterface:
         if self.opposite is not None:
             interface, B_2 = self.halves(mesh)
             return interface if self.turn is not None else replace(interface, B=interface.B - B_2)
@@ -80,6 +86,27 @@ class ContactFaces:
             away = np.tan(self.inclination) * (face.points @ along) - face.points @ normal
             gap = gap + away - away.min()
         return self._interface(mesh, face, gap)
+
+    def _at_centres(self, nodes: ContactInterface) -> ContactInterface:
+        """One pair for each polygon, by one-point integration as zero-thickness elements have it.
+
+        Raises  ValueError where the polygons do not cover the face, or the neighbour has the other half
+        """
+        n_face, k = nodes.faces.shape
+        corner = nodes.points[nodes.faces]
+        area = np.linalg.norm(np.cross(corner[:, 2] - corner[:, 0], corner[:, -1] - corner[:, 1]), axis=1) / 2
+        if self.turn is not None or abs(area.sum() / nodes.area.sum() - 1) > 0.01:  # of a curved face
+            raise ValueError(
+                f"contact '{self.face}': face_centres needs both faces in one sector and nodes at the corners of their "
+                "elements: leave it out, or set vertices_only for elements with six-node faces"
+            )
+        across = nodes.frames[nodes.faces, 2].mean(axis=1)
+        frames = contact_frames(across / np.linalg.norm(across, axis=1, keepdims=True), self.t1)
+        corners = (np.full(n_face * k, 1 / k), nodes.faces.ravel(), k * np.arange(n_face + 1))
+        mean = csr_matrix(corners, shape=(n_face, nodes.n_pair))
+        B = csr_matrix(kron(mean, eye_array(len(nodes.components))) @ nodes.B)
+        at, none = corner.mean(axis=1), np.zeros((0, k), int)
+        return ContactInterface(nodes.components, at, frames, area, mean @ nodes.gap, B, none, nodes, mean)
 
     def halves(self, mesh: Any) -> tuple[ContactInterface, csr_matrix]:
         """Both halves of a contact of two faces, over all DOFs of the mesh.
@@ -158,6 +185,10 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     """
     if len({i.components for i in interfaces}) > 1:
         raise ValueError("the contacts of a structure must be built with the same components")
+    nodes = mean = None
+    if any(i.nodes is not None for i in interfaces):
+        nodes = join([i.nodes or i for i in interfaces])
+        mean = block_diag([eye_array(i.n_pair) if i.mean is None else i.mean for i in interfaces], format="csr")
     first = np.cumsum([0] + [i.n_pair for i in interfaces])
     names = ("points", "frames", "area", "gap")
     fields = {name: np.concatenate([getattr(i, name) for i in interfaces]) for name in names}
@@ -168,6 +199,8 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
         **fields,
         B=vstack([i.B for i in interfaces], format="csr"),
         faces=np.concatenate([of + start for of, start in zip(faces, first, strict=False)]),
+        nodes=nodes,
+        mean=mean,
     )
 
 
