@@ -158,14 +158,20 @@ def walk(
         found = newton_on(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
         turned = found[0].coordinates - here
         size = np.sqrt(turned @ (weight * turned))
-        smooth = turned @ (weight * tangent) > 0.5 * size or step < options.corner_step * longest
+        corner = step < options.corner_step * longest
+        smooth = turned @ (weight * tangent) > 0.5 * size or corner
+        if found[1] != CONVERGED and corner:
+            found = _turned_back(problem, here, step, tangent, weight, options.newton)
+            turned = found[0].coordinates - here
+            size = np.sqrt(turned @ (weight * turned))
+            last = False
         if found[1] != CONVERGED or not smooth:
             step *= 0.5
             if step < options.min_step * longest:
                 return [*solved, found], BranchEnd.ENDED.say(f" its last point: {found[1]}")
             continue
         missed = np.abs(found[0].coordinates - ahead)[-3:-1].max()
-        if missed > options.misses * options.between and step >= options.corner_step * longest:
+        if missed > options.misses * options.between and not corner:
             step *= 0.5
             continue
         solved.append(found)
@@ -179,6 +185,29 @@ def walk(
         elif found[2] >= options.many_steps:
             step *= 0.6
     return solved, BranchEnd.POINTS_DONE.say(f" {options.max_points} points")
+
+
+def _turned_back(
+    problem: FreeVibration,
+    here: np.ndarray,
+    step: float,
+    tangent: np.ndarray,
+    weight: np.ndarray,
+    options: NewtonOptions,
+) -> _Solved:
+    """The point behind a corner at which the curve leaves by more than a right angle, so that nothing lies ahead.
+
+    Where a pair begins to slip or to part, the other branch is that of the contact state just beyond: its straight line
+    is followed to as far behind the corner, and solved for there. The branch that led here is no solution of it
+    """
+    normal = weight * tangent
+    beyond = problem.evaluate(here + step * tangent)
+    behind = problem.correction(beyond, normal, 1e-8, options.max_products, -2 * step)
+    found = newton_on(problem, problem.evaluate(beyond.coordinates + behind), normal, options)
+    apart = found[0].coordinates - (here - step * tangent)
+    if found[1] == CONVERGED and apart @ (weight * apart) < 0.25 * step**2:
+        return found[0], SolveEnd.NO_DESCENT.say(f" {float(np.linalg.norm(beyond.residual)):.1e}"), found[2]
+    return found
 
 
 def newton_on(problem: FreeVibration, point: Point, normal: np.ndarray, options: NewtonOptions) -> _Solved:
