@@ -70,10 +70,8 @@ class ContactFaces:
         Where the second face is a neighbour's B is the half of the first alone
         Raises  ValueError for an unknown or empty face, a t1 along the normal, a gap of the wrong length
         """
-        nodes = self._between_nodes(mesh)
-        return self._at_centres(nodes) if self.face_centres else nodes
-
-    def _between_nodes(self, mesh: Any) -> ContactInterface:
+        if self.face_centres:
+            return self._at_centres(replace(self, face_centres=False).build(mesh))
         if self.opposite is not None:
             interface, B_2 = self.halves(mesh)
             return interface if self.turn is not None else replace(interface, B=interface.B - B_2)
@@ -88,24 +86,17 @@ class ContactFaces:
         return self._interface(mesh, face, gap)
 
     def _at_centres(self, nodes: ContactInterface) -> ContactInterface:
-        """One pair for each polygon, by one-point integration as zero-thickness elements have it.
-
-        Raises  ValueError where the polygons do not cover the face, or the neighbour has the other half
-        """
+        """One pair for each polygon: one-point integration, as zero-thickness elements have it."""
         n_face, k = nodes.faces.shape
-        corner = nodes.points[nodes.faces]
+        corner, at = nodes.points[nodes.faces], nodes.points[nodes.faces].mean(axis=1)
         area = np.linalg.norm(np.cross(corner[:, 2] - corner[:, 0], corner[:, -1] - corner[:, 1]), axis=1) / 2
         if self.turn is not None or abs(area.sum() / nodes.area.sum() - 1) > 0.01:  # of a curved face
-            raise ValueError(
-                f"contact '{self.face}': face_centres needs both faces in one sector and nodes at the corners of their "
-                "elements: leave it out, or set vertices_only for elements with six-node faces"
-            )
+            needs = "nodes at the corners of the faces of elements (vertices_only), and both faces in one sector"
+            raise ValueError(f"contact '{self.face}': face_centres needs {needs}")
         across = nodes.frames[nodes.faces, 2].mean(axis=1)
         frames = contact_frames(across / np.linalg.norm(across, axis=1, keepdims=True), self.t1)
-        corners = (np.full(n_face * k, 1 / k), nodes.faces.ravel(), k * np.arange(n_face + 1))
-        mean = csr_matrix(corners, shape=(n_face, nodes.n_pair))
-        B = csr_matrix(kron(mean, eye_array(len(nodes.components))) @ nodes.B)
-        at, none = corner.mean(axis=1), np.zeros((0, k), int)
+        mean = csr_matrix((np.full(n_face * k, 1 / k), nodes.faces.ravel(), k * np.arange(n_face + 1)))
+        B, none = kron(mean, eye_array(len(nodes.components)), "csr") @ nodes.B, np.zeros((0, k), int)
         return ContactInterface(nodes.components, at, frames, area, mean @ nodes.gap, B, none, nodes, mean)
 
     def halves(self, mesh: Any) -> tuple[ContactInterface, csr_matrix]:
@@ -185,13 +176,13 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     """
     if len({i.components for i in interfaces}) > 1:
         raise ValueError("the contacts of a structure must be built with the same components")
-    nodes = mean = None
-    if any(i.nodes is not None for i in interfaces):
-        nodes = join([i.nodes or i for i in interfaces])
-        mean = block_diag([eye_array(i.n_pair) if i.mean is None else i.mean for i in interfaces], format="csr")
     first = np.cumsum([0] + [i.n_pair for i in interfaces])
     names = ("points", "frames", "area", "gap")
-    fields = {name: np.concatenate([getattr(i, name) for i in interfaces]) for name in names}
+    fields: dict[str, Any] = {name: np.concatenate([getattr(i, name) for i in interfaces]) for name in names}
+    if any(i.nodes is not None for i in interfaces):
+        fields["nodes"] = join([i.nodes or i for i in interfaces])
+        means = [eye_array(i.n_pair) if i.mean is None else i.mean for i in interfaces]
+        fields["mean"] = block_diag(means, format="csr")
     width = max(i.faces.shape[1] for i in interfaces)
     faces = [np.pad(i.faces, ((0, 0), (0, width - i.faces.shape[1])), mode="edge") for i in interfaces]
     return ContactInterface(
@@ -199,8 +190,6 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
         **fields,
         B=vstack([i.B for i in interfaces], format="csr"),
         faces=np.concatenate([of + start for of, start in zip(faces, first, strict=False)]),
-        nodes=nodes,
-        mean=mean,
     )
 
 

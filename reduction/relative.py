@@ -49,8 +49,7 @@ def relative(
         loads={name: T.T @ load for name, load in system.loads.items()},
         outputs={name: T.T @ row for name, row in system.outputs.items()},
     )
-    if means.nodes is not None:
-        place = csr_matrix(kron(means.mean, eye_array(3)) @ place)
+    place = place if means.nodes is None else csr_matrix(kron(means.mean, eye_array(3)) @ place)
     return moved, replace(means, B=place, nodes=None, mean=None), T
 
 

@@ -156,15 +156,12 @@ def walk(
         if last:
             ahead = here + (goal - here[-1]) / tangent[-1] * tangent
         found = newton_on(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
+        corner = step < options.corner_step * longest
+        if found[1] != CONVERGED and corner:
+            found, last = _turned_back(problem, here, step * tangent, weight * tangent, found, options.newton), False
         turned = found[0].coordinates - here
         size = np.sqrt(turned @ (weight * turned))
-        corner = step < options.corner_step * longest
         smooth = turned @ (weight * tangent) > 0.5 * size or corner
-        if found[1] != CONVERGED and corner:
-            found = _turned_back(problem, here, step, tangent, weight, options.newton)
-            turned = found[0].coordinates - here
-            size = np.sqrt(turned @ (weight * turned))
-            last = False
         if found[1] != CONVERGED or not smooth:
             step *= 0.5
             if step < options.min_step * longest:
@@ -188,26 +185,18 @@ def walk(
 
 
 def _turned_back(
-    problem: FreeVibration,
-    here: np.ndarray,
-    step: float,
-    tangent: np.ndarray,
-    weight: np.ndarray,
-    options: NewtonOptions,
+    problem: FreeVibration, here: np.ndarray, move: np.ndarray, normal: np.ndarray, missed: _Solved, how: NewtonOptions
 ) -> _Solved:
-    """The point behind a corner at which the curve leaves by more than a right angle, so that nothing lies ahead.
+    """The point behind a corner at which the curve leaves by more than a right angle, `missed` where there is none.
 
     Where a pair begins to slip or to part, the other branch is that of the contact state just beyond: its straight line
-    is followed to as far behind the corner, and solved for there. The branch that led here is no solution of it
+    is followed to as far behind the corner as `move` goes beyond it.
     """
-    normal = weight * tangent
-    beyond = problem.evaluate(here + step * tangent)
-    behind = problem.correction(beyond, normal, 1e-8, options.max_products, -2 * step)
-    found = newton_on(problem, problem.evaluate(beyond.coordinates + behind), normal, options)
-    apart = found[0].coordinates - (here - step * tangent)
-    if found[1] == CONVERGED and apart @ (weight * apart) < 0.25 * step**2:
-        return found[0], SolveEnd.NO_DESCENT.say(f" {float(np.linalg.norm(beyond.residual)):.1e}"), found[2]
-    return found
+    beyond = problem.evaluate(here + move)
+    behind = problem.correction(beyond, normal, 1e-8, how.max_products, -2 * (normal @ move))
+    found = newton_on(problem, problem.evaluate(beyond.coordinates + behind), normal, how)
+    return_way = np.linalg.norm(found[0].coordinates - here + move) < 0.5 * np.linalg.norm(move)
+    return missed if return_way else found
 
 
 def newton_on(problem: FreeVibration, point: Point, normal: np.ndarray, options: NewtonOptions) -> _Solved:

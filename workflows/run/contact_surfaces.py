@@ -65,8 +65,7 @@ def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> n
     found = LinearNDInterpolator(at, rows[:, 3])(wanted)
     outside = ~np.isfinite(found)
     found[outside] = NearestNDInterpolator(at, rows[:, 3])(wanted[outside])
-    if interface.nodes is not None:
-        found = interface.mean[pairs] @ found
+    found = found if interface.nodes is None else interface.mean[pairs] @ found
     return np.asarray(found - found.min())
 
 
