@@ -18,7 +18,7 @@ from tests.proof.cases.brb.fit import START, Beam, opening
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.time.decrement import decrement
 
-FITTED: dict[str, float] = START
+FITTED = START | {"friction": 0.0887, "damping": 1.405e-3, "ends": 36.5e-6, "sides": 226e-6, "modulus": 190.4e9}
 FIRST_FIT = START | {"friction": 0.137, "damping": 1.14e-3, "modulus": 192.31e9}  # with a parabola along the lap
 MODES = {"first": (6, 2e-7, 2e-4), "second": (8, 5e-8, 2e-5), "third": (9, 5e-8, 1e-5)}  # number, amplitudes [m]
 SLIDERS = 'contacts.lap.law="rough_sliders"'
