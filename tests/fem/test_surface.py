@@ -196,7 +196,7 @@ def test_pairs_at_face_centres_are_means_of_their_corners():
     assert centres.frames[:, 2] == pytest.approx(np.tile([0, 0, -1.0], (16, 1)))
     both = join([nodes, centres])
     np.testing.assert_allclose(both.mean @ both.nodes.points, both.points, atol=1e-15)
-    with pytest.raises(ValueError, match="vertices_only for elements with six-node faces"):
+    with pytest.raises(ValueError, match="face_centres needs nodes at the corners"):
         ContactFaces("bottom", (1, 0, 0), face_centres=True).build(block(tets=True))
 
 
