@@ -30,7 +30,6 @@ class MeanRules:
     # standard errors by which the means of two blocks may differ and still be those of one motion
     same_scatter: float = 2.0
     fewest_blocks: int = 4  # whose means give a standard error
-    contact: float = 1e-7  # accuracy of the contact's equations in a step
 
 
 RULES = MeanRules()
@@ -44,6 +43,10 @@ class MeanOptions:
     search : periods in which a periodic motion is looked for
     accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
         the mean that is asked for
+    contact : accuracy of the contact's equations in a step
+    passing : whether the motion passes from state to state that differ little: after the first one, whose mean is
+        settled, each takes the mean of one block, without a search for periodic motions. The scatter of such short
+        means averages out over the states
     """
 
     steps: int = 256
@@ -51,6 +54,8 @@ class MeanOptions:
     most_blocks: int = 40
     search: int = 60
     accuracy: float = 5e-3
+    contact: float = 1e-7
+    passing: bool = False
 
     def __post_init__(self) -> None:
         if self.block < 2 or self.most_blocks < 2:
@@ -128,6 +133,10 @@ class Follower:
         """
         stepper = self._at(balance, omega)
         spent = 0
+        if self.options.passing:
+            settled = self._settled(balance, stepper, see)
+            self._regular = False
+            return settled
         if self._regular:
             found, spent = self._periodic(stepper)
             if found is not None:
@@ -160,7 +169,7 @@ class Follower:
     def _settled(
         self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray]
     ) -> MeanMotion:
-        """Means of a plain march, once two blocks of periods show one motion."""
+        """Means of a plain march, once two blocks of periods show one motion, or over one where it is passing."""
         o, motion = self.options, self._motion
         assert motion is not None
         search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
@@ -168,6 +177,7 @@ class Follower:
         work: list[float] = []
         off: list[np.ndarray] = []
         first: int | None = None
+        met = o.passing and not self._regular
         for block in range(1, o.most_blocks + 1):
             for _ in range(o.block):
                 found = search.step(motion)
@@ -176,10 +186,10 @@ class Follower:
                 work.append(float(one.energy.sum()))
                 off.append(one.off)
                 rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
-            same = block > 1 and first is None and self._same(np.array(work[-2 * o.block :]))
+            same = met or block > 1 and first is None and self._same(np.array(work[-2 * o.block :]))
             if same and self._held(stepper, np.array(off[-o.block :])):
                 first = len(work) - o.block  # in the block before more of the transient is left
-            if first is not None and _standard_error(np.array(work[first:])) <= o.accuracy:
+            if first is not None and (met or _standard_error(np.array(work[first:])) <= o.accuracy):
                 break
         self._motion = motion
         kept = slice(len(rows) // 2 if first is None else first, None)
@@ -203,7 +213,7 @@ class Follower:
         return bool((np.abs(off.mean(axis=0)) <= self.options.accuracy * abs(stepper.hold.height) + chance).all())
 
     def _march_options(self) -> Options:
-        return Options(self.options.steps, accelerate=False, contact=RULES.contact)
+        return Options(self.options.steps, accelerate=False, contact=self.options.contact)
 
     def _at(self, balance: HarmonicBalance, omega: float) -> TimeStepper:
         """The stepper at a place; what moves is taken along."""
