@@ -25,11 +25,11 @@ from tribodyn.workflows.scene import scene_file
 
 SMALL = (
     "harmonics.kept=[0, 1]", "geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4",
-    "wear.tolerance=10 %", "response.points=30", "verdict.in_time=false", "wear.motion=balance",
+    "wear.tolerance=10 %", "response.points=30", "verdict.in_time=false", "wear.at=peak", "wear.motion=balance",
 )  # fmt: skip
 TINY = (
     "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=5",
-    "response.points=20", "harmonics.samples=64", "pictures.renders=false", "wear.motion=balance",
+    "response.points=20", "harmonics.samples=64", "pictures.renders=false", "wear.at=peak", "wear.motion=balance",
     "verdict.in_time=false",
 )  # fmt: skip
 OF_STATE = ("peak_frequency", "amplitude", "energy", "preload")
