@@ -15,8 +15,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration, wave_in_time
-from tribodyn.hbm.time.period_search import Period, PeriodSearch
-from tribodyn.hbm.time.push import push
+from tribodyn.hbm.time.period_search import PeriodSearch
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.time.time_step import Moving
@@ -24,9 +23,8 @@ from tribodyn.hbm.time.time_step import Moving
 
 @dataclass(frozen=True)
 class MeanRules:
-    """When a motion counts as the same, or as periodic."""
+    """When a motion counts as the same."""
 
-    periodic: float = 1e-5  # drift over a period, relative, of a motion that counts as periodic
     # standard errors by which the means of two blocks may differ and still be those of one motion
     same_scatter: float = 2.0
     fewest_blocks: int = 4  # whose means give a standard error
@@ -40,22 +38,16 @@ class MeanOptions:
     """How long to march.
 
     steps : per period; block : periods whose means are compared; most_blocks : after which to give up
-    search : periods in which a periodic motion is looked for
     accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
-        the mean that is asked for
+        the mean normal force that is asked for
     contact : accuracy of the contact's equations in a step
-    passing : whether the motion passes from state to state that differ little: after the first one, whose mean is
-        settled, each takes the mean of one block, without a search for periodic motions. The scatter of such short
-        means averages out over the states
     """
 
     steps: int = 256
     block: int = 8
     most_blocks: int = 40
-    search: int = 60
     accuracy: float = 5e-3
     contact: float = 1e-7
-    passing: bool = False
 
     def __post_init__(self) -> None:
         if self.block < 2 or self.most_blocks < 2:
@@ -83,17 +75,17 @@ class MeanMotion:
 
 
 class Follower:
-    """A motion that is followed while gaps and frequency change, and the loads do not.
+    """A motion that is followed while gaps and frequency change little by little, and the loads do not.
 
-    A periodic motion is followed as such, as long as a push dies away. Where it does not, or where nothing repeats
-    itself, the motion is marched on plainly, until that becomes periodic.
+    The first mean waits until the motion has settled; from then on the motion passes from place to place, and a mean
+    takes as long as that of the normal force needs: the scatter of the work averages out over the places.
     """
 
     def __init__(self, options: MeanOptions):
         self.options = options
         self._stepper: TimeStepper | None = None
         self._motion: Moving | None = None
-        self._regular = True
+        self._passing = False
 
     def start(self, balance: HarmonicBalance, state: State) -> None:
         """Begin at a state of a balance.
@@ -103,7 +95,7 @@ class Follower:
         if wave_in_time.is_wave(balance):
             raise ValueError("means over a motion serve one part or several bodies, not a travelling wave of a wheel")
         self._motion = self._at(balance, state.omega).start_from(state)
-        self._regular = True
+        self._passing = False
 
     def kept(self) -> np.ndarray:
         """What moves, as one vector whose length depends on the model alone."""
@@ -112,11 +104,11 @@ class Follower:
         assert motion is not None
         z = np.pad(motion.z, (0, 2 * len(stepper.modes[0]) - len(motion.z)))
         parts = (motion.x, motion.f, motion.memory, motion.bits, motion.hold)
-        return np.concatenate([[stepper.omega, self._regular], z, *(np.ravel(part) for part in parts)])
+        return np.concatenate([[stepper.omega, self._passing], z, *(np.ravel(part) for part in parts)])
 
     def take_up(self, balance: HarmonicBalance, kept: np.ndarray) -> None:
         """Go on with what `kept` has given, of a balance that differs in its gaps alone."""
-        self._regular = bool(kept[1])
+        self._passing = bool(kept[1])
         stepper = self._stepper = TimeStepper(balance, float(kept[0]), self._march_options())
         pairs, memory = balance.contact.stiffness.shape, balance.memory.shape
         hold = 0 if stepper.hold is None else len(stepper.hold.dofs)
@@ -126,58 +118,19 @@ class Follower:
         self._motion = Moving(z[:n], x.reshape(pairs), f.reshape(pairs), s.reshape(memory), bits.astype(np.int64), p)
 
     def mean(self, balance: HarmonicBalance, omega: float, see: Callable[[PeriodicMotion], np.ndarray]) -> MeanMotion:
-        """Follow the motion to a place, until it is periodic or has settled.
+        """Follow the motion to a place, until its mean is known well enough.
 
         see : what to average besides, of one period
         Raises  IntegrationFailed
         """
         stepper = self._at(balance, omega)
-        spent = 0
-        if self.options.passing:
-            settled = self._settled(balance, stepper, see)
-            self._regular = False
-            return settled
-        if self._regular:
-            found, spent = self._periodic(stepper)
-            if found is not None:
-                one = time_integration.motion_of(stepper, found, spent, CONVERGED)
-                means = one.energy, _normal(balance, one), see(one), one.amplitude
-                return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
-        settled = self._settled(balance, stepper, see)
-        self._regular = settled.settled and settled.spread <= self.options.accuracy
-        return replace(settled, periods=settled.periods + spent)
-
-    def _periodic(self, stepper: TimeStepper) -> tuple[Period | None, int]:
-        """A periodic motion that a push does not drive away, and the periods marched; else the motion has left it."""
-        o = self.options
-        assert self._motion is not None
-        options = replace(
-            stepper.options, tolerance=RULES.periodic, max_periods=o.search, patience=o.search // 2, accelerate=True
-        )
-        search = PeriodSearch(stepper, options, False)
-        found = search.mix(self._motion)
-        if found.drift > RULES.periodic:
-            return None, search.periods
-        self._motion = found.end
-        plain = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
-        pushed = push(plain, found, o.block)
-        if not pushed.away:
-            return found, search.periods + plain.periods
-        self._motion = pushed.motion
-        return None, search.periods + plain.periods
-
-    def _settled(
-        self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray]
-    ) -> MeanMotion:
-        """Means of a plain march, once two blocks of periods show one motion, or over one where it is passing."""
         o, motion = self.options, self._motion
         assert motion is not None
         search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
         rows: list[tuple[Any, ...]] = []
         work: list[float] = []
         off: list[np.ndarray] = []
-        first: int | None = None
-        met = o.passing and not self._regular
+        first: int | None = 0 if self._passing else None
         for block in range(1, o.most_blocks + 1):
             for _ in range(o.block):
                 found = search.step(motion)
@@ -186,12 +139,13 @@ class Follower:
                 work.append(float(one.energy.sum()))
                 off.append(one.off)
                 rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
-            same = met or block > 1 and first is None and self._same(np.array(work[-2 * o.block :]))
-            if same and self._held(stepper, np.array(off[-o.block :])):
+            held = self._held(stepper, np.array(off[-o.block :]))
+            if first is None and block > 1 and held and self._same(np.array(work[-2 * o.block :])):
                 first = len(work) - o.block  # in the block before more of the transient is left
-            if first is not None and (met or _standard_error(np.array(work[first:])) <= o.accuracy):
-                break
-        self._motion = motion
+            if first is not None and held:
+                if _standard_error(np.array([row[1].sum() for row in rows[first:]])) <= o.accuracy:
+                    break
+        self._motion, self._passing = motion, first is not None
         kept = slice(len(rows) // 2 if first is None else first, None)
         late = np.array(work[kept])
         energy, normal, seen, amplitude = (np.mean(column, axis=0) for column in zip(*rows[kept], strict=True))
