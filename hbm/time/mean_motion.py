@@ -15,7 +15,8 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration, wave_in_time
-from tribodyn.hbm.time.period_search import PeriodSearch
+from tribodyn.hbm.time.period_search import Period, PeriodSearch
+from tribodyn.hbm.time.push import push
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.time.time_step import Moving
@@ -23,8 +24,9 @@ from tribodyn.hbm.time.time_step import Moving
 
 @dataclass(frozen=True)
 class MeanRules:
-    """When a motion counts as the same."""
+    """When a motion counts as the same, or as periodic."""
 
+    periodic: float = 1e-5  # drift over a period, relative, of a motion that counts as periodic
     # standard errors by which the means of two blocks may differ and still be those of one motion
     same_scatter: float = 2.0
     fewest_blocks: int = 4  # whose means give a standard error
@@ -38,16 +40,21 @@ class MeanOptions:
     """How long to march.
 
     steps : per period; block : periods whose means are compared; most_blocks : after which to give up
+    search : periods in which a periodic motion is looked for
     accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
-        the mean normal force that is asked for
-    contact : accuracy of the contact's equations in a step
+        the mean that is asked for
+    contact : of the contact's equations in a step
+    passing : standard error of the mean normal force with which, once it has settled, a motion that does not repeat
+        itself passes from place to place: the scatter of its work averages out over them. 0 where each mean settles
     """
 
     steps: int = 256
     block: int = 8
     most_blocks: int = 40
+    search: int = 60
     accuracy: float = 5e-3
     contact: float = 1e-7
+    passing: float = 0.0
 
     def __post_init__(self) -> None:
         if self.block < 2 or self.most_blocks < 2:
@@ -75,17 +82,17 @@ class MeanMotion:
 
 
 class Follower:
-    """A motion that is followed while gaps and frequency change little by little, and the loads do not.
+    """A motion that is followed while gaps and frequency change, and the loads do not.
 
-    The first mean waits until the motion has settled; from then on the motion passes from place to place, and a mean
-    takes as long as that of the normal force needs: the scatter of the work averages out over the places.
+    A periodic motion is followed as such, as long as a push dies away. Where it does not, or where nothing repeats
+    itself, the motion is marched on plainly, until that becomes periodic.
     """
 
     def __init__(self, options: MeanOptions):
         self.options = options
         self._stepper: TimeStepper | None = None
         self._motion: Moving | None = None
-        self._passing = False
+        self._regular, self._passing = True, False
 
     def start(self, balance: HarmonicBalance, state: State) -> None:
         """Begin at a state of a balance.
@@ -95,7 +102,7 @@ class Follower:
         if wave_in_time.is_wave(balance):
             raise ValueError("means over a motion serve one part or several bodies, not a travelling wave of a wheel")
         self._motion = self._at(balance, state.omega).start_from(state)
-        self._passing = False
+        self._regular, self._passing = True, False
 
     def kept(self) -> np.ndarray:
         """What moves, as one vector whose length depends on the model alone."""
@@ -104,26 +111,61 @@ class Follower:
         assert motion is not None
         z = np.pad(motion.z, (0, 2 * len(stepper.modes[0]) - len(motion.z)))
         parts = (motion.x, motion.f, motion.memory, motion.bits, motion.hold)
-        return np.concatenate([[stepper.omega, self._passing], z, *(np.ravel(part) for part in parts)])
+        return np.concatenate([[stepper.omega, self._regular, self._passing], z, *(np.ravel(part) for part in parts)])
 
     def take_up(self, balance: HarmonicBalance, kept: np.ndarray) -> None:
         """Go on with what `kept` has given, of a balance that differs in its gaps alone."""
-        self._passing = bool(kept[1])
+        self._regular, self._passing = bool(kept[1]), bool(kept[2])
         stepper = self._stepper = TimeStepper(balance, float(kept[0]), self._march_options())
         pairs, memory = balance.contact.stiffness.shape, balance.memory.shape
         hold = 0 if stepper.hold is None else len(stepper.hold.dofs)
-        sizes = [2, 2 * len(stepper.modes[0]), *2 * (pairs[0] * pairs[1],), memory[0] * memory[1], pairs[0], hold]
+        sizes = [3, 2 * len(stepper.modes[0]), *2 * (pairs[0] * pairs[1],), memory[0] * memory[1], pairs[0], hold]
         _, z, x, f, s, bits, p = np.split(kept, np.cumsum(sizes)[:-1])
         n = 2 * stepper.n_dynamic
         self._motion = Moving(z[:n], x.reshape(pairs), f.reshape(pairs), s.reshape(memory), bits.astype(np.int64), p)
 
     def mean(self, balance: HarmonicBalance, omega: float, see: Callable[[PeriodicMotion], np.ndarray]) -> MeanMotion:
-        """Follow the motion to a place, until its mean is known well enough.
+        """Follow the motion to a place, until it is periodic or has settled.
 
         see : what to average besides, of one period
         Raises  IntegrationFailed
         """
         stepper = self._at(balance, omega)
+        spent = 0
+        if self._regular:
+            found, spent = self._periodic(stepper)
+            if found is not None:
+                one = time_integration.motion_of(stepper, found, spent, CONVERGED)
+                means = one.energy, _normal(balance, one), see(one), one.amplitude
+                return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
+        settled = self._settled(balance, stepper, see)
+        self._passing = settled.settled and self.options.passing > 0
+        self._regular = settled.settled and settled.spread <= self.options.accuracy and not self._passing
+        return replace(settled, periods=settled.periods + spent)
+
+    def _periodic(self, stepper: TimeStepper) -> tuple[Period | None, int]:
+        """A periodic motion that a push does not drive away, and the periods marched; else the motion has left it."""
+        o = self.options
+        assert self._motion is not None
+        options = replace(
+            stepper.options, tolerance=RULES.periodic, max_periods=o.search, patience=o.search // 2, accelerate=True
+        )
+        search = PeriodSearch(stepper, options, False)
+        found = search.mix(self._motion)
+        if found.drift > RULES.periodic:
+            return None, search.periods
+        self._motion = found.end
+        plain = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
+        pushed = push(plain, found, o.block)
+        if not pushed.away:
+            return found, search.periods + plain.periods
+        self._motion = pushed.motion
+        return None, search.periods + plain.periods
+
+    def _settled(
+        self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray]
+    ) -> MeanMotion:
+        """Means of a plain march, once two blocks of periods show one motion, or of one that is passing."""
         o, motion = self.options, self._motion
         assert motion is not None
         search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
@@ -139,13 +181,17 @@ class Follower:
                 work.append(float(one.energy.sum()))
                 off.append(one.off)
                 rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
+            same = block > 1 and first is None and self._same(np.array(work[-2 * o.block :]))
             held = self._held(stepper, np.array(off[-o.block :]))
-            if first is None and block > 1 and held and self._same(np.array(work[-2 * o.block :])):
+            if same and held:
                 first = len(work) - o.block  # in the block before more of the transient is left
-            if first is not None and held:
-                if _standard_error(np.array([row[1].sum() for row in rows[first:]])) <= o.accuracy:
-                    break
-        self._motion, self._passing = motion, first is not None
+            if self._passing:
+                known = held and _standard_error(np.array([row[1].sum() for row in rows])) <= o.passing
+            else:
+                known = first is not None and _standard_error(np.array(work[first:])) <= o.accuracy
+            if known:
+                break
+        self._motion = motion
         kept = slice(len(rows) // 2 if first is None else first, None)
         late = np.array(work[kept])
         energy, normal, seen, amplitude = (np.mean(column, axis=0) for column in zip(*rows[kept], strict=True))

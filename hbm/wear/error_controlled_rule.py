@@ -203,6 +203,7 @@ def _step_in_time(
     solves, means = state.solves, state.means
     assert means is not None
     periods = means.periods
+    target = _event(problem, state, rows)
     given = all(isinstance(duty.site, AtFrequency) for duty in problem.mission)  # no peak moves with the depth
     while True:
         there = replace(state, depth=machine.ahead(state, stride), cycles=state.cycles + stride, solves=0)
@@ -212,6 +213,10 @@ def _step_in_time(
         solves += there.solves
         periods += there.means.periods if there.means else 0
         error = local_error(tolerance, problem.area, deviation, worn, stride, state.cycles + stride)
+        preload = problem.preload_of(there)
+        if error <= 1.0 and preload < RULES.event_window[0] * target:
+            stride, target = stride * _share_to(target, problem.preload_of(state), preload), 0.0
+            continue
         if error <= 1.0 or stride <= RULES.shortest_in_time * unit:
             break
         stride = max(stride * growth(error), RULES.shortest_in_time * unit)

@@ -40,13 +40,14 @@ class MotionRules:
     accuracy : standard error of a mean, relative, and difference from the balance's work up to which a periodic motion
         is that of the balance; the errors of many wear steps average out in a life
     most_components : of the contact
-    contact : accuracy of the contact's equations in a step
+    passing, contact : of a motion that is followed everywhere, see `MeanOptions`
     """
 
     steps: int = 128
     per_harmonic: int = 16
-    accuracy: float = 2e-2
+    accuracy: float = 5e-2
     most_components: int = 600
+    passing: float = 2e-2
     contact: float = 1e-5
 
 
@@ -89,7 +90,9 @@ class MachineMotion:
     def __init__(self, problem: WearProblem, always: bool = False):
         self._problem, self._always = problem, always
         steps = max(RULES.steps, RULES.per_harmonic * problem.balance.basis.harmonics[-1])
-        self._options = MeanOptions(steps, accuracy=RULES.accuracy, contact=RULES.contact)
+        self._options = MeanOptions(steps, accuracy=RULES.accuracy)
+        if always:
+            self._options = replace(self._options, contact=RULES.contact, passing=RULES.passing)
         self._followers: list[Follower] = []
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
         self._serves = fits and not wave_in_time.is_wave(problem.balance)
@@ -125,9 +128,8 @@ class MachineMotion:
         except IntegrationFailed as failure:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
         assert found.means is not None
-        work = float(state.work.sum())
-        near = max(found.means.spread * work, abs(float(found.work.sum()) - work)) <= RULES.accuracy * work
-        if near and not self._always:
+        apart = abs(float(found.work.sum() - state.work.sum()))
+        if not self._always and found.means.spread == 0 and apart <= RULES.accuracy * float(state.work.sum()):
             self._followers, self._moving = [], np.zeros(0)
             return state  # the motion has come back to that of the balance
         return found
