@@ -2,6 +2,7 @@
 
 BEAM = (
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
     "wear.at=peak",
     "wear.motion=machine",
     "geometry.n_patch=3",

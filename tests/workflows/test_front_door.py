@@ -17,6 +17,7 @@ from tribodyn.workflows.result.provenance import rebuilt
 
 SMALL = {
     "harmonics.kept": [0, 1],
+    "wear.tolerance": 0.02,
     "wear.at": "peak",
     "wear.motion": "machine",
     "geometry.n_patch": 5,

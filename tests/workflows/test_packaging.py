@@ -22,6 +22,7 @@ FOLDERS = ("geometry", "fem", "reduction", "hbm", "workflows")
 OTHERS = 'raise ImportError("this is the module of another package")\n'  # as llama-index-workflows brings one
 SMALL = [
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
     "wear.at=peak",
     "wear.motion=machine",
     "geometry.n_patch=3",

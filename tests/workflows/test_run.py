@@ -28,6 +28,7 @@ from tribodyn.workflows.scene.scene_file import read
 ROOT = Path(__file__).parents[2]
 SMALL = [
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
     "wear.at=peak",
     "wear.motion=machine",
     "geometry.n_patch=5",

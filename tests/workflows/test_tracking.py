@@ -50,6 +50,7 @@ transitions = "located"
 SMALL = [
     "verdict.enabled=false",
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
     "wear.at=peak",
     "wear.motion=machine",
     "geometry.n_patch=3",

@@ -21,6 +21,7 @@ SMALL = (
     "geometry.n_length=4",
     "geometry.n_height=1",
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
     "wear.at=peak",
     "wear.motion=machine",
     "geometry.n_patch=3",
