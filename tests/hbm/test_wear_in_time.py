@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -82,21 +83,24 @@ def test_a_balance_that_is_stable_again_is_taken_again(monkeypatch: pytest.Monke
     assert "from 0 cycles on" in str(found.end)
 
 
-def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit() -> None:
+@pytest.mark.parametrize("motion", ["machine", "time"])
+def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit(
+    motion: Literal["machine", "time"],
+) -> None:
     problem = flipping()
     flips = problem.balance
     rows: list[WearRow] = []
-    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, rows.append, motion="machine")
+    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, rows.append, motion=motion)
     assert whole.in_time.all()
     assert "followed in time for 100% of the cycles" in str(whole.end)
     follower = Follower(MeanOptions(128))
     follower.start(flips, newton.solve(flips, FLIPS_AT, whole.displacement[0].reshape(3, 3, -1)).state)
-    alone = follower.mean(flips, FLIPS_AT, lambda motion: motion.energy)
+    alone = follower.mean(flips, FLIPS_AT, lambda period: period.energy)
     assert whole.energy[0].sum() == pytest.approx(alone.energy.sum(), rel=0.01)
     along_balance = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 1).energy[0].sum()
     assert abs(whole.energy[0].sum() / along_balance - 1) > 0.04
     begun = history(rows[:4], WearEnd.UNFINISHED.say())
-    resumed = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, resume=begun, motion="machine")
+    resumed = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, resume=begun, motion=motion)
     for name in ("cycles", "depth", "energy", "moving", "spread"):
         np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name))
 
