@@ -111,7 +111,7 @@ modal = "1 %"
 """
 BEAM = (
     "geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "response.points=20",
-    "wear.max_steps=4", "harmonics.kept=[0, 1]",
+    "wear.max_steps=4", "harmonics.kept=[0, 1]", "wear.tolerance=2 %", "wear.at=peak", "wear.motion=machine",
 )  # fmt: skip
 BLADE = (
     "geometry.n_span=3", "geometry.n_side=1", "geometry.n_root=1", "reduction.cutoff=6 kHz", "wheel.speed=6000 rpm",

@@ -35,7 +35,7 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "beam": (
         (
             "harmonics.kept=[0, 1]", "geometry.n_patch=5", "response.points=6", "wear.max_steps=2",
-            "wear.motion=balance",
+            "wear.at=peak", "wear.motion=balance",
         ),
         # systems : linear systems that the harmonics see; extra : masters that are neither contact nor modes
         {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | WEAR},
@@ -43,7 +43,7 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "beam, nothing drawn": (
         (
             "harmonics.kept=[0, 1]", "geometry.n_patch=5", "response.points=6", "wear.max_steps=2",
-            "pictures.plots=false", "pictures.renders=false", "wear.motion=balance",
+            "pictures.plots=false", "pictures.renders=false", "wear.at=peak", "wear.motion=balance",
         ),
         {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"wear"}},
     ),

@@ -28,6 +28,9 @@ from tribodyn.workflows.scene.scene_file import read
 ROOT = Path(__file__).parents[2]
 SMALL = [
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
+    "wear.at=peak",
+    "wear.motion=machine",
     "geometry.n_patch=5",
     "geometry.n_length=4",
     "geometry.n_height=1",
