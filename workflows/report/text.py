@@ -9,7 +9,7 @@ from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.readable import UNKNOWN, digits, measured, rounded
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, order_of_line, size_of
+from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, order_of_line, size_of, worn_at_peak
 from tribodyn.workflows.result.verdict import NAMES, UNITS, Refinement, Statement, Status, loaded
 
 Lines = list[tuple[str, str]]
@@ -66,8 +66,13 @@ def _response_in_brief(result: Result, found: dict[str, Any], judged: dict[str, 
         for hertz, height in zip(found["peak_hz"], found["peak_m"], strict=True)
     ]
     shown = [f"peak      {peaks[0]}{', unworn' if found['wear_steps'] else ''}"]
-    if found["wear_steps"]:
+    if found["wear_steps"] and worn_at_peak(result):
         shown.append(f"          {peaks[1]}, at the end of wear")
+    elif found["wear_steps"]:
+        shown = [f"worn at   {peaks[0]}, unworn", f"          {peaks[1]}, at the end of wear"]
+        if (frf := result.response) is not None and (top := frf.peak(frf.output_names[0])) is not None:
+            highest = measured(frf.frequency[top], "Hz", 4), measured(frf.amplitude(frf.output_names[0])[top], "m")
+            shown.insert(0, f"peak      {', '.join(highest)}, unworn")
     if (order := order_of_line(result)) is not None:
         speeds = [f"{60 * hertz / order:.{count[0]}g} rpm" for hertz in found["peak_hz"]]
         shown.append(f"speed     {speeds[0]}" + (f", {speeds[1]} at the end of wear" if found["wear_steps"] else ""))
@@ -115,7 +120,7 @@ def _errors_in_brief(judged: dict[str, Statement]) -> list[str]:
     shown, reasons = [], dict[str, list[str]]()
     for name, one in judged.items():
         label = NAMES.get(name, name)
-        if one.value is None:
+        if one.value is None or (name == "peak_frequency" and one.error == 0.0):  # given by the scene
             continue
         if one.stated:
             value, error = measured(one.value, UNITS[name], digits(one.error)), percent(one.error or 0.0)
@@ -146,7 +151,8 @@ def warnings(result: Result) -> Iterator[str]:
     if (wear := result.wear) is not None:
         if wear.in_time[:1].any():
             height, work = measured(wear.amplitude[0], "m", 2), measured(wear.energy[0].sum(), "J", 2)
-            yield f"the unworn peak is unstable: a machine leaves it for {height} and {work} a cycle on average"
+            what = "peak" if worn_at_peak(result) else "motion"
+            yield f"the unworn {what} is unstable: a machine leaves it for {height} and {work} a cycle on average"
         if found["unstable_cycles"]:
             share = percent(found["unstable_cycles"])
             yield f'the motion is unstable for {share} of the cycles; wear.motion = "machine" follows a machine there'

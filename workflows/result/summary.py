@@ -121,6 +121,11 @@ def order_of_line(result: Result) -> int | None:
     return abs(wheel["engine_order"]) if wheel.get("sweep") == "speed" else None
 
 
+def worn_at_peak(result: Result) -> bool:
+    """Whether a result wears at a peak, not at a frequency that its scene gives."""
+    return (_wear_table(result).get("at") or {}).get("frequency") is None
+
+
 def _wear_table(result: Result) -> dict[str, Any]:
     return dict(json.loads(result.provenance.get("scene", "{}")).get("wear") or {})
 
