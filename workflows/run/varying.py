@@ -66,20 +66,24 @@ def keys(scene: Scene) -> dict[str, float]:
 class Varying:
     """A scene with its model, and what a step of each of its numbers makes of it."""
 
-    def __init__(self, file: SceneFile, progress: Progress):
+    def __init__(self, file: SceneFile, part: Part | None, plain: ReducedModel, model: modelling.Model):
         self.file, self.scene = file, file.scene
-        part = plain = None
-        if isinstance(self.scene, MeshScene):
+        self.part, self.plain, self.model = part, plain, model
+        self.own = Posed.of(model.balance)
+
+    @classmethod
+    def of(cls, file: SceneFile, progress: Progress) -> Varying:
+        """Of a scene that was read."""
+        scene, part = file.scene, None
+        if isinstance(scene, MeshScene):
             with progress.stage("mesh, mass and stiffness, reduction"):
-                part, plain = self._made(file)
-            reduced = part_reduction.with_prescribed(self.scene, part, modelling.damped(self.scene, plain))
+                part, plain = cls._made(file)
+            reduced = part_reduction.with_prescribed(scene, part, modelling.damped(scene, plain))
         else:
-            assert isinstance(self.scene, MatrixScene)
-            plain = matrix_model.make(self.scene, file.folder)
-            reduced = modelling.damped(self.scene, plain)
-        self.part, self.plain = part, plain
-        self.model = modelling.make_model(self.scene, part, reduced)
-        self.own = Posed.of(self.model.balance)
+            assert isinstance(scene, MatrixScene)
+            plain = matrix_model.make(scene, file.folder)
+            reduced = modelling.damped(scene, plain)
+        return cls(file, part, plain, modelling.make_model(scene, part, reduced))
 
     @staticmethod
     def _made(file: SceneFile) -> tuple[Part, ReducedModel]:

@@ -88,12 +88,13 @@ def counted(
     the others put there. The ends are the next values to either side whose corrected share is not as wanted, by the
     scatter of that count.
 
-    values, said : (n,) runs drawn from the distribution, and what the others say of each; none were added on purpose
+    values, said : (n, m) runs drawn from the distribution, and what the others say of each, m equally likely ones of
+        each where a factor of them is known exactly; none were added on purpose
     Source  Angelopoulos et al. 2023, doi 10.1126/science.adi6000: prediction-powered quantiles
     """
     thinned = sample.mean[:: max(len(sample.mean) // GRID, 1)]
-    at = np.unique(np.concatenate([thinned, values, said]))
-    off = np.subtract(values[:, None] <= at, said[:, None] <= at, dtype=float)  # runs x values
+    at = np.unique(np.concatenate([thinned, values.ravel(), said.ravel()]))
+    off = np.array([_share(own, at) - _share(others, at) for own, others in zip(values, said, strict=True)])
     below = np.interp(at, sample.mean, np.cumsum(sample.weight)) + off.mean(axis=0)
     width = stats.norm.ppf(0.5 + confidence / 2) * off.std(axis=0, ddof=1) / np.sqrt(len(values))
     low = high = int(np.argmax(below >= share))
@@ -102,6 +103,11 @@ def counted(
     while high < len(at) - 1 and below[high] - width[high] <= share:
         high += 1
     return float(at[low]), float(at[high])
+
+
+def _share(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Share of values (m,) that lie at or below each of others."""
+    return np.searchsorted(np.sort(values), at, side="right") / len(values)
 
 
 def next_runs(sample: Sample, surrogate: Surrogate, share: float, count: int) -> np.ndarray:

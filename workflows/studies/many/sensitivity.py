@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -91,12 +90,9 @@ def _as_before(
 def indices(space: Space, found: StudyTable) -> dict[str, tuple[float, tuple[Influence, ...]]]:
     """Number -> share of its variance that the surrogate explains where runs are left out, and its influences.
 
-    Of peak, amplitude, depth and life, as far as FEWEST runs have one that varies; logarithms where all are above 0.
-    Empty without scikit-learn
+    Of peak, amplitude, depth and life, as far as FEWEST runs have one that varies; logarithms where all are above 0
     """
     by_number: dict[str, tuple[float, tuple[Influence, ...]]] = {}
-    if importlib.util.find_spec("sklearn") is None:
-        return by_number
     points = space.coordinates(space.points_of(found.columns))
     for name in SHOWN:
         values = np.asarray(found.columns.get(name, np.full(len(points), np.nan)), float)

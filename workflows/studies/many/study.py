@@ -179,9 +179,10 @@ def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], 
     """The runs, and rows for those whose scene is refused; raises SceneError where every one is."""
     always = ["solver.threads=1", *([] if study.settings.verdict else ["verdict.enabled=false"]), *study.settings.set]
     base = scene_file.read(study.scene, always)
+    slopes = tuple(dict.fromkeys((*study.varied, *study.settings.same))) if study.settings.derivatives else ()
     tasks, refused = [], {}
     for number, values in enumerate(varied, 1):
-        task = Task(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
+        task = Task(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder, slopes)
         try:
             scene = task.scene().scene
         except SceneError as error:

@@ -8,7 +8,6 @@ import time
 import tomllib
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
@@ -17,13 +16,15 @@ from tribodyn.version import __version__
 from tribodyn.workflows.errors.verdict import with_verdict
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import QUANTITIES
-from tribodyn.workflows.run import modelling, pipeline
+from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.reuse import Bench
+from tribodyn.workflows.run.varying import Varying
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.studies import derivatives
 
 Status = Literal["complete", "failed", "refused", "lost"]
 ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
@@ -37,6 +38,7 @@ class Task:
     """One run: a scene by its text, so that another process or machine needs no file of it.
 
     number : of the run, from 1; overrides : of the scene, those of the run last; folder : of the files it names
+    slopes : keys by which the numbers of its first state have derivatives too, as far as these are exact
     early : what its mesh and reduction are made of, empty where they are not shared
     store : file that these are shared through by the processes of a study
     """
@@ -46,13 +48,14 @@ class Task:
     text: str
     overrides: tuple[str, ...]
     folder: Path
+    slopes: tuple[str, ...] = ()
     early: str = field(default="", repr=False, compare=False)
     store: Path | None = field(default=None, repr=False, compare=False)
 
     @property
     def key(self) -> str:
         """Hash of all that the row depends on: scene, overrides, contents of the files that they name, version."""
-        return self._content(self.text, self.overrides)
+        return self._content(self.text, self.overrides, *([self.slopes] if self.slopes else []))
 
     @property
     def early_key(self) -> str:
@@ -105,7 +108,15 @@ def solve(task: Task) -> Row:
     with _one_at_a_time:
         _set_up(task)
         try:
-            result = pipeline.run(task.scene(), None, Progress(), build=_model, row_only=True, judge=with_verdict)
+            file = task.scene()
+            varying = _varying(file)
+            result = pipeline.run(
+                file, None, Progress(), build=lambda _: varying.model, row_only=True, judge=with_verdict
+            )
+            numbers = numbers_of(result)
+            if task.slopes and result.response is not None and not numbers.get("peak_at_end"):
+                slopes = derivatives.of_summary(varying, result.response, numbers, task.slopes)
+                numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
         except np.linalg.LinAlgError as error:
             return ended("failed", error)
         except (ValueError, OSError) as error:
@@ -116,7 +127,6 @@ def solve(task: Task) -> Row:
             return ended("failed", error)
         except Exception as error:  # one run that nobody foresaw does not stop the others
             return ended("failed", f"{type(error).__name__}: {error}")
-        numbers = numbers_of(result)
         state = result.state + (NO_PEAK if numbers.get("peak_at_end") else "")
         return ended("complete", state, numbers)
 
@@ -129,12 +139,16 @@ def _set_up(task: Task) -> None:
     _bench.store = task.store
 
 
-def _model(file: SceneFile) -> modelling.Model:
+def _varying(file: SceneFile) -> Varying:
     """The model of a scene; mesh, part and reduction are those of the run before, where the scene allows it."""
     if isinstance(file.scene, PartScene):
-        return _bench.model(file)
-    with TemporaryDirectory() as folder:
-        return modelling.build(file, Path(folder), Progress())
+        return Varying(file, _bench.part, _bench.plain(file), _bench.model(file))
+    return Varying.of(file, Progress())
+
+
+def slope_column(number: str, key: str) -> str:
+    """The column of the derivative of a number by a key."""
+    return f"d {number} / d {key}"
 
 
 def numbers_of(result: Result) -> dict[str, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED, STYLE
+from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, STYLE
 from tribodyn.workflows.studies.many.pictures import SHOWN
 from tribodyn.workflows.studies.many.table import RUN
 
@@ -42,14 +42,6 @@ def _trade(found: Optimum, axes: Any) -> None:
     if open_:
         axes.plot(x[open_], y[open_], "^", mfc="none", color=INK, ms=10, zorder=4, label="not lost by then: at least")
     axes.plot(x[found.best], y[found.best], "*", color=ORANGE, ms=17, zorder=5, label="nearest to the best of both")
-    label = "the same, solved finer"
-    for check in found.checked:
-        again = [check.again[name] for name in (one, two)]
-        if None not in again and again != [check.values[name] for name in (one, two)]:
-            ends = zip((check.values[one], check.values[two]), again, strict=True)
-            axes.plot(*ends, "-", color=RED, lw=0.8, zorder=4)
-            axes.plot(*again, "x", color=RED, ms=8, mew=1.8, zorder=6, label=label)
-            label = ""
     for axis, values in ((axes.set_xscale, x), (axes.set_yscale, y)):
         if _wide(values):
             axis("log")
