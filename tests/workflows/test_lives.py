@@ -16,7 +16,7 @@ from scipy import stats
 
 import tribodyn as td
 from tests.helpers.command import leave
-from tribodyn.workflows.studies.many import design, pictures, pool, quantiles, sensitivity, study_file
+from tribodyn.workflows.studies.many import design, pool, quantiles, study_file
 from tribodyn.workflows.studies.many import study as studies
 from tribodyn.workflows.studies.many.quantiles import Sample
 from tribodyn.workflows.studies.many.sensitivity import influences
@@ -38,7 +38,7 @@ MEDIAN = 1e8
 def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """They take longer than all the rest."""
     if "command" not in request.node.name:
-        monkeypatch.setattr(studies, "draw", lambda study, found, folder: None)
+        monkeypatch.setattr(studies, "draw", lambda found, folder: None)
         monkeypatch.setattr(td.studies.Lives, "plot", lambda self: Figure())
 
 
@@ -266,24 +266,6 @@ def test_indices_of_correlated_variables_are_those_of_a_linear_function() -> Non
     assert found["b"].total == pytest.approx((1 - 0.36) / variance, abs=0.01)
 
 
-def test_a_study_of_lists_has_the_indices_of_its_box(tmp_path: Path) -> None:
-    lists = {"a": [1.0, 2.0, 3.0, 4.0], "b": [0.0, 0.5, 1.0, 1.5]}
-    tables = {"study": {"scene": "beam", "design": "grid"}, "vary": lists}
-    read = study_file.parse(tables, "mine.toml", Path())
-    rows = design.runs(read)
-    a, b = (np.array([row[key] for row in rows]) for key in "ab")
-    columns = {"run": np.arange(1, 17), "status": np.full(16, "complete", dtype=object), "a": a, "b": b}
-    table = td.studies.StudyTable("mine", columns | {"peak_hz_first": np.exp(a + 2 * b)}, ("a", "b"))
-    told = sensitivity.indices(Space.of(read, lists=True), table)
-    found = {one.key: one.first for one in told["peak_hz_first"][1]}
-    whole = 3.0**2 + (2 * 1.5) ** 2  # variance of a linear function of uniform variables
-    assert found == pytest.approx({"a": 9 / whole, "b": 9 / whole}, abs=0.01)
-    pictures.sensitivities("mine", told).savefig(tmp_path / "mine.png")
-    texts = {"study": {"scene": "beam", "design": "grid"}, "vary": {"a": ["x", "y"]}}
-    with pytest.raises(td.SceneError, match=r"vary.a: expected a distribution"):
-        Space.of(study_file.parse(texts, "mine.toml", Path()), lists=True)
-
-
 def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:
     of, log_life = planted(1)
     points = of.draw(5)[0]
@@ -302,7 +284,12 @@ def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:
 
 def test_covariances_of_derivatives_are_derivatives_of_covariances() -> None:
     draw = np.random.default_rng(0)
-    a, b, log, h = draw.standard_normal((4, 2)), draw.standard_normal((3, 2)), np.array([0.3, -1.0, -9, 0.2, -0.4]), 1e-5
+    a, b, log, h = (
+        draw.standard_normal((4, 2)),
+        draw.standard_normal((3, 2)),
+        np.array([0.3, -1.0, -9, 0.2, -0.4]),
+        1e-5,
+    )
 
     def of(a: np.ndarray, i: int, b: np.ndarray, j: int) -> np.ndarray:
         return covariance(log, a, np.full(4, i), b, np.full(3, j))
@@ -310,7 +297,10 @@ def test_covariances_of_derivatives_are_derivatives_of_covariances() -> None:
     for i in range(2):
         step = h * np.eye(2)[i]
         for j in (-1, 0, 1):
-            by_a, by_b = of(a + step, -1, b, j) - of(a - step, -1, b, j), of(a, j, b + step, -1) - of(a, j, b - step, -1)
+            by_a, by_b = (
+                of(a + step, -1, b, j) - of(a - step, -1, b, j),
+                of(a, j, b + step, -1) - of(a, j, b - step, -1),
+            )
             np.testing.assert_allclose(of(a, i, b, j), by_a / (2 * h), atol=1e-8)
             np.testing.assert_allclose(of(a, j, b, i), by_b / (2 * h), atol=1e-8)
 

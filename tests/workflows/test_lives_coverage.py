@@ -66,7 +66,9 @@ def test_ends_of_the_beams_lives_hold_as_often_as_they_say(population: tuple[np.
         sample = sampled(points, surrogate)
         for share in SHARES:
             by_surrogate = np.quantile(quantiles.drawn(sample, surrogate, share), [0.05, 0.95])
-            by_count = quantiles.counted(sample, surrogate.values[:, None], surrogate.left_out[:, None], share, CONFIDENCE)
+            by_count = quantiles.counted(
+                sample, surrogate.values[:, None], surrogate.left_out[:, None], share, CONFIDENCE
+            )
             low, high = min(by_surrogate[0], by_count[0]), max(by_surrogate[1], by_count[1])
             held[share] += bool(low <= np.quantile(lives, share) <= high)
     print({f"P{100 * share:g}": f"{count} of {SETS}" for share, count in held.items()})

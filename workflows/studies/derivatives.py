@@ -194,7 +194,11 @@ def of_scene(file: SceneFile, at: float | None, only: tuple[str, ...], report: A
 
 
 def _found(
-    varying: Varying, branch: Branch, at: float | None, wanted: Mapping[str, float], advance: Callable[[float, str], None]
+    varying: Varying,
+    branch: Branch,
+    at: float | None,
+    wanted: Mapping[str, float],
+    advance: Callable[[float, str], None],
 ) -> Derivatives:
     """At a frequency [Hz], or along the highest peak of a response; wanted : key -> value."""
     balance, scene = varying.model.balance, varying.scene
@@ -207,9 +211,7 @@ def _found(
         advance(i / (len(wanted) + 1), key)
         changes.append(varying.change(key, value))
     take = exact.at_peak if at is None else exact.at_frequency
-    return take(
-        balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), settings.newton_options(scene)
-    )
+    return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), settings.newton_options(scene))
 
 
 def of_summary(varying: Varying, response: Branch, numbers: Mapping[str, float], wanted: Sequence[str]) -> Slopes:

@@ -191,7 +191,7 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
         points = quantiles.next_runs(sample, found.surrogate, shares[0], min(BATCH, wanted.most - done))
         added += [space.run_of(point) for point in points]
     folder = runner.folder
-    studies.draw(study, table, folder)
+    studies.draw(table, folder)
     error, source = _model_error(study, middle, table, folder, runner.progress)
     distribution = _result(study, table, found, sample, shares, error, source)
     (folder / "lives.json").write_text(json.dumps(distribution.record(), indent=2) + "\n", encoding="utf-8")
@@ -274,12 +274,13 @@ class _Fit:
         alone = [law for group, law in zip(scaled, laws, strict=True) if len(group) == 1][:1]
         share = np.repeat(((np.arange(RATIOS) + 0.5) / RATIOS)[:, None], len(space.keys), axis=1)
         likely = space.coordinates(space.values(share))
-        runs = table.columns["run"][good]
+        runs, by_ratio = table.columns["run"][good], (np.zeros(len(points)), np.zeros(1))
+        if alone:
+            by_ratio = alone[0].known(points), alone[0].known(likely)
         return cls(
             space, surrogate, runs <= drawn, asked if runs.max() > drawn + len(groups) + 1 else None, logarithmic,
             float(np.min(bounds, initial=np.inf, where=open_)), int(open_.sum()), int(good.sum()),
-            1 - float(np.mean(good)), scaled,
-            alone[0].known(points) if alone else np.zeros(len(points)), alone[0].known(likely) if alone else np.zeros(1),
+            1 - float(np.mean(good)), scaled, *by_ratio,
         )  # fmt: skip
 
 
@@ -345,9 +346,9 @@ def _result(
     middle = float(body.mean @ body.weight)
     scatter = float(np.sqrt((body.mean - middle) ** 2 @ body.weight))
     return Lives(
-        study.name, wanted.number, table, tuple(every), influences(found.space, found.surrogate.mean), wanted.confidence,
-        found.runs, found.open, len(table.columns["run"]) - found.runs,
-        found.scaled, found.surrogate.explained, scatter, found.logarithmic, error, source, back(body.mean), body.weight,
+        study.name, wanted.number, table, tuple(every), influences(found.space, found.surrogate.mean),
+        wanted.confidence, found.runs, found.open, len(table.columns["run"]) - found.runs, found.scaled,
+        found.surrogate.explained, scatter, found.logarithmic, error, source, back(body.mean), body.weight,
     )  # fmt: skip
 
 

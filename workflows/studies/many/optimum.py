@@ -18,11 +18,11 @@ from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import study as studies
 from tribodyn.workflows.studies.many import study_file, trade_picture
 from tribodyn.workflows.studies.many.distributions import Marginal, si
-from tribodyn.workflows.studies.many.trades import Known, chebyshev, ends, propose
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study import Runner
-from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Limit, Study
+from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
 from tribodyn.workflows.studies.many.table import RUN, SENTENCE, StudyTable
+from tribodyn.workflows.studies.many.trades import Known, chebyshev, ends, propose
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
 

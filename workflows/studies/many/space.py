@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import design
-from tribodyn.workflows.studies.many.distributions import Marginal, si
+from tribodyn.workflows.studies.many.distributions import Marginal
 from tribodyn.workflows.studies.many.study_file import Study
 from tribodyn.workflows.studies.many.task import slope_column
 
@@ -29,12 +29,12 @@ class Space:
     ratios: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, study: Study, lists: bool = False) -> Space:
-        """The space of a study; lists : numbers of a list count as evenly spread from their lowest to their highest.
-
-        Raises  SceneError for a key that varies over a list otherwise
-        """
-        return cls(replace(study, varied={key: _marginal(study, key, lists) for key in study.varied}))
+    def of(cls, study: Study) -> Space:
+        """The space of a study; raises SceneError for a key that varies over a list."""
+        for key, law in study.varied.items():
+            if not isinstance(law, Marginal):
+                raise SceneError(f"{study.name}: vary.{key}: expected a distribution, this has a list of values")
+        return cls(study)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -103,14 +103,3 @@ class Space:
     def _law(self, key: str) -> Marginal:
         law: Any = self.study.varied[key]
         return law
-
-
-def _marginal(study: Study, key: str, lists: bool) -> Marginal:
-    given = study.varied[key]
-    if isinstance(given, Marginal):
-        return given
-    numbers = [si(value) for value in given]
-    known = [number for number in numbers if number is not None]
-    if not lists or len(known) < len(numbers) or len(set(known)) < 2:
-        raise SceneError(f"{study.name}: vary.{key}: expected a distribution, this has a list of values")
-    return Marginal(stats.uniform(min(known), max(known) - min(known)))

@@ -23,9 +23,7 @@ LIKELY = 1e-5  # relative change of the likelihood that ends a search for them
 STARTS = (0.7, -0.5, 2.0)  # logarithms of lengths that the most likely ones are looked for from
 
 
-def covariance(
-    log: np.ndarray, a: np.ndarray, i: np.ndarray, b: np.ndarray, j: np.ndarray
-) -> np.ndarray:
+def covariance(log: np.ndarray, a: np.ndarray, i: np.ndarray, b: np.ndarray, j: np.ndarray) -> np.ndarray:
     """(n, m) covariance of what is known at points a (n, k) with that at points b (m, k), without noise.
 
     log : logarithms of variance, trend, noise and the k lengths

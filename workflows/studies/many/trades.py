@@ -1,8 +1,8 @@
 """Best trades between aims under limits: which of some runs they are, and where the next run promises most.
 
 Every aim and every limit has a Gaussian process of its own, through its values and derivatives at the runs. Of several
-aims one is made by the Chebyshev function with weights: the largest weighted aim, each between its ends along the trade,
-is made small. Least t with all of these at most t, and all limits kept, is a problem of nonlinear programming that
+aims one is made by the Chebyshev function with weights: the largest weighted aim, each between its ends along the
+trade, is made small. Least t with all of these at most t, and all limits kept, is a problem of nonlinear programming that
 sequential quadratic programming solves on the processes, from several starts.
 Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005.851274; a process for every aim:
     Daulton, Balandat and Bakshy 2020
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
@@ -109,8 +109,10 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
         warnings.simplefilter("ignore")  # Sobol points whose number is no power of two; steps beyond the bounds
         places = np.vstack([share[known.front], qmc.Sobol(share.shape[1], seed=draw).random_base2(8)])
         aims, excess = expected(places)
-        order = np.argsort(chebyshev(aims, weights, low, high) + MISSED * np.maximum(excess, 0).max(axis=1, initial=0.0))
-        found = min((_descended(expected, place, weights, low, high) for place in places[order[:STARTS]]), key=lambda x: x[1])
+        passed = np.maximum(excess, 0).max(axis=1, initial=0.0)
+        order = np.argsort(chebyshev(aims, weights, low, high) + MISSED * passed)
+        ended = [_descended(expected, place, weights, low, high) for place in places[order[:STARTS]]]
+    found = min(ended, key=lambda one: one[1])
     at, value = found
     if np.abs(share - at).max(axis=1).min() < NEAR:
         return (at, 0.0) if m == 1 else (_emptiest(share, draw), np.inf)
