@@ -179,7 +179,8 @@ class Varying:
     def _followed(self, key: str, value: float) -> ReducedModel:
         """The reduced model with another value of a key that it follows."""
         own, part, following = keys(self.scene)[key], self.part, self._sensitivity
-        assert part is not None and following is not None
+        assert part is not None
+        assert following is not None
         if key not in self._ways:
             self._ways[key] = following.towards(self._coordinates(self._doubled(key, 2 * own, part)))
         return following.moved(self._ways[key], value / own - 1)

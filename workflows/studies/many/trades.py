@@ -2,8 +2,8 @@
 
 Every aim and every limit has a Gaussian process of its own, through its values and derivatives at the runs. Of several
 aims one is made by the Chebyshev function with weights: the largest weighted aim, each between its ends along the
-trade, is made small. Least t with all of these at most t, and all limits kept, is a problem of nonlinear programming that
-sequential quadratic programming solves on the processes, from several starts.
+trade, is made small. Least t with all of these at most t, and all limits kept, is a problem of nonlinear programming;
+sequential quadratic programming solves it on the processes, from several starts.
 Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005.851274; a process for every aim:
     Daulton, Balandat and Bakshy 2020
 """
