@@ -293,9 +293,11 @@ def _scaling(study: Study) -> list[tuple[str, ...]]:
     if study.lives.number != LIFE or study.correlations:
         return []
     loads = [key for key in keys(scene_file.read(study.scene, study.settings.set).scene) if key.startswith("loads.")]
-    varied = study.varied.keys() - study.settings.same.values()
-    groups = [tuple(loads)] if loads and varied.issuperset(loads) else []
-    return [(COEFFICIENT,), *groups] if COEFFICIENT in varied else groups
+    moved = {**{key: key for key in study.varied}, **study.settings.same}
+    groups = [(COEFFICIENT,)] if COEFFICIENT in study.varied else []
+    if loads and all(key in moved for key in loads):
+        groups.append(tuple(dict.fromkeys(moved[key] for key in loads)))
+    return groups
 
 
 def _half_width(found: _Fit, sample: Sample, share: float, confidence: float) -> float:

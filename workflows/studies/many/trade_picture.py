@@ -1,15 +1,15 @@
-"""The best designs as a picture: the trade between two aims, or how one got better, and where the keys lie."""
+"""The best designs as a picture: the trade between two aims, or how one got better."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, STYLE
+from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE
 from tribodyn.workflows.studies.many.pictures import SHOWN
 from tribodyn.workflows.studies.many.table import RUN
 
@@ -20,13 +20,9 @@ WIDE = 10.0  # largest over least value, from which on an axis is logarithmic
 
 
 def picture(found: Optimum) -> Figure:
-    """Left the runs over the first two aims, or the one aim over the runs; right the keys of the best runs in their
-    ranges."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 4.4), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
-        (_trade if len(found.aims) > 1 else _progress)(found, left)
-        _keys(found, right)
+    """The runs over the first two aims, or the one aim over the runs."""
+    with axes_of(6.4, 4.4) as (figure, axes):
+        (_trade if len(found.aims) > 1 else _progress)(found, axes)
     return figure
 
 
@@ -59,36 +55,6 @@ def _progress(found: Optimum, axes: Any) -> None:
         axes.set_yscale("log")
     axes.set(xlabel="run", ylabel=_label(found, 0), title=f"{found.name}: {len(values)} runs")
     axes.legend(fontsize=8, frameon=True)
-
-
-def _keys(found: Optimum, axes: Any) -> None:
-    """Where the keys of the best runs lie between the least and the largest value of all runs."""
-    table = found.table
-    keys = table.varied
-    front = list(found.front)
-    for row in [*front, found.best]:
-        best = row == found.best
-        heights = [_height(np.asarray(table.columns[key], float), row) for key in keys]
-        shown = {"color": ORANGE, "ms": 13, "lw": 1.6, "zorder": 3} if best else {"color": BLUE, "ms": 5, "lw": 0.8}
-        axes.plot(heights, range(len(keys)), "-*" if best else "-o", alpha=1.0 if best else 0.45, **shown)
-    for at, key in enumerate(keys):
-        values = np.asarray(table.columns[key], float)
-        for x, value, side in ((-0.05, values.min(), "right"), (1.05, values.max(), "left")):
-            axes.text(x, at, f"{value:.3g}", ha=side, va="center", fontsize=8, color=INK)
-    axes.set_yticks(range(len(keys)), [key.replace(".", ".\n", 1) for key in keys], fontsize=8)
-    axes.tick_params(axis="y", pad=46, length=0)
-    axes.set(
-        xlim=(-0.04, 1.04),
-        ylim=(-0.5, len(keys) - 0.5),
-        xticks=[],
-        title="keys of the best runs, in all that was tried",
-    )
-    axes.invert_yaxis()
-
-
-def _height(values: np.ndarray, row: int) -> float:
-    scaled = np.log(values) if _wide(values) else values
-    return float((scaled[row] - scaled.min()) / (np.ptp(scaled) or 1.0))
 
 
 def _wide(values: np.ndarray) -> bool:
