@@ -20,6 +20,8 @@ from tribodyn.fem.assembly import named_in
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.style import BLUE, RED
+from tribodyn.workflows.run import modelling, sanity_checks
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.draft import draft
 
@@ -119,6 +121,19 @@ def test_the_smallest_scene_has_at_most_fifteen_lines() -> None:
     assert (scene.response.group, scene.response.direction) == ("shaker", (0.0, 1.0, 0.0))
     whole = f'{SMALLEST}group = "response"\ndirection = "x"\n'
     assert scene_file.parse(whole, "small.toml", (), Path()).mesh_scene.response.group == "response"
+
+
+@pytest.mark.parametrize(("direction", "loose"), [("[0, 0, 1]", True), ("[0, 0, -1]", False)])
+def test_a_contact_that_nothing_presses_is_said(direction: str, loose: bool) -> None:
+    press = f'static = {{ press = {{ group = "contact", direction = {direction}, value = "1 kN" }} }}\n'
+    coarse = ("geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=2")
+    for text, said in (
+        (SMALLEST, True),
+        (SMALLEST.replace("[loads.harmonic]", f"[loads]\n{press}[loads.harmonic]"), loose),
+    ):
+        file = scene_file.parse(text, "small.toml", coarse, Path())
+        found = list(sanity_checks.lines(file, modelling.build(file, None, Progress())))
+        assert any("nothing presses" in line for line in found) == said
 
 
 def test_a_plan_draws_the_scene_with_its_contact_supports_and_loads(

@@ -45,13 +45,14 @@ LIMITS = Limits()
 class Candidate:
     """Two faces that may touch: "body.face" of each, least distance [m], share of the smaller one that is near.
 
-    declared : whether the deck has them as a contact pair
+    normal : of the first face, outward; declared : whether the deck has them as a contact pair
     """
 
     first: str
     second: str
     distance: float
     share: float
+    normal: tuple[float, float, float]
     declared: bool = False
 
 
@@ -155,8 +156,8 @@ def _candidates(source: Any) -> Iterator[Candidate]:
             yield pair
 
 
-def _near(one: Any, two: Any, near: float) -> tuple[float, float] | None:
-    """Least distance of two faces [m] and the share of the smaller one that is near; None where they are apart."""
+def _near(one: Any, two: Any, near: float) -> tuple[float, float, Any] | None:
+    """Least distance of two faces [m], share of the smaller one near, normal there; None where they are apart."""
     (centre, normal, wide), (places, normals, widths) = one, two
     _, at = cKDTree(places).query(centre)
     apart = places[at] - centre
@@ -166,7 +167,8 @@ def _near(one: Any, two: Any, near: float) -> tuple[float, float] | None:
     share = good.sum() / min(len(centre), len(places))
     if share < LIMITS.share:
         return None
-    return float(gap[good].min()), float(min(share, 1.0))
+    mean = normal[good].mean(axis=0)
+    return float(gap[good].min()), float(min(share, 1.0)), tuple((mean / np.linalg.norm(mean)).round(3).tolist())
 
 
 def _said(pair: Candidate) -> str:
@@ -211,6 +213,12 @@ def _text(
     held = {name for name, body in source.bodies.items() for s in source.deck.supports if s.group in body.node_sets}
     moved = [*held, *(name for name in source.bodies if name not in held)][-1]
     face = json.dumps(named_in(moved, first_face[moved], source.bodies[moved].node_sets))
+    own = [(pair, end) for pair in candidates for end in (pair.first, pair.second) if end.startswith(f"{moved}.")]
+    if own and not (source.deck.forces or source.deck.pressures):
+        pair, end = own[0]
+        towards = [(1 if end == pair.first else -1) * one + 0.0 for one in pair.normal]
+        yield from ("", "# [loads.static.press]  # presses the faces together: its resultant has to lie between them")
+        yield from (f"# group = {json.dumps(end)}", f"# direction = {towards}", '# value = "1 kN"')
     yield from ("", "[loads.harmonic.drive]  # GUESS", f"group = {face}", 'direction = "x"', 'value = "10 N"')
     yield from (
         "",
