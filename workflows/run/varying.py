@@ -102,11 +102,9 @@ class Varying:
         """The problems a step above and below a value of a key."""
         anew = self._settles or self.anew(key)
         step = (REBUILT if anew or self.follows(key) else STEP) * abs(value)
-        far: tuple[Posed, ...] | None = None
+        far: tuple[Posed, ...] | None = () if self.follows(key) else None
         if anew:
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
-        elif self.follows(key):
-            far = ()
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far)
 
     def posed(self, key: str, value: float) -> Posed:

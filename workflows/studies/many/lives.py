@@ -294,7 +294,7 @@ def _scaling(study: Study) -> list[tuple[str, ...]]:
         return []
     loads = [key for key in keys(scene_file.read(study.scene, study.settings.set).scene) if key.startswith("loads.")]
     moved = {**{key: key for key in study.varied}, **study.settings.same}
-    groups = [(COEFFICIENT,)] if COEFFICIENT in study.varied else []
+    groups: list[tuple[str, ...]] = [(COEFFICIENT,)] if COEFFICIENT in study.varied else []
     if loads and all(key in moved for key in loads):
         groups.append(tuple(dict.fromkeys(moved[key] for key in loads)))
     return groups

@@ -133,7 +133,7 @@ def _search(study: Study, runner: Runner) -> Optimum:
             raise SolveFailed(f"no run has all numbers; the first: {table.columns[SENTENCE][0]}")
         if len(known.share) >= wanted.evaluations:
             break
-        place, gain = propose(known, lambda share: _coordinates(space, share), study.settings.seed)
+        place, gain = propose(known, lambda share: space.coordinates(space.values(share)), study.settings.seed)
         if gain < GAIN:
             break
         more.append(space.run_of(space.values(place[None])[0]))
@@ -164,10 +164,6 @@ def _space(study: Study) -> Space:
         if not np.isfinite(law.at(np.array([0.0, 1.0]))).all():
             raise SceneError(f"{study.name}: vary.{key}: an optimisation needs a range, give low and high")
     return space
-
-
-def _coordinates(space: Space, share: np.ndarray) -> np.ndarray:
-    return space.coordinates(space.values(share))
 
 
 def _known(study: Study, space: Space, table: StudyTable) -> Known:

@@ -89,7 +89,7 @@ def parallel(found: StudyTable, number: str | None = None) -> Figure:
     with axes_of(1.9 * len(names) + 1.6, 4.2) as (figure, axes):
         lines = np.stack([np.broadcast_to(np.arange(len(names)), heights.shape), heights], axis=-1)
         values = found.columns[name][good].astype(float)
-        scale = (LogNorm if _wide(values) else Normalize)(values.min(), values.max())
+        scale = (LogNorm if wide(values) else Normalize)(values.min(), values.max())
         order = np.argsort(values)[::-1]  # the least, which matter most of lives, on top
         axes.add_collection(
             LineCollection(list(lines[order]), colors=colormaps[WEAR_MAP](scale(values[order])), lw=1.1, alpha=0.8)
@@ -115,13 +115,13 @@ def _scaled(column: np.ndarray) -> tuple[np.ndarray, list[tuple[float, str]]]:
         return np.array([at[str(value)] for value in column]), [(at[kind], kind) for kind in kinds]
     if np.ptp(column) == 0:
         return np.full(len(column), 0.5), [(0.5, f"{column[0]:.4g}")]
-    values = np.log(column) if _wide(column) else column
+    values = np.log(column) if wide(column) else column
     low, high = float(values.min()), float(values.max())
     ticks = [(share, low + share * (high - low)) for share in (0.0, 0.5, 1.0)]
-    return (values - low) / (high - low), [(s, f"{np.exp(v) if _wide(column) else v:.3g}") for s, v in ticks]
+    return (values - low) / (high - low), [(s, f"{np.exp(v) if wide(column) else v:.3g}") for s, v in ticks]
 
 
-def _wide(values: np.ndarray) -> bool:
+def wide(values: np.ndarray) -> bool:
     """Whether values spread so far that their logarithms are shown."""
     return bool(values.min() > 0 and values.max() > WIDE_SCALE * values.min())
 

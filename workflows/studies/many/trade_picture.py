@@ -10,13 +10,11 @@ from matplotlib.ticker import MaxNLocator
 
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE
-from tribodyn.workflows.studies.many.pictures import SHOWN
+from tribodyn.workflows.studies.many.pictures import SHOWN, wide
 from tribodyn.workflows.studies.many.table import RUN
 
 if TYPE_CHECKING:
     from tribodyn.workflows.studies.many.optimum import Optimum
-
-WIDE = 10.0  # largest over least value, from which on an axis is logarithmic
 
 
 def picture(found: Optimum) -> Figure:
@@ -39,7 +37,7 @@ def _trade(found: Optimum, axes: Any) -> None:
         axes.plot(x[open_], y[open_], "^", mfc="none", color=INK, ms=10, zorder=4, label="not lost by then: at least")
     axes.plot(x[found.best], y[found.best], "*", color=ORANGE, ms=17, zorder=5, label="nearest to the best of both")
     for axis, values in ((axes.set_xscale, x), (axes.set_yscale, y)):
-        if _wide(values):
+        if wide(values[np.isfinite(values)]):
             axis("log")
     axes.set(xlabel=_label(found, 0), ylabel=_label(found, 1), title=f"{found.name}: {len(x)} runs")
     axes.legend(fontsize=8, frameon=True)
@@ -51,15 +49,10 @@ def _progress(found: Optimum, axes: Any) -> None:
     runs = found.table.columns[RUN]
     axes.plot(runs, values, "o", color=GREY, ms=4, label="runs")
     axes.plot(runs[found.best], values[found.best], "*", color=ORANGE, ms=17, label="best that keeps the limits")
-    if _wide(values):
+    if wide(values[np.isfinite(values)]):
         axes.set_yscale("log")
     axes.set(xlabel="run", ylabel=_label(found, 0), title=f"{found.name}: {len(values)} runs")
     axes.legend(fontsize=8, frameon=True)
-
-
-def _wide(values: np.ndarray) -> bool:
-    good = values[np.isfinite(values)]
-    return bool(len(good) and good.min() > 0 and good.max() > WIDE * good.min())
 
 
 def _label(found: Optimum, at: int) -> str:
