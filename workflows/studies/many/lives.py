@@ -273,10 +273,8 @@ class _Fit:
         surrogate = Surrogate.fitted(points, numbers, None if laws else slopes, tuple(laws))
         alone = [law for group, law in zip(scaled, laws, strict=True) if len(group) == 1][:1]
         share = np.repeat(((np.arange(RATIOS) + 0.5) / RATIOS)[:, None], len(space.keys), axis=1)
-        likely = space.coordinates(space.values(share))
-        runs, by_ratio = table.columns["run"][good], (np.zeros(len(points)), np.zeros(1))
-        if alone:
-            by_ratio = alone[0].known(points), alone[0].known(likely)
+        likely, runs = space.coordinates(space.values(share)), table.columns["run"][good]
+        by_ratio = (alone[0].known(each) if alone else np.zeros(1) for each in (points, likely))
         return cls(
             space, surrogate, runs <= drawn, asked if runs.max() > drawn + len(groups) + 1 else None, logarithmic,
             float(np.min(bounds, initial=np.inf, where=open_)), int(open_.sum()), int(good.sum()),

@@ -94,7 +94,8 @@ def counted(
     """
     thinned = sample.mean[:: max(len(sample.mean) // GRID, 1)]
     at = np.unique(np.concatenate([thinned, values.ravel(), said.ravel()]))
-    off = np.array([_share(own, at) - _share(others, at) for own, others in zip(values, said, strict=True)])
+    own, others = (np.array([np.searchsorted(np.sort(x), at, side="right") for x in each]) for each in (values, said))
+    off = (own - others) / values.shape[1]  # runs x values
     below = np.interp(at, sample.mean, np.cumsum(sample.weight)) + off.mean(axis=0)
     width = stats.norm.ppf(0.5 + confidence / 2) * off.std(axis=0, ddof=1) / np.sqrt(len(values))
     low = high = int(np.argmax(below >= share))
@@ -103,11 +104,6 @@ def counted(
     while high < len(at) - 1 and below[high] - width[high] <= share:
         high += 1
     return float(at[low]), float(at[high])
-
-
-def _share(values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Share of values (m,) that lie at or below each of others."""
-    return np.searchsorted(np.sort(values), at, side="right") / len(values)
 
 
 def next_runs(sample: Sample, surrogate: Surrogate, share: float, count: int) -> np.ndarray:
