@@ -153,14 +153,15 @@ class Posed:
 class Change:
     """A parameter p of some name: the problem a step above and a step below it.
 
-    twice : the same by two steps, for a difference of order four, which a system near its own resonance needs
+    twice : where p acts on the structure, whose changes have no corners: the same by two steps, for a difference of
+        order four, which a system near its own resonance needs; none of these where the model moves linearly
     """
 
     name: str
     step: float
     above: Posed
     below: Posed
-    twice: tuple[Posed, Posed] | None = None
+    twice: tuple[Posed, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -395,8 +396,8 @@ class Gradient:
         """One-sided derivatives of the quantities above and below a parameter, both (n_quantity,)."""
         sides = (change.above, change.below, *(change.twice or ()))
         up, down, *far = (self.moves_to(side).sum(axis=1) + self.structure_to(side) for side in sides)
-        if far:  # no corner is looked for within so long a step
-            up = (8 * (up - down) - (far[0] - far[1])) / 12
+        if change.twice is not None:
+            up = (8 * (up - down) - (far[0] - far[1])) / 12 if far else (up - down) / 2
             down = -up
         return up / change.step, -down / change.step
 

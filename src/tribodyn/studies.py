@@ -23,7 +23,6 @@ from tribodyn.workflows.studies.measured.compare import Compared, compare
 from tribodyn.workflows.studies.supports import Supports, supports
 from tribodyn.workflows.studies.surfaces import FaceAsperities, asperities
 from tribodyn.workflows.studies.trades import Traded, trade
-from tribodyn.workflows.studies.variation import Variation, vary
 from tribodyn.workflows.studies.verification import Comparison
 from tribodyn.workflows.studies.worn_states import WornStates, verify_states
 
@@ -47,7 +46,6 @@ __all__ = [
     "Supports",
     "Track",
     "Traded",
-    "Variation",
     "WornStates",
     "asperities",
     "backbone",
@@ -65,6 +63,5 @@ __all__ = [
     "supports",
     "track",
     "trade",
-    "vary",
     "verify_states",
 ]

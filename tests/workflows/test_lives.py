@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +16,13 @@ from scipy import stats
 
 import tribodyn as td
 from tests.helpers.command import leave
-from tribodyn.workflows.studies.many import design, pictures, pool, quantiles, sensitivity, study_file
+from tribodyn.workflows.studies.many import design, pool, quantiles, study_file
 from tribodyn.workflows.studies.many import study as studies
 from tribodyn.workflows.studies.many.quantiles import Sample
 from tribodyn.workflows.studies.many.sensitivity import influences
 from tribodyn.workflows.studies.many.space import Space
-from tribodyn.workflows.studies.many.surrogate import Level, Surrogate
+from tribodyn.workflows.studies.many.surrogate import Surrogate, covariance
 from tribodyn.workflows.studies.many.task import Row, Task
-
-pytest.importorskip("sklearn")
 
 PRESS, FRICTION, DAMPING = "loads.static.press.value", "contact.friction", "damping.modal"
 VARY = {
@@ -39,7 +38,7 @@ MEDIAN = 1e8
 def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """They take longer than all the rest."""
     if "command" not in request.node.name:
-        monkeypatch.setattr(studies, "draw", lambda study, found, folder: None)
+        monkeypatch.setattr(studies, "draw", lambda found, folder: None)
         monkeypatch.setattr(td.studies.Lives, "plot", lambda self: Figure())
 
 
@@ -133,7 +132,7 @@ def test_counting_holds_a_quantile_beside_a_jump_that_the_surrogate_smooths() ->
         truth = float(np.quantile(jumps(of.draw(15, seed=99)[0]), 0.5))
         low, high = np.quantile(quantiles.drawn(sample, surrogate, 0.5), [0.05, 0.95])
         inside["surrogate"] += low <= truth <= high
-        low, high = quantiles.counted(sample, *surrogate.runs, 0.5, 0.9)
+        low, high = quantiles.counted(sample, surrogate.values[:, None], surrogate.left_out[:, None], 0.5, 0.9)
         inside["counted"] += low <= truth <= high
     assert inside["counted"] >= 7 > inside["surrogate"]
 
@@ -189,25 +188,42 @@ def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypa
     assert again.quantiles[0] == found.quantiles[0]
 
 
-def test_few_full_runs_correct_many_cheap_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def life(values: dict[str, float], task: Task) -> dict[str, float]:
-        friction = math.log(values[FRICTION] / 0.5)
-        bend = math.exp(math.sin(25 * friction))  # what only many runs see
-        cheap = "harmonics.samples=32" in task.overrides
-        return {"life_cycles": lasts(values) * bend * (0.7 * math.exp(friction) if cheap else 1.0)}
+def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A life that jumps with friction and damping alone, times powers of loads and wear coefficient."""
+    shake, wear = "loads.harmonic.shake.value", "wear.coefficient"
+    vary = VARY | {
+        shake: {"distribution": "normal", "mean": "10 kN", "cov": "5 %"},
+        wear: {"distribution": "lognormal", "median": "2e3 um3/J", "cov": "30 %"},
+    }
 
-    monkeypatch.setattr(pool, "finished", engine(life))
-    both = {"model_error": 0, "cheap": ["harmonics.samples=32"], "cheap_runs": 96}
-    one = td.studies.lives(study(runs=16, lives={"model_error": 0}), tmp_path / "one")
-    two = td.studies.lives(study(runs=16, lives=both), tmp_path / "two")
-    assert (two.runs, two.cheap_runs) == (16, 96)
-    of = space(study())
-    many = of.draw(17, seed=99)[0]
-    lives = [lasts(of.run_of(x)) * math.exp(math.sin(25 * math.log(x[0] / 0.5))) for x in many[:20000]]
-    truth = float(np.quantile(lives, 0.1))
-    errors = [abs(math.log(each.quantiles[0].value / truth)) for each in (one, two)]
-    assert errors[1] < 0.03
-    assert errors[1] < 0.5 * errors[0]
+    def life(x: dict[str, float], powers: tuple[float, float]) -> float:
+        ratio = math.log(x[shake] / x[PRESS] * 2)
+        jump = 1.5 * (math.log(x[FRICTION] / 0.5) - ratio > 0.05)
+        whole = MEDIAN * math.exp(jump - 3 * ratio) * (2e-15 / x[wear]) ** powers[0]
+        return whole * (20e3 / x[PRESS]) ** powers[1]
+
+    def runs(powers: tuple[float, float]) -> Any:
+        def finished(tasks: Sequence[Task], workers: int, solve: Any) -> Iterator[Row]:
+            for task in tasks:
+                said = dict(text.split("=", 1) for text in task.overrides)
+                numbers = {"life_cycles": life({key: float(said[key]) for key in vary}, powers)}
+                yield Row(task.number, task.key, "complete", "told", numbers)
+
+        return finished
+
+    of = space(study(vary))
+    tables = study(vary, runs=45, lives={"model_error": 0})
+    for powers, scaled in (((1.0, 1.0), 2), ((1.0, 1.2), 1)):
+        monkeypatch.setattr(pool, "finished", runs(powers))
+        found = td.studies.lives(tables, tmp_path / str(scaled))
+        assert len(found.scaled) == scaled
+        assert found.runs == 48
+        if scaled == 2:
+            assert found.scaled == ((wear,), (PRESS, shake))
+            truth = float(np.quantile([life(of.run_of(x), powers) for x in of.draw(14, seed=99)[0]], 0.1))
+            assert found.quantiles[0].value == pytest.approx(truth, rel=0.05)
 
 
 def test_missing_runs_widen_what_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -250,38 +266,58 @@ def test_indices_of_correlated_variables_are_those_of_a_linear_function() -> Non
     assert found["b"].total == pytest.approx((1 - 0.36) / variance, abs=0.01)
 
 
-def test_a_study_of_lists_has_the_indices_of_its_box(tmp_path: Path) -> None:
-    lists = {"a": [1.0, 2.0, 3.0, 4.0], "b": [0.0, 0.5, 1.0, 1.5]}
-    tables = {"study": {"scene": "beam", "design": "grid"}, "vary": lists}
-    read = study_file.parse(tables, "mine.toml", Path())
-    rows = design.runs(read)
-    a, b = (np.array([row[key] for row in rows]) for key in "ab")
-    columns = {"run": np.arange(1, 17), "status": np.full(16, "complete", dtype=object), "a": a, "b": b}
-    table = td.studies.StudyTable("mine", columns | {"peak_hz_first": np.exp(a + 2 * b)}, ("a", "b"))
-    told = sensitivity.indices(Space.of(read, lists=True), table)
-    found = {one.key: one.first for one in told["peak_hz_first"][1]}
-    whole = 3.0**2 + (2 * 1.5) ** 2  # variance of a linear function of uniform variables
-    assert found == pytest.approx({"a": 9 / whole, "b": 9 / whole}, abs=0.01)
-    pictures.sensitivities("mine", told).savefig(tmp_path / "mine.png")
-    texts = {"study": {"scene": "beam", "design": "grid"}, "vary": {"a": ["x", "y"]}}
-    with pytest.raises(td.SceneError, match=r"vary.a: expected a distribution"):
-        Space.of(study_file.parse(texts, "mine.toml", Path()), lists=True)
-
-
 def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:
     of, log_life = planted(1)
     points = of.draw(5)[0]
     coordinates, values = of.coordinates(points), log_life(points)
-    level = Level.fitted(coordinates, values)
-    kernel = level.regression.kernel_
-    missed = []
-    for i in range(len(values)):
-        rest = np.arange(len(values)) != i
-        own = kernel(coordinates[rest])
-        across = kernel(coordinates[[i]], coordinates[rest])
-        scaled = (values - level.middle) / level.width
-        missed.append(scaled[i] - (across @ np.linalg.solve(own, scaled[rest]))[0])
-    assert level.explained == pytest.approx(1 - np.mean(np.square(missed)), abs=1e-6)
+    slopes = np.full(coordinates.shape, np.nan)
+    slopes[::3, 1] = 0.3  # of some runs, by one coordinate
+    for given in (None, slopes):
+        level = Surrogate.fitted(coordinates, values, given)
+        missed = []
+        for i in range(len(values)):
+            rest = np.arange(len(values)) != i
+            others = replace(level, points=coordinates[rest], values=values[rest], slopes=level.slopes[rest])
+            missed.append(values[i] - others.mean(coordinates[[i]])[0])
+        np.testing.assert_allclose(values - level.left_out, missed, atol=1e-6)
+
+
+def test_covariances_of_derivatives_are_derivatives_of_covariances() -> None:
+    draw = np.random.default_rng(0)
+    a, b, log, h = (
+        draw.standard_normal((4, 2)),
+        draw.standard_normal((3, 2)),
+        np.array([0.3, -1.0, -9, 0.2, -0.4]),
+        1e-5,
+    )
+
+    def of(a: np.ndarray, i: int, b: np.ndarray, j: int) -> np.ndarray:
+        return covariance(log, a, np.full(4, i), b, np.full(3, j))
+
+    for i in range(2):
+        step = h * np.eye(2)[i]
+        for j in (-1, 0, 1):
+            by_a, by_b = (
+                of(a + step, -1, b, j) - of(a - step, -1, b, j),
+                of(a, j, b + step, -1) - of(a, j, b - step, -1),
+            )
+            np.testing.assert_allclose(of(a, i, b, j), by_a / (2 * h), atol=1e-8)
+            np.testing.assert_allclose(of(a, j, b, i), by_b / (2 * h), atol=1e-8)
+
+
+def test_runs_with_derivatives_say_as_much_as_three_times_as_many() -> None:
+    of, log_life = planted(2)
+    many = of.draw(10, seed=9)[0]
+
+    def error(runs: int, slopes: bool) -> float:
+        points = of.coordinates(of.draw(6)[0][:runs])
+        back = lambda c: of.values(stats.norm.cdf(c))  # noqa: E731
+        step = 1e-6 * np.eye(4)
+        by = np.stack([(log_life(back(points + s)) - log_life(back(points - s))) / 2e-6 for s in step], axis=1)
+        found = Surrogate.fitted(points, log_life(back(points)), by if slopes else None)
+        return float(np.std(found.mean(of.coordinates(many)) - log_life(many)))
+
+    assert error(16, True) < error(48, False)
 
 
 @pytest.mark.parametrize(
@@ -289,7 +325,6 @@ def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:
     [
         ({"lives": {"number": "lifes"}}, 'has no number "lifes": there are life_cycles'),
         ({"lives": {"shares": [1.5]}}, "lives.shares"),
-        ({"lives": {"cheap_runs": 3}}, "say in lives.cheap what makes a run cheap"),
         ({"vary": VARY | {"damping.modal": [0.01, 0.02]}}, "vary.damping.modal: expected a distribution"),
         ({"study": {"scene": "beam", "design": "list"}, "vary": {FRICTION: [0.5]}}, "lives are drawn"),
     ],

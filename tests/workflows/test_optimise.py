@@ -14,14 +14,12 @@ import tribodyn as td
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import study_file
-from tribodyn.workflows.studies.many.proposal import Known, best_trades, propose
 from tribodyn.workflows.studies.many.table import StudyTable
 from tribodyn.workflows.studies.many.task import numbers_of
-
-pytest.importorskip("sklearn")
+from tribodyn.workflows.studies.many.trades import Known, best_trades, propose
 
 LINEAR = {
-    "scene": "beam", "design": "sobol", "runs": 8, "seed": 3,
+    "scene": "beam", "design": "sobol", "runs": 3, "seed": 3,
     "set": ["geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=3", "wear=",
             "harmonics.kept=[0, 1]", "response.points=16", "response.frequency=['1700 Hz', '2600 Hz']",
             "contact.friction=50"],
@@ -29,13 +27,24 @@ LINEAR = {
 FORCE, DAMPING = "loads.harmonic.shake.value", "damping.modal"
 
 
-def searched(aims, excess, count, seed=0):
-    """Runs of functions of the unit square, from eight points on, two at a time."""
-    share = qmc.Sobol(2, seed=seed).random(8)
+def searched(aims, excess, first, count, slopes=True):
+    """Runs of functions of the unit square, with their derivatives or without, until nothing is to be gained."""
+    share = qmc.Sobol(2, seed=0).random(8)[:first]
+
+    def known():
+        def both(s):
+            return np.concatenate([aims(s), excess(s)], axis=1)
+
+        by = np.stack([(both(share + h) - both(share - h)) / 8e-6 for h in 1e-6 * np.eye(2)], axis=2)
+        m = aims(share).shape[1]
+        return Known(share, both(share)[:, :m], both(share)[:, m:], by if slopes else np.full(by.shape, np.nan))
+
     while len(share) < count:
-        known = Known(share, aims(share), excess(share))
-        share = np.vstack([share, propose(known, lambda s: 4 * (s - 0.5), 2, seed)])
-    return Known(share, aims(share), excess(share))
+        place, gain = propose(known(), lambda s: 4 * (s - 0.5), 0)
+        if gain < 1e-3:
+            break
+        share = np.vstack([share, place])
+    return known()
 
 
 def test_best_trades_are_those_that_none_beats() -> None:
@@ -59,11 +68,13 @@ def test_two_aims_come_to_their_known_trade() -> None:
         f = rows[best_trades(rows, (rows < 1.2).all(axis=1))]
         return float(np.sum((np.append(f[1:, 0], 1.2) - f[:, 0]) * (1.2 - f[:, 1])))
 
-    found = searched(aims, lambda s: np.zeros((len(s), 0)), 16)
     whole = 1.2 * 1.2 - 1 / 6
-    assert dominated(found.aims[:8]) < 0.75 * whole
-    assert 0.9 * whole < dominated(found.aims) < whole
-    assert np.sort(np.abs(found.share[8:, 1] - 0.3))[4] < 0.02
+    none = lambda s: np.zeros((len(s), 0))  # noqa: E731
+    by_values, by_slopes = searched(aims, none, 8, 16, slopes=False), searched(aims, none, 3, 12)
+    assert dominated(by_values.aims[:8]) < 0.75 * whole
+    assert 0.85 * whole < dominated(by_values.aims) < whole
+    assert 0.9 * whole < dominated(by_slopes.aims) < whole
+    assert np.sort(np.abs(by_slopes.share[3:, 1] - 0.3))[4] < 0.02
 
 
 def test_a_limit_is_kept_and_failed_runs_are_not_followed() -> None:
@@ -72,11 +83,13 @@ def test_a_limit_is_kept_and_failed_runs_are_not_followed() -> None:
     def aims(s):
         return np.where(s[:, :1] > 0.8, np.nan, s.sum(axis=1, keepdims=True))
 
-    found = searched(aims, lambda s: 0.25 - s.prod(axis=1, keepdims=True), 18)
-    best = found.front[0]
-    assert found.excess[best] <= 0
-    assert found.aims[best, 0] == pytest.approx(1.0, abs=0.03)
-    np.testing.assert_allclose(found.share[best], 0.5, atol=0.15)
+    for first, slopes, most in ((8, False, 18), (4, True, 9)):
+        found = searched(aims, lambda s: 0.25 - s.prod(axis=1, keepdims=True), first, 18, slopes)
+        best = found.front[0]
+        assert found.excess[best] <= 0
+        assert found.aims[best, 0] == pytest.approx(1.0, abs=2e-3)
+        np.testing.assert_allclose(found.share[best], 0.5, atol=0.05)
+        assert len(found.share) <= most
 
 
 def tables(**more):
@@ -89,7 +102,7 @@ def tables(**more):
 def test_the_linear_scene_comes_to_its_corner_and_resumes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Least amplitude of a linear structure: least force and most damping; the command and Python say the same."""
     file, folder = tmp_path / "corner.toml", tmp_path / "found"
-    file.write_text(tomli_w.dumps(tables(finer=["harmonics.kept=[0, 1, 2]"])), encoding="utf-8")
+    file.write_text(tomli_w.dumps(tables()), encoding="utf-8")
     cli.app(
         ["study", "optimise", str(file), "--workers", "1", "--out", str(folder), "--json"], result_action="return_value"
     )
@@ -100,12 +113,10 @@ def test_the_linear_scene_comes_to_its_corner_and_resumes(tmp_path: Path, capsys
     assert found.record() == said == json.loads((folder / "optimum.json").read_text(encoding="utf-8"))
     assert (folder / "rows.jsonl").read_text(encoding="utf-8") == rows
     keys, amplitude = found.keys(found.best), found.values(found.best)["peak_m_first"]
-    assert keys[FORCE] == pytest.approx(10.0, rel=0.05)
-    assert keys[DAMPING] == pytest.approx(0.02, rel=0.05)
+    assert keys[FORCE] == pytest.approx(10.0, rel=1e-3)
+    assert keys[DAMPING] == pytest.approx(0.02, rel=1e-3)
     assert amplitude == found.table.columns["peak_m_first"].min()
-    (check,) = found.checked
-    assert check.again["peak_m_first"] == pytest.approx(amplitude, rel=1e-4)
-    assert check.keeps is True
+    assert len(found.table.columns["run"]) <= 6  # each with its derivatives
 
 
 def test_a_response_that_is_highest_at_its_end_has_no_peak_to_win_with() -> None:

@@ -21,7 +21,6 @@ from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
 
 pytest.importorskip("emcee")
-pytest.importorskip("sklearn")
 
 SLOPES = np.array([[1.0, 0.5], [-0.4, 1.5], [0.8, 0.8]])  # d ln(number) / d ln(parameter)
 ERRORS = np.array([0.05, 0.08, 0.05])

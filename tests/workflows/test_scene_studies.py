@@ -1,4 +1,4 @@
-"""Studies of any scene: one change at a time, supports; on the beam, which none of them was made for."""
+"""Supports of any scene; on the beam, which they were not made for."""
 
 from __future__ import annotations
 
@@ -9,13 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tribodyn as td
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.errors import cost
-from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import variation
 from tribodyn.workflows.studies.supports import support_work
 
 TINY = (
@@ -35,45 +31,6 @@ def words(*said: str, sets: tuple[str, ...] = TINY) -> list[str]:
 
 def call(said: list[str]) -> None:
     cli.app(said, result_action="return_value")
-
-
-def test_each_change_is_made_alone_and_none_stops_the_others(capsys: pytest.CaptureFixture[str]) -> None:
-    changes = ("contact.friction=1", "damping.modal=4 %", "damping.modal=4 %; contact.friction=0.4")
-    with pytest.raises(ValueError, match="max_steps"):
-        td.studies.vary("beam", (*changes, "response.options.max_steps=0"), overrides=TINY)
-    call([*words("study", "vary", "beam"), *(word for change in changes for word in ("--change", change)), "--json"])
-    own, stuck, damped, both = json.loads(capsys.readouterr().out)
-    assert "the resonance peak of response has moved beyond 1200 Hz" in stuck["outcome"]
-    direct = cost.measure(scene_file.read("beam", (*TINY, "damping.modal=4 %", "contact.friction=0.4")))
-    assert both["peak_m"] == direct.values["peak_m"]
-    assert damped["peak_m"] < own["peak_m"]
-    assert own["outcome"] == "converged"
-
-
-def test_a_number_is_fitted_again_for_every_change() -> None:
-    """The softer beam needs another load to have the same static force in its contact."""
-    load = {"keys": ["loads.static.press.value"], "low": "5 kN", "high": "40 kN"}
-    task = {"parameters": {"load": load}, "measured": {"force": {"of": "preload", "value": "6 kN"}}}
-    found = td.studies.vary("beam", ["geometry.length=220 mm"], fit=task, overrides=TINY)
-    rows = found.rows
-    assert [row.outcome for row in rows] == ["converged"] * 2
-    loads = [float(row.fitted[0].partition("=")[2].split()[0]) for row in rows]
-    assert loads[0] != pytest.approx(loads[1], rel=1e-3)
-    assert sum("(fitted: loads.static.press.value=" in line for line in found.lines()) == 2
-
-
-def test_a_failed_change_has_a_row_that_says_why() -> None:
-    def ask(file: scene_file.SceneFile) -> tuple[dict[str, float | None], str]:
-        if file.scene.contact.friction == 1.0:
-            raise RuntimeError("no solution at 400 Hz")
-        return {"answer": file.scene.contact.friction}, "converged"
-
-    changes = ["contact.friction=1", "contact.friction=0.2"]
-    found = variation.each("beam", changes, TINY, None, Progress(), ask)
-    rows = found.rows
-    assert [row.values.get("answer") for row in rows] == [0.5, None, 0.2]
-    assert rows[1].outcome == "no solution at 400 Hz"
-    assert "(-60 %)" in found.lines()[3]
 
 
 def test_work_of_a_support_in_closed_form() -> None:

@@ -15,7 +15,6 @@ from tribodyn.workflows.studies.many.study import grid
 from tribodyn.workflows.studies.measured.compare import compare
 from tribodyn.workflows.studies.supports import supports
 from tribodyn.workflows.studies.trades import trade
-from tribodyn.workflows.studies.variation import vary
 
 app = App(name="study")
 app.command(word(grid, "study grid"))
@@ -23,7 +22,6 @@ app.command(word(lives, "study lives"))
 app.command(word(optimise, "study optimise"))
 app.command(word(identify, "study identify"))
 app.command(word(posterior, "study posterior", into="asked"))
-app.command(word(vary, "study vary"))
 app.command(word(derivatives, "study derivatives"))
 app.command(word(converge, "study converge"))
 app.command(word(trade, "study trade"))

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,8 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.contact.joint import Contact
 from tribodyn.hbm.derivatives import Change, Posed
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.relative import body_1_dofs, relative
+from tribodyn.reduction.sensitivity import Sensitivity
 from tribodyn.workflows.run import joints, matrix_model, modelling, part_reduction
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.loads import KINDS
@@ -22,7 +27,8 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 STEP = 1e-5  # relative, of a number that acts on contact, loads or damping alone
-REBUILT = 1e-3  # the same of one with which the model is reduced anew, whose rounding is larger
+REBUILT = 1e-3  # the same of a number of the structure, whose rounding is larger
+STRUCTURAL = ("material.", "materials.", "springs.")
 OF_CONTACT = ("tangential_stiffness", "normal_stiffness")
 
 
@@ -78,6 +84,7 @@ class Varying:
         self.part, self.plain = part, plain
         self.model = modelling.make_model(self.scene, part, reduced)
         self.own = Posed.of(self.model.balance)
+        self._ways: dict[str, SecondOrderSystem] = {}  # key -> what the reduced model moves by where it doubles
 
     @staticmethod
     def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
@@ -86,11 +93,11 @@ class Varying:
 
     def change(self, key: str, value: float) -> Change:
         """The problems a step above and below a value of a key."""
-        if self._settles or self.anew(key):
-            step = REBUILT * abs(value)
+        anew = self._settles or self.anew(key)
+        step = (REBUILT if anew or self.follows(key) else STEP) * abs(value)
+        far: tuple[Posed, ...] | None = () if self.follows(key) else None
+        if anew:
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
-        else:
-            step, far = STEP * abs(value), None
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far)
 
     def posed(self, key: str, value: float) -> Posed:
@@ -99,6 +106,8 @@ class Varying:
         scene, part, plain = file.scene, self.part, self.plain
         if self._scales(key):
             plain = _scaled(plain, key.rpartition(".")[2], value / keys(self.scene)[key])
+        elif self.follows(key):
+            plain = self._followed(key, value)
         elif self.anew(key):
             part, plain = self._made(file)
         reduced = self.own.model
@@ -112,6 +121,8 @@ class Varying:
         base = None
         if isinstance(scene, MeshScene) and part is not None:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
+        if self.follows(key) and np.array_equal(reduced.interface.B, self.own.model.interface.B):
+            reduced = replace(reduced, interface=self.own.model.interface)  # the same coordinates
         contact = Contact.of(reduced, joints.make_joints(scene, plain))
         return Posed(reduced, contact, joints.excite(scene, base), self.own.memory)
 
@@ -127,10 +138,56 @@ class Varying:
 
     def anew(self, key: str) -> bool:
         """Whether the model is reduced anew: the stress of a part that spins is that of its contact at rest."""
-        if self._scales(key):
-            return False
         of_stress = ("contact.", "contacts.", "loads.static.") if self._spins else ()
-        return key.startswith(("material.", "materials.", "springs.", "wheel.", *of_stress))
+        structural = key.startswith((*STRUCTURAL, "wheel.", *of_stress))
+        return structural and not self._scales(key) and not self.follows(key)
+
+    def follows(self, key: str) -> bool:
+        """Whether the reduced matrices follow the full ones, which are linear in it."""
+        return key.startswith(STRUCTURAL) and not self._scales(key) and self._sensitivity is not None
+
+    @cached_property
+    def _sensitivity(self) -> Sensitivity | None:
+        """None where the model is no plain reduction by Craig and Bampton of a part that stands still."""
+        part, plain = self.part, self.plain
+        if part is None or plain.basis is None or plain.info.masters is None or len(part.held):
+            return None
+        if plain.per_harmonic is not None or plain.info.n_interface_modes is not None or plain.residual is not None:
+            return None
+        if part.system.gyroscopic is not None:
+            return None
+        shapes = plain.basis
+        if self.file.mesh_scene.reduction.relative:
+            shapes = shapes.copy()
+            shapes[body_1_dofs(part.interface).ravel()] = part.interface.B @ plain.basis
+        return Sensitivity(self._coordinates(part), plain, shapes)
+
+    def _coordinates(self, part: Part) -> SecondOrderSystem:
+        """The full system in the coordinates that it is reduced in."""
+        moves = self.file.mesh_scene.reduction.relative
+        return relative(part.system, part.interface)[0] if moves else part.system
+
+    def _followed(self, key: str, value: float) -> ReducedModel:
+        """The reduced model with another value of a key that it follows."""
+        own, part, following = keys(self.scene)[key], self.part, self._sensitivity
+        assert part is not None
+        assert following is not None
+        if key not in self._ways:
+            self._ways[key] = following.towards(self._coordinates(self._doubled(key, 2 * own, part)))
+        return following.moved(self._ways[key], value / own - 1)
+
+    def _doubled(self, key: str, value: float, part: Part) -> Part:
+        """The part with another value of a key; nothing is assembled for a spring."""
+        twice, scene = self.file.changed(f"{key}={value!r}"), self.scene
+        if isinstance(scene, PartScene) and key.startswith("springs."):
+            spring = modelling.springs(scene)[list(scene.springs).index(key.split(".")[1])]
+            added = spring.matrix(part.mesh, part.node_sets)[part.free][:, part.free]
+            return replace(part, system=replace(part.system, stiffness=part.system.stiffness + added))
+        mesh, node_sets = part.mesh, dict(part.node_sets)
+        if not isinstance(scene, PartScene):  # its mesh has the materials
+            with TemporaryDirectory() as folder:
+                mesh, node_sets = modelling.make_mesh(twice, Path(folder))
+        return modelling.make_part(twice.mesh_scene, mesh, node_sets, twice.folder)
 
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm import derivatives as exact
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.derivatives import Derivatives, NoDerivative
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.figures import axes_of, named
@@ -23,9 +24,12 @@ from tribodyn.workflows.run.varying import Varying, keys
 from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.wear import Place
 from tribodyn.workflows.studies.files import write_files
 
 SHOWN = 12  # parameters in the picture
+OF_ROWS = {"peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
+Slopes = dict[tuple[str, str], float]
 UNITS = {"frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3"}
 MICROMETRE = 1e-6
 
@@ -167,25 +171,15 @@ def of_scene(file: SceneFile, at: float | None, only: tuple[str, ...], report: A
         raise SceneError(f"{unknown[0]} is no number that a response depends on: these are {', '.join(known)}")
     wanted = {key: value for key, value in known.items() if not only or key in only}
     varying = Varying(file, report)
-    balance, options = varying.model.balance, settings.newton_options(file.scene)
+    balance = varying.model.balance
     clock = process_time()
     with report.track("frequency response") as advance:
         branch = curve.follow_response(file.scene, balance, advance)
     pipeline.check_branch(branch)
     solved = process_time()
-    height = np.where(branch.converged, branch.amplitude(settings.OUTPUT), -1.0)
-    near = int(np.argmax(height)) if at is None else int(np.argmin(np.abs(branch.frequency - at)))
-    x = branch.contact[near].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
-    state = balance.evaluate(branch.omega[near] if at is None else 2 * np.pi * at, x)
     with report.track("derivatives") as advance:
-        changes = []
-        for i, (key, value) in enumerate(wanted.items()):
-            advance(i / (len(wanted) + 1), key)
-            changes.append(varying.change(key, value))
-        take = exact.at_peak if at is None else exact.at_frequency
-        worn = wear_run.coefficients(file.scene)
         try:
-            found = take(balance, state, settings.OUTPUT, changes, worn, options)
+            found = _found(varying, branch, at, wanted, advance)
         except NoDerivative as reason:
             raise SolveFailed(f"{file.name} has no derivatives here: {reason}") from None
     return ResponseDerivatives(
@@ -197,3 +191,50 @@ def of_scene(file: SceneFile, at: float | None, only: tuple[str, ...], report: A
         process_time() - solved,
         tuple(key for key in wanted if varying.anew(key)),
     )
+
+
+def _found(
+    varying: Varying,
+    branch: Branch,
+    at: float | None,
+    wanted: Mapping[str, float],
+    advance: Callable[[float, str], None],
+) -> Derivatives:
+    """At a frequency [Hz], or along the highest peak of a response; wanted : key -> value."""
+    balance, scene = varying.model.balance, varying.scene
+    height = np.where(branch.converged, branch.amplitude(settings.OUTPUT), -1.0)
+    near = int(np.argmax(height)) if at is None else int(np.argmin(np.abs(branch.frequency - at)))
+    x = branch.contact[near].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    state = balance.evaluate(branch.omega[near] if at is None else 2 * np.pi * at, x)
+    changes = []
+    for i, (key, value) in enumerate(wanted.items()):
+        advance(i / (len(wanted) + 1), key)
+        changes.append(varying.change(key, value))
+    take = exact.at_peak if at is None else exact.at_frequency
+    return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), settings.newton_options(scene))
+
+
+def of_summary(varying: Varying, response: Branch, numbers: Mapping[str, float], wanted: Sequence[str]) -> Slopes:
+    """Derivatives of the numbers of a finished run by some keys of its scene, as far as these are exact.
+
+    numbers : of the row of a study; those of its first state have derivatives
+    Returns (number, key) -> d number / d key, SI units; empty where the first state has no derivatives
+    """
+    scene, known = varying.scene, keys(varying.scene)
+    slopes: dict[tuple[str, str], float] = {}
+    of_gap = {("contact.gap" if name == "contact" else f"contacts.{name}.gap"): name for name in scene.joints}
+    places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
+    own = {key: known[key] for key in wanted if key in known}
+    if len(places) > 1 or places[0].peak not in (None, 1.0) or not (own or of_gap.keys() & set(wanted)):
+        return slopes
+    try:
+        found = _found(varying, response, places[0].frequency, own, lambda done, text: None)
+    except NoDerivative:
+        return slopes
+    by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}
+    rows = {joint.name: joint.rows for joint in varying.model.balance.contact.joints}
+    by |= {key: found.by_gap[:, rows[name]].sum(axis=1) for key, name in of_gap.items() if key in wanted}
+    for number, name in OF_ROWS.items():
+        if number in numbers and name in found.names:
+            slopes |= {(number, key): float(column[found.names.index(name)]) for key, column in by.items()}
+    return slopes

@@ -23,7 +23,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 from tribodyn.workflows.studies.many.distributions import Marginal
-from tribodyn.workflows.studies.many.surrogate import Level
+from tribodyn.workflows.studies.many.surrogate import Surrogate
 
 WALKERS = 96
 STEPS = 500  # of every walker, a third of which is left out
@@ -246,13 +246,13 @@ class _Trials:
         if 2 * self.failed > self.count:
             raise SolveFailed(f"{self.failed} of {self.count} trials fail: narrow the bounds; the last: {self._why}")
 
-    def levels(self) -> list[Level]:
+    def levels(self) -> list[Surrogate]:
         points, numbers = self.box.coordinates(np.array(self.shares)), np.array(self._numbers)
-        return [Level.fitted(points, numbers[:, i]) for i in range(self._width)]
+        return [Surrogate.fitted(points, numbers[:, i]) for i in range(self._width)]
 
 
 def _chains(
-    box: _Box, levels: Sequence[Level], target: np.ndarray, errors: np.ndarray, seed: int
+    box: _Box, levels: Sequence[Surrogate], target: np.ndarray, errors: np.ndarray, seed: int
 ) -> tuple[np.ndarray, float]:
     """Samples (n, k) as shares, and how many autocorrelation times the chains are long."""
     emcee = _library()
@@ -284,7 +284,7 @@ def _chains(
     return np.asarray(chain), STEPS / time if np.isfinite(time) else 0.0
 
 
-def _uncertainty(levels: Sequence[Level], errors: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
+def _uncertainty(levels: Sequence[Surrogate], errors: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
     """(n,) largest standard deviation of a process over the error of its measurement."""
     each = [level.mean_and_deviation(coordinates)[1] / error for level, error in zip(levels, errors, strict=True)]
     return np.asarray(np.max(each, axis=0))

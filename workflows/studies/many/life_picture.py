@@ -11,13 +11,13 @@ from scipy import stats
 
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, RED
+from tribodyn.workflows.studies.many.pictures import SHOWN
 
 if TYPE_CHECKING:
     from tribodyn.workflows.studies.many.table import StudyTable
 
 FEWEST = 5  # values that a distribution is fitted to
 TICKS = (0.01, 0.05, 0.1, 0.2, 0.5, 0.8, 0.9, 0.99)
-LABELS = {"life_cycles": "life / cycles", "depth_max_m": "depth / m", "peak_m_first": "amplitude / m"}
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def picture(found: StudyTable, number: str = "life_cycles") -> Figure:
         axes.set_yticks(_paper(np.array(TICKS)), [f"{100 * tick:g} %" for tick in TICKS])
         axes.set_ylim(_paper(0.5 * share[0]), _paper(1 - 0.5 * (1 - share[-1])))
         without, lost = done - len(values), len(column) - done
-        axes.set(xlabel=LABELS.get(number, number), ylabel="share of the runs below")
+        axes.set(xlabel=SHOWN.get(number, number), ylabel="share of the runs below")
         said = f"; {without} runs without, not fitted" if without else ""
         said += f"; {lost} of {len(column)} runs not complete" if lost else ""
         axes.set_title(f"{found.name}: distribution{said}")

@@ -15,6 +15,8 @@ from scipy import stats
 from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
+from tribodyn.workflows.run.varying import keys
+from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
@@ -26,10 +28,13 @@ from tribodyn.workflows.studies.many.sensitivity import Influence, influences
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study import Runner
 from tribodyn.workflows.studies.many.study_file import LISTED, Study
-from tribodyn.workflows.studies.many.surrogate import Surrogate
+from tribodyn.workflows.studies.many.surrogate import Law, Surrogate
 from tribodyn.workflows.studies.many.table import LIFE, StudyTable
 from tribodyn.workflows.studies.many.task import solve
 
+COEFFICIENT = "wear.coefficient"
+RATIOS = 64  # equally likely values of a key that scales a life
+PROBED, SAME = 1.1, 1e-3  # factor on keys that may scale it, and how far its logarithm may be off from that
 BATCH = 8  # runs that are added at a time
 COLUMNS = {  # of the table -> quantity of a verdict
     "peak_hz_first": "peak_frequency", "peak_m_first": "amplitude", "preload_N_first": "preload",
@@ -65,7 +70,8 @@ class Lives:
     """A number as a distribution.
 
     table : of the full runs; runs : that have the number; open : of them, those with only a lower bound of it
-    cheap_runs : cheap ones; missing : runs that lack the number
+    missing : runs that lack the number
+    scaled : keys whose common factor, one set after the other, a life is in proportion to the reciprocal of
     explained : share of the variance that the surrogate explains where runs are left out
     scatter : standard deviation of the number's logarithm; of the number itself where it is not always above 0
     model_error : relative, None where it is not known; model_error_of : where it is from, or why it is not known
@@ -80,8 +86,8 @@ class Lives:
     confidence: float
     runs: int
     open: int
-    cheap_runs: int
     missing: int
+    scaled: tuple[tuple[str, ...], ...]
     explained: float
     scatter: float
     logarithmic: bool
@@ -92,7 +98,7 @@ class Lives:
 
     def record(self) -> dict[str, Any]:
         """Plain data for machines."""
-        own = ("name", "number", "confidence", "runs", "open", "cheap_runs", "missing", "explained", "scatter",
+        own = ("name", "number", "confidence", "runs", "open", "missing", "scaled", "explained", "scatter",
                "logarithmic", "model_error", "model_error_of")  # fmt: skip
         return {
             **{name: getattr(self, name) for name in own},
@@ -103,11 +109,11 @@ class Lives:
     def lines(self) -> list[str]:
         """For people."""
         runs = f"{self.runs} runs" + (f" ({self.open} of them survived, or ended before)" if self.open else "")
-        runs += f" and {self.cheap_runs} cheap ones" if self.cheap_runs else ""
         known = "not known: " + self.model_error_of if self.model_error is None else self.model_error_of
         error = "" if self.model_error is None else f"{100 * self.model_error:.2g} %, "
         found = [
             f"{self.number} from {runs}" + (f", {self.missing} more have none" if self.missing else ""),
+            *(f"in proportion to the reciprocal of {' and '.join(group)}, by two runs" for group in self.scaled),
             f"surrogate explains {100 * self.explained:.2f} % of the variance of runs that are left out",
             f"error of the model itself: {error}{known}",
             f"{'':8}{'value':>12}   {100 * self.confidence:g} % sure{'':17}with the model's error",
@@ -165,19 +171,16 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
         raise SceneError(f'{study.name}: lives are drawn, give design = "sobol" and distributions instead of lists')
     if rare is not None and not 0 < rare < 1:
         raise ValueError(f"rare {rare}: give a share between 0 and 1")
-    space = Space.of(study)
-    cheap = None
-    if wanted.cheap:
-        rough = _cheap(study)
-        runner.progress.say(f"{rough.settings.runs} cheap runs")
-        cheap = studies.run(rough, runner.below("cheap"), drawn=False)
+    space, groups = Space.of(study), _scaling(study)
     shares = wanted.shares if rare is None else (rare, *wanted.shares)
-    added: list[dict[str, Any]] = []
+    middle = space.run_of(space.values(np.full((1, len(space.keys)), 0.5))[0])
+    probes = [{**middle, **{key: PROBED * middle[key] for key in group}} for group in groups]
+    added: list[dict[str, Any]] = [middle, *probes] if probes else []
     while True:
-        again = replace(runner, resume=runner.resume or bool(added))
+        again = replace(runner, resume=runner.resume or len(added) > len(groups) + 1)
         table = studies.run(study, again, more=added, drawn=False)
-        found = _Fit.of(space, table, cheap, wanted.number, study.settings.runs or 0, shares[0])
-        sample = Sample.of(space, found.surrogate, shares[0] < RARE)
+        found = _Fit.of(space, table, wanted.number, study.settings.runs or 0, shares[0], groups)
+        sample = Sample.of(found.space, found.surrogate, shares[0] < RARE)
         half = _half_width(found, sample, shares[0], wanted.confidence)
         done = len(table.columns["run"])
         if wanted.within is None or half <= wanted.within or done >= wanted.most:
@@ -188,9 +191,9 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
         points = quantiles.next_runs(sample, found.surrogate, shares[0], min(BATCH, wanted.most - done))
         added += [space.run_of(point) for point in points]
     folder = runner.folder
-    studies.draw(study, table, folder)
-    error, source = _model_error(study, space, table, folder, runner.progress)
-    distribution = _result(study, table, cheap, space, found, sample, shares, error, source)
+    studies.draw(table, folder)
+    error, source = _model_error(study, middle, table, folder, runner.progress)
+    distribution = _result(study, table, found, sample, shares, error, source)
     (folder / "lives.json").write_text(json.dumps(distribution.record(), indent=2) + "\n", encoding="utf-8")
     distribution.plot().savefig(folder / "lives.png")
     return distribution
@@ -198,14 +201,17 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
 
 @dataclass(frozen=True)
 class _Fit:
-    """A surrogate of a number.
+    """A surrogate of a number, over a space.
 
     drawn : (n,) whether a run was drawn from the distribution, not added where it says most about a quantile
     asked : the share that runs were added for; None where none were
     logarithmic : of its logarithm; open : runs of which only a lower bound is known, bound : the lowest of them
     failed : share of runs without
+    scaled : keys whose common factor a life is in proportion to the reciprocal of, one set after the other
+    by_ratio : (n,) what a key that scales by itself adds to each run; ratios : (m,) what it adds to equally likely ones
     """
 
+    space: Space
     surrogate: Surrogate
     drawn: np.ndarray
     asked: float | None
@@ -214,6 +220,9 @@ class _Fit:
     open: int
     runs: int
     failed: float
+    scaled: tuple[tuple[str, ...], ...]
+    by_ratio: np.ndarray
+    ratios: np.ndarray
 
     def ends(
         self, sample: Sample, share: float, at: float, draws: np.ndarray, confidence: float
@@ -227,7 +236,8 @@ class _Fit:
         low, high = np.quantile(draws, [0.5 - confidence / 2, 0.5 + confidence / 2])
         if share == self.asked:
             return float(low), float(high)
-        values, said = (each[self.drawn] for each in self.surrogate.runs)
+        of = self.surrogate
+        values, said = ((each - self.by_ratio)[self.drawn, None] + self.ratios for each in (of.values, of.left_out))
         fewest, most = quantiles.counted(sample, values, said, at, confidence)
         return float(min(low, fewest)), float(max(high, most))
 
@@ -244,7 +254,7 @@ class _Fit:
 
     @classmethod
     def of(
-        cls, space: Space, table: StudyTable, cheap: StudyTable | None, number: str, drawn: int, asked: float
+        cls, space: Space, table: StudyTable, number: str, drawn: int, asked: float, groups: Sequence[tuple[str, ...]]
     ) -> _Fit:
         values, bounds = table.bounded(number)
         open_ = np.isfinite(bounds)
@@ -252,30 +262,40 @@ class _Fit:
         if not good.any():
             raise SolveFailed(f"no run has a {number}; the first: {table.columns['sentence'][0]}")
         logarithmic = bool((values[good] > 0).all())
-        below = None
-        if cheap is not None:
-            rough, _ = cheap.bounded(number)
-            fine = np.isfinite(rough) & ((rough > 0) if logarithmic else True)
-            below = space.coordinates(space.points_of(cheap.columns)[fine]), _scaled(rough[fine], logarithmic)
-        points = space.coordinates(space.points_of(table.columns)[good])
-        surrogate = Surrogate.fitted(points, _scaled(values[good], logarithmic), below)
-        bound = float(np.min(bounds, initial=np.inf, where=open_))
-        own = table.columns["run"][good] <= drawn
-        added = None if own.all() else asked
+        probed = np.log(PROBED * values[drawn + 1 : drawn + 1 + len(groups)] / values[drawn]) if groups else ()
+        scaled = tuple(group for group, off in zip(groups, probed, strict=True) if abs(off) < SAME)
+        space = replace(space, ratios=tuple(key for group in scaled for key in group))
+        laws = [Law(np.isin(space.keys, group) / space.widths, -1.0) for group in scaled]
+        numbers, points = values[good], space.coordinates(space.points_of(table.columns)[good])
+        slopes = space.slopes_of(table.columns, number)[good]
+        if logarithmic:
+            numbers, slopes = np.log(numbers), slopes / numbers[:, None]
+        surrogate = Surrogate.fitted(points, numbers, None if laws else slopes, tuple(laws))
+        alone = [law for group, law in zip(scaled, laws, strict=True) if len(group) == 1][:1]
+        share = np.repeat(((np.arange(RATIOS) + 0.5) / RATIOS)[:, None], len(space.keys), axis=1)
+        likely, runs = space.coordinates(space.values(share)), table.columns["run"][good]
+        by_ratio = (alone[0].known(each) if alone else np.zeros(1) for each in (points, likely))
         return cls(
-            surrogate, own, added, logarithmic, bound, int(open_.sum()), int(good.sum()), 1 - float(np.mean(good))
-        )
+            space, surrogate, runs <= drawn, asked if runs.max() > drawn + len(groups) + 1 else None, logarithmic,
+            float(np.min(bounds, initial=np.inf, where=open_)), int(open_.sum()), int(good.sum()),
+            1 - float(np.mean(good)), scaled, *by_ratio,
+        )  # fmt: skip
 
 
-def _scaled(values: np.ndarray, logarithmic: bool) -> np.ndarray:
-    return np.log(values) if logarithmic else values
+def _scaling(study: Study) -> list[tuple[str, ...]]:
+    """Keys that vary whose common factor a life may be in proportion to the reciprocal of.
 
-
-def _cheap(study: Study) -> Study:
-    """The study of the cheap runs."""
-    wanted, own = study.lives, study.settings
-    changed = {"set": (*own.set, *wanted.cheap), "runs": wanted.cheap_runs or 4 * (own.runs or 0), "verdict": False}
-    return replace(study, settings=own.model_copy(update=changed))
+    So the wear coefficient, that rates are in proportion to; and all loads together, of a contact whose forces are in
+    proportion to displacements and whose depth counts beside them. Two runs say whether it is so in a scene
+    """
+    if study.lives.number != LIFE or study.correlations:
+        return []
+    loads = [key for key in keys(scene_file.read(study.scene, study.settings.set).scene) if key.startswith("loads.")]
+    moved = {**{key: key for key in study.varied}, **study.settings.same}
+    groups: list[tuple[str, ...]] = [(COEFFICIENT,)] if COEFFICIENT in study.varied else []
+    if loads and all(key in moved for key in loads):
+        groups.append(tuple(dict.fromkeys(moved[key] for key in loads)))
+    return groups
 
 
 def _half_width(found: _Fit, sample: Sample, share: float, confidence: float) -> float:
@@ -287,7 +307,7 @@ def _half_width(found: _Fit, sample: Sample, share: float, confidence: float) ->
 
 
 def _model_error(
-    study: Study, space: Space, table: StudyTable, folder: Path, progress: Progress
+    study: Study, middle: Mapping[str, float], table: StudyTable, folder: Path, progress: Progress
 ) -> tuple[float | None, str]:
     """Relative error of the model itself, and where it is from."""
     given, quantity = study.lives.model_error, COLUMNS.get(study.lives.number, "")
@@ -298,8 +318,7 @@ def _model_error(
     errors = np.asarray(table.columns.get(f"{quantity}_error", np.empty(0)), float)
     if np.isfinite(errors).any():
         return float(np.nanmedian(errors)), f"median of the verdicts on {np.isfinite(errors).sum()} runs"
-    medians = space.values(np.full((1, len(space.keys)), 0.5))[0]
-    task, journal = studies.task_at(study, space.run_of(medians)), Journal(folder / "medians")
+    task, journal = studies.task_at(study, middle), Journal(folder / "medians")
     row = journal.rows().get(task.key)
     if row is None:
         with progress.stage("verdict on the run at the medians"):
@@ -313,12 +332,12 @@ def _model_error(
 
 
 def _result(
-    study: Study, table: StudyTable, cheap: StudyTable | None, space: Space, found: _Fit, sample: Sample,
+    study: Study, table: StudyTable, found: _Fit, sample: Sample,
     shares: Sequence[float], error: float | None, source: str,
 ) -> Lives:  # fmt: skip
     wanted, body = study.lives, sample
     if shares[0] < RARE:
-        body = Sample.of(space, found.surrogate)
+        body = Sample.of(found.space, found.surrogate)
     back = np.exp if found.logarithmic else np.asarray
     every = []
     for share in sorted(shares):
@@ -327,8 +346,8 @@ def _result(
     middle = float(body.mean @ body.weight)
     scatter = float(np.sqrt((body.mean - middle) ** 2 @ body.weight))
     return Lives(
-        study.name, wanted.number, table, tuple(every), influences(space, found.surrogate.mean), wanted.confidence,
-        found.runs, found.open, 0 if cheap is None else cheap.count("complete"), len(table.columns["run"]) - found.runs,
+        study.name, wanted.number, table, tuple(every), influences(found.space, found.surrogate.mean),
+        wanted.confidence, found.runs, found.open, len(table.columns["run"]) - found.runs, found.scaled,
         found.surrogate.explained, scatter, found.logarithmic, error, source, back(body.mean), body.weight,
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ from scipy import stats
 
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE, RED
-from tribodyn.workflows.studies.many.life_picture import LABELS
+from tribodyn.workflows.studies.many.pictures import SHOWN
 
 if TYPE_CHECKING:
     from tribodyn.workflows.studies.many.lives import Lives
@@ -43,7 +43,7 @@ def picture(found: Lives) -> Figure:
             left.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             left.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             left.xaxis.set_minor_formatter(NullFormatter())
-        left.set(xlabel=LABELS.get(found.number, found.number), ylabel="share of the parts below")
+        left.set(xlabel=SHOWN.get(found.number, found.number), ylabel="share of the parts below")
         left.set_title(f"{found.name}: {found.runs} runs")
         left.legend(loc="upper left", fontsize=9)
         order = found.influences[::-1]

@@ -1,4 +1,4 @@
-"""The best designs of a scene: runs of a study where they promise most, the best trades, and these solved finer."""
+"""The best designs of a scene: runs of a study where they promise most, and the best trades between aims."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError
@@ -19,37 +18,13 @@ from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import study as studies
 from tribodyn.workflows.studies.many import study_file, trade_picture
 from tribodyn.workflows.studies.many.distributions import Marginal, si
-from tribodyn.workflows.studies.many.proposal import Known, chebyshev, ends, propose
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study import Runner
-from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Limit, Study
-from tribodyn.workflows.studies.many.table import LIFE, RUN, SENTENCE, STATUS, StudyTable
+from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
+from tribodyn.workflows.studies.many.table import RUN, SENTENCE, StudyTable
+from tribodyn.workflows.studies.many.trades import Known, chebyshev, ends, propose
 
-PROPOSED = "proposed.json"
-FINER = "finer"
-OF_VERDICT = {
-    "peak_hz_first": "peak_frequency", "peak_m_first": "amplitude", "preload_N_first": "preload",
-    "energy_J": "energy", "depth_max_m": "depth", "life_cycles": "life",
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Checked:
-    """One of the best runs, solved again with finer settings or judged by its verdict.
-
-    values : number of an aim -> value of the run; again : value with finer settings, None where that has none
-    errors : number -> relative error by the verdict, None where it is not known; empty where finer settings were given
-    sentence : how the run with finer settings ended, empty where it is complete
-    keeps : whether all limits are kept there too, None where not known
-    """
-
-    run: int
-    role: str
-    values: dict[str, float]
-    again: dict[str, float | None]
-    errors: dict[str, float | None]
-    sentence: str
-    keeps: bool | None
+GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
 
 
 @dataclass(frozen=True)
@@ -59,7 +34,6 @@ class Optimum:
     table : of all runs; front : rows of the table that no other allowed one beats in all aims, by the first aim
     best : row of the one nearest to the best of every aim, each between its ends on the front; the best of one aim
     only : by aim, rows of which only a lower bound is known, such as lives that did not end
-    checked : the ends of the front and `best`, again
     """
 
     name: str
@@ -68,7 +42,6 @@ class Optimum:
     front: tuple[int, ...]
     best: int
     only: dict[str, tuple[int, ...]]
-    checked: tuple[Checked, ...]
 
     def values(self, row: int) -> dict[str, float]:
         """Values of the aims in a row of the table; lower bounds count as values."""
@@ -91,7 +64,6 @@ class Optimum:
             "complete": self.table.count("complete"),
             "best": self._record(self.best),
             "front": [self._record(row) for row in self.front],
-            "checked": [vars(one) for one in self.checked],
         }
 
     def lines(self) -> list[str]:
@@ -103,9 +75,7 @@ class Optimum:
         for row in self.front:
             mark = "  <- nearest to the best of every aim" if row == self.best and len(self.front) > 1 else ""
             said.append(f"  {self._told(row)}{mark}")
-        return (
-            self.table.troubles() + said + [f"run {one.run}, {one.role}, again: {_again(one)}" for one in self.checked]
-        )
+        return self.table.troubles() + said
 
     def _told(self, row: int) -> str:
         keys = ", ".join(f"{key} {_short(value)}" for key, value in self.keys(row).items())
@@ -122,7 +92,7 @@ class Optimum:
         return [] if folder is None else [folder / "optimum.json", folder / "optimum.png"]
 
     def plot(self) -> Figure:
-        """The trade of the first two aims, or how the one aim got better, and where in their ranges the keys lie."""
+        """The trade of the first two aims, or how the one aim got better; the keys are in `table.plot_parallel()`."""
         return trade_picture.picture(self)
 
 
@@ -150,44 +120,35 @@ def optimise(
 
 
 def _search(study: Study, runner: Runner) -> Optimum:
-    """Runs where they promise most, until there are as many as are wanted, then the best ones again."""
-    folder, resume = runner.folder, runner.resume
+    """Runs where they promise most, until nothing is to be gained or there are as many as may be."""
     wanted, space = study.optimise, _space(study)
-    proposed = folder / PROPOSED
-    shares = (
-        [np.asarray(place, float) for place in json.loads(proposed.read_text())] if resume and proposed.exists() else []
-    )
-    shares = [place for place in shares if len(place) == len(space.keys)]
-    first = study.settings.runs or 0
-    shares = shares[: max(wanted.evaluations - first, 0)]
-    table = None
+    study = replace(study, settings=study.settings.model_copy(update={"derivatives": True}))
+    more: list[dict[str, float]] = []
     while True:
-        more = [space.run_of(point) for point in space.values(np.array(shares))] if shares else []
-        again = replace(runner, resume=resume or table is not None)
-        table = studies.run(study, again, more=more, drawn=False, inside=True)
-        known = _known(study, space, table)
-        left = wanted.evaluations - len(known.share)
-        if left <= 0:
-            break
-        if known.solved.sum() == 0:
-            raise SolveFailed(f"no run has all numbers; the first: {table.columns[SENTENCE][0]}")
-        shares += list(
-            propose(known, lambda share: _coordinates(space, share), min(wanted.batch, left), study.settings.seed)
+        table = studies.run(
+            study, replace(runner, resume=runner.resume or bool(more)), more=more, drawn=False, inside=True
         )
-        proposed.write_text(json.dumps([place.tolist() for place in shares]), encoding="utf-8")
+        known = _known(study, space, table)
+        if not known.solved.any():
+            raise SolveFailed(f"no run has all numbers; the first: {table.columns[SENTENCE][0]}")
+        if len(known.share) >= wanted.evaluations:
+            break
+        place, gain = propose(known, lambda share: space.coordinates(space.values(share)), study.settings.seed)
+        if gain < GAIN:
+            break
+        more.append(space.run_of(space.values(place[None])[0]))
         runner.progress.say(
             f"{len(known.front)} best trades of {len(known.share)} runs, {int(known.allowed.sum())} allowed"
         )
     front = known.front
     if not len(front):
-        raise SolveFailed(_why_none(study, table, known))
+        raise SolveFailed(_why_none(study, known))
     low, high = ends(known)
     best = int(front[chebyshev(known.aims[front], np.ones(len(wanted.aims)), low, high).argmin()])
     only = {aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in wanted.aims}
-    found = Optimum(study.name, wanted.aims, table, tuple(int(row) for row in front), best, only, ())
-    found = replace(found, checked=_checked(study, found, known, runner))
-    (folder / "optimum.json").write_text(json.dumps(found.record(), indent=2) + "\n", encoding="utf-8")
-    found.plot().savefig(folder / "optimum.png")
+    found = Optimum(study.name, wanted.aims, table, tuple(int(row) for row in front), best, only)
+    (runner.folder / "optimum.json").write_text(json.dumps(found.record(), indent=2) + "\n", encoding="utf-8")
+    found.plot().savefig(runner.folder / "optimum.png")
     return found
 
 
@@ -205,107 +166,33 @@ def _space(study: Study) -> Space:
     return space
 
 
-def _coordinates(space: Space, share: np.ndarray) -> np.ndarray:
-    return space.coordinates(space.values(share))
-
-
 def _known(study: Study, space: Space, table: StudyTable) -> Known:
     """What the runs say of aims and limits, small values better; a number that is always positive by its logarithm."""
-    wanted = study.optimise
-    aims = [_column(table, aim.number) * (1.0 if aim.want == "low" else -1.0) for aim in wanted.aims]
-    excess = [column for limit in wanted.limits for column in _excess(table, limit)]
-    points = space.points_of(table.columns)
-    share = space.shares(points)
-    rows = len(table.columns[RUN])
-    return Known(share, np.stack(aims, axis=1), np.array(excess).T.reshape(rows, len(excess)))
+    wanted, columns = study.optimise, []
+    for aim in wanted.aims:
+        values, slopes = table.values_of(aim.number)[0], space.slopes_of(table.columns, aim.number)
+        good = np.isfinite(values)
+        if good.any() and (values[good] > 0).all():
+            values, slopes = np.log(values), slopes / values[:, None]
+        sign = 1.0 if aim.want == "low" else -1.0
+        columns.append((sign * values, sign * slopes))
+    for limit in wanted.limits:
+        values, slopes = table.values_of(limit.number)[0], space.slopes_of(table.columns, limit.number)
+        for end, sign in ((limit.low, -1.0), (limit.high, 1.0)):
+            if end is not None:
+                at = si(end)
+                assert at is not None
+                size = sign / (abs(at) or 1.0)
+                columns.append((size * (values - at), size * slopes))
+    numbers, by = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
+    m = len(wanted.aims)
+    return Known(space.shares(space.points_of(table.columns)), numbers[:, :m], numbers[:, m:], by)
 
 
-def _column(table: StudyTable, number: str) -> np.ndarray:
-    values = table.values_of(number)[0]
-    good = np.isfinite(values)
-    return np.log(values) if good.any() and (values[good] > 0).all() else values
-
-
-def _excess(table: StudyTable, limit: Limit) -> list[np.ndarray]:
-    """By how much the ends of a limit are passed, over its size."""
-    values = table.values_of(limit.number)[0]
-    found = []
-    for end, sign in ((limit.low, -1.0), (limit.high, 1.0)):
-        if end is not None:
-            at = si(end)
-            assert at is not None
-            found.append(sign * (values - at) / (abs(at) or 1.0))
-    return found
-
-
-def _why_none(study: Study, table: StudyTable, known: Known) -> str:
-    if not known.solved.any():
-        return f"no run has all numbers; the first: {table.columns[SENTENCE][0]}"
+def _why_none(study: Study, known: Known) -> str:
     least = known.excess[known.solved].max(axis=1).min()
     limits = ", ".join(limit.number for limit in study.optimise.limits)
     return f"no run keeps the limits of {limits}: the nearest passes one by {100 * least:.2g} % of it"
-
-
-def _checked(study: Study, found: Optimum, known: Known, runner: Runner) -> tuple[Checked, ...]:
-    """The best runs with finer settings, or with their verdicts."""
-    wanted = study.optimise
-    roles: dict[int, str] = {}
-    for i, aim in enumerate(wanted.aims):
-        roles[int(found.front[int(known.aims[list(found.front), i].argmin())])] = f"best {aim.number}"
-    roles[found.best] = "nearest to the best of every aim" if len(wanted.aims) > 1 else f"best {wanted.aims[0].number}"
-    rows, keys = list(roles), list(study.varied)
-    settings = study.settings.model_copy(
-        update={
-            "design": "list",
-            "runs": None,
-            "verdict": not wanted.finer,
-            "set": (*study.settings.set, *wanted.finer),
-        }
-    )
-    varied = {key: tuple(float(found.table.columns[key][row]) for row in rows) for key in keys}
-    runner.progress.say(f"{len(rows)} of the best runs again, {'finer' if wanted.finer else 'with their verdicts'}")
-    again_study = replace(study, settings=settings, varied=varied)
-    table = studies.run(again_study, runner.below(FINER), drawn=False, inside=True)
-    checked = []
-    for i, row in enumerate(rows):
-        again, errors = {}, {}
-        for number in found.values(row):
-            value = table.values_of(number)[0][i] if _has(table, number) else np.nan
-            again[number] = float(value) if np.isfinite(value) else None
-            if not wanted.finer:
-                errors[number] = _error(table, number, i)
-        excess = [column[i] for limit in wanted.limits if _has(table, limit.number) for column in _excess(table, limit)]
-        known_all = all(_has(table, limit.number) for limit in wanted.limits) and bool(np.isfinite(excess).all())
-        keeps = bool(np.max(excess, initial=-1.0) <= 0) if known_all else None
-        told = str(table.columns[SENTENCE][i]) if table.columns[STATUS][i] != "complete" else ""
-        run_number = int(found.table.columns[RUN][row])
-        checked.append(Checked(run_number, roles[row], found.values(row), again, errors, told, keeps))
-    return tuple(checked)
-
-
-def _has(table: StudyTable, number: str) -> bool:
-    return number in table.columns or (number == LIFE and "cycles" in table.columns)
-
-
-def _error(table: StudyTable, number: str, row: int) -> float | None:
-    quantity = OF_VERDICT.get(number)
-    column = table.columns.get(f"{quantity}_error") if quantity in QUANTITIES else None
-    return float(column[row]) if column is not None and np.isfinite(column[row]) else None
-
-
-def _again(one: Checked) -> str:
-    if one.sentence:
-        return one.sentence
-    said = []
-    for number, value in one.values.items():
-        again = one.again[number]
-        text = f"{number} not known" if again is None else f"{number} {again:.4g} ({100 * (again / value - 1):+.2g} %)"
-        if number in one.errors:
-            error = one.errors[number]
-            text += ", error not known" if error is None else f", error {100 * error:.2g} % by its verdict"
-        said.append(text)
-    limits = {True: "", False: "; a limit is passed", None: "; limits not known"}[one.keeps]
-    return ", ".join(said) + limits
 
 
 def _short(value: Any) -> str:

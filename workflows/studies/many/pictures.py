@@ -1,4 +1,4 @@
-"""A study as pictures: what was computed against each key, parallel coordinates, and Sobol indices as bars."""
+"""A study as pictures: what was computed against each key, and parallel coordinates."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from tribodyn.workflows.pictures.figures import axes_of
-from tribodyn.workflows.pictures.style import BLUE, GREY, INK, PAPER, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.style import BLUE, INK, PAPER, STYLE, WEAR_MAP
 
 if TYPE_CHECKING:
-    from tribodyn.workflows.studies.many.sensitivity import Influence
     from tribodyn.workflows.studies.many.table import StudyTable
 
 FEWEST_LINES = 3  # runs, and keys with the result, that parallel coordinates need
@@ -90,7 +89,7 @@ def parallel(found: StudyTable, number: str | None = None) -> Figure:
     with axes_of(1.9 * len(names) + 1.6, 4.2) as (figure, axes):
         lines = np.stack([np.broadcast_to(np.arange(len(names)), heights.shape), heights], axis=-1)
         values = found.columns[name][good].astype(float)
-        scale = (LogNorm if _wide(values) else Normalize)(values.min(), values.max())
+        scale = (LogNorm if wide(values) else Normalize)(values.min(), values.max())
         order = np.argsort(values)[::-1]  # the least, which matter most of lives, on top
         axes.add_collection(
             LineCollection(list(lines[order]), colors=colormaps[WEAR_MAP](scale(values[order])), lw=1.1, alpha=0.8)
@@ -116,35 +115,16 @@ def _scaled(column: np.ndarray) -> tuple[np.ndarray, list[tuple[float, str]]]:
         return np.array([at[str(value)] for value in column]), [(at[kind], kind) for kind in kinds]
     if np.ptp(column) == 0:
         return np.full(len(column), 0.5), [(0.5, f"{column[0]:.4g}")]
-    values = np.log(column) if _wide(column) else column
+    values = np.log(column) if wide(column) else column
     low, high = float(values.min()), float(values.max())
     ticks = [(share, low + share * (high - low)) for share in (0.0, 0.5, 1.0)]
-    return (values - low) / (high - low), [(s, f"{np.exp(v) if _wide(column) else v:.3g}") for s, v in ticks]
+    return (values - low) / (high - low), [(s, f"{np.exp(v) if wide(column) else v:.3g}") for s, v in ticks]
 
 
-def _wide(values: np.ndarray) -> bool:
+def wide(values: np.ndarray) -> bool:
     """Whether values spread so far that their logarithms are shown."""
     return bool(values.min() > 0 and values.max() > WIDE_SCALE * values.min())
 
 
 def _label(name: str) -> str:
     return SHOWN.get(name, name.replace(".", "\n"))
-
-
-def sensitivities(name: str, indices: dict[str, tuple[float, tuple[Influence, ...]]]) -> Figure:
-    """First and total indices of every number."""
-    keys = sorted({one.key for _, found in indices.values() for one in found})
-    height = np.arange(len(keys))
-    with axes_of(1.2 + 3.4 * len(indices), 1.6 + 0.5 * len(keys), columns=len(indices), share=False) as (figure, axes):
-        for at, (pane, (number, (explained, found))) in enumerate(
-            zip(np.atleast_1d(axes), indices.items(), strict=True)
-        ):
-            by_key = {one.key: one for one in found}
-            pane.barh(height + 0.19, [by_key[key].first for key in keys], 0.36, color=BLUE, label="first")
-            pane.barh(height - 0.19, [by_key[key].total for key in keys], 0.36, color=GREY, label="total")
-            pane.set_yticks(height, keys if at == 0 else [""] * len(keys), fontsize=9)
-            pane.set(xlim=(0, 1), xlabel="Sobol index")
-            pane.set_title(f"{SHOWN[number].split(' / ')[0]}, {100 * explained:.1f} % explained", fontsize=10)
-        pane.legend(loc="lower right", fontsize=8)
-        figure.suptitle(f"{name}: shares of the variance", x=0.01, ha="left", fontsize=12)
-    return figure

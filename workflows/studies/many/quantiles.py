@@ -88,12 +88,14 @@ def counted(
     the others put there. The ends are the next values to either side whose corrected share is not as wanted, by the
     scatter of that count.
 
-    values, said : (n,) runs drawn from the distribution, and what the others say of each; none were added on purpose
+    values, said : (n, m) runs drawn from the distribution, and what the others say of each, m equally likely ones of
+        each where a factor of them is known exactly; none were added on purpose
     Source  Angelopoulos et al. 2023, doi 10.1126/science.adi6000: prediction-powered quantiles
     """
     thinned = sample.mean[:: max(len(sample.mean) // GRID, 1)]
-    at = np.unique(np.concatenate([thinned, values, said]))
-    off = np.subtract(values[:, None] <= at, said[:, None] <= at, dtype=float)  # runs x values
+    at = np.unique(np.concatenate([thinned, values.ravel(), said.ravel()]))
+    own, others = (np.array([np.searchsorted(np.sort(x), at, side="right") for x in each]) for each in (values, said))
+    off = (own - others) / values.shape[1]  # runs x values
     below = np.interp(at, sample.mean, np.cumsum(sample.weight)) + off.mean(axis=0)
     width = stats.norm.ppf(0.5 + confidence / 2) * off.std(axis=0, ddof=1) / np.sqrt(len(values))
     low = high = int(np.argmax(below >= share))

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
-from tribodyn.workflows.studies.many.pictures import SHOWN
 from tribodyn.workflows.studies.many.space import Space
-from tribodyn.workflows.studies.many.surrogate import Surrogate
-
-if TYPE_CHECKING:
-    from tribodyn.workflows.studies.many.table import StudyTable
 
 POINTS = 2**12  # a power of two
-FEWEST = 16  # runs with a number
-MOST = 200  # runs that a surrogate is fitted to, spread over the table
 
 
 @dataclass(frozen=True)
@@ -86,25 +77,3 @@ def _as_before(
     """The function of coordinates in another order of the keys."""
     back = [keys.index(key) for key in space.keys]
     return lambda coordinates: mean(coordinates[:, back])
-
-
-def indices(space: Space, found: StudyTable) -> dict[str, tuple[float, tuple[Influence, ...]]]:
-    """Number -> share of its variance that the surrogate explains where runs are left out, and its influences.
-
-    Of peak, amplitude, depth and life, as far as FEWEST runs have one that varies; logarithms where all are above 0.
-    Empty without scikit-learn
-    """
-    by_number: dict[str, tuple[float, tuple[Influence, ...]]] = {}
-    if importlib.util.find_spec("sklearn") is None:
-        return by_number
-    points = space.coordinates(space.points_of(found.columns))
-    for name in SHOWN:
-        values = np.asarray(found.columns.get(name, np.full(len(points), np.nan)), float)
-        good = np.flatnonzero(np.isfinite(values))
-        if len(good) < FEWEST or np.ptp(values[good]) == 0:
-            continue
-        good = good[:: -(-len(good) // MOST)]
-        own = values[good]
-        surrogate = Surrogate.fitted(points[good], np.log(own) if (own > 0).all() else own)
-        by_number[name] = surrogate.explained, influences(space, surrogate.mean)
-    return by_number

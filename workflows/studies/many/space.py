@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,9 @@ from scipy.stats import qmc
 
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import design
-from tribodyn.workflows.studies.many.distributions import Marginal, si
+from tribodyn.workflows.studies.many.distributions import Marginal
 from tribodyn.workflows.studies.many.study_file import Study
+from tribodyn.workflows.studies.many.task import slope_column
 
 
 @dataclass(frozen=True)
@@ -21,17 +22,19 @@ class Space:
     """What varies, in SI units.
 
     study : every key of which varies by a distribution
+    ratios : keys whose coordinates are logarithms whatever their distributions
     """
 
     study: Study
+    ratios: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, study: Study, lists: bool = False) -> Space:
-        """The space of a study; lists : numbers of a list count as evenly spread from their lowest to their highest.
-
-        Raises  SceneError for a key that varies over a list otherwise
-        """
-        return cls(replace(study, varied={key: _marginal(study, key, lists) for key in study.varied}))
+    def of(cls, study: Study) -> Space:
+        """The space of a study; raises SceneError for a key that varies over a list."""
+        for key, law in study.varied.items():
+            if not isinstance(law, Marginal):
+                raise SceneError(f"{study.name}: vary.{key}: expected a distribution, this has a list of values")
+        return cls(study)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -63,13 +66,31 @@ class Space:
 
     def coordinates(self, values: np.ndarray) -> np.ndarray:
         """Values (n, k) in widths of their distributions from their medians; those of a lognormal one in logarithms."""
-        columns = []
-        for i, key in enumerate(self.keys):
-            law = self._law(key)
-            scaled = np.log if law.logarithmic else np.asarray
-            low, middle, high = (float(scaled(law.at(np.array([share])))[0]) for share in (0.16, 0.5, 0.84))
-            columns.append((scaled(values[:, i]) - middle) / (0.5 * (high - low)))
-        return np.stack(columns, axis=1)
+        middle = self._scaled(np.stack([self._law(key).at(np.array([0.5])) for key in self.keys], axis=1))
+        return (self._scaled(values) - middle) / self.widths
+
+    @property
+    def widths(self) -> np.ndarray:
+        """(k,) what a coordinate is counted in: half the width of the middle 68 % of its distribution."""
+        low, high = self._scaled(np.stack([self._law(key).at(np.array([0.16, 0.84])) for key in self.keys], axis=1))
+        return np.asarray(0.5 * (high - low))
+
+    def _scaled(self, values: np.ndarray) -> np.ndarray:
+        return np.where(self._logarithmic, np.log(np.where(self._logarithmic, values, 1.0)), values)
+
+    @property
+    def _logarithmic(self) -> np.ndarray:
+        return np.array([self._law(key).logarithmic or key in self.ratios for key in self.keys])
+
+    def slopes_of(self, columns: Mapping[str, np.ndarray], number: str) -> np.ndarray:
+        """(n, k) derivatives of a number of the runs by the coordinates, nan where a table has none."""
+        none = np.full(len(next(iter(columns.values()))), np.nan)
+        by_key = []
+        for key in self.keys:
+            moved = [key, *(copy for copy, original in self.study.settings.same.items() if original == key)]
+            by_key.append(sum(np.asarray(columns.get(slope_column(number, one), none), float) for one in moved))
+        values = self.points_of(columns)
+        return np.stack(by_key, axis=1) * self.widths * np.where(self._logarithmic, values, 1.0)
 
     def run_of(self, point: np.ndarray) -> dict[str, float]:
         """The values of a run at a point (k,)."""
@@ -82,14 +103,3 @@ class Space:
     def _law(self, key: str) -> Marginal:
         law: Any = self.study.varied[key]
         return law
-
-
-def _marginal(study: Study, key: str, lists: bool) -> Marginal:
-    given = study.varied[key]
-    if isinstance(given, Marginal):
-        return given
-    numbers = [si(value) for value in given]
-    known = [number for number in numbers if number is not None]
-    if not lists or len(known) < len(numbers) or len(set(known)) < 2:
-        raise SceneError(f"{study.name}: vary.{key}: expected a distribution, this has a list of values")
-    return Marginal(stats.uniform(min(known), max(known) - min(known)))

@@ -15,9 +15,8 @@ from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many import cluster, design, life_picture, pictures, pool, sensitivity, study_file
+from tribodyn.workflows.studies.many import cluster, design, life_picture, pictures, pool, study_file
 from tribodyn.workflows.studies.many.journal import Journal
-from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study_file import Study
 from tribodyn.workflows.studies.many.table import StudyTable, table, write
 from tribodyn.workflows.studies.many.task import Row, Task, solve
@@ -125,11 +124,11 @@ def run(
                 write(found, folder)
         assert found is not None
         if drawn:
-            draw(study, found, folder)
+            draw(found, folder)
     return found
 
 
-def draw(study: Study, found: StudyTable, folder: Path) -> None:
+def draw(found: StudyTable, folder: Path) -> None:
     """Pictures of a study, as far as its runs make any."""
     if pictures.shown(found):
         found.plot().savefig(folder / "study.png")
@@ -137,12 +136,6 @@ def draw(study: Study, found: StudyTable, folder: Path) -> None:
             found.plot_parallel().savefig(folder / "parallel.png")
         if life_picture.possible(found):
             found.plot_distribution().savefig(folder / "life.png")
-        try:
-            indices = sensitivity.indices(Space.of(study, lists=True), found)
-        except SceneError:  # a key that is no number
-            indices = {}
-        if indices:
-            pictures.sensitivities(found.name, indices).savefig(folder / "sensitivity.png")
 
 
 def _finished(tasks: Sequence[Task], workers: int, scheduler: str, inside: bool) -> Iterator[Row]:
@@ -174,9 +167,10 @@ def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], 
     """The runs, and rows for those whose scene is refused; raises SceneError where every one is."""
     always = ["solver.threads=1", *([] if study.settings.verdict else ["verdict.enabled=false"]), *study.settings.set]
     base = scene_file.read(study.scene, always)
+    slopes = tuple(dict.fromkeys((*study.varied, *study.settings.same))) if study.settings.derivatives else ()
     tasks, refused = [], {}
     for number, values in enumerate(varied, 1):
-        task = Task(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
+        task = Task(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder, slopes)
         try:
             task.scene()
         except SceneError as error:

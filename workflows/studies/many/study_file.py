@@ -33,6 +33,8 @@ class Settings(Table):
     """Of what is drawn: the same seed gives the same runs."""
     verdict: StrictBool = False
     """Measure the errors of every run, which costs more than most runs do."""
+    derivatives: StrictBool = False
+    """Add the exact derivatives of every run's first peak by the keys, as columns "d NUMBER / d KEY"."""
     set: tuple[str, ...] = ()
     """Keys that every run changes, as "section.key=value"."""
     same: dict[str, str] = Field(default_factory=dict)
@@ -72,18 +74,8 @@ class Lives(Table):
     """Runs are added near the first share until its ends are within this of it, such as "5 %"; none are by default."""
     most: Annotated[StrictInt, Field(ge=1)] = 200
     """Largest number of full runs, those of the design and those that are added."""
-    cheap: tuple[str, ...] = ()
-    """Keys that make a run cheap, as "section.key=value"; the full runs then correct what the cheap ones say."""
-    cheap_runs: Annotated[StrictInt, Field(ge=1)] | None = None
-    """Number of cheap runs; four times as many as full ones by default."""
     model_error: Annotated[Number, Field(ge=0)] | None = None
     """Relative error of the model itself; by default that of the verdict on a run at the medians."""
-
-    @model_validator(mode="after")
-    def _cheap_has_runs(self) -> Lives:
-        if self.cheap_runs is not None and not self.cheap:
-            raise ValueError("lives.cheap_runs: say in lives.cheap what makes a run cheap")
-        return self
 
 
 class Aim(Table):
@@ -125,13 +117,8 @@ class Optimise(Table):
     """What is wanted; of several aims the best trades are looked for."""
     limits: tuple[Limit, ...] = ()
     """What a run must keep to."""
-    evaluations: Annotated[StrictInt, Field(ge=8)] = 40
-    """Number of runs, those of the design and those that are added where they promise most."""
-    batch: Annotated[StrictInt, Field(ge=1)] = 2
-    """Runs that are added at a time."""
-    finer: tuple[str, ...] = ()
-    """Keys of the finer settings that the best runs are solved with again, as "section.key=value"; their verdict is
-    asked for by default."""
+    evaluations: Annotated[StrictInt, Field(ge=2)] = 40
+    """Most runs, those of the design among them."""
 
 
 class StudyFile(Table):
@@ -187,7 +174,7 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
     leaves = dict(_leaves(file.vary))
     if not leaves:
         raise SceneError(f'{label}: vary is empty, give keys of the scene such as "contact.friction" = [0.3, 0.5]')
-    given = (*leaves, *file.study.set, *file.study.same, *file.lives.cheap, *file.optimise.finer)
+    given = (*leaves, *file.study.set, *file.study.same)
     if any(key.replace(" ", "").startswith("solver.threads") for key in given):
         raise SceneError(f"{label}: solver.threads: every run has one thread, say by --workers how many run at a time")
     varied = {key: _read(key, value, file.study.design, label) for key, value in leaves.items()}

@@ -1,182 +1,231 @@
-"""A Gaussian process through runs of a study: it knows how far it may be off, and is held to that by leaving runs out.
+"""A Gaussian process through runs of a study, by their values and, where these are known, their derivatives.
 
-The regression is scikit-learn's. Several levels add up: one through many cheap runs, and one through the differences
-that few full runs make to it.
+It knows how far it may be off, and is held to that by leaving runs out. Covariance: Matern 5/2 with a length for each
+coordinate, a linear trend, and noise.
 """
 
 from __future__ import annotations
 
-import warnings
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sla
+from scipy.optimize import minimize
 
-FEWEST = 8  # runs that a surrogate is fitted to
-JITTER = 1e-9  # of the largest variance, on the diagonal of a covariance that is drawn from
+FEWEST = 8  # numbers, values and derivatives, that a surrogate is fitted to
 BLOCK = 4096  # points at a time
-NOISE = 0.01  # most of the variance that counts as noise of the runs: more would hide what the points are too few for
+JITTER = 1e-9  # of the largest variance, on the diagonal of a covariance
+# logarithms of the least and the largest variance of the process, of its trend and of noise, over that of the runs, and
+# of lengths; more noise would hide what the points are too few for
+BOUNDS = ((-7.0, 7.0), (-14.0, 7.0), (-23.0, -4.6), (-2.3, 4.6))
+LIKELY = 1e-5  # relative change of the likelihood that ends a search for them
+STARTS = (0.7, -0.5, 2.0)  # logarithms of lengths that the most likely ones are looked for from
 
 
-@dataclass(frozen=True)
-class Level:
-    """A Gaussian process of one kind of runs.
+def covariance(log: np.ndarray, a: np.ndarray, i: np.ndarray, b: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """(n, m) covariance of what is known at points a (n, k) with that at points b (m, k), without noise.
 
-    regression : fitted to values less `middle`, over `width`; points, values : (n, k), (n,) that it was fitted to
+    log : logarithms of variance, trend, noise and the k lengths
+    i (n,), j (m,) : the coordinate that it is the derivative by, -1 for a value
+    Source  Rasmussen and Williams 2006, eq. 4.17; derivatives: section 9.4
+    """
+    variance, trend, length = np.exp(log[0]), np.exp(log[1]), np.exp(log[3:])
+    d = (a[:, None] - b[None]) / length
+    r = np.sqrt(5 * np.einsum("nmk,nmk->nm", d, d))
+    fall = variance * np.exp(-r)
+    found = np.asarray(fall * (1 + r + r**2 / 3) + trend * (1 + a @ b.T))
+    n, m = np.flatnonzero(i >= 0), np.flatnonzero(j >= 0)
+    slope = 5 / 3 * fall * (1 + r)
+    by_i = d[n, :, i[n]] / length[i[n], None]  # (n, m) the own coordinate's distance over its length squared
+    by_j = d[:, m, j[m]] / length[j[m]]
+    found[n] = trend * b.T[i[n]] - slope[n] * by_i
+    found[:, m] = trend * a[:, j[m]] + slope[:, m] * by_j
+    both = np.ix_(n, m)
+    same = i[n, None] == j[m]
+    own = same * (slope[both] / length[i[n], None] ** 2 + trend)
+    found[both] = own - 25 / 3 * fall[both] * by_i[:, m] * by_j[n]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A direction (k,) of the coordinates; along one times it values change by `slope` from any point."""
+
+    direction: np.ndarray
+    slope: float
+
+    def along(self, points: np.ndarray) -> np.ndarray:
+        """(n,) how many times the direction points (n, k) lie from the plane that is left for a process."""
+        moved = self.direction != 0
+        return np.asarray((points[:, moved] / self.direction[moved]).mean(axis=1))
+
+    def known(self, points: np.ndarray) -> np.ndarray:
+        """(n,) what values there have from the law."""
+        return self.slope * self.along(points)
+
+
+@dataclass(frozen=True, eq=False)
+class Surrogate:
+    """A process conditioned on runs.
+
+    log : see `covariance`, in the scale of values less `middle`, over `width`
+    points : (n, k); values : (n,); slopes : (n, k) derivatives, nan where they are not known
+    laws : directions along which the values are known to be linear; the process is through what these leave
     stretch : factor on its standard deviation, so that it accounts for the runs when they are left out one by one
-    explained : share of their variance that it explains when they are left out
     """
 
-    regression: Any
+    log: np.ndarray
     points: np.ndarray
     values: np.ndarray
+    slopes: np.ndarray
+    laws: tuple[Law, ...]
     middle: float
     width: float
-    stretch: float
-    explained: float
+    stretch: float = 1.0
 
     @classmethod
-    def fitted(cls, points: np.ndarray, values: np.ndarray, seed: int = 0) -> Level:
-        """Fit to coordinates (n, k) of order 1 and values (n,).
+    def fitted(
+        cls,
+        points: np.ndarray,
+        values: np.ndarray,
+        slopes: np.ndarray | None = None,
+        laws: tuple[Law, ...] = (),
+    ) -> Surrogate:
+        """The most likely process: coordinates (n, k) of order 1, values (n,), derivatives (n, k) or nan.
 
-        Raises  ValueError where the runs are fewer than FEWEST or scikit-learn is not there
-        Source  Rasmussen and Williams 2006, eq. 2.23, 2.24; trend as a linear kernel, section 2.7
+        Of a number that has laws no derivatives are taken.
+
+        Raises  ValueError where fewer than FEWEST numbers are known
+        Source  Rasmussen and Williams 2006, eq. 2.30
         """
-        if len(values) < FEWEST:
-            raise ValueError(f"{len(values)} runs have a value, a surrogate needs {FEWEST} at least")
-        process, kernels = _library()
-        middle, width = float(np.mean(values)), float(np.std(values)) or 1.0
+        slopes = np.full(points.shape, np.nan) if slopes is None else slopes
+        known = len(values) + int(np.isfinite(slopes).sum())
+        if known < FEWEST:
+            raise ValueError(f"{known} numbers of runs are known, a surrogate needs {FEWEST} at least")
+        left = values - sum(law.known(points) for law in laws)
+        middle, width = float(np.mean(left)), float(np.std(left)) or 1.0
         k = points.shape[1]
-        kernel = (
-            kernels.ConstantKernel(1.0, (1e-3, 1e3)) * kernels.Matern(np.full(k, 2.0), (0.1, 100.0), nu=2.5)
-            + kernels.ConstantKernel(1.0, (1e-6, 1e3)) * kernels.DotProduct(1.0, (1e-3, 1e3))
-            + kernels.WhiteKernel(1e-4, (1e-10, NOISE))
+        bounds = [*BOUNDS[:3], *[BOUNDS[3]] * k]
+
+        def unlikely(log: np.ndarray) -> float:
+            tried = cls(log, points, values, slopes, laws, middle, width)
+            try:
+                root, alpha = tried._conditioned
+            except np.linalg.LinAlgError:
+                return 1e6
+            return float(0.5 * tried._given @ alpha + np.log(np.diag(root)).sum())
+
+        # derivatives leave little doubt of the lengths
+        lengths = STARTS[:1] if np.isfinite(slopes).any() else STARTS
+        climbs = (
+            minimize(unlikely, [0.0, -3.0, -9.0, *[length] * k], method="L-BFGS-B", bounds=bounds, tol=LIKELY)
+            for length in lengths
         )
-        regression = process.GaussianProcessRegressor(kernel, alpha=1e-10, n_restarts_optimizer=2, random_state=seed)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a length at its bound: what does not matter
-            regression.fit(points, (values - middle) / width)
-        spread, missed = _leaving_out(regression)
-        stretch = max(1.0, float(np.sqrt(np.mean(missed**2 / spread))))
-        explained = 1 - float(np.mean(missed**2))
-        return cls(regression, points, values, middle, width, stretch, explained)
+        found = min(climbs, key=lambda one: one.fun)
+        fitted = cls(found.x, points, values, slopes, laws, middle, width)
+        spread, missed = fitted._leaving_out
+        return replace(fitted, stretch=max(1.0, float(np.sqrt(np.mean(missed**2 / spread)))))
+
+    @cached_property
+    def _rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n_known,) the run of all that is known, values first, and the coordinate that it is the derivative by."""
+        run, by = np.nonzero(np.isfinite(self.slopes))
+        n = len(self.values)
+        return np.concatenate([np.arange(n), run]), np.concatenate([np.full(n, -1), by])
+
+    @property
+    def _given(self) -> np.ndarray:
+        run, by = self._rows
+        left = self.values - self.known(self.points) - self.middle
+        return np.where(by < 0, left[run], self.slopes[run, by]) / self.width
+
+    def known(self, points: np.ndarray) -> np.ndarray:
+        """(n,) what the laws say."""
+        return np.asarray(sum((law.known(points) for law in self.laws), start=np.zeros(len(points))))
+
+    def _own(self, points: np.ndarray) -> np.ndarray:
+        """Coordinates of the process."""
+        for law in self.laws:
+            points = points - law.along(points)[:, None] * law.direction
+        return points
+
+    @cached_property
+    def _conditioned(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower root L of the covariance of what is known, and that covariance's inverse times what it is."""
+        run, by = self._rows
+        at = self._own(self.points)[run]
+        own = covariance(self.log, at, by, at, by)
+        own[np.diag_indices_from(own)] += np.exp(self.log[2]) + JITTER * np.exp(self.log[0])
+        root = np.linalg.cholesky(own)
+        return root, sla.cho_solve((root, True), self._given)
+
+    @cached_property
+    def _leaving_out(self) -> tuple[np.ndarray, np.ndarray]:
+        """Variance (n,) of each run's value where the others alone are known, and by how much they miss it.
+
+        Source  Rasmussen and Williams 2006, eq. 5.12, for a run's value and its derivatives together
+        """
+        root, alpha = self._conditioned
+        inverse, run = sla.cho_solve((root, True), np.eye(len(root))), self._rows[0]
+        spread, missed = np.empty(len(self.values)), np.empty(len(self.values))
+        for i in range(len(self.values)):
+            own = np.flatnonzero(run == i)  # its value first
+            block = np.linalg.inv(inverse[np.ix_(own, own)])
+            spread[i], missed[i] = block[0, 0], block[0] @ alpha[own]
+        return spread, missed
+
+    @property
+    def explained(self) -> float:
+        """Share of the variance of the runs that is explained when each is left out."""
+        return 1 - float(np.mean((self.values - self.left_out) ** 2) / (np.var(self.values) or 1.0))
 
     @property
     def left_out(self) -> np.ndarray:
         """(n,) what the others say of each run."""
-        return self.values - self.width * _leaving_out(self.regression)[1]
+        return self.values - self.width * self._leaving_out[1]
 
-    def with_run(self, point: np.ndarray, value: float) -> Level:
+    def with_run(self, point: np.ndarray, value: float) -> Surrogate:
         """The same process with one run more, nothing fitted again."""
-        process, _ = _library()
-        points, values = np.vstack([self.points, point]), np.append(self.values, value)
-        again = process.GaussianProcessRegressor(self.regression.kernel_, alpha=1e-10, optimizer=None)
-        again.fit(points, (values - self.middle) / self.width)
-        return Level(again, points, values, self.middle, self.width, self.stretch, self.explained)
+        more = np.vstack([self.slopes, np.full(len(point), np.nan)])
+        return replace(self, points=np.vstack([self.points, point]), values=np.append(self.values, value), slopes=more)
+
+    def mean(self, points: np.ndarray) -> np.ndarray:
+        """Expected values (n,)."""
+        each = [self._seen(part) @ self._conditioned[1] for part in _blocks(points)]
+        return self.known(points) + self.middle + self.width * np.concatenate(each)
 
     def mean_and_deviation(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Expected values (n,) and their standard deviations (n,), of what is computed without its noise."""
+        root, alpha = self._conditioned
         means, deviations = [], []
-        for start in range(0, len(points), BLOCK):
-            mean, deviation = self.regression.predict(points[start : start + BLOCK], return_std=True)
-            means.append(mean)
-            deviations.append(np.sqrt(np.maximum(deviation**2 - self._noise, 0.0)))
-        return (
-            self.middle + self.width * np.concatenate(means),
-            self.width * self.stretch * np.concatenate(deviations),
-        )
-
-    def mean(self, points: np.ndarray) -> np.ndarray:
-        """Expected values (n,)."""
-        parts = [self.regression.predict(points[start : start + BLOCK]) for start in range(0, len(points), BLOCK)]
-        return self.middle + self.width * np.concatenate(parts)
+        for part in _blocks(points):
+            seen = self._seen(part)
+            known = sla.solve_triangular(root, seen.T, lower=True)
+            size = 1 + (self._own(part) ** 2).sum(axis=1)
+            own = np.exp(self.log[0]) + np.exp(self.log[1]) * size
+            means.append(seen @ alpha)
+            deviations.append(np.sqrt(np.maximum(own - np.einsum("mn,mn->n", known, known), 0.0)))
+        scale = self.width * self.stretch
+        expected = self.known(points) + self.middle + self.width * np.concatenate(means)
+        return expected, scale * np.concatenate(deviations)
 
     def departures(self, points: np.ndarray, draws: int, seed: int = 0) -> np.ndarray:
         """(draws, n) drawn jointly: how far the function may lie from its expected values."""
-        _, covariance = self.regression.predict(points, return_cov=True)
-        diagonal = covariance.diagonal()
-        covariance[np.diag_indices_from(covariance)] += JITTER * diagonal.max() - self._noise
-        try:
-            root = np.linalg.cholesky(covariance)
-        except np.linalg.LinAlgError:  # rounding has made it indefinite
-            values, vectors = np.linalg.eigh(covariance)
-            root = vectors * np.sqrt(np.maximum(values, 0.0))
+        value = np.full(len(points), -1)
+        known = sla.solve_triangular(self._conditioned[0], self._seen(points).T, lower=True)
+        own = self._own(points)
+        left = covariance(self.log, own, value, own, value) - known.T @ known
+        values, vectors = np.linalg.eigh(left)
         normal = np.random.default_rng(seed).standard_normal((draws, len(points)))
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
         return np.asarray(self.width * self.stretch * normal @ root.T)
 
-    @property
-    def _noise(self) -> float:
-        return float(np.exp(self.regression.kernel_.theta[-1]))  # of the last kernel, the white one
+    def _seen(self, points: np.ndarray) -> np.ndarray:
+        """(n, n_known) covariance of values at points with what is known."""
+        run, by = self._rows
+        return covariance(self.log, self._own(points), np.full(len(points), -1), self._own(self.points)[run], by)
 
 
-@dataclass(frozen=True)
-class Surrogate:
-    """The sum of its levels."""
-
-    levels: tuple[Level, ...]
-
-    @classmethod
-    def fitted(
-        cls, points: np.ndarray, values: np.ndarray, cheap: tuple[np.ndarray, np.ndarray] | None = None
-    ) -> Surrogate:
-        """Fit to coordinates (n, k) and values (n,) of full runs, and to those of cheap runs where there are any.
-
-        Raises  ValueError where one kind has too few runs
-        Source  levels that add up: Kennedy and O'Hagan 2000, doi 10.1093/biomet/87.1.1, with their factor rho = 1
-        """
-        if cheap is None:
-            return cls((Level.fitted(points, values),))
-        first = Level.fitted(*cheap)
-        return cls((first, Level.fitted(points, values - first.mean(points))))
-
-    @property
-    def explained(self) -> float:
-        """Share of the variance of the full runs that is explained when each is left out."""
-        last = self.levels[-1]
-        if len(self.levels) == 1:
-            return last.explained
-        return 1 - (1 - last.explained) * float(np.var(last.values) / np.var(self.runs[0]))
-
-    @property
-    def runs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Values of the full runs (n,), and what the others say of each of them (n,)."""
-        last = self.levels[-1]
-        below = np.asarray(sum((level.mean(last.points) for level in self.levels[:-1]), start=np.zeros(1)))
-        return last.values + below, last.left_out + below
-
-    def mean(self, points: np.ndarray) -> np.ndarray:
-        """Expected values (n,)."""
-        return np.asarray(sum(level.mean(points) for level in self.levels))
-
-    def mean_and_deviation(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Expected values (n,) and their standard deviations (n,)."""
-        each = [level.mean_and_deviation(points) for level in self.levels]
-        return np.asarray(sum(mean for mean, _ in each)), np.sqrt(sum(deviation**2 for _, deviation in each))
-
-    def departures(self, points: np.ndarray, draws: int, seed: int = 0) -> np.ndarray:
-        """(draws, n) drawn jointly: how far the function may lie from its expected values."""
-        return np.asarray(sum(level.departures(points, draws, seed + i) for i, level in enumerate(self.levels)))
-
-    def with_run(self, point: np.ndarray, value: float) -> Surrogate:
-        """With one full run more, nothing fitted again."""
-        below = sum(float(level.mean(point[None])[0]) for level in self.levels[:-1])
-        return Surrogate((*self.levels[:-1], self.levels[-1].with_run(point, value - below)))
-
-
-def _leaving_out(regression: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Variance of each run by the others (n,), and by how much they miss it (n,), in the scale of the regression.
-
-    Source  Rasmussen and Williams 2006, eq. 5.12
-    """
-    spread = 1 / np.diag(sla.cho_solve((regression.L_, True), np.eye(len(regression.alpha_))))
-    return spread, regression.alpha_ * spread
-
-
-def _library() -> tuple[Any, Any]:
-    try:
-        from sklearn import gaussian_process
-        from sklearn.gaussian_process import kernels
-    except ImportError:
-        raise ValueError('this needs the package scikit-learn: install it with pip install "tribodyn[lives]"') from None
-    return gaussian_process, kernels
+def _blocks(points: np.ndarray) -> list[np.ndarray]:
+    return [points[start : start + BLOCK] for start in range(0, len(points), BLOCK)]

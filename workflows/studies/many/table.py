@@ -87,7 +87,7 @@ class StudyTable:
         """
         found: dict[str, dict[str, float]] = {}
         for number in self.computed:
-            for key in self.varied:
+            for key in self.varied if not number.startswith("d ") else ():
                 x, y = self.columns[key], self.columns[number]
                 if x.dtype.kind != "f":
                     continue

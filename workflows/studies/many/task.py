@@ -18,9 +18,11 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.varying import Varying
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.studies import derivatives
 
 Status = Literal["complete", "failed", "refused", "lost"]
 ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
@@ -34,6 +36,7 @@ class Task:
     """One run: a scene by its text, so that another process or machine needs no file of it.
 
     number : of the run, from 1; overrides : of the scene, those of the run last; folder : of the files it names
+    slopes : keys by which the numbers of its first state have derivatives too, as far as these are exact
     """
 
     number: int
@@ -41,11 +44,12 @@ class Task:
     text: str
     overrides: tuple[str, ...]
     folder: Path
+    slopes: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
         """Hash of all that the row depends on: scene, overrides, contents of the files that they name, version."""
-        content = hashlib.sha256(repr((__version__, self.text, self.overrides)).encode())
+        content = hashlib.sha256(repr((__version__, self.text, self.overrides, self.slopes)).encode())
         said = [tomllib.loads(self.text), *(one.partition("=")[2].strip(" \"'") for one in self.overrides)]
         content.update(repr(digests(said, self.folder)).encode())
         return content.hexdigest()
@@ -88,7 +92,13 @@ def solve(task: Task) -> Row:
 
     with _one_at_a_time:
         try:
-            result = pipeline.run(task.scene(), None, Progress(), row_only=True, judge=with_verdict)
+            file = task.scene()
+            result = pipeline.run(file, None, Progress(), row_only=True, judge=with_verdict)
+            numbers = numbers_of(result)
+            if task.slopes and result.response is not None and not numbers.get("peak_at_end"):
+                varying = Varying(file, Progress())
+                slopes = derivatives.of_summary(varying, result.response, numbers, task.slopes)
+                numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
         except np.linalg.LinAlgError as error:
             return ended("failed", error)
         except (ValueError, OSError) as error:
@@ -99,9 +109,13 @@ def solve(task: Task) -> Row:
             return ended("failed", error)
         except Exception as error:  # one run that nobody foresaw does not stop the others
             return ended("failed", f"{type(error).__name__}: {error}")
-        numbers = numbers_of(result)
         state = result.state + (NO_PEAK if numbers.get("peak_at_end") else "")
         return ended("complete", state, numbers)
+
+
+def slope_column(number: str, key: str) -> str:
+    """The column of the derivative of a number by a key."""
+    return f"d {number} / d {key}"
 
 
 def numbers_of(result: Result) -> dict[str, float]:

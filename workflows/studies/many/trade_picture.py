@@ -1,32 +1,26 @@
-"""The best designs as a picture: the trade between two aims, or how one got better, and where the keys lie."""
+"""The best designs as a picture: the trade between two aims, or how one got better."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED, STYLE
-from tribodyn.workflows.studies.many.pictures import SHOWN
+from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE
+from tribodyn.workflows.studies.many.pictures import SHOWN, wide
 from tribodyn.workflows.studies.many.table import RUN
 
 if TYPE_CHECKING:
     from tribodyn.workflows.studies.many.optimum import Optimum
 
-WIDE = 10.0  # largest over least value, from which on an axis is logarithmic
-
 
 def picture(found: Optimum) -> Figure:
-    """Left the runs over the first two aims, or the one aim over the runs; right the keys of the best runs in their
-    ranges."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 4.4), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
-        (_trade if len(found.aims) > 1 else _progress)(found, left)
-        _keys(found, right)
+    """The runs over the first two aims, or the one aim over the runs."""
+    with axes_of(6.4, 4.4) as (figure, axes):
+        (_trade if len(found.aims) > 1 else _progress)(found, axes)
     return figure
 
 
@@ -42,16 +36,8 @@ def _trade(found: Optimum, axes: Any) -> None:
     if open_:
         axes.plot(x[open_], y[open_], "^", mfc="none", color=INK, ms=10, zorder=4, label="not lost by then: at least")
     axes.plot(x[found.best], y[found.best], "*", color=ORANGE, ms=17, zorder=5, label="nearest to the best of both")
-    label = "the same, solved finer"
-    for check in found.checked:
-        again = [check.again[name] for name in (one, two)]
-        if None not in again and again != [check.values[name] for name in (one, two)]:
-            ends = zip((check.values[one], check.values[two]), again, strict=True)
-            axes.plot(*ends, "-", color=RED, lw=0.8, zorder=4)
-            axes.plot(*again, "x", color=RED, ms=8, mew=1.8, zorder=6, label=label)
-            label = ""
     for axis, values in ((axes.set_xscale, x), (axes.set_yscale, y)):
-        if _wide(values):
+        if wide(values[np.isfinite(values)]):
             axis("log")
     axes.set(xlabel=_label(found, 0), ylabel=_label(found, 1), title=f"{found.name}: {len(x)} runs")
     axes.legend(fontsize=8, frameon=True)
@@ -63,45 +49,10 @@ def _progress(found: Optimum, axes: Any) -> None:
     runs = found.table.columns[RUN]
     axes.plot(runs, values, "o", color=GREY, ms=4, label="runs")
     axes.plot(runs[found.best], values[found.best], "*", color=ORANGE, ms=17, label="best that keeps the limits")
-    if _wide(values):
+    if wide(values[np.isfinite(values)]):
         axes.set_yscale("log")
     axes.set(xlabel="run", ylabel=_label(found, 0), title=f"{found.name}: {len(values)} runs")
     axes.legend(fontsize=8, frameon=True)
-
-
-def _keys(found: Optimum, axes: Any) -> None:
-    """Where the keys of the best runs lie between the least and the largest value of all runs."""
-    table = found.table
-    keys = table.varied
-    front = list(found.front)
-    for row in [*front, found.best]:
-        best = row == found.best
-        heights = [_height(np.asarray(table.columns[key], float), row) for key in keys]
-        shown = {"color": ORANGE, "ms": 13, "lw": 1.6, "zorder": 3} if best else {"color": BLUE, "ms": 5, "lw": 0.8}
-        axes.plot(heights, range(len(keys)), "-*" if best else "-o", alpha=1.0 if best else 0.45, **shown)
-    for at, key in enumerate(keys):
-        values = np.asarray(table.columns[key], float)
-        for x, value, side in ((-0.05, values.min(), "right"), (1.05, values.max(), "left")):
-            axes.text(x, at, f"{value:.3g}", ha=side, va="center", fontsize=8, color=INK)
-    axes.set_yticks(range(len(keys)), [key.replace(".", ".\n", 1) for key in keys], fontsize=8)
-    axes.tick_params(axis="y", pad=46, length=0)
-    axes.set(
-        xlim=(-0.04, 1.04),
-        ylim=(-0.5, len(keys) - 0.5),
-        xticks=[],
-        title="keys of the best runs, in all that was tried",
-    )
-    axes.invert_yaxis()
-
-
-def _height(values: np.ndarray, row: int) -> float:
-    scaled = np.log(values) if _wide(values) else values
-    return float((scaled[row] - scaled.min()) / (np.ptp(scaled) or 1.0))
-
-
-def _wide(values: np.ndarray) -> bool:
-    good = values[np.isfinite(values)]
-    return bool(len(good) and good.min() > 0 and good.max() > WIDE * good.min())
 
 
 def _label(found: Optimum, at: int) -> str:

@@ -16,13 +16,13 @@ from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.columns import named_lines
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.scene.source import AnyPath, Overrides, Source
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.measured.beside import Beside, beside
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run
 from tribodyn.workflows.studies.measured.reading import read
 from tribodyn.workflows.studies.measured.resonance import prepared
-from tribodyn.workflows.studies.variation import changed
 
 
 @dataclass(frozen=True)
@@ -234,6 +234,13 @@ def compare(
         raise ValueError(f"{measured.source}: {trouble}") from None
     first = found.pop("")
     return Compared(own.name, measured, first, found)
+
+
+def changed(scene: Source, overrides: Overrides, changes: Sequence[str]) -> dict[str, SceneFile]:
+    """The scene, and the scene with each of the changes; raises SceneError for one that it does not know."""
+    base = read_scene(scene, overrides)
+    own = {change: [one.strip() for one in change.split(";") if one.strip()] for change in changes}
+    return {"": base} | {change: base.changed(*keys) for change, keys in own.items()}
 
 
 def _named(text: str) -> tuple[str, str]:

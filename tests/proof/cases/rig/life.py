@@ -18,7 +18,7 @@ from tests.proof.cases.rig.model import NoSolution, Rig
 from tests.proof.cases.rig.published import LIFE_MEASURED, PRELOAD, TABLE_5_3, WORK
 from tests.proof.cases.rig.wear import wear_down
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.variation import changed
+from tribodyn.workflows.studies.measured.compare import changed
 
 CLOSE = 1e-6  # of the published preload, to which that of a changed rig is set
 LOST = "lost"
