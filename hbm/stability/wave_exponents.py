@@ -17,6 +17,8 @@ for one sector; the extension to all nodal diameters and the elimination of the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.linalg as sla
 
@@ -25,9 +27,12 @@ from tribodyn.hbm.linear.expansion import stuck_modes
 from tribodyn.reduction.model import ReducedModel
 
 COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: how far truncation drives copies apart
-
+GROWS, ACCURACY = 1e-6, 1e-3  # over omega: growth that is looked at, and how exactly
+SHARES = (0.25, 0.5, 0.75, *8 * (1.0,))  # of the answer to the exponent itself, on the way to it
+INVERSE = 12  # inverse iterations for the exponent nearest to a known one
 
 _Index = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Answer = Callable[[complex], np.ndarray]  # exponent over omega -> as `perturbed_contact.PerturbedContact.departure`
 
 
 class WaveModes:
@@ -75,12 +80,12 @@ class WaveModes:
 
 
 def exponents(
-    balance: HarmonicBalance, modes: WaveModes, omega: float, slope: np.ndarray
+    balance: HarmonicBalance, modes: WaveModes, omega: float, slope: np.ndarray, answer: Answer | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Floquet exponents of a travelling wave against perturbations of every nodal diameter.
 
     slope : (n_pair, c, n_coeff, c, n_coeff) dg/dx with coefficients [x_0, a_1, b_1, ...] up to the highest harmonic of
-        the perturbation
+        the perturbation; answer : as of `settled`
     Returns exponents (n,) [1/s] and the index d (n,) of each perturbation, from -N/2 + 1 to N/2
     """
     order, n = balance.model.info.engine_order, modes.n_sectors
@@ -98,7 +103,43 @@ def exponents(
             diameters.append(np.full(len(found), sign * d))
     every = np.concatenate(values), np.concatenate(centres), np.concatenate(diameters)
     chosen = _once(*every, order, n, sum(2 * len(modes(d)[0]) for d in range(n)))
-    return every[0][chosen] * omega, every[2][chosen]
+    exponents, waves = every[0][chosen], every[2][chosen]
+    if answer is not None:
+        for d in range(n // 2 + 1):
+            there, mirror = (np.flatnonzero(waves == sign * d) for sign in (1, -1))
+            exponents[there] = settled(exponents[there], modes, order, d, omega, slope, answer)
+            if 0 < 2 * d < n:
+                exponents[mirror] = settled(exponents[mirror].conj(), modes, order, d, omega, slope, answer).conj()
+    return exponents * omega, waves
+
+
+def settled(
+    exponents: np.ndarray,
+    modes: Callable[[int], _Index],
+    order: int,
+    d: int,
+    omega: float,
+    slope: np.ndarray,
+    answer: Answer,
+) -> np.ndarray:
+    """Exponents (n,), in units of omega, those that grow as the contact answers to just them; see `answer`.
+
+    slope : its answer to a steady vibration, from which each is followed; it stays where that leads nowhere
+    """
+    rows = np.arange(slope.shape[0] * slope.shape[1])
+    steady, found = of_exponentials(slope), exponents.copy()
+    for i in np.flatnonzero(exponents.real > GROWS):
+        now, known = exponents[i], np.flatnonzero(np.abs(exponents[:i].conj() - exponents[i]) < 1e-9)
+        if d == 0 and len(known):
+            found[i] = found[known[0]].conj()
+            continue
+        for share in SHARES:
+            answered = (1 - share) * steady + share * answer(now)
+            before, now = now, _nearest(*_equations(modes, order, d, omega, answered, rows)[:2], now)
+            if share == 1 and abs(now - before) < ACCURACY:
+                found[i] = now
+                break
+    return found
 
 
 def _once(
@@ -136,26 +177,44 @@ def of_exponentials(slope: np.ndarray) -> np.ndarray:
 
 
 def _of_index(
-    modes: WaveModes, order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
+    modes: Callable[[int], _Index], order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exponents of perturbations of index d, in units of omega, and the mean k of each; those with it within 1."""
-    nc = blocks.shape[-1]
-    numbers = np.arange(nc) - nc // 2
-    seen = [modes(int(k) * order + d) for k in numbers]
-    m = len(seen[0][0])
-    coupling = _contact_in_modes(blocks, rows, seen)
-    rate = np.repeat(1j * numbers, m)
-    damping = sla.block_diag(*(c / omega for _, c, *_ in seen))
-    spring = np.diag(np.concatenate([lam for lam, *_ in seen])) - coupling
-    spring = spring + sla.block_diag(*(flow for _, _, flow, _, _ in seen))
-    constant = np.diag(rate**2) + damping * rate + spring / omega**2
-    n = len(rate)
-    companion = np.block([[np.zeros((n, n)), np.eye(n)], [-constant, -np.diag(2 * rate) - damping]])
-    values, vectors = np.linalg.eig(companion)
-    weight = (np.abs(vectors[:n].reshape(nc, m, -1)) ** 2).sum(axis=1)
+    constant, linear, numbers = _equations(modes, order, d, omega, blocks, rows)
+    n = len(constant)
+    values, vectors = np.linalg.eig(np.block([[np.zeros((n, n)), np.eye(n)], [-constant, -linear]]))
+    weight = (np.abs(vectors[:n].reshape(len(numbers), -1, 2 * n)) ** 2).sum(axis=1)
     centre = numbers @ weight / weight.sum(axis=0)
     near = np.abs(centre) < 1.0
     return values[near], centre[near]
+
+
+def _equations(
+    modes: Callable[[int], _Index], order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Matrices A, B (n, n) of (z^2 + B z + A) eta = 0, z in units of omega, harmonic by harmonic, and the harmonics."""
+    nc = blocks.shape[-1]
+    numbers = np.arange(nc) - nc // 2
+    seen = [modes(int(k) * order + d) for k in numbers]
+    rate = np.repeat(1j * numbers, len(seen[0][0]))
+    damping = sla.block_diag(*(c / omega for _, c, *_ in seen))
+    spring = np.diag(np.concatenate([lam for lam, *_ in seen])) - _contact_in_modes(blocks, rows, seen)
+    spring = spring + sla.block_diag(*(flow for _, _, flow, _, _ in seen))
+    return np.diag(rate**2) + damping * rate + spring / omega**2, damping + np.diag(2 * rate), numbers
+
+
+def _nearest(constant: np.ndarray, linear: np.ndarray, z: complex) -> complex:
+    """The solution of such equations that is nearest to z, by inverse iteration."""
+    n = len(constant)
+    factors = sla.lu_factor(constant + z * linear + z * z * np.eye(n))
+    a, b, more = np.ones(n, complex), np.zeros(n, complex), 0j
+    for _ in range(INVERSE):
+        x = -sla.lu_solve(factors, b + linear @ a + z * a)
+        y = z * x + a
+        more = (a.conj() @ x + b.conj() @ y) / (a.conj() @ a + b.conj() @ b)
+        size = np.linalg.norm(np.concatenate([x, y]))
+        a, b = x / size, y / size
+    return z + 1 / more
 
 
 def _contact_in_modes(blocks: np.ndarray, rows: np.ndarray, seen: list[_Index]) -> np.ndarray:
