@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
-from tests.helpers.verification_models import oscillator
+from tests.helpers.verification_models import interface, oscillator
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
@@ -16,6 +17,7 @@ from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.stability.exponents import Stability, mark, stability
 from tribodyn.hbm.stability.floquet import monodromy
 from tribodyn.hbm.time import time_integration
