@@ -34,7 +34,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import crossing, floquet, wave_exponents
-from tribodyn.hbm.stability.perturbed_contact import PerturbedContact
+from tribodyn.hbm.stability.perturbed_contact import answer_of
 from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
 
@@ -283,7 +283,7 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     if answer is not None:
         flow = np.zeros((m, m)) if expansion.flow is None else expansion.flow[:m, :m]
         modes = expansion.lam[:m], expansion.c[:m, :m], flow, phi, static
-        found = wave_exponents.settled(found, lambda index: modes, 0, 0, state.omega, slope, answer)
+        found = wave_exponents.settled(found, lambda index: modes, (0, 0), state.omega, slope, answer)
     return found * state.omega
 
 
@@ -292,7 +292,7 @@ def _answer(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> wav
     if balance.contact.stiffness.size * basis.n_coeff > RULES.most_settled:
         return None
     try:
-        return PerturbedContact(balance, state, basis).departure
+        return answer_of(balance, state, basis.harmonics[-1])
     except ValueError:
         return None
 

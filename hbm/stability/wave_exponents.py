@@ -27,12 +27,13 @@ from tribodyn.hbm.linear.expansion import stuck_modes
 from tribodyn.reduction.model import ReducedModel
 
 COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: how far truncation drives copies apart
+
+
 GROWS, ACCURACY = 1e-6, 1e-3  # over omega: growth that is looked at, and how exactly
-SHARES = (0.25, 0.5, 0.75, *8 * (1.0,))  # of the answer to the exponent itself, on the way to it
-INVERSE = 12  # inverse iterations for the exponent nearest to a known one
+SHARES = (0.25, 0.5, 0.75, *8 * (1.0,))  # of the answer to an exponent itself, on the way to it
 
 _Index = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-Answer = Callable[[complex], np.ndarray]  # exponent over omega -> as `perturbed_contact.PerturbedContact.departure`
+Answer = Callable[[complex], np.ndarray]  # exponent over omega -> as `perturbed_contact.departure`
 
 
 class WaveModes:
@@ -103,39 +104,31 @@ def exponents(
             diameters.append(np.full(len(found), sign * d))
     every = np.concatenate(values), np.concatenate(centres), np.concatenate(diameters)
     chosen = _once(*every, order, n, sum(2 * len(modes(d)[0]) for d in range(n)))
-    exponents, waves = every[0][chosen], every[2][chosen]
+    values, waves = every[0][chosen], every[2][chosen]
     if answer is not None:
-        for d in range(n // 2 + 1):
-            there, mirror = (np.flatnonzero(waves == sign * d) for sign in (1, -1))
-            exponents[there] = settled(exponents[there], modes, order, d, omega, slope, answer)
-            if 0 < 2 * d < n:
-                exponents[mirror] = settled(exponents[mirror].conj(), modes, order, d, omega, slope, answer).conj()
-    return exponents * omega, waves
+        for d in np.unique(waves[values.real > GROWS]):
+            values[waves == d] = settled(values[waves == d], modes, (order, int(d)), omega, slope, answer)
+    return values * omega, waves
 
 
 def settled(
     exponents: np.ndarray,
     modes: Callable[[int], _Index],
-    order: int,
-    d: int,
+    wave: tuple[int, int],
     omega: float,
     slope: np.ndarray,
     answer: Answer,
 ) -> np.ndarray:
-    """Exponents (n,), in units of omega, those that grow as the contact answers to just them; see `answer`.
+    """Exponents (n,), in units of omega: those that grow by the answer `slope` to a steady vibration solved for again.
 
-    slope : its answer to a steady vibration, from which each is followed; it stays where that leads nowhere
+    Each is followed to the contact's answer to just that exponent, and stays where that leads nowhere. wave : EO, d
     """
-    rows = np.arange(slope.shape[0] * slope.shape[1])
-    steady, found = of_exponentials(slope), exponents.copy()
+    rows, steady, found = np.arange(slope.shape[0] * slope.shape[1]), of_exponentials(slope), exponents.copy()
     for i in np.flatnonzero(exponents.real > GROWS):
-        now, known = exponents[i], np.flatnonzero(np.abs(exponents[:i].conj() - exponents[i]) < 1e-9)
-        if d == 0 and len(known):
-            found[i] = found[known[0]].conj()
-            continue
+        now = exponents[i]
         for share in SHARES:
-            answered = (1 - share) * steady + share * answer(now)
-            before, now = now, _nearest(*_equations(modes, order, d, omega, answered, rows)[:2], now)
+            values, _ = _of_index(modes, *wave, omega, (1 - share) * steady + share * answer(now), rows)
+            before, now = now, values[np.argmin(np.abs(values - now))]
             if share == 1 and abs(now - before) < ACCURACY:
                 found[i] = now
                 break
@@ -180,41 +173,23 @@ def _of_index(
     modes: Callable[[int], _Index], order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exponents of perturbations of index d, in units of omega, and the mean k of each; those with it within 1."""
-    constant, linear, numbers = _equations(modes, order, d, omega, blocks, rows)
-    n = len(constant)
-    values, vectors = np.linalg.eig(np.block([[np.zeros((n, n)), np.eye(n)], [-constant, -linear]]))
-    weight = (np.abs(vectors[:n].reshape(len(numbers), -1, 2 * n)) ** 2).sum(axis=1)
-    centre = numbers @ weight / weight.sum(axis=0)
-    near = np.abs(centre) < 1.0
-    return values[near], centre[near]
-
-
-def _equations(
-    modes: Callable[[int], _Index], order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Matrices A, B (n, n) of (z^2 + B z + A) eta = 0, z in units of omega, harmonic by harmonic, and the harmonics."""
     nc = blocks.shape[-1]
     numbers = np.arange(nc) - nc // 2
     seen = [modes(int(k) * order + d) for k in numbers]
-    rate = np.repeat(1j * numbers, len(seen[0][0]))
+    m = len(seen[0][0])
+    coupling = _contact_in_modes(blocks, rows, seen)
+    rate = np.repeat(1j * numbers, m)
     damping = sla.block_diag(*(c / omega for _, c, *_ in seen))
-    spring = np.diag(np.concatenate([lam for lam, *_ in seen])) - _contact_in_modes(blocks, rows, seen)
+    spring = np.diag(np.concatenate([lam for lam, *_ in seen])) - coupling
     spring = spring + sla.block_diag(*(flow for _, _, flow, _, _ in seen))
-    return np.diag(rate**2) + damping * rate + spring / omega**2, damping + np.diag(2 * rate), numbers
-
-
-def _nearest(constant: np.ndarray, linear: np.ndarray, z: complex) -> complex:
-    """The solution of such equations that is nearest to z, by inverse iteration."""
-    n = len(constant)
-    factors = sla.lu_factor(constant + z * linear + z * z * np.eye(n))
-    a, b, more = np.ones(n, complex), np.zeros(n, complex), 0j
-    for _ in range(INVERSE):
-        x = -sla.lu_solve(factors, b + linear @ a + z * a)
-        y = z * x + a
-        more = (a.conj() @ x + b.conj() @ y) / (a.conj() @ a + b.conj() @ b)
-        size = np.linalg.norm(np.concatenate([x, y]))
-        a, b = x / size, y / size
-    return z + 1 / more
+    constant = np.diag(rate**2) + damping * rate + spring / omega**2
+    n = len(rate)
+    companion = np.block([[np.zeros((n, n)), np.eye(n)], [-constant, -np.diag(2 * rate) - damping]])
+    values, vectors = np.linalg.eig(companion)
+    weight = (np.abs(vectors[:n].reshape(nc, m, -1)) ** 2).sum(axis=1)
+    centre = numbers @ weight / weight.sum(axis=0)
+    near = np.abs(centre) < 1.0
+    return values[near], centre[near]
 
 
 def _contact_in_modes(blocks: np.ndarray, rows: np.ndarray, seen: list[_Index]) -> np.ndarray:
