@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -288,13 +289,12 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
 
 
 def _answer(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> wave_exponents.Answer | None:
-    """The contact's answer to a perturbation; None of large contacts, and where it does not depend on the growth."""
+    """The contact's answer to a perturbation; None of large contacts and several laws."""
     if balance.contact.stiffness.size * basis.n_coeff > RULES.most_settled:
         return None
-    try:
+    with suppress(ValueError):
         return answer_of(balance, state, basis.harmonics[-1])
-    except ValueError:
-        return None
+    return None
 
 
 def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> np.ndarray:

@@ -20,16 +20,16 @@ STEPS = 256  # of a period
 MOST_MEMORY = 10  # numbers that a pair remembers; the linearised steps of laws with more fill the memory
 
 
-def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[complex], np.ndarray]:
-    """Derivative of g = k x - f on the amplitudes of exp((rate + i k) w t), k = -top .. top, by the rate.
+def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[complex], np.ndarray] | None:
+    """Derivative of g = k x - f (n_pair, c, nc, c, nc) on the amplitudes of exp((rate + i k) w t), |k| <= top, by rate.
 
-    The call returns (n_pair, c, nc, c, nc).
-    Raises  ValueError for several laws, for one without a memory, on which nothing depends, and for one with much of it
+    None for a law without a memory, on which nothing depends, or with much of it
+    Raises  ValueError for several laws
     """
     joint = balance.contact.merged("stability")
     parameters, memory = joint.parameters, balance.memory
     if not 0 < memory.shape[1] <= MOST_MEMORY:
-        raise ValueError("the law has no memory, or too much of it")
+        return None
     normal = parameters.components.index("n") if "n" in parameters.components else -1
     contact = time_step.Contact(parameters.packed(), parameters.gap, normal, np.zeros((1, 1)))
     law, (n_pair, c, _), n_state = compiled_law.pointer(joint.module.step), state.x.shape, memory.shape[1]

@@ -29,7 +29,7 @@ class Options:
     modes: int = 2
     harmonics: int = 5
     max_dofs: int = 100_000
-    max_unknowns: int = 6000
+    max_unknowns: int = 5000
     max_wear: float = 5e5
     coarser: float = 1.5
     wear_steps: float = 2.0
