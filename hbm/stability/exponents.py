@@ -284,7 +284,7 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     if answer is not None:
         flow = np.zeros((m, m)) if expansion.flow is None else expansion.flow[:m, :m]
         modes = expansion.lam[:m], expansion.c[:m, :m], flow, phi, static
-        found = wave_exponents.settled(found, lambda index: modes, (0, 0), state.omega, slope, answer)
+        found = wave_exponents.settled(found, (lambda index: modes, 0, 0, state.omega), slope, answer)
     return found * state.omega
 
 

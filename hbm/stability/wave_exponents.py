@@ -33,6 +33,7 @@ GROWS, ACCURACY = 1e-6, 1e-3  # over omega: growth that is looked at, and how ex
 SHARES = (0.25, 0.5, 0.75, *8 * (1.0,))  # of the answer to an exponent itself, on the way to it
 
 _Index = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Place = tuple[Callable[[int], _Index], int, int, float]  # modes by index, engine order, d, omega
 Answer = Callable[[complex], np.ndarray]  # exponent over omega -> as `perturbed_contact.departure`
 
 
@@ -107,27 +108,20 @@ def exponents(
     values, waves = every[0][chosen], every[2][chosen]
     if answer is not None:
         for d in np.unique(waves[values.real > GROWS]):
-            values[waves == d] = settled(values[waves == d], modes, (order, int(d)), omega, slope, answer)
+            values[waves == d] = settled(values[waves == d], (modes, order, int(d), omega), slope, answer)
     return values * omega, waves
 
 
-def settled(
-    exponents: np.ndarray,
-    modes: Callable[[int], _Index],
-    wave: tuple[int, int],
-    omega: float,
-    slope: np.ndarray,
-    answer: Answer,
-) -> np.ndarray:
+def settled(exponents: np.ndarray, at: Place, slope: np.ndarray, answer: Answer) -> np.ndarray:
     """Exponents (n,), in units of omega: those that grow by the answer `slope` to a steady vibration solved for again.
 
-    Each is followed to the contact's answer to just that exponent, and stays where that leads nowhere. wave : EO, d
+    Each is followed to the contact's answer to just that exponent, and stays where that leads nowhere
     """
     rows, steady, found = np.arange(slope.shape[0] * slope.shape[1]), of_exponentials(slope), exponents.copy()
     for i in np.flatnonzero(exponents.real > GROWS):
         now = exponents[i]
         for share in SHARES:
-            values, _ = _of_index(modes, *wave, omega, (1 - share) * steady + share * answer(now), rows)
+            values, _ = _of_index(*at, (1 - share) * steady + share * answer(now), rows)
             before, now = now, values[np.argmin(np.abs(values - now))]
             if share == 1 and abs(now - before) < ACCURACY:
                 found[i] = now
