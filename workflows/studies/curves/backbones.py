@@ -165,11 +165,8 @@ class SceneBackbone:
             frequency, damping = (", ".join(f"{100 * v[i]:+.3g}" for i in at) for v in (one.frequency, one.damping))
             yield one.change, f"frequency {frequency} %, damping {damping} % in {one.seconds:.3g} s"
         if self.changes:
-            sums = [
-                np.sum([np.abs(getattr(one, name)) for one in self.changes], axis=0)
-                for name in ("frequency", "damping")
-            ]
-            frequency, damping = (f"{100 * each.max():.3g} %" for each in sums)
+            every = ([np.abs(getattr(one, name)) for one in self.changes] for name in ("frequency", "damping"))
+            frequency, damping = (f"{100 * np.sum(each, axis=0).max():.3g} %" for each in every)
             yield "all of them", f"frequency {frequency}, damping {damping} at most, summed without signs"
 
     def write(self, folder: Path) -> list[Path]:
@@ -199,8 +196,8 @@ class SceneBackbone:
             upper.set(ylabel="frequency / Hz", title=named(self.name, "backbone"))
             upper.legend(loc="best")
             lower.plot(amplitude, 100 * mode.damping[good], ".-", color=ORANGE, ms=4)
-            lower.set(xscale="log", xlabel=f"amplitude in the mode at rest / {unit}", ylabel="damping ratio / %")
-            lower.set_ylim(bottom=0)
+            lower.set(xscale="log", yscale="log", ylabel="damping ratio / %")
+            lower.set(xlabel=f"amplitude in the mode at rest / {unit}")
         return figure
 
 
