@@ -8,7 +8,8 @@ Hill: a perturbation exp(lambda t) p(t), p periodic, of the modal coordinates of
 so the contact is eliminated exactly and what is left is a small quadratic eigenproblem. Modes that are not kept follow
 statically (W_0), and the contact law answers as to a steady vibration (its derivative by alternating frequency/time):
 exact where lambda = 0, so that a fold is where an exponent passes zero, and an approximation for laws with memory
-where it is not. Floquet multipliers of the integrated motion (method "floquet") make neither assumption.
+where it is not. Of small contacts an exponent that grows by it is solved for again with the law's answer to just that
+exponent (perturbed_contact). Floquet multipliers of the integrated motion (method "floquet") need neither assumption.
 Source  Hill's method and the choice of exponents by their centre: Lazarus and Thomas 2010; Guillot et al. 2020; the
 elimination of the contact is ours
 """
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -33,6 +35,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import crossing, floquet, wave_exponents
+from tribodyn.hbm.stability.perturbed_contact import answer_of
 from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
 
@@ -49,6 +52,7 @@ class HillRules:
     most_modes: int = 30
     copy_distance: float = 0.02  # over omega: how far truncation may drive copies of one exponent apart
     equally_central: float = 1e-5  # difference of the mean harmonics of two perturbations that is rounding
+    most_settled: int = 500  # coefficients of the contact up to which exponents that grow are solved for again
 
 
 RULES = HillRules()
@@ -251,7 +255,8 @@ def _of_wave(balance: HarmonicBalance, state: State, n_modes: int | None, top: i
     modes = _WAVES.get(linear)
     if modes is None or modes.m != wanted:
         modes = _WAVES[linear] = WaveModes(balance.model, linear.k, wanted)
-    found, diameters = wave_exponents.exponents(balance, modes, state.omega, _departure_slope(balance, state, basis))
+    slope, answer = _departure_slope(balance, state, basis), _answer(balance, state, basis)
+    found, diameters = wave_exponents.exponents(balance, modes, state.omega, slope, answer)
     exponents, order = _sorted(found, state.omega)
     return Stability(state.omega, exponents, "hill", diameters[order])
 
@@ -263,7 +268,8 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     n_contact = balance.compliance.n_contact
     phi, rest = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]
     static = expansion.w0[:n_contact, :n_contact] + (rest / expansion.lam[m:]) @ rest.T
-    coupling = _contact_in_modes(_departure_slope(balance, state, basis), phi, static)
+    slope, answer = _departure_slope(balance, state, basis), _answer(balance, state, basis)
+    coupling = _contact_in_modes(slope, phi, static)
     nc = basis.n_coeff
     unit = np.eye(nc)
     turn = np.kron(np.eye(m), basis.rate.T)  # d / d(w t)
@@ -274,7 +280,21 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     constant = turn @ turn + damping @ turn + spring / state.omega**2
     companion = np.block([[np.zeros_like(turn), np.eye(len(turn))], [-constant, -2 * turn - damping]])
     values, vectors = np.linalg.eig(companion)
-    return _central(values, *_centre(vectors[: m * nc], m, basis), 2 * m) * state.omega
+    found = _central(values, *_centre(vectors[: m * nc], m, basis), 2 * m)
+    if answer is not None:
+        flow = np.zeros((m, m)) if expansion.flow is None else expansion.flow[:m, :m]
+        modes = expansion.lam[:m], expansion.c[:m, :m], flow, phi, static
+        found = wave_exponents.settled(found, (lambda index: modes, 0, 0, state.omega), slope, answer)
+    return found * state.omega
+
+
+def _answer(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> wave_exponents.Answer | None:
+    """The contact's answer to a perturbation; None of large contacts and several laws."""
+    if balance.contact.stiffness.size * basis.n_coeff > RULES.most_settled:
+        return None
+    with suppress(ValueError):
+        return answer_of(balance, state, basis.harmonics[-1])
+    return None
 
 
 def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> np.ndarray:

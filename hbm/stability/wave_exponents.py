@@ -17,6 +17,8 @@ for one sector; the extension to all nodal diameters and the elimination of the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.linalg as sla
 
@@ -27,7 +29,12 @@ from tribodyn.reduction.model import ReducedModel
 COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: how far truncation drives copies apart
 
 
+GROWS, ACCURACY = 1e-6, 1e-3  # over omega: growth that is looked at, and how exactly
+SHARES = (0.25, 0.5, 0.75, *8 * (1.0,))  # of the answer to an exponent itself, on the way to it
+
 _Index = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Place = tuple[Callable[[int], _Index], int, int, float]  # modes by index, engine order, d, omega
+Answer = Callable[[complex], np.ndarray]  # exponent over omega -> as `perturbed_contact.departure`
 
 
 class WaveModes:
@@ -75,12 +82,12 @@ class WaveModes:
 
 
 def exponents(
-    balance: HarmonicBalance, modes: WaveModes, omega: float, slope: np.ndarray
+    balance: HarmonicBalance, modes: WaveModes, omega: float, slope: np.ndarray, answer: Answer | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Floquet exponents of a travelling wave against perturbations of every nodal diameter.
 
     slope : (n_pair, c, n_coeff, c, n_coeff) dg/dx with coefficients [x_0, a_1, b_1, ...] up to the highest harmonic of
-        the perturbation
+        the perturbation; answer : as of `settled`
     Returns exponents (n,) [1/s] and the index d (n,) of each perturbation, from -N/2 + 1 to N/2
     """
     order, n = balance.model.info.engine_order, modes.n_sectors
@@ -98,7 +105,28 @@ def exponents(
             diameters.append(np.full(len(found), sign * d))
     every = np.concatenate(values), np.concatenate(centres), np.concatenate(diameters)
     chosen = _once(*every, order, n, sum(2 * len(modes(d)[0]) for d in range(n)))
-    return every[0][chosen] * omega, every[2][chosen]
+    values, waves = every[0][chosen], every[2][chosen]
+    if answer is not None:
+        for d in np.unique(waves[values.real > GROWS]):
+            values[waves == d] = settled(values[waves == d], (modes, order, int(d), omega), slope, answer)
+    return values * omega, waves
+
+
+def settled(exponents: np.ndarray, at: Place, slope: np.ndarray, answer: Answer) -> np.ndarray:
+    """Exponents (n,), in units of omega: those that grow by the answer `slope` to a steady vibration solved for again.
+
+    Each is followed to the contact's answer to just that exponent, and stays where that leads nowhere
+    """
+    rows, steady, found = np.arange(slope.shape[0] * slope.shape[1]), of_exponentials(slope), exponents.copy()
+    for i in np.flatnonzero(exponents.real > GROWS):
+        now = exponents[i]
+        for share in SHARES:
+            values, _ = _of_index(*at, (1 - share) * steady + share * answer(now), rows)
+            before, now = now, values[np.argmin(np.abs(values - now))]
+            if share == 1 and abs(now - before) < ACCURACY:
+                found[i] = now
+                break
+    return found
 
 
 def _once(
@@ -136,7 +164,7 @@ def of_exponentials(slope: np.ndarray) -> np.ndarray:
 
 
 def _of_index(
-    modes: WaveModes, order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
+    modes: Callable[[int], _Index], order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exponents of perturbations of index d, in units of omega, and the mean k of each; those with it within 1."""
     nc = blocks.shape[-1]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
-from tests.helpers.verification_models import oscillator
+from tests.helpers.verification_models import interface, oscillator
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
@@ -16,6 +17,7 @@ from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.stability.exponents import Stability, mark, stability
 from tribodyn.hbm.stability.floquet import monodromy
 from tribodyn.hbm.time import time_integration
@@ -153,3 +155,27 @@ def test_names_and_refusals():
     with pytest.raises(ValueError, match="one system for all harmonics"):
         stability(other, state)
     assert Stability(10.0, np.array([1.0 + 3j]), "hill").crossing == "Neimark-Sacker"
+
+
+def self_excited(ratio: float, force: float) -> HarmonicBalance:
+    """A mass that negative damping drives and a slider limits."""
+    system = SecondOrderSystem(np.eye(1), np.eye(1), 2 * ratio * np.eye(1), {"force": np.ones(1)}, {"mass": np.ones(1)})
+    law = ContactParameters.of(("t1",), [[4.0]], friction=1.0, normal_load=1.0)
+    contact = Joint("contact", "jenkins_constant", law)
+    basis, load = HarmonicBasis((1, 3, 5, 7), 256, "located"), Excitation.of({}, {1: {"force": force}})
+    return HarmonicBalance.of(ReducedModel(system, interface(np.eye(1), ("t1",))), contact, basis, load, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "force", "omega", "stable"),
+    [(-0.02, 1.5, 2.2, True), (-0.02, 3.0, 0.8, True), (-0.1, 3.0, 1.8, True), (-0.1, 3.0, 1.3, False)],
+)
+def test_growth_that_friction_limits_is_that_of_the_motion_in_time(ratio, force, omega, stable, monkeypatch):
+    """The answer to a steady vibration has no friction for the perturbation: by it every such motion grows."""
+    balance = self_excited(ratio, force)
+    state = newton.solve_from_rest(balance, omega).state
+    found, reference = (exponents.stability(balance, state, method) for method in ("hill", "floquet"))
+    assert found.stable == reference.stable == stable
+    assert np.abs(found.multipliers).max() == pytest.approx(np.abs(reference.multipliers).max(), rel=0.02)
+    monkeypatch.setattr(exponents, "_answer", lambda *of: None)
+    assert not exponents.stability(balance, state).stable

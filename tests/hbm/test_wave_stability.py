@@ -8,7 +8,9 @@ import pytest
 from tests.helpers import tiny_wheel as tiny
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS
+from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.stability.exponents import stability
+from tribodyn.reduction.damping import modal_damping
 
 EXACT = newton.NewtonOptions(tolerance=1e-12)
 
@@ -66,6 +68,23 @@ def test_exponents_of_a_slipping_wave_are_those_of_the_whole_wheel_by_the_same_m
     lead = found.exponents[:8]
     assert matched(lead, reference.exponents) < 1e-10 * np.abs(lead).max()
     assert matched(reference.exponents[:8], found.exponents) < 1e-10 * np.abs(lead).max()
+
+
+@pytest.mark.parametrize("omega", [120.0, 140.0])
+def test_growth_that_friction_limits_is_that_of_the_whole_wheel_in_time(omega, monkeypatch):
+    """Negative damping: what grows is found again with the contact's answer to just that."""
+    monkeypatch.setattr(tiny, "modal_damping", lambda system, ratio: -modal_damping(system, ratio))
+    slipping = tiny.sector(("t1", "n"), 12.0)
+    one, wheel = tiny.wave_and_wheel(slipping, "jenkins", 2, (0, 1, 2, 3, 4, 5), 12.0, damping=0.005, friction=0.4)
+    here, there = solved(one, wheel, omega, 2)
+    assert (here.cycle.status & SLIPS).all()
+    found, reference = stability(one, here), stability(wheel, there, "floquet")
+    largest = np.abs(reference.multipliers).max()
+    assert np.abs(found.multipliers).max() == pytest.approx(largest, rel=2e-4)
+    monkeypatch.setattr(exponents, "_answer", lambda *of: None)
+    steady = stability(one, here)
+    assert np.abs(steady.multipliers).max() > largest + 5e-3
+    assert steady.n_unstable > found.n_unstable
 
 
 def test_a_wave_whose_contacts_stick_is_as_stable_as_the_stuck_wheel():

@@ -16,8 +16,7 @@ import numpy as np
 from tests.helpers.verification_models import random_structure
 from tests.proof import scoreboard
 from tribodyn.hbm.wear.history import LIFE_SHARE
-from tribodyn.workflows.errors import refine, verdict
-from tribodyn.workflows.result import summary
+from tribodyn.workflows.errors import verdict
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import parse
 
@@ -51,7 +50,7 @@ class Row:
     value, error, reason : what the verdict says of the life; stated : whether it states it
     brute : the finer of two lives in time; doubt : its difference from the other, relative
     preload : first one of `run` over that in time
-    change : of the life of `run` with twice the harmonics and a third of the wear step, relative
+    followed : share of the cycles of `run` whose motion it followed in time
     """
 
     number: int
@@ -62,7 +61,7 @@ class Row:
     brute: Brute
     doubt: float | None
     preload: float | None
-    change: float | None = None
+    followed: float = 0.0
 
     @property
     def outcome(self) -> str:
@@ -120,6 +119,7 @@ kept = [0, 1, 2, 3, 4, 5]
 coefficient = {COEFFICIENT}
 at = {{ frequency = {hertz} }}
 rule = "error_controlled"
+motion = "machine"
 max_steps = 400
 lost_below = {LIFE_SHARE}
 """
@@ -242,12 +242,9 @@ def run(scenes: int, say: Callable[[str], None], first: int = 0) -> list[Row]:
                 result, model = scoreboard.solved(file)
                 said = verdict.judge(file, model, result, Progress()).statements["life"]
                 row = replace(row, value=said.value, error=said.error, stated=said.stated, reason=said.reason)
-                if said.value is not None:
-                    finer, _ = scoreboard.solved(refine.wear(refine.harmonics(file, 10), 3.0))
-                    there = summary.life(finer)
-                    row = replace(row, change=None if there is None else abs(there / said.value - 1))
-                if result.wear is not None:
-                    row = replace(row, preload=float(result.wear.preload[0]) / brute.first)
+                if (worn := result.wear) is not None:
+                    followed = float(worn.cycles_in_step[worn.in_time].sum() / worn.cycles_in_step.sum())
+                    row = replace(row, preload=float(worn.preload[0]) / brute.first, followed=followed)
             except (ValueError, RuntimeError) as refusal:
                 row = replace(row, reason=str(refusal))
         rows.append(row)
@@ -266,7 +263,7 @@ def as_text(rows: list[Row]) -> str:
         ratio = r.value / r.brute.cycles if r.value and r.brute.cycles else None
         lines.append(
             f"{r.number:3d} in time {shown(r.brute.cycles, '.4g')} +- {shown(r.doubt, '.1%')}, "
-            f"run {shown(r.value, '.4g')} +- {shown(r.error, '.1%')}, refined by {shown(r.change, '.1%')}, "
+            f"run {shown(r.value, '.4g')} +- {shown(r.error, '.1%')}, in time for {r.followed:.0%} of its cycles, "
             f"ratio {shown(ratio, '.3f')}, "
             f"first preload {shown(r.preload, '.4f')}, open {r.brute.opened:.2f}, {r.brute.blocks} blocks: {r.outcome}"
             + "".join(f"; {why}" for why in (r.brute.reason, r.reason) if why)

@@ -2,6 +2,7 @@
 
 Modes, then mesh and contact grid, then harmonics are refined, each on top of the one before, so that the rows of single
 refinements sum, with their signs, to the combined one. A refinement that meets a limit of the options is not measured.
+Matrices have no mesh: modes and harmonics, and the steps of wear, are all that can be refined in them.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from tribodyn.workflows.result.verdict import Change, Refinement
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.wear import Wear
 
@@ -67,8 +69,7 @@ def measure(
         return table
     finer, ratio, why = refined(file, table.first, result, options)
     if finer is None:
-        table.refuse(Refinement.COMBINED, why)
-        _on_own_mesh(file, table, say)
+        _on_own_mesh(file, why, table, say)
     else:
         _step_by_step(file, finer, ratio, table, say)
     _estimates(file, table, result)
@@ -111,7 +112,7 @@ def _step_by_step(file: SceneFile, finer: SceneFile, ratio: float, table: Table,
     """Modes, mesh, harmonics, each on top of the one before; the last is the combined refinement."""
     own = table.first
     assert own is not None
-    before = _more_modes(file, table, say) or own.answers
+    before = (_more_modes(file, table, say) or own).answers
     say(f"a mesh with {ratio:.2g} times the elements")
     how = f"{ratio:.3g} times the elements along every edge"
     kept = own.balance.basis.harmonics
@@ -130,14 +131,18 @@ def _step_by_step(file: SceneFile, finer: SceneFile, ratio: float, table: Table,
     table.add(Refinement.COMBINED, own.answers, last, f"{how}, more modes, harmonics 0 to {top_of(own)}")
 
 
-def _on_own_mesh(file: SceneFile, table: Table, say: Callable[[str], None]) -> None:
-    """What can be refined where the mesh cannot."""
-    assert table.first is not None
-    _more_modes(file, table, say)
-    _more_harmonics(table.first, table, say)
+def _on_own_mesh(file: SceneFile, why: str, table: Table, say: Callable[[str], None]) -> None:
+    """What can be refined where the mesh cannot, as `why` says: all that there is where there is none."""
+    own = table.first
+    assert own is not None
+    last = _more_harmonics(_more_modes(file, table, say) or own, table, say)
+    if last is None or not isinstance(file.scene, MatrixScene):
+        table.refuse(Refinement.COMBINED, why if last else table.rows[-1].how)
+    else:
+        table.add(Refinement.COMBINED, own.answers, last, f"more modes, harmonics 0 to {top_of(own)}")
 
 
-def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> Answers | None:
+def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> State | None:
     """The own state with more modes, followed from its own solution; None where the scene has no number of modes."""
     own = table.first
     assert own is not None
@@ -154,9 +159,9 @@ def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> An
     except REFUSALS as refusal:
         table.refuse(Refinement.MODES, str(refusal))
         return None
-    answers = Answers.of(balance, point)
-    table.add(Refinement.MODES, own.answers, answers, f"{DEFAULT.modes} times as many modes")
-    return answers
+    found = State(own.cycles, balance, own.site, point)
+    table.add(Refinement.MODES, own.answers, found.answers, f"{DEFAULT.modes} times as many modes")
+    return found
 
 
 def _load(file: SceneFile) -> float:
@@ -208,7 +213,7 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     """Depth and life of the whole run on another mesh, with more modes, harmonics and wear steps.
 
     The refined mesh is taken where the work allows it, else one coarser than the scene's own, whose run takes about as
-    much work as the scene's.
+    much work as the scene's. Matrices, which have no mesh, are worn as they are.
     """
     own, wear = table.first, result.wear
     assert own is not None
@@ -220,20 +225,23 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     top = top_of(own, options)
     periods = 0 if wear.periods is None else wear.periods.sum()  # one costs about as much as a solve
     work = float(wear.solves.sum() + periods) * own.balance.contact.stiffness.size * (2 * top + 1)
-    ratio = table.ratio or options.ratios[0]
-    if finer is None or (ratio > 1 and work * ratio**2 > options.max_wear):
-        try:
-            finer, ratio = refine.mesh(file, 1 / options.coarser)
-        except refine.NoMesh as refusal:
-            why = str(refusal)
-        if finer is None or ratio >= 1:
+    bare = isinstance(file.scene, MatrixScene)
+    ratio = 1.0 if bare else table.ratio or options.ratios[0]
+    if bare and work > options.max_wear:
+        table.refuse(Refinement.COMBINED, f"finer wear takes work above the limit of {options.max_wear:g}", OF_WEAR)
+        return
+    if bare:
+        finer = refine.modes(file, options.modes) or file
+    elif finer is None or (ratio > 1 and work * ratio**2 > options.max_wear):
+        finer, ratio = refine.mesh(file, 1 / options.coarser)
+        if ratio >= 1:
             table.refuse(Refinement.COMBINED, why or "the mesh is given and can only be cut", OF_WEAR)
             return
         finer = refine.modes(finer, options.modes) or finer
-    steps = options.wear_steps if ratio > 1 else 1.0
+    steps = options.wear_steps if ratio >= 1 else 1.0
     other = refine.wear(refine.harmonics(finer, top), steps)
-    how = f"{ratio:.3g} times the elements along every edge, more modes, harmonics 0 to {top}"
-    how += f", {steps:g} times the wear steps" if steps > 1 else ""
+    how = "" if bare else f"{ratio:.3g} times the elements along every edge, "
+    how += f"more modes, harmonics 0 to {top}" + (f", {steps:g} times the wear steps" if steps > 1 else "")
     table_of_wear = other.scene.wear
     assert table_of_wear is not None
     try:
@@ -245,7 +253,7 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     except REFUSALS as refusal:
         table.refuse(Refinement.COMBINED, f"{how}: {refusal}", OF_WEAR)
         return
-    table.worn_ratio = ratio
+    table.worn_ratio = None if bare else ratio
     pairs = (
         ("depth", float(result.depth_after(-1).max()), float((worn.depth[-1] + worn.worn[-1]).max())),
         ("life", life, there),

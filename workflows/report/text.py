@@ -156,6 +156,8 @@ def warnings(result: Result) -> Iterator[str]:
         if found["unstable_cycles"]:
             share = percent(found["unstable_cycles"])
             yield f'the motion is unstable for {share} of the cycles; wear.motion = "machine" follows a machine there'
+        elif found["unstable_cycles"] is None and result.facts.around is not None and found["wear_steps"]:
+            yield "whether the wheel stays at the motion that it wears along is not known"
         for row in wear.jumps:
             before, after = (measured(hertz, "Hz", 4) for hertz in wear.frequency[row : row + 2])
             when = measured(wear.cycles[row + 1], "cycles")
