@@ -71,7 +71,7 @@ def _tables(source: Source) -> dict[Form, dict[Place, tuple[Place, ...]]]:
     for form, rows in found.items():
         if _equal(form):
             count = Counter(place for row in rows for place in row)
-            found[form] = [sorted(row, key=lambda place: count[place]) for row in rows]
+            found[form] = [sorted(row, key=lambda place: (count[place], place)) for row in rows]
     return {form: {first: tuple(others) for first, *others in rows} for form, rows in found.items() if form}
 
 
