@@ -369,9 +369,13 @@ def _cards(lines: list[str]) -> Iterator[tuple[str, list[str]]]:
 
 
 def _fields(line: str) -> tuple[str, list[str]]:
+    """Name and fields of a line: eight, or the four of a name with a star, in free and in fixed format."""
     if "," in line:
         head, *more = [item.strip() for item in line.split(",")]
-        return head, (more + [""] * 8)[:8]
+        if "*" in head and any(item and item[0] not in "+*" for item in more[4:]):
+            raise ValueError(f"the line '{line[:40]}' has more than the four fields of a star: take the star out")
+        count = 4 if "*" in head else 8
+        return head, (more + [""] * count)[:count]
     line = line.expandtabs(8)
     head = line[:8].strip()
     width, count = (16, 4) if "*" in head else (8, 8)

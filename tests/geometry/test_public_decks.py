@@ -149,8 +149,8 @@ def test_equations_between_two_faces_make_one_body_of_them_added_nodes_too(kind:
     support = "*BOUNDARY\n" + "".join(f"{n}, 1, 3\n" for n in foot)
     place = {tuple(x): n for n, x in enumerate(half[0], 1)}
     pairs = [(place[(100.0, *half[0][n - 1][1:])], n + 1000) for n in foot]
-    joined = "".join(f"*EQUATION\n2\n{n}, {axis}, 1., {m}, {axis}, -1.\n"
-                     for k, (a, b) in enumerate(pairs) for n, m in [(a, b) if k % 2 else (b, a)] for axis in (1, 2, 3))  # fmt: skip
+    turned = [pair if k % 2 else pair[::-1] for k, pair in enumerate(pairs)]
+    joined = "".join(f"*EQUATION\n2\n{n}, {axis}, 1., {m}, {axis}, -1.\n" for n, m in turned for axis in (1, 2, 3))
     two = steel + block(half, "A", 0, 0.0) + block(half, "B", 1000, 50.0) + support + joined
     one = steel + block(whole, "A", 0, 0.0) + "*BOUNDARY\n" + "".join(
         f"{n}, 1, 3\n" for n in whole[2] if any(n in c[:corners] for c in whole[1])
