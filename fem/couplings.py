@@ -1,7 +1,8 @@
 """Constraints: faces glued together though their meshes differ, points that carry faces, and points linked together.
 
 Source  ties: Wohlmuth, A mortar finite element method using dual spaces for the Lagrange multiplier, SIAM Journal on
-    Numerical Analysis 38, 2000; distributed coupling: the mean motion of a face in the sense of least squares, weighted by area
+    Numerical Analysis 38, 2000; distributed coupling: the mean motion of a face in the sense of least squares,
+    weighted by area
 """
 
 from __future__ import annotations
