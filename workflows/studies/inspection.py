@@ -184,7 +184,7 @@ def _of_file(
             made, lacking = None, str(sentence)
         solids.append(Solid(name, mesh, node_sets, made))
     found = measured(solids, decks.said(source, table), source.unused)
-    pairs, apart, remarks = pairs_of(source)
+    pairs, apart, remarks = _pairs_of(source.deck, solids)
     ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
     found = replace(found, pairs=pairs, refused=(*ignored, *apart))
     if n_modes:
@@ -204,24 +204,24 @@ def _of_file(
     return replace(found, remarks=tuple(remarks))
 
 
-def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[str], list[str]]:
+def _pairs_of(of: Deck, solids: Sequence[Solid]) -> tuple[dict[str, dict[str, float]], list[str], list[str]]:
     """How the faces of ties and contact pairs of a deck meet.
 
     Returns for each pair the area that is shared and that of the first face [m2], the least and largest opening [m],
         negative where they overlap, the angle between them [degrees]; sentences on pairs that share nothing; remarks
         on those that are an opening apart
     """
-    whole = Assembly([Body(name, body.mesh, body.node_sets, {}) for name, body in source.bodies.items()])
+    whole = Assembly([Body(solid.name, solid.mesh, solid.node_sets, {}) for solid in solids])
     found: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     remarks: list[str] = []
-    for kind, one in [*(("tie", tie) for tie in source.deck.ties), *(("contact", c) for c in source.deck.contacts)]:
+    for kind, one in [*(("tie", tie) for tie in of.ties), *(("contact", c) for c in of.contacts)]:
         name = f"{kind} '{one.name}'"
         first, second = (
-            [face for body in source.bodies if (face := f"{body}.{group}") in whole.boundaries]
+            [face for solid in solids if (face := f"{solid.name}.{group}") in whole.boundaries]
             for group in (one.slave, one.master)
         )
-        slaves = [of.mesh for of in source.bodies.values() if one.slave in (of.mesh.boundaries or {})]
+        slaves = [solid.mesh for solid in solids if one.slave in (solid.mesh.boundaries or {})]
         met, trouble = [], f"{name}: its sets are no faces of elements: give surfaces"
         for ends in product(first, second):
             try:
@@ -233,7 +233,7 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
             continue
         gaps = np.concatenate([shared.gap for *_, shared in met])
         facing = [(a.normal[s.first] * b.normal[s.second]).sum(axis=1) @ s.weight for a, b, s in met]
-        shared = sum(float(of.weight.sum()) for *_, of in met)
+        shared = sum(float(own.weight.sum()) for *_, own in met)
         low, high = float(gaps.min()), float(gaps.max())
         found[name] = {
             "shared_m2": shared,
