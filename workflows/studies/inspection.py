@@ -252,11 +252,7 @@ def _frequencies(part: Part, count: int) -> tuple[float, ...]:
     """The lowest natural frequencies of a part [Hz]; 0 where they are rounding."""
     M, K = part.system.mass, part.system.stiffness
     shift = 1e-9 * stiffest(K, M)
-    along_x = np.tile([1.0, 0.0, 0.0], (len(part.points), 1))
-    along_x[[turn for _, turn in getattr(part.mesh, "points", {}).values()]] = 0.0
-    q = along_x.ravel()[part.free]
-    free = q @ (K @ q) < 1e-12 * (q**2 @ K.diagonal())  # then K is singular, and need not be factorised to know it
-    omega, _ = modes(K, M, min(count, M.shape[0]), sigma=-shift if free else None)
+    omega, _ = modes(K, M, min(count, M.shape[0]), sigma=-shift)  # K alone is singular where something can move rigidly
     omega[omega**2 < 1e-5 * shift] = 0.0
     return tuple((omega / (2 * np.pi)).tolist())
 
