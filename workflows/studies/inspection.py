@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from tribodyn.fem.assembly import Assembly, Body
+from tribodyn.fem.assembly import Assembly, Body, named_in
 from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
@@ -218,7 +218,12 @@ def _pairs_of(of: Deck, solids: Sequence[Solid]) -> tuple[dict[str, dict[str, fl
     for kind, one in [*(("tie", tie) for tie in of.ties), *(("contact", c) for c in of.contacts)]:
         name = f"{kind} '{one.name}'"
         first, second = (
-            [face for solid in solids if (face := f"{solid.name}.{group}") in whole.boundaries]
+            [
+                face
+                for solid in solids
+                if (face := named_in(solid.name, group, solid.node_sets)) in whole.boundaries
+                and group in solid.node_sets
+            ]
             for group in (one.slave, one.master)
         )
         slaves = [solid.mesh for solid in solids if one.slave in (solid.mesh.boundaries or {})]
