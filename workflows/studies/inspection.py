@@ -16,7 +16,6 @@ from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes, stiffest
-from tribodyn.fem.part import Part
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources.deck import Deck
@@ -198,7 +197,7 @@ def _of_file(
             with progress.stage("mass and stiffness"):
                 part = decks.part(path.stem, table, named, path.parent)
             with progress.stage("modes"):
-                found = replace(found, frequencies=_frequencies(part, n_modes))
+                found = replace(found, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes))
     hint = 'give --unit mm (in a scene: unit = "mm")'
     remarks += sanity_checks.check_size(found.size, hint) + _check_materials(solids)
     return replace(found, remarks=tuple(remarks))
@@ -253,9 +252,8 @@ def _pairs_of(of: Deck, solids: Sequence[Solid]) -> tuple[dict[str, dict[str, fl
     return found, refused, remarks
 
 
-def _frequencies(part: Part, count: int) -> tuple[float, ...]:
-    """The lowest natural frequencies of a part [Hz]; 0 where they are rounding."""
-    M, K = part.system.mass, part.system.stiffness
+def _frequencies(M: Any, K: Any, count: int) -> tuple[float, ...]:
+    """The lowest natural frequencies of mass and stiffness [Hz]; 0 where they are rounding."""
     shift = 1e-9 * stiffest(K, M)
     omega, _ = modes(K, M, min(count, M.shape[0]), sigma=-shift)  # K alone is singular where something can move rigidly
     omega[omega**2 < 1e-5 * shift] = 0.0
@@ -263,15 +261,11 @@ def _frequencies(part: Part, count: int) -> tuple[float, ...]:
 
 
 def _free_frequencies(solids: Sequence[Solid], count: int, progress: Progress) -> tuple[float, ...]:
-    """The lowest natural frequencies of bodies that nothing holds [Hz]; rigid motions are 0."""
+    """The lowest natural frequencies of bodies that nothing holds [Hz]."""
     found: list[float] = []
     for solid in solids:
         with progress.stage(f"modes of {solid.name}"):
-            M, K = assemble(solid.mesh, solid.material)
-            omega, _ = modes(K, M, min(count, K.shape[0]))
-        elastic = omega.copy()
-        elastic[:6] = 0.0
-        found += (elastic / (2 * np.pi)).tolist()
+            found += _frequencies(*assemble(solid.mesh, solid.material), count)
     return tuple(sorted(found)[:count])
 
 
@@ -282,7 +276,7 @@ def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> I
     found = of_part(file, part)
     if n_modes:
         with progress.stage("modes"):
-            found = replace(found, frequencies=_frequencies(part, n_modes))
+            found = replace(found, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes))
     return found
 
 
