@@ -32,30 +32,10 @@ APART = 0.005  # of the length of a face: an opening or overlap from which on a 
 
 
 @dataclass(frozen=True)
-class Solid:
-    """One body. material : one, or by volume group, None where nothing says it"""
-
-    name: str
-    mesh: Any
-    node_sets: Mapping[str, np.ndarray]
-    material: Any = None
-
-    @property
-    def density(self) -> np.ndarray | None:
-        """Density of each element (n_element,) [kg/m3], None where nothing says it."""
-        return None if self.material is None else densities(self.mesh, self.material)
-
-    @property
-    def plain(self) -> Material | None:
-        """Its only, isotropic material."""
-        return self.material if isinstance(self.material, Material) else None
-
-
-@dataclass(frozen=True)
 class Inspection:
-    """What was found, in SI units; see `record` for the fields. solids : the bodies, for a picture"""
+    """What was found, in SI units; see `record` for the fields. solids : the bodies, material {} where none is known"""
 
-    solids: tuple[Solid, ...]
+    solids: tuple[Body, ...]
     size: np.ndarray
     volume: float
     mass: float | None
@@ -180,8 +160,8 @@ def _of_file(
         try:
             made = decks.material(source.deck, name, mesh, table, named)
         except ValueError as sentence:  # no or no whole material
-            made, lacking = None, str(sentence)
-        solids.append(Solid(name, mesh, node_sets, made))
+            made, lacking = {}, str(sentence)
+        solids.append(Body(name, mesh, node_sets, made))
     found = measured(solids, decks.said(source, table), source.unused)
     pairs, apart, remarks = _pairs_of(source.deck, solids)
     ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
@@ -203,14 +183,14 @@ def _of_file(
     return replace(found, remarks=tuple(remarks))
 
 
-def _pairs_of(of: Deck, solids: Sequence[Solid]) -> tuple[dict[str, dict[str, float]], list[str], list[str]]:
+def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, float]], list[str], list[str]]:
     """How the faces of ties and contact pairs of a deck meet.
 
     Returns for each pair the area that is shared and that of the first face [m2], the least and largest opening [m],
         negative where they overlap, the angle between them [degrees]; sentences on pairs that share nothing; remarks
         on those that are an opening apart
     """
-    whole = Assembly([Body(solid.name, solid.mesh, solid.node_sets, {}) for solid in solids])
+    whole = Assembly(solids)
     found: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     remarks: list[str] = []
@@ -260,7 +240,7 @@ def _frequencies(M: Any, K: Any, count: int) -> tuple[float, ...]:
     return tuple((omega / (2 * np.pi)).tolist())
 
 
-def _free_frequencies(solids: Sequence[Solid], count: int, progress: Progress) -> tuple[float, ...]:
+def _free_frequencies(solids: Sequence[Body], count: int, progress: Progress) -> tuple[float, ...]:
     """The lowest natural frequencies of bodies that nothing holds [Hz]."""
     found: list[float] = []
     for solid in solids:
@@ -299,20 +279,23 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
     return replace(found, gaps=gaps, remarks=tuple(remarks))
 
 
-def _check_materials(solids: Sequence[Solid]) -> list[str]:
-    return sanity_checks.check_materials({one.name: one.plain for one in solids if one.plain is not None})
+def _check_materials(solids: Sequence[Body]) -> list[str]:
+    return sanity_checks.check_materials({of.name: of.material for of in solids if isinstance(of.material, Material)})
 
 
-def _solids(file: scene_file.SceneFile, part: Any) -> list[Solid]:
+def _solids(file: scene_file.SceneFile, part: Any) -> list[Body]:
     """The bodies of a part."""
     if isinstance(part.mesh, Assembly):
-        return [Solid(b.name or file.name, b.mesh, b.node_sets, b.material) for b in part.mesh.bodies]
-    return [Solid(file.name, part.mesh, part.node_sets, part_reduction.material(file.mesh_scene, part.mesh))]
+        return [replace(body, name=body.name or file.name) for body in part.mesh.bodies]
+    return [Body(file.name, part.mesh, part.node_sets, part_reduction.material(file.mesh_scene, part.mesh))]
 
 
-def measured(solids: Sequence[Solid], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
+def measured(solids: Sequence[Body], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
     """Sizes, volumes, masses, groups and the worst element of bodies."""
-    all_facts = {solid.name: facts(solid.mesh, solid.density) for solid in solids}
+    all_facts = {
+        solid.name: facts(solid.mesh, densities(solid.mesh, solid.material) if solid.material else None)
+        for solid in solids
+    }
     volume = sum(one.volume for one in all_facts.values())
     masses = [one.mass for one in all_facts.values() if one.mass is not None]
     mass = sum(masses) if len(masses) == len(solids) else None
