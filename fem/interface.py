@@ -22,6 +22,8 @@ class ContactInterface:
     gap : (n_pair,) opening before loading [m], negative is interference
     B : (n_pair * n_component, n_dof) row pair * n_component + component, sparse (full model) or dense (reduced)
     faces : (n_face, k) corner-ordered polygons over the pairs, for area and pictures (may be empty)
+    nodes, mean : node pairs, and the (n_pair, n_node_pair) weights by which their means are these pairs; None where
+        these are node pairs themselves
     """
 
     components: tuple[str, ...]
@@ -31,6 +33,8 @@ class ContactInterface:
     gap: np.ndarray
     B: Any
     faces: np.ndarray
+    nodes: ContactInterface | None = None
+    mean: Any = None
 
     @property
     def n_pair(self) -> int:

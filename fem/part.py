@@ -134,7 +134,9 @@ def build(
         outputs={name: _felt(part, f"output '{name}'", of.vector(mesh, node_sets, M)) for name, of in outputs.items()},
     )
     held_rows = np.array([part.force(row) for row in rows]).reshape(len(held), len(free))
-    return replace(part, system=system, interface=replace(interface, B=part.rows(interface.B)), held=held_rows)
+    nodes = interface.nodes and replace(interface.nodes, B=part.rows(interface.nodes.B))
+    interface = replace(interface, B=part.rows(interface.B), nodes=nodes)
+    return replace(part, system=system, interface=interface, held=held_rows)
 
 
 def _felt(part: Part, what: str, vector: np.ndarray) -> np.ndarray:

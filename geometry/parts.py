@@ -29,9 +29,10 @@ def names() -> tuple[str, ...]:
 
 def file_of(name: str) -> Path:
     """The file of a part; raises ValueError with the parts that there are."""
-    if name not in names():
+    file = _FOLDER / f"{name}.py"
+    if file.parent != _FOLDER or not file.is_file() or not _is_part(file):
         raise ValueError(f"there is no part '{name}': the parts are {', '.join(names())}, or give a file my_part.py")
-    return _FOLDER / f"{name}.py"
+    return file
 
 
 def load(name: str) -> ModuleType:

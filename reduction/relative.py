@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_matrix, eye_array
+from scipy.sparse import csr_matrix, eye_array, kron
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
@@ -29,6 +29,7 @@ def relative(
     """
     if interface.components != COMPONENTS:
         raise ValueError(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
+    means, interface = interface, interface.nodes or interface
     n, n_pair = system.n_dof, interface.n_pair
     B = csr_matrix(interface.B)
     own, other = body_1_dofs(interface).ravel(), np.ones(n, dtype=bool)
@@ -48,7 +49,8 @@ def relative(
         loads={name: T.T @ load for name, load in system.loads.items()},
         outputs={name: T.T @ row for name, row in system.outputs.items()},
     )
-    return moved, replace(interface, B=place), T
+    place = place if means.nodes is None else csr_matrix(kron(means.mean, eye_array(3)) @ place)
+    return moved, replace(means, B=place, nodes=None, mean=None), T
 
 
 def body_1_dofs(interface: ContactInterface) -> np.ndarray:
@@ -56,6 +58,7 @@ def body_1_dofs(interface: ContactInterface) -> np.ndarray:
 
     Raises  ValueError where one is not among the DOFs of the system
     """
+    interface = interface.nodes or interface
     n_pair = interface.n_pair
     B = csr_matrix(interface.B)
     found = np.empty((n_pair, 3), dtype=int)

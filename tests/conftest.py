@@ -7,7 +7,9 @@ run of a scene minutes later; what starts processes comes last.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -15,7 +17,7 @@ ROOMS = ("geometry", "fem", "reduction", "hbm", "workflows", "properties", "proo
 PROCESSES = ("subprocess", "multiprocessing")  # a test module that imports one of them starts processes
 LONG = (  # more than 20 s of processor each, the longest first
     "test_pages", "test_report", "test_rig", "test_scene_leaf_seal", "test_scene_brb", "test_scene_blade",
-    "test_own_part", "test_accuracy", "test_run", "test_blade_study", "test_study", "test_turbine", "test_extremes",
+    "test_own_part", "test_run", "test_blade_study", "test_study", "test_turbine", "test_extremes",
     "test_wear_rules", "test_only_what_is_needed", "test_verification", "test_pictures", "test_wear_steps",
 )  # fmt: skip
 TESTS = Path(__file__).parent
@@ -27,6 +29,14 @@ def rank(item: pytest.Item) -> tuple[int, bool, int]:
     starts = any(hasattr(getattr(item, "module", None), name) for name in PROCESSES)
     long = LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG)
     return long, starts, ROOMS.index(room) if room in ROOMS else len(ROOMS)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Parts and reductions that these tests make serve all of them and their subprocesses, and no other run."""
+    if "TRIBODYN_CACHE" not in os.environ:
+        kept = TemporaryDirectory(prefix="tribodyn-kept-")
+        config.add_cleanup(kept.cleanup)
+        os.environ["TRIBODYN_CACHE"] = kept.name
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

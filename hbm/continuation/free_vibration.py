@@ -325,8 +325,8 @@ class FreeVibration:
         relative = mismatch * self.push / (self.reference_omega**2 * a)
         return np.concatenate([(x / scale).ravel(), [relative.real, relative.imag]])
 
-    def correction(self, p: Point, normal: np.ndarray, tolerance: float, max_products: int) -> np.ndarray:
-        """Newton direction for the coordinates within the hyperplane normal to `normal`."""
+    def correction(self, p: Point, normal: np.ndarray, tolerance: float, most: int, along: float = 0.0) -> np.ndarray:
+        """Newton direction for the coordinates to the hyperplane normal to `normal`, `along` of it away from p."""
         jac = p.cycle.jacobian
         assert jac is not None
         units = self._units(p.a)
@@ -341,7 +341,7 @@ class FreeVibration:
             out = self._residual(p.a, d - self._moved(eta), mismatch)
             return np.append(out + y[-3] * by_omega + y[-2] * by_zeta + y[-1] * by_a, normal @ y / size)
 
-        return gmres(product, np.append(-p.residual, 0.0), tolerance, max_products)[0]
+        return gmres(product, np.append(-p.residual, along / size), tolerance, most)[0]
 
     def _slopes(self, p: Point) -> tuple[np.ndarray, ...]:
         """Derivatives of the residual at fixed x by the logarithm of omega, by zeta and by the logarithm of a."""

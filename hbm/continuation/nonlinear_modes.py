@@ -156,16 +156,19 @@ def walk(
         if last:
             ahead = here + (goal - here[-1]) / tangent[-1] * tangent
         found = newton_on(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
+        corner = step < options.corner_step * longest
+        if found[1] != CONVERGED and corner:
+            found, last = _turned_back(problem, here, step * tangent, weight * tangent, found, options.newton), False
         turned = found[0].coordinates - here
         size = np.sqrt(turned @ (weight * turned))
-        smooth = turned @ (weight * tangent) > 0.5 * size or step < options.corner_step * longest
+        smooth = turned @ (weight * tangent) > 0.5 * size or corner
         if found[1] != CONVERGED or not smooth:
             step *= 0.5
             if step < options.min_step * longest:
                 return [*solved, found], BranchEnd.ENDED.say(f" its last point: {found[1]}")
             continue
         missed = np.abs(found[0].coordinates - ahead)[-3:-1].max()
-        if missed > options.misses * options.between and step >= options.corner_step * longest:
+        if missed > options.misses * options.between and not corner:
             step *= 0.5
             continue
         solved.append(found)
@@ -179,6 +182,21 @@ def walk(
         elif found[2] >= options.many_steps:
             step *= 0.6
     return solved, BranchEnd.POINTS_DONE.say(f" {options.max_points} points")
+
+
+def _turned_back(
+    problem: FreeVibration, here: np.ndarray, move: np.ndarray, normal: np.ndarray, missed: _Solved, how: NewtonOptions
+) -> _Solved:
+    """The point behind a corner at which the curve leaves by more than a right angle, `missed` where there is none.
+
+    Where a pair begins to slip or to part, the other branch is that of the contact state just beyond: its straight line
+    is followed to as far behind the corner as `move` goes beyond it.
+    """
+    beyond = problem.evaluate(here + move)
+    behind = problem.correction(beyond, normal, 1e-8, how.max_products, -2 * (normal @ move))
+    found = newton_on(problem, problem.evaluate(beyond.coordinates + behind), normal, how)
+    return_way = np.linalg.norm(found[0].coordinates - here + move) < 0.5 * np.linalg.norm(move)
+    return missed if return_way else found
 
 
 def newton_on(problem: FreeVibration, point: Point, normal: np.ndarray, options: NewtonOptions) -> _Solved:

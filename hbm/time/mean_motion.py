@@ -30,7 +30,6 @@ class MeanRules:
     # standard errors by which the means of two blocks may differ and still be those of one motion
     same_scatter: float = 2.0
     fewest_blocks: int = 4  # whose means give a standard error
-    contact: float = 1e-7  # accuracy of the contact's equations in a step
 
 
 RULES = MeanRules()
@@ -44,6 +43,9 @@ class MeanOptions:
     search : periods in which a periodic motion is looked for
     accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
         the mean that is asked for
+    contact : of the contact's equations in a step
+    passing : standard error of the mean normal force with which, once it has settled, a motion that does not repeat
+        itself passes from place to place: the scatter of its work averages out over them. 0 where each mean settles
     """
 
     steps: int = 256
@@ -51,6 +53,8 @@ class MeanOptions:
     most_blocks: int = 40
     search: int = 60
     accuracy: float = 5e-3
+    contact: float = 1e-7
+    passing: float = 0.0
 
     def __post_init__(self) -> None:
         if self.block < 2 or self.most_blocks < 2:
@@ -88,7 +92,7 @@ class Follower:
         self.options = options
         self._stepper: TimeStepper | None = None
         self._motion: Moving | None = None
-        self._regular = True
+        self._regular, self._passing = True, False
 
     def start(self, balance: HarmonicBalance, state: State) -> None:
         """Begin at a state of a balance.
@@ -98,7 +102,7 @@ class Follower:
         if wave_in_time.is_wave(balance):
             raise ValueError("means over a motion serve one part or several bodies, not a travelling wave of a wheel")
         self._motion = self._at(balance, state.omega).start_from(state)
-        self._regular = True
+        self._regular, self._passing = True, False
 
     def kept(self) -> np.ndarray:
         """What moves, as one vector whose length depends on the model alone."""
@@ -107,15 +111,15 @@ class Follower:
         assert motion is not None
         z = np.pad(motion.z, (0, 2 * len(stepper.modes[0]) - len(motion.z)))
         parts = (motion.x, motion.f, motion.memory, motion.bits, motion.hold)
-        return np.concatenate([[stepper.omega, self._regular], z, *(np.ravel(part) for part in parts)])
+        return np.concatenate([[stepper.omega, self._regular, self._passing], z, *(np.ravel(part) for part in parts)])
 
     def take_up(self, balance: HarmonicBalance, kept: np.ndarray) -> None:
         """Go on with what `kept` has given, of a balance that differs in its gaps alone."""
-        self._regular = bool(kept[1])
+        self._regular, self._passing = bool(kept[1]), bool(kept[2])
         stepper = self._stepper = TimeStepper(balance, float(kept[0]), self._march_options())
         pairs, memory = balance.contact.stiffness.shape, balance.memory.shape
         hold = 0 if stepper.hold is None else len(stepper.hold.dofs)
-        sizes = [2, 2 * len(stepper.modes[0]), *2 * (pairs[0] * pairs[1],), memory[0] * memory[1], pairs[0], hold]
+        sizes = [3, 2 * len(stepper.modes[0]), *2 * (pairs[0] * pairs[1],), memory[0] * memory[1], pairs[0], hold]
         _, z, x, f, s, bits, p = np.split(kept, np.cumsum(sizes)[:-1])
         n = 2 * stepper.n_dynamic
         self._motion = Moving(z[:n], x.reshape(pairs), f.reshape(pairs), s.reshape(memory), bits.astype(np.int64), p)
@@ -135,7 +139,8 @@ class Follower:
                 means = one.energy, _normal(balance, one), see(one), one.amplitude
                 return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
         settled = self._settled(balance, stepper, see)
-        self._regular = settled.settled and settled.spread <= self.options.accuracy
+        self._passing = settled.settled and self.options.passing > 0
+        self._regular = settled.settled and settled.spread <= self.options.accuracy and not self._passing
         return replace(settled, periods=settled.periods + spent)
 
     def _periodic(self, stepper: TimeStepper) -> tuple[Period | None, int]:
@@ -160,14 +165,14 @@ class Follower:
     def _settled(
         self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray]
     ) -> MeanMotion:
-        """Means of a plain march, once two blocks of periods show one motion."""
+        """Means of a plain march, once two blocks of periods show one motion, or of one that is passing."""
         o, motion = self.options, self._motion
         assert motion is not None
         search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
         rows: list[tuple[Any, ...]] = []
         work: list[float] = []
         off: list[np.ndarray] = []
-        first: int | None = None
+        first: int | None = 0 if self._passing else None
         for block in range(1, o.most_blocks + 1):
             for _ in range(o.block):
                 found = search.step(motion)
@@ -177,9 +182,14 @@ class Follower:
                 off.append(one.off)
                 rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
             same = block > 1 and first is None and self._same(np.array(work[-2 * o.block :]))
-            if same and self._held(stepper, np.array(off[-o.block :])):
+            held = self._held(stepper, np.array(off[-o.block :]))
+            if same and held:
                 first = len(work) - o.block  # in the block before more of the transient is left
-            if first is not None and _standard_error(np.array(work[first:])) <= o.accuracy:
+            if self._passing:
+                known = held and _standard_error(np.array([row[1].sum() for row in rows])) <= o.passing
+            else:
+                known = first is not None and _standard_error(np.array(work[first:])) <= o.accuracy
+            if known:
                 break
         self._motion = motion
         kept = slice(len(rows) // 2 if first is None else first, None)
@@ -203,7 +213,7 @@ class Follower:
         return bool((np.abs(off.mean(axis=0)) <= self.options.accuracy * abs(stepper.hold.height) + chance).all())
 
     def _march_options(self) -> Options:
-        return Options(self.options.steps, accelerate=False, contact=RULES.contact)
+        return Options(self.options.steps, accelerate=False, contact=self.options.contact)
 
     def _at(self, balance: HarmonicBalance, omega: float) -> TimeStepper:
         """The stepper at a place; what moves is taken along."""

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from tribodyn.hbm import newton
-from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak, OperatingPoint
 from tribodyn.hbm.outcome import Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time.stepper import IntegrationFailed
@@ -121,7 +121,9 @@ def evolve(
     at_rest = PreloadAtRest(problem)
     end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps and state is not None:
-        state = with_growth(problem, at_rest.of(state), always=machine is not None)
+        state = at_rest.of(state)
+        if motion != "time":  # where nothing depends on it
+            state = with_growth(problem, state, always=machine is not None)
         if machine is not None:
             state = machine.of(state)
         first = (first_preload(problem, rows, state), first_at_rest(rows, state))
@@ -201,17 +203,26 @@ def _step_in_time(
     solves, means = state.solves, state.means
     assert means is not None
     periods = means.periods
+    target = _event(problem, state, rows)
+    given = all(isinstance(duty.site, AtFrequency) for duty in problem.mission)  # no peak moves with the depth
     while True:
-        there = assess(problem, machine.ahead(state, stride), state.cycles + stride, state)
+        there = replace(state, depth=machine.ahead(state, stride), cycles=state.cycles + stride, solves=0)
+        if not given:
+            there = assess(problem, there.depth, there.cycles, state)
         there, worn, deviation = machine.step(state, there, stride)
         solves += there.solves
         periods += there.means.periods if there.means else 0
         error = local_error(tolerance, problem.area, deviation, worn, stride, state.cycles + stride)
+        preload = problem.preload_of(there)
+        if error <= 1.0 and preload < RULES.event_window[0] * target:
+            stride, target = stride * _share_to(target, problem.preload_of(state), preload), 0.0
+            continue
         if error <= 1.0 or stride <= RULES.shortest_in_time * unit:
             break
         stride = max(stride * growth(error), RULES.shortest_in_time * unit)
     slopes, look = np.full(len(state.points), RULES.unknown_slope), _next_look(problem, state, rows)
-    stride_after = stride * growth(error)
+    # where rates scatter a small error may be chance: two in turn are believed
+    stride_after = stride * growth(max(error, rows[-1].step_error) if rows else error)
     after = assess(problem, state.depth + worn, state.cycles + stride, state)
     solves += after.solves
     if not after.failure and _share_left(problem, after, rows, state) <= look:

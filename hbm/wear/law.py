@@ -7,7 +7,7 @@ declares in `class Parameters` with their units, see `tribodyn.declare`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -48,6 +48,7 @@ class JointWear:
 class Exposure:
     """One vibration cycle as a wear law sees it.
 
+    solved : the state, or what forms it
     The law serves one joint; n_pair counts the pairs of that joint.
     area : (n_pair,) tributary area [m2]; numbers : the law's own by name, each (n_pair,)
     depth : (n_pair,) wear depth so far [m]; cycles : vibration cycles so far
@@ -55,12 +56,17 @@ class Exposure:
     """
 
     balance: HarmonicBalance
-    state: State
+    solved: State | Callable[[], State]
     area: np.ndarray
     numbers: Mapping[str, np.ndarray]
     depth: np.ndarray
     cycles: float
     on: str = ""
+
+    @cached_property
+    def state(self) -> State:
+        """The cycle in the balance's harmonics; of a motion in time formed when a law asks for it."""
+        return self.solved() if callable(self.solved) else self.solved
 
     @property
     def joint(self) -> Joint:

@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.time import wave_in_time
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
@@ -40,12 +40,15 @@ class MotionRules:
     accuracy : standard error of a mean, relative, and difference from the balance's work up to which a periodic motion
         is that of the balance; the errors of many wear steps average out in a life
     most_components : of the contact
+    passing, contact : of a motion that is followed everywhere, see `MeanOptions`
     """
 
     steps: int = 128
     per_harmonic: int = 16
     accuracy: float = 5e-2
     most_components: int = 600
+    passing: float = 2e-2
+    contact: float = 1e-5
 
 
 RULES = MotionRules()
@@ -88,6 +91,8 @@ class MachineMotion:
         self._problem, self._always = problem, always
         steps = max(RULES.steps, RULES.per_harmonic * problem.balance.basis.harmonics[-1])
         self._options = MeanOptions(steps, accuracy=RULES.accuracy)
+        if always:
+            self._options = replace(self._options, contact=RULES.contact, passing=RULES.passing)
         self._followers: list[Follower] = []
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
         self._serves = fits and not wave_in_time.is_wave(problem.balance)
@@ -210,8 +215,10 @@ def _depth_rate(
     problem: WearProblem, balance: HarmonicBalance, motion: PeriodicMotion, depth: np.ndarray, cycles: float
 ) -> np.ndarray:
     """(n_pair,) wear depth of one period [m], by the laws of the joints."""
-    x = motion.coefficients(motion.x, balance.basis)
-    state = balance.evaluate(motion.omega, x, jacobian=False)
+
+    def state() -> State:
+        return balance.evaluate(motion.omega, motion.coefficients(motion.x, balance.basis), jacobian=False)
+
     rate = np.zeros_like(depth)
     for name, wear in problem.wearing.items():
         pairs = balance.contact.joint(name).rows

@@ -117,6 +117,21 @@ def test_phase_resonance_with_friction_goes_through_the_states_of_constant_force
     assert max(_missed(balance, found, i) for i in range(len(found.omega))) < 1e-6
 
 
+def test_phase_resonance_goes_round_a_sharp_turn_of_its_amplitude():
+    """Where a pair begins to slip the curve leaves backwards, and ends in small amplitudes of another mode."""
+    balance = rubbing()
+    name = balance.compliance.output_names[0]
+    found = phase_resonance(balance, name, 700.0, 950.0, 1e-9, 1e-5, BackboneOptions(20))
+    assert str(found.end).startswith("turned back")
+    top = int(found.parameter.argmax())
+    assert found.parameter[[0, -1]].max() < 1e-8
+    assert found.parameter[top] > 3e-7
+    assert found.omega[-1] > 1.01 * found.omega[0]
+    assert np.abs(found.energy[: top + 1]).max() < 1e-12 < 1e-7 < found.energy[top + 1]
+    np.testing.assert_allclose(np.abs(np.angle(found.fundamental(name))), np.pi / 2, atol=1e-6)
+    assert max(_missed(balance, found, i) for i in range(len(found.omega))) < 1e-6
+
+
 def _missed(balance: HarmonicBalance, branch, i: int) -> float:
     """How far the solution of constant force, found from a disturbed state, is from a point under control."""
     x = branch.contact[i].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -54,6 +55,7 @@ def test_life_in_time_is_that_of_many_harmonics(problem: WearProblem, run: WearH
     assert found.scatter == 0.0
     assert cycles_to_preload(found, LEFT) == pytest.approx(cycles_to_preload(run, LEFT), rel=5e-3)
     assert found.energy[0].sum() == pytest.approx(run.energy[0].sum(), rel=5e-3)
+    assert 0.95 < found.preload[-1] / (LEFT * found.preload[0]) < 1  # the last step ends where life does
 
 
 def test_a_motion_that_is_the_balances_is_not_followed(
@@ -81,21 +83,24 @@ def test_a_balance_that_is_stable_again_is_taken_again(monkeypatch: pytest.Monke
     assert "from 0 cycles on" in str(found.end)
 
 
-def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit() -> None:
+@pytest.mark.parametrize("motion", ["machine", "time"])
+def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit(
+    motion: Literal["machine", "time"],
+) -> None:
     problem = flipping()
     flips = problem.balance
     rows: list[WearRow] = []
-    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, rows.append, motion="machine")
+    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, rows.append, motion=motion)
     assert whole.in_time.all()
     assert "followed in time for 100% of the cycles" in str(whole.end)
     follower = Follower(MeanOptions(128))
     follower.start(flips, newton.solve(flips, FLIPS_AT, whole.displacement[0].reshape(3, 3, -1)).state)
-    alone = follower.mean(flips, FLIPS_AT, lambda motion: motion.energy)
+    alone = follower.mean(flips, FLIPS_AT, lambda period: period.energy)
     assert whole.energy[0].sum() == pytest.approx(alone.energy.sum(), rel=0.01)
     along_balance = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 1).energy[0].sum()
     assert abs(whole.energy[0].sum() / along_balance - 1) > 0.04
     begun = history(rows[:4], WearEnd.UNFINISHED.say())
-    resumed = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, resume=begun, motion="machine")
+    resumed = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, resume=begun, motion=motion)
     for name in ("cycles", "depth", "energy", "moving", "spread"):
         np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name))
 
@@ -152,6 +157,19 @@ def test_a_motion_that_takes_two_periods_is_told() -> None:
     assert abs(late[1] / late[0] - 1) > 0.1
     assert found.spread == pytest.approx(abs(late[1] - late[0]) / late[:2].sum(), rel=0.05)
     np.testing.assert_array_equal(found.seen, found.energy)
+
+
+def test_a_motion_that_passes_needs_no_more_periods_than_its_normal_force() -> None:
+    flips = three_pairs(friction=0.05, static=30.0, shaker=60.0, top=7)
+    follower = Follower(MeanOptions(128, passing=0.02))
+    follower.start(flips, newton.solve_from_rest(flips, FLIPS_AT).state)
+    settled, passed = (follower.mean(flips, FLIPS_AT, lambda motion: motion.energy) for _ in range(2))
+    again = Follower(MeanOptions(128, passing=0.02))
+    again.take_up(flips, follower.kept())
+    assert settled.periods > 2 * passed.periods == 2 * follower.options.block
+    assert passed.energy.sum() == pytest.approx(settled.energy.sum(), rel=0.02)
+    later = [one.mean(flips, FLIPS_AT, lambda motion: motion.energy) for one in (follower, again)]
+    np.testing.assert_array_equal(later[1].energy, later[0].energy)
 
 
 def test_the_largest_multiplier_without_the_monodromy_matrix(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,9 @@
 
 BEAM = (
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
+    "wear.at=peak",
+    "wear.motion=machine",
     "geometry.n_patch=3",
     "geometry.n_length=2",
     "geometry.n_height=1",

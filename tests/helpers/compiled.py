@@ -1,7 +1,7 @@
 """Compile the kernels that most tests need, which numba then keeps on disk.
 
-Two test processes that begin together would each compile them. `python -m tests.helpers.compiled` is run by
-`./tribodyn check` beside the build of the documentation.
+Processes that begin together would each compile them. `python -m tests.helpers.compiled` is run by `./tribodyn check`
+before the documentation and the tests.
 """
 
 from __future__ import annotations

@@ -65,7 +65,8 @@ def name(page: Path) -> str:
 
 def environment(folder: Path) -> dict[str, str]:
     """What a user has: the folder with the start script, and no Python of ours on the path."""
-    kept = {key: os.environ[key] for key in ("HOME", "LANG", "NUMBA_CACHE_DIR", "TMPDIR") if key in os.environ}
+    wanted = ("HOME", "LANG", "NUMBA_CACHE_DIR", "TMPDIR", "TRIBODYN_CACHE")
+    kept = {key: os.environ[key] for key in wanted if key in os.environ}
     return kept | {"PATH": f"{folder}:/usr/bin:/bin", "MPLBACKEND": "agg"}
 
 

@@ -65,6 +65,7 @@ def tell(scene: str, overrides: list[str]) -> None:
 
 
 if __name__ == "__main__":
+    os.environ["TRIBODYN_CACHE"] = "off"  # what is kept of an earlier run is not factorised again
     for line in sys.stdin:
         if (child := os.fork()) == 0:
             tell(*json.loads(line))

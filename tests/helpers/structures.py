@@ -115,4 +115,4 @@ modes = 5
 
 
 def built(text: str, folder: Path, *overrides: str) -> modelling.Model:
-    return modelling.build(scene_file.parse(text, "scene.toml", overrides, folder), folder, Progress())
+    return modelling.build(scene_file.parse(text, "scene.toml", overrides, folder), Progress())

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -70,8 +68,7 @@ class Body:
 def beam(n_patch: int) -> Body:
     """The beam scene with n_patch x n_patch contact nodes and its published loads, between free and stuck peak."""
     file = scene_file.read("beam_thesis", (f"geometry.n_patch={n_patch}", "damping="))
-    with TemporaryDirectory() as folder:
-        model = modelling.build(file, Path(folder), Progress())
+    model = modelling.build(file, Progress())
     contact, loads = file.part_scene.contact, model.balance.excitation.loads
     tangential, normal = contact.tangential_stiffness or 0.0, contact.normal_stiffness or 0.0
     ordinary = Setting(

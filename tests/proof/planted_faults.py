@@ -110,6 +110,7 @@ def _planted(
 ) -> None:
     """Plant the faults of these numbers in one process, which writes their rows."""
     own = {"PYTHONPATH": str(tree / "src"), "OMP_NUM_THREADS": "1", "NUMBA_DISABLE_JIT": str(int(uncompiled))}
+    own["TRIBODYN_CACHE"] = "off"  # what was made without a fault would hide it
     words = [sys.executable, "-B", "-m", "tests.proof.planting", str(folder), str(seconds)]
     with subprocess.Popen(
         [*words, *map(str, numbers)], cwd=tree, env=os.environ | own, stdout=subprocess.PIPE, text=True

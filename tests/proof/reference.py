@@ -53,7 +53,7 @@ def solved(file: SceneFile, seconds: float, elements: float = FINER.elements) ->
     what = "its reference"
     try:
         with processor_seconds(seconds), threads.limited(1):
-            model = modelling.build(fine, None, Progress())
+            model = modelling.build(fine, Progress())
             values |= dict(states.unworn(fine, model).answers.by_quantity())
         wear = fine.scene.wear
         if fine.scene.wears and wear is not None:

@@ -111,7 +111,7 @@ modal = "1 %"
 """
 BEAM = (
     "geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "response.points=20",
-    "wear.max_steps=4", "harmonics.kept=[0, 1]",
+    "wear.max_steps=4", "harmonics.kept=[0, 1]", "wear.tolerance=2 %", "wear.at=peak", "wear.motion=machine",
 )  # fmt: skip
 BLADE = (
     "geometry.n_span=3", "geometry.n_side=1", "geometry.n_root=1", "reduction.cutoff=6 kHz", "wheel.speed=6000 rpm",
@@ -167,15 +167,14 @@ def bodies() -> Numbers:
     """Two bodies with an orthotropic material, bolt, spring, mass, pressure, weight, rotation and heat."""
     with TemporaryDirectory() as folder:
         place = Path(folder)
-        model = modelling.build(scene_file.parse(BODIES, "bodies.toml", (), place), place, Progress())
+        model = modelling.build(scene_file.parse(BODIES, "bodies.toml", (), place), Progress())
     return _linear(model) | _response(model.balance, 2 * np.pi * 5500.0)
 
 
 def blade() -> Numbers:
     """A sector of a turning wheel under a travelling wave."""
-    with TemporaryDirectory() as folder:
-        file = scene_file.read("blade", BLADE)
-        model = modelling.build(file, Path(folder), Progress())
+    file = scene_file.read("blade", BLADE)
+    model = modelling.build(file, Progress())
     area, approach = model.reduced.interface.area, references.free_deflection(model.balance)
     scale = {"depth that ends the preload": np.array([references.delta_max(file.scene, approach, area)])}
     return scale | _linear(model) | _response(model.balance, 2 * np.pi * 400.0)
@@ -183,8 +182,7 @@ def blade() -> Numbers:
 
 def leaf_seal() -> Numbers:
     """A leaf on pins whose tip is pushed, over an eccentric shaft."""
-    with TemporaryDirectory() as folder:
-        model = modelling.build(scene_file.read("leaf_seal", LEAF), Path(folder), Progress())
+    model = modelling.build(scene_file.read("leaf_seal", LEAF), Progress())
     return _response(model.balance, 2 * np.pi * 110.0)
 
 

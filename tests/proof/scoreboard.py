@@ -162,13 +162,8 @@ def measured(number: int, seed: int, seconds: float) -> Row:
 
 def solved(file: SceneFile) -> tuple[Result, modelling.Model]:
     """The result of a scene that is not judged, and its model."""
-    models: list[modelling.Model] = []
-
-    def build(one: SceneFile) -> modelling.Model:
-        models.append(modelling.build(one, None, Progress()))
-        return models[-1]
-
-    return pipeline.run(file.changed("verdict.enabled=false"), None, Progress(), build=build), models[-1]
+    result = pipeline.run(file.changed("verdict.enabled=false"), None, Progress())
+    return result, modelling.build(file, Progress(), result.harmonics)
 
 
 def _judged(name: str, said: Verdict, truth: reference.Values) -> Judged:

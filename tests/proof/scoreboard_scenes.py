@@ -64,7 +64,7 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
         table["reduction"] = {"modes": int(rng.integers(5, 16))}
     guess: Table = {"frequency": [1.0, 1e5], "points": 10}
     text = as_toml(table | {"response": table["response"] | guess})
-    balance = modelling.build(parse(text, "drawn.toml", (), folder), None, Progress()).balance
+    balance = modelling.build(parse(text, "drawn.toml", (), folder), Progress()).balance
     worn, at = bool(rng.uniform() < WORN), float(rng.uniform(*BESIDE[int(rng.integers(len(BESIDE)))]))
     drive = float(10 ** rng.uniform(*(WEARING if worn else DRIVE)))
     low, high, place, force = _placed(balance, drive, at if worn else None)

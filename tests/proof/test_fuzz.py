@@ -16,7 +16,7 @@ from tribodyn.workflows.result.verdict import Statement, Verdict
 from tribodyn.workflows.studies import scenes
 
 TINY = (
-    "harmonics.kept=[0, 1]",
+    "harmonics.kept=[0, 1]", "wear.tolerance=2 %", "wear.at=peak", "wear.motion=machine",
     "geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "response.points=6",
     "wear.max_steps=1", "verdict.enabled=false",
 )  # fmt: skip

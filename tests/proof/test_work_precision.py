@@ -45,7 +45,7 @@ def test_energy_is_that_of_the_scene_with_so_many_harmonics(found: measured.Work
     assert found.place == pytest.approx(HERTZ)
     for row, kept in zip(found.of(measured.LOCATED), ("[0, 1]", "[0, 1, 2, 3]"), strict=True):
         file = scene_file.read("beam", (*SMALL, f"harmonics.kept={kept}"))
-        balance = modelling.build(file, None, Progress()).balance
+        balance = modelling.build(file, Progress()).balance
         state = newton.solve_from_rest(balance, 2 * np.pi * HERTZ).state
         assert row.values["energy"] == pytest.approx(balance.energy(state).sum(), rel=1e-5)
         assert row.seconds > 0

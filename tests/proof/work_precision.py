@@ -201,7 +201,7 @@ def _life(file: SceneFile, top: int) -> Candidate:
     try:
         with processor_seconds(LIFE_SECONDS):
             fine = _with_harmonics(file, top)
-            worn = wear_run.worn_out(fine, modelling.build(fine, None, Progress()), share)
+            worn = wear_run.worn_out(fine, modelling.build(fine, Progress()), share)
         outcome, cycles = str(worn.end), cycles_to_share(worn.cycles, worn.preload, share)
         if cycles is not None:
             values[LIFE] = cycles
@@ -230,8 +230,8 @@ class _Start:
 
 def _start(file: SceneFile, at: float | None) -> _Start:
     scene, options = file.scene, settings.newton_options(file.scene)
-    own = modelling.build(file, None, Progress()).balance
-    problems = {top: modelling.build(_with_harmonics(file, top), None, Progress()).balance for top in tops_of(file)}
+    own = modelling.build(file, Progress()).balance
+    problems = {top: modelling.build(_with_harmonics(file, top), Progress()).balance for top in tops_of(file)}
     if at is not None:
         point = AtFrequency(settings.OUTPUT, at, options).first(own)
     elif scene.wears:

@@ -130,7 +130,7 @@ def test_what_cannot_be_is_refused(full: ReducedModel) -> None:
 
 def peak(tmp_path: Path, *overrides: str) -> tuple[ReducedModel, np.ndarray]:
     file = scene_file.read("beam", (*SMALL, *overrides))
-    model = modelling.build(file, tmp_path, Progress())
+    model = modelling.build(file, Progress())
     site = settings.peak_of(file.scene)
     assert isinstance(site, AtPeak)
     point: OperatingPoint = site.first(model.balance)

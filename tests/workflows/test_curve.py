@@ -48,7 +48,7 @@ def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixtu
     assert "estimated truncation error" in leave(["show", str(folder)], capsys)[1]
     # the estimate is that of the balance which was solved, at the peak
     file = read(str(folder / "own.toml"), [*QUICK, *overrides])
-    balance = modelling.build(file, folder, Progress(), kept).balance
+    balance = modelling.build(file, Progress(), kept).balance
     assert balance.basis.harmonics == kept
     peak = settings.peak_of(file.scene).first(balance).state
     own = estimate(widened(balance, 9), kept, peak.omega, peak.x, split=False).error
@@ -63,7 +63,7 @@ def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: py
     assert marks is not None
     assert bounds is not None
     file = read(str(folder / "own.toml"), [*QUICK, "loads.harmonic.shaker.value=12 N"])
-    again = mark(modelling.build(file, folder, Progress()).balance, frf)
+    again = mark(modelling.build(file, Progress()).balance, frf)
     assert np.array_equal(marks.stable, again.stable)
     height = frf.amplitude("response")
     assert np.all(bounds.amplitude_low <= height * (1 + 1e-9))

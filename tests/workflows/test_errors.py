@@ -25,11 +25,12 @@ from tribodyn.workflows.scene import scene_file
 
 SMALL = (
     "harmonics.kept=[0, 1]", "geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4",
-    "wear.tolerance=10 %", "response.points=30", "verdict.in_time=false", "wear.motion=balance",
+    "wear.tolerance=10 %", "response.points=30", "verdict.in_time=false", "wear.at=peak", "wear.motion=balance",
 )  # fmt: skip
 TINY = (
     "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=5",
-    "response.points=20", "harmonics.samples=64", "pictures.renders=false", "wear.motion=balance",
+    "response.points=20", "harmonics.samples=64", "pictures.renders=false", "wear.tolerance=2 %", "wear.at=peak",
+    "wear.motion=balance",
     "verdict.in_time=false",
 )  # fmt: skip
 OF_STATE = ("peak_frequency", "amplitude", "energy", "preload")
@@ -78,6 +79,16 @@ def test_the_combined_refinement_is_that_of_a_finer_run(small: td.Result) -> Non
     assert finer.wear is not None
     assert combined["preload"].refined == pytest.approx(float(finer.wear.preload[0]), rel=1e-4)
     assert combined["peak_frequency"].refined == pytest.approx(float(finer.wear.omega[0]) / (2 * np.pi), rel=1e-4)
+
+
+def test_the_scatter_of_a_motion_in_time_and_of_its_steps_is_the_least_change_that_counts() -> None:
+    def row(refinement: Refinement, relative: float) -> Change:
+        return Change(refinement, "life", None, None, relative, "")
+
+    own = [row(Refinement.COMBINED, 0.002), row(Refinement.WEAR_STEPS, 0.01)]
+    assert verdict.error_of(own, 0.7)[0] == DEFAULT.total(0.002, 0.7)
+    assert verdict.error_of([*own, row(Refinement.MOTION, 0.005)], 0.7)[0] == DEFAULT.total(0.01, 0.7)
+    assert verdict.error_of([*own, row(Refinement.MOTION, 0.03)], 0.7)[0] == DEFAULT.total(0.03, 0.7)
 
 
 def test_the_error_holds_against_a_finer_reference(small: td.Result) -> None:

@@ -86,6 +86,7 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
     """From the scene's own zero, where a relative step would have no length; against the rig's own preload."""
     made = []
     original = modelling.make_mesh
+    monkeypatch.setenv("TRIBODYN_CACHE", "off")
     monkeypatch.setattr(modelling, "make_mesh", lambda *args: made.append(1) or original(*args))
     task = Task.model_validate(
         {
@@ -255,7 +256,7 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
     assert found.values == pytest.approx([130e6], rel=1e-3)
     assert found.rms < 1e-3
     file = scene_file.read(scene, own)
-    opened = modelling.build(file, None, Progress()).reduced.interface.gap
+    opened = modelling.build(file, Progress()).reduced.interface.gap
     np.testing.assert_allclose(Bench().plain(file).interface.gap, opened, rtol=0, atol=1e-20)
     assert np.ptp(opened) > 1e-9
     assert fit_file.value_of(file.mesh_scene, "bodies.lower.length") == pytest.approx(0.1)

@@ -17,6 +17,9 @@ from tribodyn.workflows.result.provenance import rebuilt
 
 SMALL = {
     "harmonics.kept": [0, 1],
+    "wear.tolerance": 0.02,
+    "wear.at": "peak",
+    "wear.motion": "machine",
     "geometry.n_patch": 5,
     "geometry.n_length": 4,
     "geometry.n_height": 1,

@@ -99,7 +99,7 @@ def pressed(folder: Path, load: float, n: tuple[int, int], size: float, point: b
     write(folder / "upper.msh", n[0], 1.6 * HALF, size, True, point)
     write(folder / "lower.msh", n[1], 1.8 * HALF, size, False, point)
     file = scene_file.parse(SCENE.replace("LOAD", repr(load)), "hertz.toml", (), folder)
-    balance = modelling.build(file, folder, Progress()).balance.with_load(0.0)
+    balance = modelling.build(file, Progress()).balance.with_load(0.0)
     omega = 2 * np.pi * 100
     found = newton.solve(balance, omega, balance.stuck(omega))
     assert found.converged

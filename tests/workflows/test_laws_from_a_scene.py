@@ -15,6 +15,9 @@ from tribodyn.hbm.wear import law as wear_law
 
 SMALL: dict[str, Any] = {
     "harmonics.kept": [0, 1],
+    "wear.tolerance": 0.02,
+    "wear.at": "peak",
+    "wear.motion": "machine",
     "geometry.n_patch": 3,
     "geometry.n_length": 4,
     "geometry.n_height": 1,

@@ -98,7 +98,7 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
 
 
 def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
-    written = modelling.build(read(str(folder / "own.toml")), folder, Progress()).balance
+    written = modelling.build(read(str(folder / "own.toml")), Progress()).balance
     named = [
         "contact.dofs={variable = 'touching'}",
         "contact.area={variable = 'areas'}",
@@ -108,7 +108,7 @@ def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
         "reduction.modes=8",
     ]
     # every mode kept: Craig-Bampton is exact
-    reduced = modelling.build(read(str(folder / "own.toml"), named), folder, Progress())
+    reduced = modelling.build(read(str(folder / "own.toml"), named), Progress())
     assert reduced.part is None
     assert reduced.reduced.interface.points[1, 0] == 1e-3
     stuck = [balance.compliance.at(300.0) for balance in (written, reduced.balance)]
@@ -117,10 +117,10 @@ def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
 
 
 def test_damping_is_that_of_the_files_or_of_the_scene(folder: Path) -> None:
-    given = modelling.build(read(str(folder / "own.toml"), ["model.names.damping=C"]), folder, Progress())
+    given = modelling.build(read(str(folder / "own.toml"), ["model.names.damping=C"]), Progress())
     assert given.reduced.system.damping == pytest.approx(random_structure(2, n_extra=12).system.damping)
     with pytest.raises(ValueError, match=r"hold a damping matrix: leave \[damping\] out"):
-        modelling.build(read(str(folder / "own.toml"), ["damping.modal=1 %"]), folder, Progress())
+        modelling.build(read(str(folder / "own.toml"), ["damping.modal=1 %"]), Progress())
 
 
 BAD = {

@@ -33,7 +33,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def worn(scene: Path, *changes: str) -> WearHistory:
     file = scene_file.read(str(scene), (*SLIPPING, *changes))
-    model = modelling.build(file, None, Progress())
+    model = modelling.build(file, Progress())
     wear = file.scene.wear
     assert wear is not None
     problem = wear_run.wear_problem(file.scene, file.folder, model.balance)

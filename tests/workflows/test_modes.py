@@ -28,7 +28,7 @@ SET = [word for override in SMALL for word in ("--set", override)]
 
 
 def test_the_backbone_goes_from_the_stuck_to_the_free_mode(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    model = modelling.build(read("beam", SMALL), tmp_path, Progress())
+    model = modelling.build(read("beam", SMALL), Progress())
     free = linear_modes(model.reduced, n=1)[0][0]
     code, out, err = leave(
         ["curve", "backbone", "beam", *SET, "--from", "0.01um", "--to", "10mm", "--out", str(tmp_path), "--json"],

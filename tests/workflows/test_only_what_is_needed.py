@@ -35,7 +35,7 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "beam": (
         (
             "harmonics.kept=[0, 1]", "geometry.n_patch=5", "response.points=6", "wear.max_steps=2",
-            "wear.motion=balance",
+            "wear.at=peak", "wear.motion=balance",
         ),
         # systems : linear systems that the harmonics see; extra : masters that are neither contact nor modes
         {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | WEAR},
@@ -43,7 +43,7 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "beam, nothing drawn": (
         (
             "harmonics.kept=[0, 1]", "geometry.n_patch=5", "response.points=6", "wear.max_steps=2",
-            "pictures.plots=false", "pictures.renders=false", "wear.motion=balance",
+            "pictures.plots=false", "pictures.renders=false", "wear.at=peak", "wear.motion=balance",
         ),
         {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"wear"}},
     ),
@@ -172,7 +172,7 @@ def matrix_scene(folder: Path, *overrides: str) -> scene_file.SceneFile:
 def test_the_static_part_is_there_where_a_static_load_is_and_nowhere_else(tmp_path: Path) -> None:
     file = matrix_scene(tmp_path, "harmonics.kept=[1, 3]")
     with pytest.raises(ValueError, match="load 'press' acts in harmonic 0, which is not kept"):
-        modelling.build(file, tmp_path, Progress())
+        modelling.build(file, Progress())
     file = matrix_scene(tmp_path, "harmonics.kept=[1, 3]", "loads.static=")
     result = pipeline.run(file, tmp_path, Progress())
     assert result.response is not None

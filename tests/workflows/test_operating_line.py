@@ -30,7 +30,7 @@ def scene(sectors: int, *overrides: str) -> scene_file.SceneFile:
 
 
 def line(sectors: int, order: int, *overrides: str) -> HarmonicBalance:
-    return modelling.build(scene(sectors, *LINE, f"wheel.engine_order={order}", *overrides), None, Progress()).balance
+    return modelling.build(scene(sectors, *LINE, f"wheel.engine_order={order}", *overrides), Progress()).balance
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,7 @@ def test_trials_that_fail_are_left_out_and_too_many_end_it() -> None:
 BEAM = (
     "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=4",
     "harmonics.samples=32", "harmonics.transitions=sampled", "response.points=10", "wear.tolerance=30 %",
+    "wear.at=peak", "wear.motion=machine",
 )  # fmt: skip
 TRUTH = ("contact.tangential_stiffness=300e6", "contact.friction=0.42")
 ASKED = {

@@ -148,7 +148,7 @@ def test_nothing_is_wider_than_the_window(width: int, browser: Any, tmp_path: Pa
 
 SMALL = {
     "beam": (
-        "harmonics.kept=[0, 1]",
+        "harmonics.kept=[0, 1]", "wear.tolerance=2 %", "wear.at=peak", "wear.motion=machine",
         "geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "response.points=6",
         "wear.tolerance=20 %", "wear.max_steps=4",
     ),

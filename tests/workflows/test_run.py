@@ -28,6 +28,9 @@ from tribodyn.workflows.scene.scene_file import read
 ROOT = Path(__file__).parents[2]
 SMALL = [
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
+    "wear.at=peak",
+    "wear.motion=machine",
     "geometry.n_patch=5",
     "geometry.n_length=4",
     "geometry.n_height=1",
@@ -99,7 +102,7 @@ def test_loops_enclose_the_energy(finished: Result, tmp_path: Path) -> None:
     wear, loops = finished.wear, finished.loops
     assert wear is not None
     assert loops is not None
-    balance = modelling.build(read("beam", SMALL), tmp_path, Progress()).balance.with_samples(4096, located=False)
+    balance = modelling.build(read("beam", SMALL), Progress()).balance.with_samples(4096, located=False)
     fine = full_fields.hysteresis_loops(balance, [wear.rows()[row] for row in loops.row], loops.row)
     for row, x, force in zip(loops.row, fine.displacement, fine.force, strict=True):
         following = np.roll(x, -1, -1) - np.roll(x, 1, -1)
@@ -125,7 +128,7 @@ def test_references_peak_where_the_modes_are(finished: Result) -> None:
 
 
 def test_the_highest_linear_response_is_that_of_a_fine_grid(tmp_path: Path) -> None:
-    balance = modelling.build(read("beam", SMALL), tmp_path, Progress()).balance
+    balance = modelling.build(read("beam", SMALL), Progress()).balance
     low, high = 2 * np.pi * 300.0, 2 * np.pi * 1000.0
     highest = references.highest_linear(balance, "response", low, high)
     drawn = references.linear_references(balance, "response", 2 * np.pi * 410.0, 2 * np.pi * 430.0)
@@ -139,7 +142,7 @@ def test_the_highest_linear_response_is_that_of_a_fine_grid(tmp_path: Path) -> N
 def test_transitions_are_located_where_every_law_can(tmp_path: Path) -> None:
     for law, wanted in (("jenkins", "located"), ("coulomb_planar", "sampled")):
         file = read("beam", [*SMALL, 'harmonics.transitions="auto"', f"contact.law={law}"])
-        assert modelling.build(file, tmp_path, Progress()).balance.basis.transitions == wanted
+        assert modelling.build(file, Progress()).balance.basis.transitions == wanted
 
 
 def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import pickle
 import subprocess
 import sys
 import time
@@ -22,9 +21,8 @@ from scipy import stats
 import tribodyn as td
 from tests.helpers import dying
 from tests.helpers.command import leave
-from tribodyn.workflows.run import reuse
-from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many import design, pictures, pool, study_file, task
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.studies.many import design, pictures, pool, study_file
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.task import Row, Task
 
@@ -244,38 +242,17 @@ def _runs(pid: int) -> bool:
         return False
 
 
-def test_processes_share_what_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Path] = []
+def test_what_runs_share_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Any] = []
     both = {FRICTION: [0.3, 0.4], "geometry.n_length": [3, 4]}
-    own = reuse._made
-    monkeypatch.setattr(reuse, "_made", lambda file: made.append(file.folder) or own(file))
-
-    def every_process_new(tasks: list[Task], workers: int, solve: Any) -> Any:
-        for one in tasks:
-            assert one.store is not None
-            assert one.store.parent.is_dir()
-            task._bench.early = ""  # as in a process that has done nothing yet
-            yield solve(one)
-
-    monkeypatch.setattr(pool, "finished", every_process_new)
+    own = modelling.make_mesh
+    monkeypatch.setenv("TRIBODYN_CACHE", str(tmp_path / "kept"))
+    monkeypatch.setattr(modelling, "make_mesh", lambda *which: made.append(which) or own(*which))
+    monkeypatch.setattr(pool, "finished", lambda tasks, workers, solve: map(solve, tasks))
     found = td.studies.grid(TABLES | {"vary": both}, tmp_path, workers=2)
     assert found.count("complete") == 4
     assert len(made) == 2
-    assert not (tmp_path / "models").exists()
     assert pictures.parallel(found).axes
-
-
-def test_the_parts_of_all_scenes_can_be_stored() -> None:
-    for name in ("beam", "blade", "leaf_seal"):
-        small = (*TINY, "reduction.modes=4") if name == "beam" else ()
-        bench = reuse.Bench()
-        bench.plain(scene_file.read(name, small))
-        kept = pickle.loads(pickle.dumps((bench.part, bench.reduced)))[1]
-        assert bench.reduced is not None
-        for h in (0, 1):
-            here, there = bench.reduced.at_harmonic(h), kept.at_harmonic(h)
-            np.testing.assert_array_equal(here[0].stiffness, there[0].stiffness)
-            np.testing.assert_array_equal(here[1], there[1])
 
 
 def test_runs_without_a_peak_have_nothing_to_draw() -> None:

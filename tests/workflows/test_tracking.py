@@ -50,6 +50,9 @@ transitions = "located"
 SMALL = [
     "verdict.enabled=false",
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
+    "wear.at=peak",
+    "wear.motion=machine",
     "geometry.n_patch=3",
     "geometry.n_length=4",
     "geometry.n_height=1",
@@ -73,7 +76,7 @@ def test_a_fold_against_the_load_is_that_of_a_branch_traced_anew(
     assert code == 0, err
     found = json.loads(out)
     assert (found["what"], found["against"], found["end"]) == ("fold", "load factor", "reached load factor 1.4")
-    balance = modelling.build(read(lifting), tmp_path, Progress()).balance
+    balance = modelling.build(read(lifting), Progress()).balance
     for at in (0, -1):
         loaded = balance.with_load(found["value"][at])
         branch = arc_length.follow(loaded, 2 * np.pi * 0.6, 2 * np.pi * 0.1)
@@ -97,7 +100,7 @@ def test_peaks_are_those_of_the_problem_made_anew(
     found = json.loads(out)
     assert len(found["value"]) == 3
     file = read("beam", SMALL)
-    balance = modelling.build(file, tmp_path, Progress()).balance
+    balance = modelling.build(file, Progress()).balance
     last = found["value"][-1]
     if against == "load":
         balance = balance.with_load(last)

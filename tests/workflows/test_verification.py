@@ -17,6 +17,9 @@ from tribodyn.workflows.studies import verification
 SMALL = [
     "verdict.enabled=false",
     "harmonics.kept=[0, 1]",
+    "wear.tolerance=2 %",
+    "wear.at=peak",
+    "wear.motion=machine",
     "geometry.n_patch=3",
     "geometry.n_length=4",
     "geometry.n_height=1",
@@ -28,6 +31,9 @@ SMALL = [
     "wear.lost_below=0",
     "wear.max_steps=2",
     "harmonics.kept=[0, 1, 2, 3]",
+    "wear.tolerance=2 %",
+    "wear.at=peak",
+    "wear.motion=machine",
 ]
 
 

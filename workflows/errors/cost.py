@@ -45,7 +45,7 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
     clock = process_time()
     memory.forget_peak()
     with threadpool_limits(1):
-        model = modelling.build(file, None, Progress())
+        model = modelling.build(file, Progress())
         balance, interface = model.balance, model.reduced.interface
         depth = energy = np.zeros(interface.n_pair)
         outcome = ANSWERED

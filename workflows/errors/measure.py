@@ -116,7 +116,7 @@ def _step_by_step(file: SceneFile, finer: SceneFile, ratio: float, table: Table,
     how = f"{ratio:.3g} times the elements along every edge"
     kept = own.balance.basis.harmonics
     try:
-        there = states.unworn(finer, modelling.build(finer, None, Progress(), kept), own.site)
+        there = states.unworn(finer, modelling.build(finer, Progress(), kept), own.site)
     except REFUSALS as refusal:
         table.refuse(Refinement.MESH, f"{how}: {refusal}")
         table.refuse(Refinement.COMBINED, f"{how}: {refusal}")
@@ -146,7 +146,7 @@ def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> An
         return None
     say("more modes")
     try:
-        model = modelling.build(other, None, Progress(), own.balance.basis.harmonics)
+        model = modelling.build(other, Progress(), own.balance.basis.harmonics)
         balance = model.balance.with_load(_load(file))
         point = own.site.next(balance, own.here.state.omega, own.here.state.x)
         if not point.solution.converged:
@@ -237,7 +237,7 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     table_of_wear = other.scene.wear
     assert table_of_wear is not None
     try:
-        model = modelling.build(other, None, Progress())
+        model = modelling.build(other, Progress())
         worn = wear_run.worn_out(other, model, table_of_wear.lost_below)
         there = life_of(worn, model, table_of_wear)
         if worn.ended.failed or there is None:

@@ -85,7 +85,9 @@ def _beside(findings: Sequence[Finding], result: Result) -> list[Finding]:
 
 def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEFAULT) -> tuple[float | None, str]:
     """Total error of a quantity from its rows, and why it is not known where it is not."""
-    chance = max((row.relative or 0.0 for row in rows if row.refinement == Refinement.MOTION), default=0.0)
+    marched = any(row.refinement == Refinement.MOTION for row in rows)  # then means and steps scatter
+    by_chance = (Refinement.MOTION, Refinement.WEAR_STEPS) if marched else ()
+    chance = max((row.relative or 0.0 for row in rows if row.refinement in by_chance), default=0.0)
     for row in rows:
         if row.refinement == Refinement.COMBINED:
             if row.relative is None:

@@ -24,7 +24,7 @@ def reduced_model(result: Result) -> ReducedModel:
     """
     from tribodyn.workflows.result.provenance import rebuilt
 
-    return modelling.build(rebuilt(result), None, Progress(), result.harmonics).reduced
+    return modelling.build(rebuilt(result), Progress(), result.harmonics).reduced
 
 
 def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:

@@ -60,10 +60,12 @@ def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> n
         nearest one outside
     """
     tangents = interface.frames[pairs].mean(axis=0)[:2]
-    at, wanted = rows[:, :3] @ tangents.T, interface.points[pairs] @ tangents.T
+    points = interface.points[pairs] if interface.nodes is None else interface.nodes.points
+    at, wanted = rows[:, :3] @ tangents.T, points @ tangents.T
     found = LinearNDInterpolator(at, rows[:, 3])(wanted)
     outside = ~np.isfinite(found)
     found[outside] = NearestNDInterpolator(at, rows[:, 3])(wanted[outside])
+    found = found if interface.nodes is None else interface.mean[pairs] @ found
     return np.asarray(found - found.min())
 
 

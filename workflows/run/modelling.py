@@ -37,6 +37,7 @@ from tribodyn.workflows.run import (
     bodies,
     curve,
     joints,
+    kept,
     matrix_model,
     memory,
     part_reduction,
@@ -68,31 +69,23 @@ class Model:
     choice: HarmonicChoice | None = None
 
 
-def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tuple[int, ...] = ()) -> Model:
+def build(file: SceneFile, progress: Progress, chosen: tuple[int, ...] = ()) -> Model:
     """The nonlinear problem of a scene, stage by stage.
 
-    folder : where a mesh that is made is kept, None keeps none
     chosen : harmonics of an earlier run, for a scene that leaves the choice
     """
-    if folder is None:
-        with TemporaryDirectory() as scratch:
-            return build(file, Path(scratch), progress, chosen)
     scene = file.scene
     part = None
     if isinstance(scene, MatrixScene):
         with progress.stage("matrices"):
             reduced = damped(scene, matrix_model.make(scene, file.folder))
     else:
-        with progress.stage("mesh"):
-            mesh, node_sets = make_mesh(file, folder)
-            memory.check(3 * mesh.doflocs.shape[1], file.mesh_scene.reduction.solver)
-        with progress.stage("mass and stiffness"):
-            part = make_part(file.mesh_scene, mesh, node_sets, file.folder)
-        part, repairs = with_surfaces(file.mesh_scene, part, file.folder)
+        part, repairs = with_surfaces(file.mesh_scene, part_of(file, progress), file.folder)
         for sentence in repairs:
             progress.say(sentence)
         with progress.stage("reduction"):
-            reduced = reduce_part(file.mesh_scene, part)
+            plain = plain_of(file, part)
+            reduced = part_reduction.with_prescribed(file.mesh_scene, part, damped(scene, plain))
     with progress.stage("choice of harmonics" if scene.harmonics.automatic and not chosen else "contact compliance"):
         try:
             model = make_model(scene, part, reduced, chosen)
@@ -107,6 +100,24 @@ def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tupl
     if model.choice is not None:
         progress.detail(model.choice.outcome)
     return model
+
+
+def part_of(file: SceneFile, progress: Progress) -> Part:
+    """The part of a scene, without the gap of measured faces; made once on a machine, see kept."""
+
+    def made() -> Part:
+        with progress.stage("mesh"), TemporaryDirectory() as folder:
+            mesh, node_sets = make_mesh(file, Path(folder))
+            memory.check(3 * mesh.doflocs.shape[1], file.mesh_scene.reduction.solver)
+        with progress.stage("mass and stiffness"):
+            return make_part(file.mesh_scene, mesh, node_sets, file.folder)
+
+    return kept.part(file, made)
+
+
+def plain_of(file: SceneFile, part: Part) -> ReducedModel:
+    """The reduction of a part, not damped and with nothing prescribed; made once on a machine, see kept."""
+    return kept.reduction(file, part, lambda: plain_model(file.mesh_scene, part))
 
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
@@ -209,13 +220,8 @@ def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
     return NodalForce(load.group, load.direction, load.shared)
 
 
-def reduce_part(scene: MeshScene, part: Part) -> ReducedModel:
-    """The part on its contact and load nodes and a few modes, damped and held as the scene asks."""
-    return part_reduction.with_prescribed(scene, part, damped(scene, plain_model(scene, part)))
-
-
 def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
-    """The same, not damped and with nothing prescribed; of a wheel one wave of it."""
+    """The part on its contact and load nodes and a few modes, not damped, nothing prescribed; of a wheel one wave."""
     if scene.wheel is not None and scene.wheel.along_speed:
         return sector.along_speed(scene, part)
     if scene.wheel is not None:
@@ -272,11 +278,11 @@ class Problem:
             bolts = tightening.tightened(scene, tightening.rods(scene, part.mesh, part.node_sets), alone)
         return cls(scene, part, reduced, made, bolts)
 
-    def balance(self, kept: tuple[int, ...]) -> HarmonicBalance:
+    def balance(self, harmonics: tuple[int, ...]) -> HarmonicBalance:
         """The balance of some harmonics; raises ValueError where they leave out what the scene has in harmonic 0."""
         scene, wanted, gap = self.scene, self.scene.harmonics, self.reduced.interface.gap
         auto = wanted.transitions == "auto"
-        basis = HarmonicBasis(kept, wanted.samples, joint_transitions(self.joints) if auto else wanted.transitions)
+        basis = HarmonicBasis(harmonics, wanted.samples, joint_transitions(self.joints) if auto else wanted.transitions)
         rounding = 1e-12  # of node positions [m]
         if not basis.has_static and np.any(np.abs(gap) > rounding):
             raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
@@ -304,10 +310,10 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     """The harmonic balance of the scene; harmonics are those it names, else `chosen`, else chosen here."""
     problem = Problem.of(scene, part, reduced)
     choice = problem.choice() if scene.harmonics.automatic and not chosen else None
-    kept = scene.harmonics.kept or chosen or (choice.harmonics if choice else ())
-    final = problem.balance(kept)
+    harmonics = scene.harmonics.kept or chosen or (choice.harmonics if choice else ())
+    final = problem.balance(harmonics)
     if part is not None and isinstance(scene, MeshScene) and scene.other_speeds:
-        final = replace(final, at_speed=_at_speeds(scene, part, kept))
+        final = replace(final, at_speed=_at_speeds(scene, part, harmonics))
     return Model(part, final.model, final, choice)
 
 
@@ -317,7 +323,7 @@ def _at_speeds(scene: MeshScene, part: Part, harmonics: tuple[int, ...]) -> dict
     assert scene.wheel is not None
     for speed in scene.other_speeds:
         there = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"speed": speed}), "wear": None})
-        found[speed] = make_model(there, part, reduce_part(there, part), harmonics).balance
+        found[speed] = make_model(there, part, damped(there, plain_model(there, part)), harmonics).balance
     return found
 
 

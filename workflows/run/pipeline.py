@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -34,7 +33,6 @@ def run(
     folder: Path | None,
     progress: Progress,
     earlier: Result | None = None,
-    build: Callable[[SceneFile], modelling.Model] | None = None,
     row_only: bool = False,
     judge: Judge | None = None,
 ) -> Result:
@@ -42,7 +40,6 @@ def run(
 
     folder : None keeps nothing on disk
     earlier : an unfinished result of the same scene to resume
-    build : makes the model, for runs that share what models are made of; from the scene alone by default
     row_only : without linear references, which the row of a study does not hold
     judge : measures the errors of the finished result, where the scene wants them
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
@@ -50,12 +47,8 @@ def run(
     scene, clock = file.scene, Clock(earlier)
     settings.check_names(scene)
     keep = Keeper(None if folder is None else folder / "result.h5", clock)
-    with alone_in(folder), limited(scene.solver.threads), TemporaryDirectory() as scratch:
-        if build is not None:
-            model = build(file)
-        else:
-            chosen = () if earlier is None else earlier.harmonics
-            model = modelling.build(file, folder or Path(scratch), progress, chosen)
+    with alone_in(folder), limited(scene.solver.threads):
+        model = modelling.build(file, progress, () if earlier is None else earlier.harmonics)
         for line in () if progress.silent else sanity_checks.lines(file, model):
             (progress.say if line.startswith("warning: ") else progress.detail)(line)
         result = earlier or described(file, model.part, model.balance, model.choice)

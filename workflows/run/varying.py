@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -83,11 +81,8 @@ class Varying:
 
     @staticmethod
     def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
-        scene = file.mesh_scene
-        with TemporaryDirectory() as folder:
-            mesh, node_sets = modelling.make_mesh(file, Path(folder))
-        part, _ = modelling.with_surfaces(scene, modelling.make_part(scene, mesh, node_sets, file.folder), file.folder)
-        return part, modelling.plain_model(scene, part)
+        part, _ = modelling.with_surfaces(file.mesh_scene, modelling.part_of(file, Progress()), file.folder)
+        return part, modelling.plain_of(file, part)
 
     def change(self, key: str, value: float) -> Change:
         """The problems a step above and below a value of a key."""

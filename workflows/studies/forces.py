@@ -94,7 +94,7 @@ def forces(scene: Source, *, overrides: Overrides = ()) -> Forces:
 def of_scene(file: SceneFile, scene: MeshScene) -> Forces:
     """The forces of a scene that was read."""
     with limited(scene.solver.threads):
-        model = modelling.build(file, None, Progress())
+        model = modelling.build(file, Progress())
         part, balance = model.part, model.balance.with_load(0.0)
         assert part is not None
         omega = 2 * np.pi * settings.response_range(scene)[0]

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -250,9 +249,7 @@ def _free_frequencies(solids: Sequence[Body], count: int, progress: Progress) ->
 
 
 def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> Inspection:
-    with TemporaryDirectory() as folder, progress.stage("mesh, mass and stiffness"):
-        mesh, node_sets = modelling.make_mesh(file, Path(folder))
-        part = modelling.make_part(file.mesh_scene, mesh, node_sets, file.folder)
+    part = modelling.part_of(file, progress)
     found = of_part(file, part)
     if n_modes:
         with progress.stage("modes"):

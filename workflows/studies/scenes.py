@@ -15,7 +15,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.store import Held
 from tribodyn.workflows.run import checkpoint, modelling, pipeline, planning
 from tribodyn.workflows.run.modelling import Model
-from tribodyn.workflows.run.progress import Report, reporter
+from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
@@ -36,20 +36,15 @@ def picture(source: Source, path: AnyPath, overrides: Overrides = ()) -> Path:
 
     Raises  SceneError: the scene has no mesh, or asks for what cannot be; RenderingUnavailable
     """
-    from tempfile import TemporaryDirectory
-
     from tribodyn.workflows.pictures import scene_picture
 
     file = read_scene(source, overrides)
-    with TemporaryDirectory() as folder:
-        mesh, node_sets = modelling.make_mesh(file, Path(folder))
-        part = modelling.make_part(file.mesh_scene, mesh, node_sets, file.folder)
-    return scene_picture.draw(file.mesh_scene, part, Path(path))
+    return scene_picture.draw(file.mesh_scene, modelling.part_of(file, Progress()), Path(path))
 
 
 def build(source: Source, overrides: Overrides = (), *, progress: Report = None) -> Model:
     """The nonlinear problem of a scene, reduced and ready to be solved, with the part that it was made from."""
-    return modelling.build(read_scene(source, overrides), None, reporter(progress))
+    return modelling.build(read_scene(source, overrides), reporter(progress))
 
 
 def run(

@@ -215,7 +215,7 @@ def verify(
     found, report = held(result), reporter(progress)
     file = rebuilt(found, override_texts(overrides))
     with limited(file.scene.solver.threads):
-        unworn = modelling.build(file, None, report, found.harmonics).balance
+        unworn = modelling.build(file, report, found.harmonics).balance
     omega = None if at is None else 2 * np.pi * at
     return held_against(found, file.scene, unworn, omega, row, steps, report)
 

@@ -143,7 +143,7 @@ def verify_states(
         raise ValueError(f"--states must be at least 1, not {states}")
     file = rebuilt(result, override_texts(overrides))
     with limited(file.scene.solver.threads):
-        unworn = modelling.build(file, None, report, result.harmonics).balance
+        unworn = modelling.build(file, report, result.harmonics).balance
     found = []
     for row in spread(result.wear, states):
         comparison, alone, why = None, None, ""

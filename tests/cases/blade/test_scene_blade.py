@@ -29,7 +29,7 @@ from tribodyn.workflows.scene import scene_file
 
 
 def built(folder, *overrides):
-    return modelling.build(scene_file.read("blade_thesis", (*COARSE, *overrides)), folder, Progress())
+    return modelling.build(scene_file.read("blade_thesis", (*COARSE, *overrides)), Progress())
 
 
 @pytest.fixture(scope="module")

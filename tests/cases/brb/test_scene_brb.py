@@ -44,7 +44,7 @@ COARSER = [  # for what does not ask for frequencies
 def built(name: str) -> modelling.Model:
     """The model of a scene; the part and its reduction are those of the plain one."""
     if name in ("brb", "brb_locked"):
-        return modelling.build(scene_file.read(name, COARSE if name == "brb" else COARSER), None, Progress())
+        return modelling.build(scene_file.read(name, COARSE if name == "brb" else COARSER), Progress())
     file, plain = scene_file.read(name, COARSE), built("brb")
     part, _ = modelling.with_surfaces(file.mesh_scene, plain.part, file.folder)
     reduced = replace(

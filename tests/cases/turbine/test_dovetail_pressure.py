@@ -28,7 +28,7 @@ STATIONS = 1e-4  # distance within which nodes stand at one place along the flan
 
 @pytest.fixture(scope="module")
 def model() -> modelling.Model:
-    return modelling.build(scene_file.read(str(HERE / "dovetail.toml")), None, Progress())
+    return modelling.build(scene_file.read(str(HERE / "dovetail.toml")), Progress())
 
 
 @pytest.fixture(scope="module")

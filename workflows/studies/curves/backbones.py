@@ -5,7 +5,6 @@ Followed again with changes of the scene: what finer harmonics, samples and mesh
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,8 +33,6 @@ from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.published import PublishedBackbone, published_backbone
 
 COMPARED = 9  # amplitudes at which two backbones are compared
-LATE: Any = {"harmonics": True, "solver": True, "loads": {"static": {"__all__": {"value", "pressure"}}}}
-"""What a scene may change without another part or reduction."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +73,7 @@ class Changed:
 
     change : overrides, joined by ";"; modal_amplitude : (n,) [m kg^0.5]
     frequency, damping : (n,) differences there from the backbone of the scene, relative to it
-    seconds : of the processor, with a model of its own where the change asks for one
+    seconds : of the processor, with its model
     """
 
     change: str
@@ -165,11 +162,8 @@ class SceneBackbone:
             frequency, damping = (", ".join(f"{100 * v[i]:+.3g}" for i in at) for v in (one.frequency, one.damping))
             yield one.change, f"frequency {frequency} %, damping {damping} % in {one.seconds:.3g} s"
         if self.changes:
-            sums = [
-                np.sum([np.abs(getattr(one, name)) for one in self.changes], axis=0)
-                for name in ("frequency", "damping")
-            ]
-            frequency, damping = (f"{100 * each.max():.3g} %" for each in sums)
+            every = ([np.abs(getattr(one, name)) for one in self.changes] for name in ("frequency", "damping"))
+            frequency, damping = (f"{100 * np.sum(each, axis=0).max():.3g} %" for each in every)
             yield "all of them", f"frequency {frequency}, damping {damping} at most, summed without signs"
 
     def write(self, folder: Path) -> list[Path]:
@@ -199,8 +193,8 @@ class SceneBackbone:
             upper.set(ylabel="frequency / Hz", title=named(self.name, "backbone"))
             upper.legend(loc="best")
             lower.plot(amplitude, 100 * mode.damping[good], ".-", color=ORANGE, ms=4)
-            lower.set(xscale="log", xlabel=f"amplitude in the mode at rest / {unit}", ylabel="damping ratio / %")
-            lower.set_ylim(bottom=0)
+            lower.set(xscale="log", yscale="log", ylabel="damping ratio / %")
+            lower.set(xlabel=f"amplitude in the mode at rest / {unit}")
         return figure
 
 
@@ -233,12 +227,11 @@ def backbone(
     published = published_backbone(file)
     others = {text: file.changed(*(part.strip() for part in text.split(";") if part.strip())) for text in changes}
     with limited(file.scene.solver.threads):
-        model = modelling.build(file, None, report)
-        found = along(file, model.balance, asked, report)
+        balance = modelling.build(file, report).balance
+        found = along(file, balance, asked, report)
     if not found.converged.any():
         raise SolveFailed(f"the backbone {found.end}")
-    changed = _changed(file, asked, model, found, others, report)
-    return SceneBackbone(file.name, model.balance, found, published, changed)
+    return SceneBackbone(file.name, balance, found, published, _changed(asked, found, others, report))
 
 
 def along(
@@ -255,14 +248,12 @@ def along(
 
 
 def _changed(
-    file: SceneFile,
     asked: AmplitudeRange,
-    model: modelling.Model,
     found: Backbone,
     others: Mapping[str, SceneFile],
     progress: Progress,
 ) -> tuple[Changed, ...]:
-    """The backbone of a scene again with changes of it; of its model is used what a change leaves as it is.
+    """The backbone of a scene again with changes of it.
 
     Raises  SolveFailed where a changed backbone is not found
     """
@@ -270,11 +261,7 @@ def _changed(
     for text, other in others.items():
         clock = process_time()
         with limited(other.scene.solver.threads), progress.stage(text):
-            if _early(other) == _early(file):
-                balance = modelling.make_model(other.scene, model.part, model.reduced).balance
-            else:
-                balance = modelling.build(other, None, progress).balance
-            there = along(other, balance, asked, progress)
+            there = along(other, modelling.build(other, progress).balance, asked, progress)
         if not there.converged.any():
             raise SolveFailed(f"the backbone with {text} {there.end}")
         ends = [f(b.modal_amplitude[b.converged]) for f in (min, max) for b in (found, there)]
@@ -288,11 +275,6 @@ def _changed(
         off = [t / o - 1 for t, o in zip(_at(there, a), _at(found, a), strict=True)]
         done.append(Changed(text, a, off[0], off[1], process_time() - clock))
     return tuple(done)
-
-
-def _early(file: SceneFile) -> str:
-    """What part and reduction are made of: equal texts, equal models."""
-    return json.dumps(file.scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
 
 
 def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:

@@ -166,7 +166,7 @@ def ring_down(
     if not asked.stop > asked.start:
         raise ValueError("a free decay ends at a smaller amplitude than it begins at: give --from below --to")
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, report).balance
+        balance = modelling.build(file, report).balance
         swung = _reached(along(file, balance, asked, report))
         marked = _marked(balance, swung)
         if marked is not None:
@@ -192,7 +192,7 @@ def _struck(
     if least is None or not (impulse > 0 and least > 0):
         raise ValueError("a blow needs --impulse above 0 and --from, the amplitude at which its decay ends")
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, report).balance
+        balance = modelling.build(file, report).balance
         with report.stage("free decay"):
             omega = FreeVibration(balance, mode, settings.OUTPUT).reference_omega
             swing = time_ring_down.hammer(balance, impulse, omega, settings.OUTPUT, periods, steps, least)

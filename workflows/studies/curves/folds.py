@@ -69,7 +69,7 @@ def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), pr
         raise ValueError(f"{file.name} has a [wheel]: its folds cannot be looked for in time")
     low, high = settings.response_range(file.scene)
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, report).balance
+        balance = modelling.build(file, report).balance
         with report.stage("frequency response"):
             options = arc_length.Options(newton=settings.newton_options(file.scene))
             branch = arc_length.follow(balance, low, high, options)

@@ -125,7 +125,7 @@ def track(
         raise ValueError('--worn: give the folder of a worn result with --against "wear", and only there')
     file, report = read_scene(scene, overrides), reporter(progress)
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, report).balance
+        balance = modelling.build(file, report).balance
         path = _path(balance, against, None if worn is None else _depth(worn, balance))
         if fold is None:
             with report.track("peaks") as advance:

@@ -12,14 +12,11 @@ import tomli_w
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress, Report, reporter
-from tribodyn.workflows.run.reuse import early_of
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import cluster, design, life_picture, pictures, pool, sensitivity, study_file
 from tribodyn.workflows.studies.many.journal import Journal
-from tribodyn.workflows.studies.many.shared_models import shared
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study_file import Study
 from tribodyn.workflows.studies.many.table import StudyTable, table, write
@@ -110,18 +107,16 @@ def run(
             progress.say(f"the rows that were here are now {previous}")
         if resume:
             progress.say(f"{len(known)} of {len(varied)} runs are done already")
-        # runs that share mesh and reduction come one after the other
-        left = sorted((task for task in tasks if task.number not in rows), key=lambda task: task.early)
+        left = [task for task in tasks if task.number not in rows]
         count = runner.workers or pool.cores()
         if left:
             where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(left))} processes"
             progress.say(f"{len(left)} runs on {where}, one thread for each run")
         try:
-            with progress.track(f"{len(left)} runs") as advance, shared(left, folder, count, scheduler) as (ready, end):
-                for done, row in enumerate(_finished(ready, count, scheduler, inside), 1):
+            with progress.track(f"{len(left)} runs") as advance:
+                for done, row in enumerate(_finished(left, count, scheduler, inside), 1):
                     journal.add(row)
                     rows[row.run] = row
-                    end(row.run)
                     bad = sum(one.status != "complete" for one in rows.values())
                     advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
         finally:
@@ -183,11 +178,11 @@ def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], 
     for number, values in enumerate(varied, 1):
         task = Task(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
         try:
-            scene = task.scene().scene
+            task.scene()
         except SceneError as error:
             refused[number] = Row(number, "", "refused", str(error))
         else:
-            tasks.append(replace(task, early=early_of(scene) if isinstance(scene, PartScene) else ""))
+            tasks.append(task)
     if not tasks:
         raise SceneError(f"every run is refused, the first: {refused[1].sentence}")
     return tasks, refused

@@ -8,7 +8,6 @@ import time
 import tomllib
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
@@ -17,13 +16,11 @@ from tribodyn.version import __version__
 from tribodyn.workflows.errors.verdict import with_verdict
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import QUANTITIES
-from tribodyn.workflows.run import modelling, pipeline
+from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import PartScene
 
 Status = Literal["complete", "failed", "refused", "lost"]
 ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
@@ -37,8 +34,6 @@ class Task:
     """One run: a scene by its text, so that another process or machine needs no file of it.
 
     number : of the run, from 1; overrides : of the scene, those of the run last; folder : of the files it names
-    early : what its mesh and reduction are made of, empty where they are not shared
-    store : file that these are shared through by the processes of a study
     """
 
     number: int
@@ -46,21 +41,11 @@ class Task:
     text: str
     overrides: tuple[str, ...]
     folder: Path
-    early: str = field(default="", repr=False, compare=False)
-    store: Path | None = field(default=None, repr=False, compare=False)
 
     @property
     def key(self) -> str:
         """Hash of all that the row depends on: scene, overrides, contents of the files that they name, version."""
-        return self._content(self.text, self.overrides)
-
-    @property
-    def early_key(self) -> str:
-        """Hash of all that its mesh and reduction depend on."""
-        return self._content(self.early)
-
-    def _content(self, *told: object) -> str:
-        content = hashlib.sha256(repr((__version__, *told)).encode())
+        content = hashlib.sha256(repr((__version__, self.text, self.overrides)).encode())
         said = [tomllib.loads(self.text), *(one.partition("=")[2].strip(" \"'") for one in self.overrides)]
         content.update(repr(digests(said, self.folder)).encode())
         return content.hexdigest()
@@ -91,7 +76,6 @@ class Row:
 
 
 _one_at_a_time = threading.Lock()  # workers may have several threads, Gmsh and the threads of BLAS are of a process
-_bench, _made_of = Bench(), ""  # a process outlives a study on a cluster, where files may change between two
 
 
 def solve(task: Task) -> Row:
@@ -103,9 +87,8 @@ def solve(task: Task) -> Row:
         return Row(task.number, task.key, status, told, numbers or {}, time.perf_counter() - start)
 
     with _one_at_a_time:
-        _set_up(task)
         try:
-            result = pipeline.run(task.scene(), None, Progress(), build=_model, row_only=True, judge=with_verdict)
+            result = pipeline.run(task.scene(), None, Progress(), row_only=True, judge=with_verdict)
         except np.linalg.LinAlgError as error:
             return ended("failed", error)
         except (ValueError, OSError) as error:
@@ -119,22 +102,6 @@ def solve(task: Task) -> Row:
         numbers = numbers_of(result)
         state = result.state + (NO_PEAK if numbers.get("peak_at_end") else "")
         return ended("complete", state, numbers)
-
-
-def _set_up(task: Task) -> None:
-    """Keep mesh and reduction of the run before where this one has the same."""
-    global _bench, _made_of
-    if task.early_key != _made_of:
-        _bench, _made_of = Bench(), task.early_key
-    _bench.store = task.store
-
-
-def _model(file: SceneFile) -> modelling.Model:
-    """The model of a scene; mesh, part and reduction are those of the run before, where the scene allows it."""
-    if isinstance(file.scene, PartScene):
-        return _bench.model(file)
-    with TemporaryDirectory() as folder:
-        return modelling.build(file, Path(folder), Progress())
 
 
 def numbers_of(result: Result) -> dict[str, float]:

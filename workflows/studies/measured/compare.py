@@ -115,11 +115,8 @@ class Compared:
             tops = [(r.frequency[i], r.amplitude[i]) for r in (one.measured, one.curve) for i in [r.amplitude.argmax()]]
             row: dict[str, Any] = {"run": one.measured.name, "force_N": float(one.computed.force[0])}
             for name, ours, theirs in zip(("frequency_hz", "amplitude_m"), tops[1], tops[0], strict=True):
-                row |= {
-                    name: float(theirs),
-                    f"computed_{name}": float(ours),
-                    f"{name}_difference": float(ours / theirs - 1),
-                }
+                apart = float(ours / theirs - 1)
+                row |= {name: float(theirs), f"computed_{name}": float(ours), f"{name}_difference": apart}
             found.append(row)
         return found
 
@@ -157,11 +154,8 @@ class Compared:
         for row in rows:
             cells = [shown[n].value(row[n]) for n in first]
             for n in names:
-                cells += [
-                    shown[n].value(row[n]),
-                    shown[n].value(row[f"computed_{n}"]),
-                    shown[n].off(row[f"{n}_difference"]),
-                ]
+                cells += [shown[n].value(row[n]), shown[n].value(row[f"computed_{n}"])]
+                cells.append(shown[n].off(row[f"{n}_difference"]))
             table.append(f"{row['run'][:20]:20}" + "".join(f"{cell:>13}" for cell in cells))
         off = {n.removesuffix("_difference"): v for n, v in self.largest().items() if v is not None}
         table += named_lines((f"{shown[n].word} off", f"{shown[n].off(v, '')} at most") for n, v in off.items())
@@ -171,9 +165,8 @@ class Compared:
     def write(self, folder: Path) -> list[Path]:
         """Write compare.csv and compare.png."""
         rows = self.rows()
-        return write_files(
-            folder, {"compare": {n: [row[n] for row in rows] for n in rows[0]}}, {"compare": self.plot()}
-        )
+        columns = {n: [row[n] for row in rows] for n in rows[0]}
+        return write_files(folder, {"compare": columns}, {"compare": self.plot()})
 
     def plot(self) -> Figure:
         """Amplitude, phase and force over frequency, or frequency, damping and force over amplitude."""
@@ -234,7 +227,7 @@ def compare(
         found = {}
         for change, file in files.items():
             with limited(file.scene.solver.threads):
-                model = modelling.build(file, None, report)
+                model = modelling.build(file, report)
                 measured.near(file.scene, model.part)
                 found[change] = beside(file, model, measured, report)
     except ValueError as trouble:

@@ -84,14 +84,10 @@ class Measurement:
         if load.direction is not None:
             sign *= _along(self.force_direction, load.direction, "the force")
         factor = sign * (abs(force) if self.per_force else 1.0) * (abs(force) / force if self.timed else 1.0)
-        runs = [
-            replace(
-                run,
-                displacement=factor * run.displacement,
-                force=np.where(np.isfinite(run.force), run.force, abs(force)),
-            )
-            for run in self.runs
-        ]
+        forces = [np.where(np.isfinite(run.force), run.force, abs(force)) for run in self.runs]
+        runs = (
+            replace(r, displacement=factor * r.displacement, force=f) for r, f in zip(self.runs, forces, strict=True)
+        )
         return replace(self, runs=tuple(runs), per_force=False, timed=False)
 
     def force_at_output(self, scene: Scene) -> bool:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -22,6 +19,7 @@ from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling
 from tribodyn.workflows.run import joints, modelling
 from tribodyn.workflows.run import sector as sectors
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 
@@ -105,7 +103,8 @@ class Wheel:
         wheel = self.scene.wheel
         assert wheel is not None
         scene = self.scene.model_copy(update={"wheel": wheel.model_copy(update={"speed": speed, "sweep": None})})
-        return assembled(replace(self.file, scene=scene), self.part.mesh, dict(self.part.node_sets))
+        part = modelling.make_part(scene, self.part.mesh, dict(self.part.node_sets), self.file.folder)
+        return assembled(replace(self.file, scene=scene), part)
 
 
 def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Branch:
@@ -125,15 +124,12 @@ def build(file: SceneFile) -> Wheel:
     """Mesh, assemble and reduce the sector of a scene; raises SceneError for a scene without a wheel."""
     if file.mesh_scene.wheel is None:
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
-    with TemporaryDirectory() as folder:
-        mesh, node_sets = modelling.make_mesh(file, Path(folder))
-    return assembled(file, mesh, node_sets)
+    return assembled(file, modelling.part_of(file, Progress()))
 
 
-def assembled(file: SceneFile, mesh: Any, node_sets: dict[str, np.ndarray]) -> Wheel:
-    """Assemble and reduce the sector of a scene with a wheel from its mesh."""
+def assembled(file: SceneFile, part: Part) -> Wheel:
+    """Reduce the sector of a scene with a wheel."""
     scene = file.mesh_scene
-    part = modelling.make_part(scene, mesh, node_sets)
     full = sectors.sector(scene, part)
     return Wheel(file, part, full, sectors.reduced(scene, full))
 

@@ -1,6 +1,6 @@
 """The fit of the measured Brake-Reuss beam on its runs of constant force, judged on those of constant response.
 
-python -m tests.proof.cases.brb.fit MEASURED.csv [NAME ...]    NAME : of friction, crown, damping, bolts
+python -m tests.proof.cases.brb.fit MEASURED.csv [NAME ...]    NAME : of START
 """
 
 from __future__ import annotations
@@ -9,82 +9,97 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import process_time
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
 from tribodyn.workflows.studies.measured.beside import beside
-from tribodyn.workflows.studies.measured.measurement import Measurement
 from tribodyn.workflows.studies.measured.reading import read
 from tribodyn.workflows.studies.measured.resonance import prepared
 
 SCENE = "brb_half_fitted"
-START = {"friction": 0.12, "crown": 6e-4, "damping": 1.2e-3, "bolts": 12249.0}
-LOW = {"friction": 0.03, "crown": 5e-5, "damping": 3e-4, "bolts": 3e3}
-HIGH = {"friction": 1.0, "crown": 2e-3, "damping": 2.5e-3, "bolts": 3e4}
-WANTED = np.array([0.003, 0.15])  # of frequency and damping
+STEP = 0.04  # beyond it the ends of the laps stand back [m]
+START = {"friction": 0.09, "damping": 1.6e-3, "ends": 35e-6, "sides": 200e-6, "modulus": 190e9, "bolts": 12249.0}
+FACTOR = {"friction": 5.0, "damping": 2.0, "ends": 3.0, "sides": 5.0, "modulus": 1.06, "bolts": 2.0}  # bounds
+DIFFERENCE = dict.fromkeys(START, 0.05) | {"sides": 0.1, "modulus": 0.004}  # steps of the logarithms
+WANTED = np.array([[0.003], [0.15]])  # of frequency and damping
+
+
+def opening(points: np.ndarray, ends: float, sides: float) -> np.ndarray:
+    """Gap (n,) of the laps: how far their ends stand back and their sides are rounded [m]."""
+    x, y = np.abs(points[:, :2].T)
+    return np.where(x > STEP, ends, 0.0) + sides * (y / 0.0127) ** 2
 
 
 class Beam:
     """The beam, its parts and reduction made once."""
 
-    def __init__(self) -> None:
+    def __init__(self, path: Path) -> None:
         self.file = read_scene(SCENE, ["contacts.lap.gap_map="])
+        self.young = self.file.scene.materials["steel"].young
         with TemporaryDirectory() as folder:
             mesh, node_sets = modelling.make_mesh(self.file, Path(folder))
         self.part = modelling.make_part(self.file.mesh_scene, mesh, node_sets, self.file.folder)
         self.plain = modelling.plain_model(self.file.mesh_scene, self.part)
+        self.measured = prepared(read(path, {"direction": "-z"}), self.file.scene, True)
 
-    def off(self, values: dict[str, float], measured: Measurement) -> np.ndarray:
-        """(n, 2) logarithms of computed over measured frequency and damping at every point."""
-        damping = values["damping"]
+    def model(self, values: dict[str, float], gap: np.ndarray, *changes: str) -> tuple[SceneFile, modelling.Model]:
+        """The beam with other numbers and another gap (n_pair,) [m] of its laps."""
         pull = [f"loads.static.bolt_{k}.value={values['bolts']}" for k in (1, 2, 3)]
-        ratios = f"damping.ratios=[{damping}, {0.39 * damping}]"
-        file = self.file.changed(f"contacts.lap.friction={values['friction']}", ratios, *pull)
-        crown = values["crown"] * (self.plain.interface.points[:, 0] / 0.06) ** 2
-        reduced = replace(self.plain, interface=replace(self.plain.interface, gap=crown))
-        model = modelling.make_model(file.scene, self.part, modelling.damped(file.scene, reduced))
-        pairs = beside(file, model, measured, Progress())
-        ratio = [
-            np.log([o.computed.frequency / o.measured.frequency, o.computed.damping / o.measured.damping])
-            for o in pairs
-        ]
-        return np.concatenate(ratio, axis=1).T
+        ratios = f"damping.ratios=[{values['damping']}, {0.39 * values['damping']}]"
+        file = self.file.changed(f"contacts.lap.friction={values['friction']}", ratios, *pull, *changes)
+        plain, i = self.plain, self.plain.interface
+        stiffness = values["modulus"] / self.young * np.asarray(plain.system.stiffness)
+        reduced = replace(plain, system=replace(plain.system, stiffness=stiffness), interface=replace(i, gap=gap))
+        return file, modelling.make_model(file.scene, self.part, modelling.damped(file.scene, reduced))
+
+    def off(self, values: dict[str, float]) -> dict[str, np.ndarray]:
+        """Control -> (2, n) logarithms of computed over measured frequency and damping at every point."""
+        gap = opening(self.plain.interface.points, values["ends"], values["sides"])
+        file, model = self.model(values, gap, "backbone.modal_amplitude=[2.2e-5, 4.6e-4]", "backbone.points=12")
+        return {
+            one.measured.control: np.log(
+                [one.computed.frequency / one.measured.frequency, one.computed.damping / one.measured.damping]
+            )
+            for one in beside(file, model, self.measured, Progress())
+        }
 
 
 def main(path: Path, names: list[str]) -> None:
     """Fit, and print both sets of runs."""
-    beam, every = Beam(), read(path, {"direction": "-z"})
-    runs = {
-        control: prepared(
-            replace(every, runs=tuple(r for r in every.runs if r.control == control)), beam.file.scene, True
-        )
-        for control in ("force", "response")
-    }
+    beam, last = Beam(path), [np.zeros(0), np.zeros(0)]
 
     def values(unknowns: np.ndarray) -> dict[str, float]:
         return START | dict(zip(names, map(float, np.exp(unknowns)), strict=True))
 
     def residual(unknowns: np.ndarray) -> np.ndarray:
-        found = (beam.off(values(unknowns), runs["force"]) / WANTED).ravel()
-        print(values(unknowns), f"cost {found @ found / 2:.3f}", flush=True)
+        if np.array_equal(unknowns, last[0]):
+            return last[1]
+        found = (beam.off(values(unknowns))["force"] / WANTED).ravel()
+        last[:] = unknowns.copy(), found
+        print({n: f"{v:.4g}" for n, v in values(unknowns).items()}, f"cost {found @ found / 2:.3f}", flush=True)
         return found
 
-    first, *bounds = (np.log([table[n] for n in names]) for table in (START, LOW, HIGH))
-    found = least_squares(residual, first, bounds=bounds, diff_step=0.02, max_nfev=8)
+    def slopes(unknowns: np.ndarray) -> np.ndarray:
+        at, steps = residual(unknowns), np.diag([DIFFERENCE[n] for n in names])
+        return np.stack([(residual(unknowns + s) - at) / s.sum() for s in steps], axis=1)
+
+    first, wide = (np.log([table[n] for n in names]) for table in (START, FACTOR))
+    scale = [DIFFERENCE[n] for n in names]
+    found = least_squares(residual, first, slopes, (first - wide, first + wide), x_scale=scale, max_nfev=3)
     spread = np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)))
     for name, error in zip(names, spread, strict=True):
-        print(
-            f"{name} {values(found.x)[name]:.4g}, one standard error {100 * error:.0f} % if 0.3 and 15 % are the data's"
-        )
-    for control, measured in runs.items():
-        for row in beam.off(values(found.x), measured):
-            hertz, damping = 100 * np.expm1(row)
+        print(f"{name} {values(found.x)[name]:.4g}, standard error {100 * error:.0f} % if the data's are 0.3 and 15 %")
+    for control, rows in beam.off(values(found.x)).items():
+        for hertz, damping in 100 * np.expm1(rows.T):
             print(f"constant {control}: frequency {hertz:+.2f} %, damping {damping:+.1f} %")
+    print(f"{process_time():.0f} s of processor")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2:] or ["friction", "crown", "damping"])
+    main(Path(sys.argv[1]), sys.argv[2:] or [name for name in START if name != "bolts"])

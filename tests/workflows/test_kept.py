@@ -1,0 +1,241 @@
+"""What is kept on disk of parts and reductions: the same bits, made once, and made anew when anything of it changes."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.structures import BLOCKS, STACK
+from tribodyn.workflows.run import kept, modelling, pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene import scene_file
+
+TINY = ("geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=4", "response.points=6",
+        "harmonics.kept=[0, 1]", "wear.max_steps=1", "verdict.enabled=false")  # fmt: skip
+LATER = ("contact.friction=0.3", "loads.harmonic.shake.value=1 kN", "damping.modal=2 %", "wear.coefficient=5e3 um3/J",
+         "verdict.enabled=true", "harmonics.kept=[0, 1, 2]", "contact.normal_stiffness=1 kN/um")  # fmt: skip
+
+
+@pytest.fixture
+def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """An empty folder of entries, and what is made from now on."""
+    done: list[str] = []
+    monkeypatch.setenv("TRIBODYN_CACHE", str(tmp_path / "kept"))
+    for name in ("make_mesh", "make_part", "plain_model"):
+        own = getattr(modelling, name)
+
+        def counted(*given: object, own: Callable[..., object] = own, name: str = name) -> object:
+            done.append(name)
+            return own(*given)
+
+        monkeypatch.setattr(modelling, name, counted)
+    return done
+
+
+def built(*overrides: str, scene: str = "beam") -> modelling.Model:
+    return modelling.build(scene_file.read(scene, (*TINY, *overrides)), Progress())
+
+
+ALL = ["make_mesh", "make_part", "plain_model"]
+
+
+def test_another_friction_load_damping_or_wear_meshes_and_reduces_nothing(made: list[str]) -> None:
+    built()
+    assert made == ALL
+    for change in LATER:
+        built(change)
+    assert made == ALL
+
+
+@pytest.mark.parametrize(
+    ("change", "again"),
+    [
+        ("geometry.n_length=4", ALL),
+        ("material.young=200 GPa", ALL[1:]),
+        ("loads.static.press.direction=[0, 0.1, -1]", ALL[1:]),
+        ("contact.gap=1 um", ALL[1:]),
+        ("reduction.modes=5", ALL[2:]),
+        ('reduction.method="residual_flexibility"', ALL[2:]),
+    ],
+)
+def test_what_depends_on_a_number_is_made_again(made: list[str], change: str, again: list[str]) -> None:
+    built()
+    made.clear()
+    built(change)
+    assert set(made) >= set(again)
+    assert ("make_part" in made) == ("make_part" in again)
+
+
+def test_residual_flexibility_and_waves_are_those_of_their_springs(made: list[str]) -> None:
+    other = "contact.normal_stiffness=0.3 kN/um"
+    method = 'reduction.method="residual_flexibility"'
+    built(method)
+    made.clear()
+    stiff = built(method, other).reduced.residual
+    assert made == ALL[2:]
+    os.environ["TRIBODYN_CACHE"] = "off"  # put back by the fixture's monkeypatch
+    alone = built(method, other).reduced.residual
+    assert stiff is not None
+    assert alone is not None
+    np.testing.assert_array_equal(stiff.stiffness, alone.stiffness)
+
+
+@pytest.mark.parametrize("scene", ["beam", "blade", "leaf_seal"])
+def test_a_result_is_that_without_anything_kept(
+    made: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, scene: str
+) -> None:
+    small = TINY if scene == "beam" else ("response.points=6", "wear=", "harmonics.kept=[0, 1]",
+                                          "verdict.enabled=false")  # fmt: skip
+    file = scene_file.read(scene, small)
+    results = [pipeline.run(file, None, Progress()) for _ in range(2)]
+    assert made == ALL
+    monkeypatch.setenv("TRIBODYN_CACHE", "off")
+    results.append(pipeline.run(file, None, Progress()))
+    assert made == 2 * ALL
+    for one in results[1:]:
+        assert one.response is not None
+        assert results[0].response is not None
+        np.testing.assert_array_equal(one.response.response, results[0].response.response)
+        np.testing.assert_array_equal(one.patch.area, results[0].patch.area)
+
+
+def test_a_file_that_is_named_counts_by_its_bytes(made: list[str], tmp_path: Path) -> None:
+    (tmp_path / "scene").mkdir()
+    file = scene_file.parse(*own_mesh(tmp_path / "scene"))
+    modelling.build(file, Progress())
+    made.clear()
+    modelling.build(file, Progress())
+    assert made == []
+    with (tmp_path / "scene" / "part.msh").open("a", encoding="utf-8") as stream:
+        stream.write("$Comments\nother\n$EndComments\n")
+    modelling.build(file, Progress())
+    assert made == ALL
+
+
+def own_mesh(folder: Path) -> tuple[str, str, tuple[str, ...], Path]:
+    """The beam by a mesh file, as `scene_file.parse` takes it."""
+    given = scene_file.read("beam", TINY)
+    modelling.make_mesh(given, folder)
+    (folder / "mesh.msh").rename(folder / "part.msh")
+    begin, end = given.text.index("[geometry]"), given.text.index("[material]")
+    text = given.text[:begin] + '[geometry]\nmesh = "part.msh"\nfixed = ["clamp"]\n' + given.text[end:]
+    return text, "own.toml", tuple(one for one in TINY if not one.startswith("geometry")), folder
+
+
+@pytest.mark.parametrize(
+    ("text", "change"),
+    [
+        (BLOCKS, "contacts.lap.friction=0.4"),
+        (BLOCKS, "loads.static.press.pressure=1 MPa"),
+        (
+            BLOCKS + '[wear]\nlaw = "energy"\ncoefficient = "1e4 um3/J"\nstep = "5 %"\n',
+            "contacts.lap.wear.coefficient=2e4 um3/J",
+        ),
+        (STACK, "bolts.m8.preload=6 kN"),
+    ],
+)
+def test_bodies_are_kept_too(made: list[str], tmp_path: Path, text: str, change: str) -> None:
+    for overrides in ((), (change,)):
+        modelling.build(scene_file.parse(text, "bodies.toml", overrides, tmp_path), Progress())
+    assert made == ALL
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("notes.txt", ""), ("part.msh", "*INCLUDE, INPUT=more.inp\n"), ("clamp.py", "")]
+)
+def test_nothing_is_kept_of_files_that_may_read_others(made: list[str], tmp_path: Path, name: str, text: str) -> None:
+    """`clamp` is a word of the scene: a part of that name would be the Python file beside it."""
+    (tmp_path / "scene").mkdir()
+    words = own_mesh(tmp_path / "scene")
+    with (tmp_path / "scene" / name).open("a", encoding="utf-8") as stream:
+        stream.write(f"$Comments\n{text}$EndComments\n")
+    made.clear()
+    for _ in range(2):
+        modelling.build(scene_file.parse(*words), Progress())
+    assert made == (1 if name == "notes.txt" else 2) * ALL
+
+
+def entries(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.pickle"), key=lambda path: path.stat().st_size)
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-9])
+
+
+def flipped(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[-2000] ^= 1
+    path.write_bytes(content)
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+@pytest.mark.parametrize("damage", [cut, flipped, empty])
+def test_a_damaged_entry_is_made_again(made: list[str], tmp_path: Path, damage: Callable[[Path], None]) -> None:
+    whole = built().reduced.system.stiffness
+    for path in entries(tmp_path / "kept"):
+        damage(path)
+    np.testing.assert_array_equal(built().reduced.system.stiffness, whole)
+    assert made == 2 * ALL
+    built()
+    assert made == 2 * ALL
+
+
+def test_a_folder_that_cannot_be_written_keeps_nothing(made: list[str], tmp_path: Path) -> None:
+    (tmp_path / "kept").write_text("a file stands here")
+    for _ in range(2):
+        built()
+    assert made == 2 * ALL
+
+
+def test_the_longest_unused_goes_and_what_is_too_large_is_not_kept(
+    made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stiffer = "material.young=211 GPa"
+    built()
+    first = entries(tmp_path / "kept")
+    built(stiffer)
+    for path in entries(tmp_path / "kept"):
+        age = 1 if path in first else 2
+        os.utime(path, (age, age))
+    monkeypatch.setattr(kept, "ROOM", 4.0 * first[-1].stat().st_size)
+    built()  # is used again, so that the other one is the longest unused
+    for young in (212, 213):
+        built(f"material.young={young} GPa")
+    assert sum(path.stat().st_size for path in entries(tmp_path / "kept")) <= kept.ROOM
+    made.clear()
+    built()
+    assert made == []
+    built(stiffer)
+    assert made
+    monkeypatch.setattr(kept, "ROOM", 1e3)
+    made.clear()
+    for _ in range(2):
+        built("geometry.n_length=6")
+    assert made == 2 * ALL
+    assert not list((tmp_path / "kept").glob("*.new"))
+
+
+def test_two_at_once_make_it_once(made: list[str]) -> None:
+    threads = [threading.Thread(target=built) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert made == ALL
+
+
+def test_where_entries_lie(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("TRIBODYN_CACHE")
+    assert kept.folder() == tmp_path / "tribodyn"
+    monkeypatch.setenv("TRIBODYN_CACHE", "off")
+    assert kept.folder() is None

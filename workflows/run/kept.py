@@ -1,0 +1,190 @@
+"""Parts and reductions on disk under a hash of all that they are made of: what one run has made no other makes again.
+
+An entry is a pickle behind its own digest; one that is damaged is made anew. It is written under another name and
+renamed when it is whole, and a run waits for one that makes what it wants. Those unused for longest go where all
+together exceed `ROOM`.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import pickle
+import platform
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import IO, Any, TypeVar
+
+import numpy as np
+from filelock import FileLock
+
+from tribodyn.fem.part import Part
+from tribodyn.hbm.threads import limited, usable
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.version import package_version
+from tribodyn.workflows.run import joints, part_reduction
+from tribodyn.workflows.scene.content import code, digests, files_named
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import MeshScene
+
+FOLDER = "TRIBODYN_CACHE"  # variable of the environment: another folder, or "off"
+ROOM = 4e9  # bytes of all entries: ten of the Brake-Reuss beam, the largest scene that comes along
+PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "pypardiso", "mkl", "pymetis", "pyamg")
+CODE = code()  # of what this process has loaded: sources may change before it makes anything
+INCLUDES = re.compile(rb"^[ \t]*\*?[ \t]*(include|merge)\b|shapefromfile", re.IGNORECASE | re.MULTILINE)
+LATE: Any = {
+    "scene": True, "damping": True, "harmonics": True, "preload": True, "backbone": True, "wear": True, "solver": True,
+    "pictures": True, "surfaces": True, "verdict": True, "motion": True, "mistuning": True, "flow": True,
+    "loads": {"static": {"__all__": {"value", "pressure"}}, "harmonic": {"__all__": {"value", "pressure", "phase"}}},
+    "prescribed": {"__all__": {"displacement"}}, "bolts": {"__all__": {"preload"}},
+    "response": {"frequency", "references", "points", "method", "stability", "bounds", "options"},
+}  # fmt: skip
+"""What a scene may change without another part or reduction."""
+OF_JOINT = {
+    "law", "tangential_stiffness", "normal_stiffness", "punch", "table", "temperature", "by_temperature", "gap_map",
+    "wear",
+}  # fmt: skip
+"""... and a contact of it, besides the numbers of its law."""
+
+T = TypeVar("T")
+
+
+def early_of(scene: MeshScene) -> str:
+    """What a part and its reduction are made of, but for contact springs and gaps: equal texts, equal models."""
+    late, wheel = dict(LATE), scene.wheel
+    if wheel is not None and wheel.speed > 0:  # its stress is that of the contact at rest under the loads
+        del late["loads"]
+    else:
+        numbers = OF_JOINT.union(*(contact.numbers for contact in scene.joints.values()))
+        late |= {"contact": numbers, "contacts": {"__all__": numbers}}
+    if wheel is not None and wheel.along_speed:  # its speeds are those of the response and of the duties
+        del late["response"], late["wear"]
+    return json.dumps(scene.model_dump(mode="json", exclude=late), sort_keys=True)
+
+
+def part(file: SceneFile, make: Callable[[], Part]) -> Part:
+    """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
+    early = json.loads(early_of(file.mesh_scene))
+    del early["reduction"]
+    return _kept(file, lambda: _key(file, early), make)
+
+
+def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) -> ReducedModel:
+    """The reduction of a part, not damped, with nothing prescribed: as it is kept, else made and kept."""
+    scene, interface = file.mesh_scene, whole.interface
+
+    def key() -> str:
+        springs = b""
+        if scene.wheel or part_reduction.without_masters(scene, interface.B.shape[0], len(whole.held) > 0):
+            springs = joints.contact_stiffness(scene, joints.unreduced(whole)).tobytes()
+        return _key(file, json.loads(early_of(scene)), springs, np.asarray(interface.gap, float).tobytes())
+
+    return _kept(file, key, make)
+
+
+def folder() -> Path | None:
+    """Where entries lie, None where nothing is kept."""
+    given = os.environ.get(FOLDER)
+    if given is not None:
+        return None if given in ("", "off") else Path(given)
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tribodyn"
+    except RuntimeError:  # a user without a home
+        return None
+
+
+def _key(file: SceneFile, early: dict[str, Any], *more: bytes) -> str:
+    """Hash of the tables, of the files that they name, of the program and of its packages; empty where it is not known.
+
+    What a file of Python code reads, or one that includes others, is not known.
+    """
+    named = files_named(early, file.folder)
+    if any(_reads_others(path, path.stat().st_mtime_ns) for path in named.values()):
+        return ""
+    versions = (platform.python_version(), platform.machine(), *map(package_version, PACKAGES))
+    own = (early, digests(early, file.folder), usable(file.scene.solver.threads), CODE, versions, more)
+    return hashlib.sha256(repr(own).encode()).hexdigest()
+
+
+@cache
+def _reads_others(path: Path, changed: int) -> bool:
+    return path.suffix == ".py" or INCLUDES.search(path.read_bytes()) is not None
+
+
+def _kept(file: SceneFile, key_of: Callable[[], str], make: Callable[[], T]) -> T:
+    with limited(file.scene.solver.threads):  # who makes it: another count rounds differently
+        return _kept_in(folder(), key_of, make)
+
+
+def _kept_in(room: Path | None, key_of: Callable[[], str], make: Callable[[], T]) -> T:
+    key = "" if room is None else key_of()
+    if room is None or not key:
+        return make()
+    path, lock = room / f"{key}.pickle", FileLock(room / f"{key[:2]}.lock")
+    try:
+        room.mkdir(mode=0o700, parents=True, exist_ok=True)
+        lock.acquire()  # released by the system where its holder is killed
+    except (OSError, NotImplementedError):  # or a disk that cannot lock
+        return make()
+    try:
+        found: T | None = _read(path)
+        if found is None:
+            found = make()
+            _write(path, found)
+        return found
+    finally:
+        lock.release()
+
+
+def _read(path: Path) -> Any:
+    """What an entry holds, None where there is none or it is damaged."""
+    try:
+        with path.open("rb") as stream:
+            said = stream.read(hashlib.sha256().digest_size)
+            start = stream.tell()
+            if hashlib.file_digest(stream, "sha256").digest() != said:
+                return None
+            stream.seek(start)
+            os.utime(path)
+            return pickle.load(stream)
+    except OSError:
+        return None
+
+
+def _write(path: Path, what: object) -> None:
+    """Keep an entry, and let the longest unused go; nothing where it is too large or the disk is full."""
+    fresh = path.with_suffix(".new")
+    try:
+        with fresh.open("wb") as stream:
+            said = _Digested(stream)
+            stream.write(said.digest.digest())
+            pickle.dump(what, said, pickle.HIGHEST_PROTOCOL)
+            stream.seek(0)
+            stream.write(said.digest.digest())
+        os.replace(fresh, path)
+        entries = [(entry.stat().st_mtime, entry.stat().st_size, entry) for entry in path.parent.glob("*.pickle")]
+        total = sum(size for _, size, _ in entries)
+        for _, size, entry in sorted(entries):
+            if total > ROOM:
+                entry.unlink(missing_ok=True)
+                total -= size
+    except OSError:
+        fresh.unlink(missing_ok=True)
+
+
+class _Digested:
+    """A file that is written with a digest of it, up to a quarter of all room."""
+
+    def __init__(self, stream: IO[bytes]):
+        self.stream, self.digest, self.size = stream, hashlib.sha256(), 0
+
+    def write(self, data: Any) -> None:
+        self.size += memoryview(data).nbytes
+        if self.size > ROOM / 4:
+            raise OSError(errno.EFBIG, "too large to be kept")
+        self.digest.update(data)
+        self.stream.write(data)
