@@ -1,7 +1,8 @@
 """Constraints: faces glued together though their meshes differ, points that carry faces, and points linked together.
 
-Source  ties: Bernardi, Maday and Patera, A new nonconforming approach to domain decomposition: the mortar element
-    method, 1994; distributed coupling: the mean motion of a face in the sense of least squares, weighted by area
+Source  ties: Wohlmuth, A mortar finite element method using dual spaces for the Lagrange multiplier, SIAM Journal on
+    Numerical Analysis 38, 2000; distributed coupling: the mean motion of a face in the sense of least squares,
+    weighted by area
 """
 
 from __future__ import annotations
@@ -12,12 +13,11 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import coo_matrix, csr_matrix, eye_array, hstack, kron
-from scipy.sparse.linalg import splu
+from scipy.sparse import coo_matrix, csr_matrix, diags_array, eye_array, kron
 
 from tribodyn.fem.constraints import Following, named
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.mortar import MORTAR, Common, Side, common, side, tabulate
+from tribodyn.fem.mortar import MORTAR, Common, Side, coefficients, common, dual, side, tabulate
 from tribodyn.fem.mortar_contact import apart
 from tribodyn.fem.springs import shares
 
@@ -26,7 +26,9 @@ SMALL = 1e-13  # of a coefficient that is left out
 
 @dataclass(frozen=True)
 class Tie:
-    """Glue a face to another one: the jump vanishes in the mean against every shape function of the first face.
+    """Glue a face to another one: the jump vanishes in the mean against every dual function of the first face.
+
+    The functions are dual to those of its coefficients, so that each of these follows the other face near it alone
 
     what : name for errors; first, second : boundary names; reach : farthest opening [m], which is then bridged; where
         it is None a tenth of the length of the first face, and faces that are apart are refused
@@ -57,32 +59,35 @@ class Tie:
         if self.reach is None and gap > MORTAR.apart * one.length:
             who = f"{self.first} and {self.second} are {1e3 * gap:.3g} mm apart on average"
             raise ValueError(f'{self.what}: {who}: bring them together, or give reach = "{2e3 * gap:.2g} mm"')
-        n = mesh.doflocs.shape[1]
-        parts: list[list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = [[], []]
-        for i, j, g in shared.each():
-            own = tabulate(one.nodes.shape[1], shared.xi[:, g])[0]
-            other = tabulate(two.nodes.shape[1], shared.eta[:, g])[0]
-            for into, N, nodes in ((parts[0], own, one.nodes[i]), (parts[1], other, two.nodes[j])):
-                block = (own * shared.weight[g]) @ N.T
-                into.append((block.ravel(), np.repeat(one.nodes[i], len(nodes)), np.tile(nodes, len(own))))
-        D, M = (_summed(part, n) for part in parts)
-        size = D.diagonal()
-        nodes = np.unique(one.nodes)
-        whole = np.zeros(n)
+        n, k = mesh.doflocs.shape[1], one.nodes.shape[1]
+        psi, d = dual(one, shared)
+        other = tabulate(two.nodes.shape[1], shared.eta)[0]
+        cuts = shared.cuts[:-1]
+        M = _summed(
+            np.array([psi[:, g] @ other[:, g].T for *_, g in shared.each()]),
+            one.nodes[shared.first[cuts]],
+            two.nodes[shared.second[cuts]],
+            n,
+        )
         edge = one.points[:, 1:3] - one.points[:, :1]
-        np.add.at(whole, one.nodes, np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)[:, None] / 100)
-        tied = nodes[size[nodes] > MORTAR.few * whole[nodes]]
-        rest = np.setdiff1d(nodes, tied)
-        solve = splu(D[tied][:, tied].tocsc())
-        right = csr_matrix(M[tied])
-        if len(rest):
-            spread = csr_matrix((np.ones(len(rest)), (np.arange(len(rest)), rest)), shape=(len(rest), n))
-            right = csr_matrix(right - csr_matrix(D[tied][:, rest]) @ spread)
-        columns = np.unique(right.nonzero()[1])
-        pieces = np.array_split(columns, 1 + len(columns) // 256)  # all at once fill the memory, and are slower
-        solved = (solve.solve(right[:, some].toarray()) for some in pieces)
-        scalar = hstack([coo_matrix(np.where(np.abs(x) < SMALL, 0.0, x)) for x in solved], format="coo")
-        moved = csr_matrix((scalar.data, (scalar.row, columns[scalar.col])), shape=(len(tied), n))
+        area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
+        weigh, whole, count = np.zeros((3, n))
+        for into, value in ((weigh, d), (whole, area[:, None] / k), (count, 1.0)):
+            np.add.at(into, one.nodes, value)
+        nodes = np.flatnonzero(count)
+        is_tied = weigh > MORTAR.tied * whole
+        tied, rest = nodes[is_tied[nodes]], nodes[~is_tied[nodes]]
+        # of second order, coefficients F u are tied: F u_tied + F u_rest = M u_2 / d, F = diagonal (1 - N), N^3 = 0
+        F = _summed(np.tile(coefficients(k), (len(one.nodes), 1, 1)), one.nodes, one.nodes, n)
+        F = csr_matrix(diags_array(1 / count[tied]) @ F[tied])
+        free = csr_matrix((np.ones(len(rest)), (rest, rest)), shape=(n, n))
+        right = diags_array(1 / weigh[tied]) @ M[tied] - F @ free
+        inverse = diags_array(1 / F[:, tied].diagonal())
+        N = csr_matrix(eye_array(len(tied)) - inverse @ F[:, tied])
+        moved = inverse @ right
+        moved = csr_matrix(moved + N @ (moved + N @ moved))
+        moved.data[np.abs(moved.data) < SMALL] = 0.0
+        moved.eliminate_zeros()
         dofs = (tied[:, None] * 3 + np.arange(3)).ravel()
         return Following(dofs, csr_matrix(kron(moved, np.eye(3), format="csr")), self.what)
 
@@ -107,10 +112,10 @@ class Equation:
         return Following(np.array(dofs[:1]), csr_matrix(row), self.what, equation=True)
 
 
-def _summed(blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]], n: int) -> csr_matrix:
-    """Matrix (n, n) of blocks of values, rows and columns."""
-    values, rows, columns = (np.concatenate(of) for of in zip(*blocks, strict=True))
-    return csr_matrix(coo_matrix((values, (rows, columns)), shape=(n, n)))
+def _summed(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, n: int) -> csr_matrix:
+    """Matrix (n, n) of blocks (m, k, l) at rows (m, k) and columns (m, l)."""
+    at = (np.broadcast_to(places, blocks.shape).ravel() for places in (rows[:, :, None], columns[:, None]))
+    return csr_matrix(coo_matrix((blocks.ravel(), tuple(at)), shape=(n, n)))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ Source  Hughes, The Finite Element Method, 2000, section 2.8
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -78,6 +78,18 @@ def _linear_reduced(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]
     n_node = mesh.doflocs.shape[1]
     mass = kron(scatter(cells, n_node, lumped), identity(3), format="csr")
     return mass, scatter(cells, n_node, symmetric(stiffness))
+
+
+def strained(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> Iterator[tuple[np.ndarray, ...]]:
+    """Yield (elements, nodes, N, grad N, weight) as `batches` does, nodes (n_e, n_a) of each element besides, where the
+    strain of one mesh is taken: for linear reduced elements, once or eight times in each of the mesh, its mean."""
+    if any(isinstance(one, Material) and one.linear_reduced for one in of_elements(mesh, material)[0]):
+        cells, gradient, volume, _ = linear_reduced.elements(mesh)
+        parents = np.tile(np.arange(mesh.nelements), len(cells) // mesh.nelements)
+        yield parents, cells, np.full((1, 8), 1 / 8), gradient[:, None], volume[:, None]
+        return
+    for elements, *of_points in batches(mesh):
+        yield elements, connectivity(mesh)[elements], *of_points
 
 
 def mass_blocks(N: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -4,7 +4,8 @@ Facets of the second face are carried along the normal of a facet of the first o
 laid on the triangles of each cut. A flat facet is cut in its plane, which is exact for straight edges; a curved one in
 its own reference coordinates, in which the cuts fill it without overlap.
 Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 193, 2004 (segments); Popp, Wohlmuth,
-    Gee and Wall, SIAM Journal on Scientific Computing 34, 2012 (second order)
+    Gee and Wall, SIAM Journal on Scientific Computing 34, 2012 (second order, dual functions); Cichosz and Bischoff,
+    Computer Methods in Applied Mechanics and Engineering 200, 2011 (dual functions on cut facets)
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ class MortarOptions:
         its negative, which keeps the rims of bores and rounded edges out
     sliver : part of a facet that is too small to be a cut
     whole : part of a facet that counts as all of it
-    few : part of a point's own area that is too little to carry, or to be tied
+    few : part of a point's own area that is too little to carry
+    tied : part of it from which on a node is tied; less asks too much of the other face by extrapolation
+    independent : least eigenvalue, of the largest possible 1, at which shape functions still differ on a cut facet
     rounding : gap that is rounding of node positions, over the length of the face
     apart : mean gap of two tied faces, over the length of the first, from which on they do not touch
     """
@@ -49,6 +52,8 @@ class MortarOptions:
     sliver: float = 1e-10
     whole: float = 1 - 1e-6
     few: float = 1e-6
+    tied: float = 1e-3
+    independent: float = 1e-7
     rounding: float = 1e-9
     apart: float = 5e-3
 
@@ -210,6 +215,54 @@ def common(one: Side, two: Side, reach: float) -> Common:
         i[of][near], j[of][near], xi[:, near], eta[:, near], weight[near], normal[near], gap[near],
         starts, covered,
     )  # fmt: skip
+
+
+def coefficients(k: int) -> np.ndarray:
+    """The matrix (k, k) that makes Bernstein coefficients of the values at the nodes of a facet of k nodes.
+
+    On every cut of a facet Bernstein polynomials have a positive integral, which shape functions have not: that of the
+    corner of a six-node facet is zero. Those of first order are the shape functions
+    """
+    line = np.array([[1, 0, 0], [0, 1, 0], [-0.5, -0.5, 2]])  # both ends and the middle of an edge
+    if k == 9:
+        i, j = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (1, 2), (2, 1), (0, 2), (2, 2)]).T
+        return np.asarray(line[i[:, None], i] * line[j[:, None], j])
+    whole = np.eye(k)
+    for middle in range(3, k if k == 6 else 0):
+        whole[middle, [middle - 3, (middle - 2) % 3, middle]] = line[2]
+    return whole
+
+
+def dual(one: Side, shared: Common) -> tuple[np.ndarray, np.ndarray]:
+    """Dual functions of the first side, times the weights of the points, and what each coefficient weighs.
+
+    Returns psi (k, n) [m2] and d (n_facet, k) [m2] with sum(psi_a u) = d_a times the Bernstein coefficient a of u, for
+        any u that the facet can take; both are integrals over what is covered, and psi sums to the weights, so that
+        constant tractions are carried exactly. Where a cut is so thin that shape functions look alike on it, this
+        holds for u that are linear in space, rigid motions among them
+    """
+    k = one.nodes.shape[1]
+    to = coefficients(k)
+    N = np.linalg.inv(to).T @ tabulate(k, shared.xi)[0]
+    away = one.points - one.centre[:, None]
+    away /= np.abs(away).max(axis=(1, 2), keepdims=True)
+    affine = np.concatenate([np.ones((*one.nodes.shape, 1)), to @ away], axis=2)
+    starts = np.searchsorted(shared.first, np.arange(len(one.nodes) + 1))
+    psi, d = np.zeros_like(N), np.zeros(one.nodes.shape)
+    for i in np.unique(shared.first):
+        g = slice(starts[i], starts[i + 1])
+        root = np.sqrt(shared.weight[g])
+        b = N[:, g] * root
+        d[i] = b @ root
+        scale = 1 / np.linalg.norm(b, axis=1)
+        b *= scale[:, None]
+        gram = b @ b.T
+        if np.linalg.eigvalsh(gram)[0] > MORTAR.independent * k:
+            best = scale[:, None] * np.linalg.solve(gram, b)
+        else:
+            best = affine[i] @ np.linalg.pinv((affine[i].T @ (b / scale[:, None])).T, MORTAR.rounding)
+        psi[:, g] = d[i][:, None] * best * root
+    return psi, d
 
 
 def _candidates(one: Side, two: Side, reach: float) -> tuple[np.ndarray, np.ndarray]:

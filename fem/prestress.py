@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
 from tribodyn.fem.assembly import materials_of, pieces
-from tribodyn.fem.elasticity import at_elements, symmetric
+from tribodyn.fem.elasticity import at_elements, strained, symmetric
 from tribodyn.fem.elements import batches, connectivity, scatter
 from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.interface import unit
@@ -125,16 +125,17 @@ def geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np
 
 def _geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np.ndarray | None) -> csr_matrix:
     """The same of one mesh, without the factor of three components: (n_node, n_node)."""
-    nodes = connectivity(mesh)
     C, expansion = (at_elements(mesh, material, what) for what in ("tensor", "expansion_tensor"))
-    blocks = np.empty((*nodes.shape, nodes.shape[1], 1, 1))
-    for elements, N, gradient, weight in batches(mesh):
-        strain = gradient @ u[nodes[elements]][:, None]  # d u_j / d x_i; the tensor takes its symmetric part
+    found = []
+    for elements, nodes, N, gradient, weight in strained(mesh, material):
+        strain = gradient @ u[nodes][:, None]  # d u_j / d x_i; the tensor takes its symmetric part
         if temperature is not None:
-            strain = strain - (temperature[nodes[elements]] @ N.T)[..., None, None] * expansion[elements, None]
+            strain = strain - (temperature[nodes] @ N.T)[..., None, None] * expansion[elements, None]
         stress = np.einsum("eijkl,eqkl->eqij", C[elements], strain, optimize=True)
         weighted = weight[..., None, None] * (stress @ gradient)
-        blocks[elements] = symmetric(np.einsum("eqia,eqib->eab", gradient, weighted, optimize=True)[..., None, None])
+        blocks = np.einsum("eqia,eqib->eab", gradient, weighted, optimize=True)[..., None, None]
+        found.append((nodes, symmetric(blocks)))
+    nodes, blocks = (np.concatenate(of) for of in zip(*found, strict=True))
     return scatter(nodes, mesh.doflocs.shape[1], blocks)
 
 

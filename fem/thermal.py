@@ -16,8 +16,7 @@ import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from tribodyn.fem.assembly import Assembly, materials_of
-from tribodyn.fem.elasticity import at_elements
-from tribodyn.fem.elements import batches, connectivity
+from tribodyn.fem.elasticity import at_elements, strained
 
 
 @dataclass(frozen=True)
@@ -48,12 +47,10 @@ class Heating:
                 continue
             C, expansion = (at_elements(piece.mesh, material, what) for what in ("tensor", "expansion_tensor"))
             held_back = np.einsum("eijkl,ekl->eij", C, expansion)
-            nodes = connectivity(piece.mesh) + piece.node
-            for elements, N, gradient, weight in batches(piece.mesh):
-                at = values[nodes[elements]] @ N.T
-                stress = held_back[elements]
-                own = np.einsum("eq,eij,eqja->eai", weight * at, stress, gradient, optimize=True)
-                np.add.at(force, nodes[elements], own)
+            for elements, nodes, N, gradient, weight in strained(piece.mesh, material):
+                at = values[nodes + piece.node] @ N.T
+                own = np.einsum("eq,eij,eqja->eai", weight * at, held_back[elements], gradient, optimize=True)
+                np.add.at(force, nodes + piece.node, own)
         if not force.any():
             raise ValueError("temperature: no body that is heated expands; give its material an expansion")
         return force.ravel()

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from tribodyn.geometry.sources.nastran import cards_of, lines_of
 from tribodyn.reduction.abaqus_matrix import Labels
 from tribodyn.reduction.harwell_boeing import number
 
@@ -182,7 +183,9 @@ def read_dmig(path: Path) -> dict[str, Callable[[], tuple[sp.csr_matrix, Labels]
     """
     heads: dict[str, list[str]] = {}
     columns: dict[str, list[list[str]]] = {}
-    for fields in _dmig_entries(path):
+    for card, fields in cards_of(lines_of(path)):
+        if card != "DMIG":
+            continue
         name = fields[0].upper()
         if fields[1].strip() == "0":
             heads[name] = fields
@@ -191,32 +194,6 @@ def read_dmig(path: Path) -> dict[str, Callable[[], tuple[sp.csr_matrix, Labels]
         else:
             raise ValueError(f"{path.name} has columns of DMIG {name} before its first entry, DMIG {name} 0: repair it")
     return {name: partial(_square, name, head, columns.get(name, []), path) for name, head in heads.items()}
-
-
-def _dmig_entries(path: Path) -> Iterator[list[str]]:
-    """Fields of each DMIG entry, continuations joined, in small, large and free form."""
-    fields: list[str] | None = None
-    for line in path.read_text(encoding="ascii", errors="replace").splitlines():
-        line = line.split("$")[0].rstrip()
-        if not line:
-            continue
-        if "," in line:
-            head, *own = [word.strip() for word in line.split(",")]
-            own = (own + [""] * 8)[:8] if "*" not in head else (own + [""] * 4)[:4]
-        else:
-            line = line.expandtabs(8)
-            head = line[:8].strip()
-            width = 16 if "*" in head else 8
-            own = [line[i : i + width].strip() for i in range(8, 72, width)]
-        if head[:1] in ("", "+", "*"):
-            if fields is not None:
-                fields += own
-            continue
-        if fields is not None:
-            yield fields
-        fields = own if head.rstrip("*").upper() == "DMIG" else None
-    if fields is not None:
-        yield fields
 
 
 def _square(name: str, head: list[str], columns: list[list[str]], path: Path) -> tuple[sp.csr_matrix, Labels]:

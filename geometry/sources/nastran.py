@@ -6,7 +6,7 @@ Free, small and large fields. meshio reads neither sets nor what is fixed, and l
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -32,11 +32,11 @@ _EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
 def read(path: Path) -> RawMesh:
     """Read bulk data. Raises ValueError: one sentence that names the card and the cure."""
-    lines = list(_lines(path))
+    lines = list(lines_of(path))
     start = next((i + 1 for i, line in enumerate(lines) if line.upper().split()[:2] == ["BEGIN", "BULK"]), 0)
     control = "\n".join(lines[:start])
     parameters = [line.strip() for line in lines[:start] if line.strip().upper().startswith("PARAM")]
-    cards = list(_cards([*parameters, *lines[start:]]))
+    cards = list(cards_of([*parameters, *lines[start:]]))
     reader = _Bulk(path, LabelledMesh(Met(TABLE)), _chosen(control) if start else None)
     reader.common = next((fields for name, fields in cards if name == "GRDSET"), reader.common)
     for name, fields in cards:
@@ -338,7 +338,7 @@ TABLE = CardTable(
 )
 
 
-def _lines(path: Path, within: tuple[Path, ...] = ()) -> Iterator[str]:
+def lines_of(path: Path, within: tuple[Path, ...] = ()) -> Iterator[str]:
     """Lines of a file without comments, those of included files in their place."""
     if path.resolve() in within:
         raise ValueError(f"'{path}' includes itself: take the INCLUDE out")
@@ -348,12 +348,12 @@ def _lines(path: Path, within: tuple[Path, ...] = ()) -> Iterator[str]:
             other = path.parent / text[7:].strip().strip("\"'")
             if not other.is_file():
                 raise ValueError(f"INCLUDE of '{path}' names '{other.name}', which does not exist: put it there")
-            yield from _lines(other, (*within, path.resolve()))
+            yield from lines_of(other, (*within, path.resolve()))
         elif text:
             yield text
 
 
-def _cards(lines: list[str]) -> Iterator[tuple[str, list[str]]]:
+def cards_of(lines: Iterable[str]) -> Iterator[tuple[str, list[str]]]:
     """Name and fields of each card of the bulk data, continuation lines joined."""
     name, fields = "", []
     for line in lines:
@@ -369,9 +369,13 @@ def _cards(lines: list[str]) -> Iterator[tuple[str, list[str]]]:
 
 
 def _fields(line: str) -> tuple[str, list[str]]:
+    """Name and fields of a line: eight, or the four of a name with a star, in free and in fixed format."""
     if "," in line:
         head, *more = [item.strip() for item in line.split(",")]
-        return head, (more + [""] * 8)[:8]
+        if "*" in head and any(item and item[0] not in "+*" for item in more[4:]):
+            raise ValueError(f"the line '{line[:40]}' has more than the four fields of a star: take the star out")
+        count = 4 if "*" in head else 8
+        return head, (more + [""] * count)[:count]
     line = line.expandtabs(8)
     head = line[:8].strip()
     width, count = (16, 4) if "*" in head else (8, 8)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,7 @@ class SolidBody:
     node_of : (n_point,) node that each point of the file is, -1 where it is none of this body
     cut : whether its elements were cut into tetrahedra because kinds mix
     unmatched : surface groups of which some faces are no faces of the volume mesh; they are no boundaries
+    added : nodes (k,) that the file has not, and those of it (k, m) between which each lies, by the kind of place
     """
 
     mesh: Any
@@ -33,6 +34,7 @@ class SolidBody:
     node_of: np.ndarray
     cut: bool
     unmatched: tuple[str, ...] = ()
+    added: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
 
 def bodies(raw: RawMesh) -> dict[str, np.ndarray]:
@@ -103,17 +105,17 @@ def build(raw: RawMesh, elements: np.ndarray | None = None) -> SolidBody:
     subdomains = {name: members for name, members in volumes.items() if len(members)}
     node_sets = {name: np.unique(mesh.dofs.element_dofs[:, members]) for name, members in subdomains.items()}
     node_sets |= {name: np.unique(mesh.dofs.get_facet_dofs(ids).flatten()) for name, ids in boundaries.items()}
-    implied = _implied(mesh, fulls, pieces)
+    added = _added(mesh, fulls, pieces)
     for name, members in raw.nodes.items():
         mine = node_of[members]
         mine = mine[mine >= 0]
         if not len(mine) or name in node_sets:
             continue
-        node_sets[name] = np.unique(np.concatenate([mine, implied(mine)]))
+        node_sets[name] = np.unique(np.concatenate([mine, _implied(mine, added, mesh.doflocs.shape[1])]))
         if name in raw.skins and len(skin := _skin(mesh, node_sets[name])):
             boundaries[name] = skin
     named = mesh.with_boundaries(boundaries).with_subdomains(subdomains)
-    return SolidBody(named, node_sets, node_of, cut, unmatched)
+    return SolidBody(named, node_sets, node_of, cut, unmatched, added)
 
 
 def _chosen(raw: RawMesh, elements: np.ndarray | None) -> tuple[list[Cells], list[np.ndarray]]:
@@ -179,14 +181,15 @@ def _facets(mesh: Any, node_of: np.ndarray, parts: Iterable[np.ndarray]) -> np.n
     return np.unique(at) if (keys[at] == wanted).all() else None
 
 
-def _implied(mesh: Any, fulls: Sequence[split.Full], pieces: Sequence[split.Pieces]) -> Callable[..., np.ndarray]:
-    """A function from nodes of the file to the nodes added between them.
+def _added(
+    mesh: Any, fulls: Sequence[split.Full], pieces: Sequence[split.Pieces]
+) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """The nodes that were added to those of the file, and the nodes that each interpolates.
 
-    An added node belongs to a set when every node that it interpolates does: the two ends of an edge, the corners and
-    edges of a face, the whole hexahedron.
+    These are the two ends of an edge, the corners and edges of a face, the whole hexahedron
     """
     order = permutation(REFERENCE_POINTS["tetra10" if mesh.t.shape[0] == 4 else "hexahedron27"], mesh.elem().doflocs)
-    start, tables = 0, []  # (added nodes, the nodes that each interpolates)
+    start, tables = 0, []
     for one, piece in zip(fulls, pieces, strict=True):
         dofs = mesh.dofs.element_dofs[:, start : start + len(piece.parent)].T
         start += len(piece.parent)
@@ -195,17 +198,16 @@ def _implied(mesh: Any, fulls: Sequence[split.Full], pieces: Sequence[split.Piec
         for place, support in enumerate(split.supports(one.solid)):
             new = one.rows[:, place] < 0
             if new.any():
-                added, first = np.unique(nodes[new, place], return_index=True)
-                tables.append((added, nodes[new][first][:, _between(one, support)]))
+                found, first = np.unique(nodes[new, place], return_index=True)
+                tables.append((found, nodes[new][first][:, _between(one, support)]))
+    return tuple(tables)
 
-    def between(members: np.ndarray) -> np.ndarray:
-        if len(members) < 2 or not tables:
-            return np.empty(0, dtype=int)
-        inside = np.zeros(mesh.doflocs.shape[1], dtype=bool)
-        inside[members] = True
-        return np.unique(np.concatenate([added[inside[ends].all(axis=1)] for added, ends in tables]))
 
-    return between
+def _implied(members: np.ndarray, added: Sequence[tuple[np.ndarray, np.ndarray]], n_node: int) -> np.ndarray:
+    """The added nodes that belong to a set: those that interpolate nodes of it alone."""
+    inside = np.zeros(n_node, dtype=bool)
+    inside[members] = True
+    return np.concatenate([np.empty(0, dtype=int), *(new[inside[ends].all(axis=1)] for new, ends in added)])
 
 
 def _between(one: split.Full, support: tuple[int, ...]) -> list[int]:

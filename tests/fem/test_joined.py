@@ -13,7 +13,7 @@ from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import factorise
-from tribodyn.fem.loads import Moment, NodalForce
+from tribodyn.fem.loads import Moment, NodalForce, Pressure
 from tribodyn.fem.material import Material, Orthotropic
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part, build
@@ -64,6 +64,35 @@ def test_a_tie_of_different_meshes_carries_a_bar_in_tension_exactly(tets, linear
     expected = np.zeros_like(u)
     expected[:, 0] = tied.points[:, 0] / STEEL.E
     assert np.abs(u - expected).max() < 1e-11 * np.abs(expected).max()
+
+
+KINDS = [(False, False), (True, False), (False, True)]  # tetrahedra, eight nodes
+
+
+@pytest.mark.parametrize(("tets", "linear"), KINDS)
+def test_a_tie_carries_constant_tractions_of_each_node_to_the_nodes_near_it(tets, linear):
+    one = block(L(0, 1, 2), L(0, 1, 9), L(0, 1, 9), tets, linear)
+    other = block(L(1, 2, 2), L(0, 1, 8), L(0, 1, 8), linear=linear)
+    both = Assembly([Body("a", *one, STEEL), Body("b", *other, STEEL)])
+    tied = Tie("ties.t", "a.x_max", "b.x_min").build(both, {})
+    pressure = [Pressure(face).vector(both, both.node_sets, None) for face in ("a.x_max", "b.x_min")]
+    assert np.abs(tied.map.T @ pressure[0][tied.dofs] + pressure[1]).max() < 1e-12 * np.abs(pressure[1]).max()
+    assert np.diff(tied.map.indptr).max() <= (25 if linear else 81)  # 64 and 225 nodes has the other face
+
+
+@pytest.mark.parametrize(("tets", "linear"), KINDS)
+@pytest.mark.parametrize("turn", [0.0, 1e-3, 0.3])
+def test_a_face_that_another_covers_in_part_follows_its_linear_motions(tets, linear, turn):
+    """At 1e-3 slivers are cut on which shape functions look alike."""
+    one = block(L(0, 1, 2), L(0, 1, 6), L(0, 1, 6), tets, linear)
+    mesh, sets = block(L(1, 2, 2), L(0.2, 0.8, 4), L(0.2, 0.9, 5), linear=linear)
+    c, s = np.cos(turn), np.sin(turn)
+    mesh = replace(mesh, doflocs=np.array([[1, 0, 0], [0, c, s], [0, -s, c]]) @ mesh.doflocs)
+    both = Assembly([Body("a", *one, STEEL), Body("b", mesh, sets, STEEL)])
+    tied = Tie("ties.t", "a.x_max", "b.x_min").build(both, {})
+    u = (both.doflocs.T @ np.random.default_rng(0).normal(size=(3, 3))).ravel()
+    assert np.abs(tied.map @ u - u[tied.dofs]).max() < 1e-10
+    assert len(tied.dofs) < 3 * len(both.node_sets["a.x_max"])  # what is not covered stays free
 
 
 def frequencies(n: int) -> tuple[float, float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import skfem
@@ -9,6 +11,8 @@ import skfem
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.material import Material
+from tribodyn.fem.prestress import geometric_stiffness
+from tribodyn.fem.thermal import Heating
 
 REDUCED = Material(E=210e9, nu=0.3, rho=7860.0, linear_reduced=True)
 
@@ -55,6 +59,23 @@ def test_eight_node_hexahedra_are_those_on_the_nodes_of_a_27_node_mesh():
     dofs = (3 * np.array(order)[:, None] + np.arange(3)).ravel()
     for own, other in zip(assemble(fine, REDUCED), assemble(coarse, REDUCED), strict=True):
         assert abs(own - other[dofs][:, dofs]).max() < 1e-10 * abs(own).max()
+
+
+def test_an_hourglass_strain_bears_no_stress_and_a_field_of_temperature_acts_by_the_mean_gradient():
+    heated = replace(REDUCED, expansion=12e-6)
+    cube = skfem.MeshHex()
+    x = coordinates(cube)
+    hourglass = np.outer(np.prod(1 - 2 * x[:, 1:], axis=1), (1.0, 0.0, 0.0))  # its mean gradient is zero
+    stretch = 1e-3 * x * [1.0, 0.0, 0.0]
+    alone, both = (geometric_stiffness(cube, REDUCED, u) for u in (stretch, stretch + hourglass))
+    assert abs(both - alone).max() < 1e-10 * abs(alone).max()
+    lam, mu = REDUCED.lame
+    turned = (x - 0.5)[:, [0]] * [0.0, 1.0, 0.0]  # sigma_xx stiffens a rotation: its slope along x is 1 everywhere
+    assert turned.ravel() @ alone @ turned.ravel() == pytest.approx(1e-3 * (lam + 2 * mu), rel=1e-9)
+    warm = 1.0 + np.arange(8.0)
+    force = Heating(heated, values=warm).vector(cube, {}).reshape(-1, 3)
+    held = (3 * lam + 2 * mu) * 12e-6 * warm.mean()
+    assert force == pytest.approx(np.where(x > 0.5, 1, -1) * held / 4, rel=1e-9)
 
 
 def test_tetrahedra_are_refused():

@@ -1,5 +1,6 @@
 """The same bricks through every format give the same frequencies and the same set."""
 
+import re
 from functools import lru_cache
 
 import numpy as np
@@ -73,3 +74,18 @@ def test_broken_files_are_refused_in_one_sentence(name, old, new, sentence, tmp_
     with pytest.raises(ValueError, match=sentence) as said:
         read.read(path)
     assert "\n" not in str(said.value)
+
+
+@pytest.mark.parametrize("more", ["", ",7."])
+def test_a_free_line_with_a_star_has_four_fields(more, tmp_path):
+    plain = foreign_files.write(foreign_files.bricks(tmp_path), tmp_path / "d.bdf", "").read_text()
+    at = re.compile(r"GRID\*   (.{16})(.{16})(.{16})(.{16})\*\n\*       (.{16})")
+    free = at.sub(lambda g: f"GRID*,{g[1]},{g[2]},{g[3]},{g[4]},*1{more}\n*1,{g[5]}", plain)
+    assert free != plain
+    (tmp_path / "free.bdf").write_text(free)
+    if more:
+        with pytest.raises(ValueError, match="more than the four fields of a star"):
+            read.read(tmp_path / "free.bdf")
+        return
+    own, other = (next(iter(read.read(tmp_path / name).bodies.values())).mesh for name in ("d.bdf", "free.bdf"))
+    assert np.array_equal(own.doflocs, other.doflocs)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from tribodyn.extras import package
+from tribodyn.fem.assembly import Body
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.shots import SHADE
 from tribodyn.workflows.pictures.style import BODY, INK, LAYOUT, PAPER
@@ -16,16 +17,7 @@ from tribodyn.workflows.pictures.style import BODY, INK, LAYOUT, PAPER
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d", "#8c564b", "#17becf")
 
 
-class Solid(Protocol):
-    """What is drawn of a body."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def mesh(self) -> Any: ...
-
-
-def draw(solids: Sequence[Solid], path: Path, most: int = 20) -> Path:
+def draw(solids: Sequence[Body], path: Path, most: int = 20) -> Path:
     """Draw the first face groups of some bodies, each in a colour of its own. Raises RenderingUnavailable"""
     offscreen.check()
     pv = package("pyvista")

@@ -22,7 +22,7 @@ from tribodyn.fem.material import Anisotropic, AnyMaterial, Material, Orthotropi
 from tribodyn.fem.part import Part, build
 from tribodyn.fem.springs import ElongationSpring, Mass
 from tribodyn.geometry import refine
-from tribodyn.geometry.sources import deck, picking, read
+from tribodyn.geometry.sources import between, deck, picking, read
 from tribodyn.geometry.sources.directions import Directions
 from tribodyn.workflows.scene.structure import EVERYTHING
 from tribodyn.workflows.scene.structure import DeckTable as Table
@@ -95,6 +95,8 @@ class _Carrying:
     """One deck on its way into a structure."""
 
     def __init__(self, name: str, table: Table, materials: Mapping[str, AnyMaterial], source: read.Source):
+        if table.elements != "linear_reduced" and "equations" in table.use:
+            source = between.with_added_nodes(source)
         self.name, self.table, self.source, self.deck = name, table, source, source.deck
         self.materials = materials
         self.faces: dict[str, list[str]] = {}  # group of the deck -> its names in the assembly

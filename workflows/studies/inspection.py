@@ -15,7 +15,6 @@ from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes, stiffest
-from tribodyn.fem.part import Part
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources.deck import Deck
@@ -32,30 +31,10 @@ APART = 0.005  # of the length of a face: an opening or overlap from which on a 
 
 
 @dataclass(frozen=True)
-class Solid:
-    """One body. material : one, or by volume group, None where nothing says it"""
-
-    name: str
-    mesh: Any
-    node_sets: Mapping[str, np.ndarray]
-    material: Any = None
-
-    @property
-    def density(self) -> np.ndarray | None:
-        """Density of each element (n_element,) [kg/m3], None where nothing says it."""
-        return None if self.material is None else densities(self.mesh, self.material)
-
-    @property
-    def plain(self) -> Material | None:
-        """Its only, isotropic material."""
-        return self.material if isinstance(self.material, Material) else None
-
-
-@dataclass(frozen=True)
 class Inspection:
-    """What was found, in SI units; see `record` for the fields. solids : the bodies, for a picture"""
+    """What was found, in SI units; see `record` for the fields. solids : the bodies, material {} where none is known"""
 
-    solids: tuple[Solid, ...]
+    solids: tuple[Body, ...]
     size: np.ndarray
     volume: float
     mass: float | None
@@ -180,10 +159,10 @@ def _of_file(
         try:
             made = decks.material(source.deck, name, mesh, table, named)
         except ValueError as sentence:  # no or no whole material
-            made, lacking = None, str(sentence)
-        solids.append(Solid(name, mesh, node_sets, made))
+            made, lacking = {}, str(sentence)
+        solids.append(Body(name, mesh, node_sets, made))
     found = measured(solids, decks.said(source, table), source.unused)
-    pairs, apart, remarks = pairs_of(source)
+    pairs, apart, remarks = _pairs_of(source.deck, solids)
     ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
     found = replace(found, pairs=pairs, refused=(*ignored, *apart))
     if n_modes:
@@ -197,34 +176,35 @@ def _of_file(
             with progress.stage("mass and stiffness"):
                 part = decks.part(path.stem, table, named, path.parent)
             with progress.stage("modes"):
-                found = replace(found, frequencies=_frequencies(part, n_modes))
+                found = replace(found, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes))
     hint = 'give --unit mm (in a scene: unit = "mm")'
     remarks += sanity_checks.check_size(found.size, hint) + _check_materials(solids)
     return replace(found, remarks=tuple(remarks))
 
 
-def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[str], list[str]]:
+def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, float]], list[str], list[str]]:
     """How the faces of ties and contact pairs of a deck meet.
 
     Returns for each pair the area that is shared and that of the first face [m2], the least and largest opening [m],
         negative where they overlap, the angle between them [degrees]; sentences on pairs that share nothing; remarks
         on those that are an opening apart
     """
-    whole = Assembly([Body(name, body.mesh, body.node_sets, {}) for name, body in source.bodies.items()])
+    whole = Assembly(solids)
     found: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     remarks: list[str] = []
-    for kind, one in [*(("tie", tie) for tie in source.deck.ties), *(("contact", c) for c in source.deck.contacts)]:
+    for kind, one in [*(("tie", tie) for tie in of.ties), *(("contact", c) for c in of.contacts)]:
         name = f"{kind} '{one.name}'"
         first, second = (
             [
                 face
-                for name, body in source.bodies.items()
-                if (face := named_in(name, group, body.node_sets)) in whole.boundaries and group in body.node_sets
+                for solid in solids
+                if (face := named_in(solid.name, group, solid.node_sets)) in whole.boundaries
+                and group in solid.node_sets
             ]
             for group in (one.slave, one.master)
         )
-        slaves = [of.mesh for of in source.bodies.values() if one.slave in (of.mesh.boundaries or {})]
+        slaves = [solid.mesh for solid in solids if one.slave in (solid.mesh.boundaries or {})]
         met, trouble = [], f"{name}: its sets are no faces of elements: give surfaces"
         for ends in product(first, second):
             try:
@@ -236,7 +216,7 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
             continue
         gaps = np.concatenate([shared.gap for *_, shared in met])
         facing = [(a.normal[s.first] * b.normal[s.second]).sum(axis=1) @ s.weight for a, b, s in met]
-        shared = sum(float(of.weight.sum()) for *_, of in met)
+        shared = sum(float(own.weight.sum()) for *_, own in met)
         low, high = float(gaps.min()), float(gaps.max())
         found[name] = {
             "shared_m2": shared,
@@ -251,29 +231,20 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
     return found, refused, remarks
 
 
-def _frequencies(part: Part, count: int) -> tuple[float, ...]:
-    """The lowest natural frequencies of a part [Hz]; 0 where they are rounding."""
-    M, K = part.system.mass, part.system.stiffness
+def _frequencies(M: Any, K: Any, count: int) -> tuple[float, ...]:
+    """The lowest natural frequencies of mass and stiffness [Hz]; 0 where they are rounding."""
     shift = 1e-9 * stiffest(K, M)
-    along_x = np.tile([1.0, 0.0, 0.0], (len(part.points), 1))
-    along_x[[turn for _, turn in getattr(part.mesh, "points", {}).values()]] = 0.0
-    q = along_x.ravel()[part.free]
-    free = q @ (K @ q) < 1e-12 * (q**2 @ K.diagonal())  # then K is singular, and need not be factorised to know it
-    omega, _ = modes(K, M, min(count, M.shape[0]), sigma=-shift if free else None)
+    omega, _ = modes(K, M, min(count, M.shape[0]), sigma=-shift)  # K alone is singular where something can move rigidly
     omega[omega**2 < 1e-5 * shift] = 0.0
     return tuple((omega / (2 * np.pi)).tolist())
 
 
-def _free_frequencies(solids: Sequence[Solid], count: int, progress: Progress) -> tuple[float, ...]:
-    """The lowest natural frequencies of bodies that nothing holds [Hz]; rigid motions are 0."""
+def _free_frequencies(solids: Sequence[Body], count: int, progress: Progress) -> tuple[float, ...]:
+    """The lowest natural frequencies of bodies that nothing holds [Hz]."""
     found: list[float] = []
     for solid in solids:
         with progress.stage(f"modes of {solid.name}"):
-            M, K = assemble(solid.mesh, solid.material)
-            omega, _ = modes(K, M, min(count, K.shape[0]))
-        elastic = omega.copy()
-        elastic[:6] = 0.0
-        found += (elastic / (2 * np.pi)).tolist()
+            found += _frequencies(*assemble(solid.mesh, solid.material), count)
     return tuple(sorted(found)[:count])
 
 
@@ -282,7 +253,7 @@ def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> I
     found = of_part(file, part)
     if n_modes:
         with progress.stage("modes"):
-            found = replace(found, frequencies=_frequencies(part, n_modes))
+            found = replace(found, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes))
     return found
 
 
@@ -305,20 +276,23 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
     return replace(found, gaps=gaps, remarks=tuple(remarks))
 
 
-def _check_materials(solids: Sequence[Solid]) -> list[str]:
-    return sanity_checks.check_materials({one.name: one.plain for one in solids if one.plain is not None})
+def _check_materials(solids: Sequence[Body]) -> list[str]:
+    return sanity_checks.check_materials({of.name: of.material for of in solids if isinstance(of.material, Material)})
 
 
-def _solids(file: scene_file.SceneFile, part: Any) -> list[Solid]:
+def _solids(file: scene_file.SceneFile, part: Any) -> list[Body]:
     """The bodies of a part."""
     if isinstance(part.mesh, Assembly):
-        return [Solid(b.name or file.name, b.mesh, b.node_sets, b.material) for b in part.mesh.bodies]
-    return [Solid(file.name, part.mesh, part.node_sets, part_reduction.material(file.mesh_scene, part.mesh))]
+        return [replace(body, name=body.name or file.name) for body in part.mesh.bodies]
+    return [Body(file.name, part.mesh, part.node_sets, part_reduction.material(file.mesh_scene, part.mesh))]
 
 
-def measured(solids: Sequence[Solid], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
+def measured(solids: Sequence[Body], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
     """Sizes, volumes, masses, groups and the worst element of bodies."""
-    all_facts = {solid.name: facts(solid.mesh, solid.density) for solid in solids}
+    all_facts = {
+        solid.name: facts(solid.mesh, densities(solid.mesh, solid.material) if solid.material else None)
+        for solid in solids
+    }
     volume = sum(one.volume for one in all_facts.values())
     masses = [one.mass for one in all_facts.values() if one.mass is not None]
     mass = sum(masses) if len(masses) == len(solids) else None

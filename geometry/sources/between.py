@@ -1,0 +1,93 @@
+"""Equations of a deck for the nodes that were added to its elements.
+
+A deck that joins or holds a face by equations names the nodes it has. Where a face is computed with more of them, those
+between would stay free. An added node of the surface gets an equation where all nodes between which it lies have one
+of the same axes and factors, and where each further displacement is of the same node in all of them, or of nodes
+between which another added one lies: then the equation is the mean of theirs.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from tribodyn.geometry.sources.deck import Equation
+from tribodyn.geometry.sources.read import Source
+
+Place = tuple[str, int]  # body and node, or point and -1
+Form = tuple[tuple[int, float], ...]  # axis and factor of each term
+
+
+def with_added_nodes(source: Source) -> Source:
+    """The source with such equations, and a set of one node for each added node that they name."""
+    if not source.deck.equations:
+        return source
+    at, between = _places(source), {}
+    for name, body in source.bodies.items():
+        for added, ends in body.added:
+            for node, of in zip(added.tolist(), ends.tolist(), strict=True):
+                between[frozenset((name, end) for end in of)] = (name, node)
+    new = set(between.values())
+    names = {place: f"{place[0]} added {place[1]}" for place in new} | {place: group for group, place in at.items()}
+    equations, used = [], set()
+    for form, table in _tables(source, at).items():
+        for places in _means(form, table, source, between):
+            equations.append(Equation(tuple((names[p], *term) for p, term in zip(places, form, strict=True))))
+            used |= new.intersection(places)
+    bodies = {
+        name: replace(body, node_sets=body.node_sets | {names[p]: np.array([p[1]]) for p in used if p[0] == name})
+        for name, body in source.bodies.items()
+    }
+    notes = [f"{len(equations)} equations more are for nodes added between those of its own"] if equations else []
+    deck = replace(source.deck, equations=(*source.deck.equations, *equations))
+    return replace(source, bodies=bodies, deck=deck, notes=(*source.notes, *notes))
+
+
+def _places(source: Source) -> dict[str, Place]:
+    """Where the groups of its equations are."""
+    found: dict[str, Place] = {}
+    for group in {group for one in source.deck.equations for group, *_ in one.terms}:
+        on = [(name, int(b.node_sets[group][0])) for name, b in source.bodies.items() if group in b.node_sets]
+        found[group] = on[0] if on else (group, -1)
+    return found
+
+
+def _tables(source: Source, at: Mapping[str, Place]) -> dict[Form, dict[Place, list[Place]]]:
+    """Form of equations -> the first place of each -> all places; of two that are equal that with fewer equations."""
+    found: dict[Form, list[list[Place]]] = {}
+    for one in source.deck.equations:
+        if one.terms and one.terms[0][2]:
+            form = tuple((axis, factor / one.terms[0][2]) for _, axis, factor in one.terms)
+            found.setdefault(form, []).append([at[group] for group, *_ in one.terms])
+    for form in filter(_equal, found):
+        count = Counter(place for row in found[form] for place in row)
+        found[form] = [sorted(row, key=lambda place: (count[place], place)) for row in found[form]]
+    return {form: {row[0]: row[1:] for row in rows} for form, rows in found.items()}
+
+
+def _equal(form: Form) -> bool:
+    return [axis for axis, _ in form] == [form[0][0]] * 2 and form[1][1] == -1
+
+
+def _means(
+    form: Form, table: Mapping[Place, list[Place]], source: Source, between: Mapping[frozenset[Place], Place]
+) -> Iterator[list[Place]]:
+    """Places of the terms of each further equation of one form."""
+    known = {*table, *(row[0] for row in table.values() if _equal(form))}  # what others follow equals itself
+    for name, body in source.bodies.items():
+        inside = np.zeros(body.mesh.doflocs.shape[1], dtype=bool)
+        inside[[node for where, node in known if where == name]] = True
+        outer = np.flatnonzero(body.mesh.f2t[1] < 0)
+        facets = outer[inside[body.mesh.facets[:, outer]].all(axis=0)]
+        near = body.mesh.dofs.get_facet_dofs(facets).flatten() if len(facets) else []
+        for added, ends in body.added:
+            chosen = inside[ends].all(axis=1) & np.isin(added, near)
+            for node, of in zip(added[chosen].tolist(), ends[chosen].tolist(), strict=True):
+                rows = [table.get((name, end), [(name, end)]) for end in of]
+                columns = [set(column) for column in zip(*rows, strict=True)]
+                others = [min(c) if len(c) == 1 else between.get(frozenset(c)) for c in columns]
+                if None not in others and (name, node) not in others:
+                    yield [(name, node), *(place for place in others if place)]
