@@ -31,7 +31,7 @@ class BackboneOptions:
     few_steps, many_steps : Newton steps up to which the next step grows, and from which it shrinks
     frequency_weight : of log frequency and of the damping ratio in the arc length, beside that of log amplitude: they
         change by a few per cent where the amplitude changes by decades
-    corner_step : share of the longest step below which any turn is taken as a corner of the curve
+    corner_step : share of the longest step below which any turn but a reversal is taken as a corner of the curve
     misses : by how much a step may miss its prediction, over `between`: eight on a curve of constant curvature, four at
         a kink in the middle
     """
@@ -136,21 +136,41 @@ def backbone(
 
 
 def walk(
-    problem: FreeVibration, start: float, goal: float, options: BackboneOptions
+    problem: FreeVibration, start: float, goal: float, options: BackboneOptions, below: int = 4
 ) -> tuple[list[_Solved], Outcome[BranchEnd]]:
-    """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends."""
+    """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends.
+
+    below : decades under `start` from which it is walked to, one after another, where the reference mode is too far off
+    """
     first = problem.first_guess(np.exp(start))
     fixed = np.zeros(len(first.coordinates))
     fixed[-1] = 1.0
     solved = [newton_on(problem, first, fixed, options.newton)]
     if solved[0][1] != CONVERGED:
-        return solved, BranchEnd.ENDED.say(f" the start: {solved[0][1]}")
+        why = BranchEnd.ENDED.say(f" the start: {solved[0][1]}")
+        if below == 0:
+            return solved, why
+        lower, end = walk(problem, start - np.log(10.0), start, options, below - 1)
+        if end.kind is not BranchEnd.REACHED:
+            return solved, why
+        solved = lower[-1:]
     longest = abs(goal - start) / max(options.n_points - 1, 1)
-    step, tangent = longest, np.sign(goal - start) * fixed
+    sense = np.sign(goal - start)
+    step, tangent, dropped = longest, sense * fixed, 0
     weight = np.ones(len(fixed))
     weight[-3:-1] = options.frequency_weight**2
-    while len(solved) < options.max_points:
+
+    def past_corner(here: np.ndarray, upwards: float) -> tuple[_Solved, float] | None:
+        """A point at a given amplitude beyond a kink where the curve turns by more than a right angle, and the step."""
+        for length in longest * np.geomspace(options.min_step, 10 * options.corner_step, 4):
+            found = newton_on(problem, problem.evaluate(here + length * upwards * fixed), fixed, options.newton)
+            if found[1] == CONVERGED:
+                return found, float(length)
+        return None
+
+    while len(solved) + dropped < options.max_points:
         here = solved[-1][0].coordinates
+        weight[:-3] = problem.weights(solved[-1][0].a)
         ahead = here + step * tangent
         last = (ahead[-1] - goal) * (start - goal) <= 0
         if last:
@@ -158,22 +178,30 @@ def walk(
         found = newton_on(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
         turned = found[0].coordinates - here
         size = np.sqrt(turned @ (weight * turned))
-        smooth = turned @ (weight * tangent) > 0.5 * size or step < options.corner_step * longest
+        smooth = turned @ (weight * tangent) > (0.5 if step >= options.corner_step * longest else 0.0) * size
         if found[1] != CONVERGED or not smooth:
             step *= 0.5
-            if step < options.min_step * longest:
+            if step >= options.min_step * longest:
+                continue
+            if (beyond := past_corner(here, float(np.sign(tangent[-1])))) is None:
                 return [*solved, found], BranchEnd.ENDED.say(f" its last point: {found[1]}")
-            continue
-        missed = np.abs(found[0].coordinates - ahead)[-3:-1].max()
-        if missed > options.misses * options.between and step >= options.corner_step * longest:
+            (found, step), last = beyond, False
+        elif np.abs(found[0].coordinates - ahead)[-3:-1].max() > options.misses * options.between and (
+            step >= options.corner_step * longest
+        ):
             step *= 0.5
             continue
+        if (found[0].coordinates[-1] - start) * sense < 0:
+            top = int(np.argmax([sense * point.a for point, _, _ in solved]))
+            if (beyond := past_corner(solved[top][0].coordinates, sense)) is None:
+                return [*solved, found], BranchEnd.TURNED_BACK.say(" where it began")
+            dropped += len(solved) - top - 1  # the way back from a kink that reversed the walk
+            solved, here, (found, step), last = solved[: top + 1], solved[top][0].coordinates, beyond, False
         solved.append(found)
         if last:
             return solved, BranchEnd.REACHED.say(" the amplitude asked for")
-        if (found[0].coordinates[-1] - start) * (goal - start) < 0:
-            return solved, BranchEnd.TURNED_BACK.say(" where it began")
-        tangent = turned / size
+        turned = found[0].coordinates - here
+        tangent = turned / np.sqrt(turned @ (weight * turned))
         if found[2] <= options.few_steps:
             step = min(longest, 1.6 * step)
         elif found[2] >= options.many_steps:
