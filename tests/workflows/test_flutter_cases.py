@@ -10,10 +10,13 @@ import pytest
 
 from tests.helpers.wheel_scene import WHEEL
 from tests.workflows.test_flutter_scene import FLOW
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.free_vibration import FreeVibration
+from tribodyn.hbm.continuation.limit_cycles import LimitCycle
 from tribodyn.hbm.continuation.nonlinear_modes import newton_on
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import leave_alone
 from tribodyn.workflows.scene import scene_file
@@ -57,9 +60,7 @@ def keeps(balance: HarmonicBalance, cycle: LimitCycle) -> bool:
     return bool(np.delete(own, np.argmin(np.abs(own))).real.max() < 2e-3 * cycle.omega)
 
 
-@pytest.mark.parametrize(
-    "case", [pytest.param(c, marks=[] if c == "second family" else pytest.mark.slow) for c in CASES]
-)
+@pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.slow) for c in CASES])
 def test_every_wave_that_flutters_has_a_limit_cycle_or_a_reason(case: str) -> None:
     """An attracting cycle is what time integration comes to from 0.95 of its amplitude in the reference mode."""
     kept = ("harmonics.kept=[0, 1, 2, 3]", *CASES[case])
