@@ -73,7 +73,7 @@ def limit_cycles(
             tried = (_without_damping(problem, guess, rises, options) for guess in guesses)
             if (cycle := next((one for one in tried if one is not None), None)) is None:
                 missing.append(f"one near {before.a * problem.per_amplitude:.3g} m was not solved")
-            elif not any(np.allclose(cycle.point.coordinates, one.point.coordinates, 1e-5, 1e-6) for one in found):
+            elif not any(np.allclose(cycle.point.coordinates, one.point.coordinates, 1e-4, 1e-4) for one in found):
                 found.append(cycle)  # a backbone that turned back may pass it twice
     if end.kind is not BranchEnd.REACHED:
         reached = max((point.a for point in points), default=0.0) * problem.per_amplitude
