@@ -6,7 +6,7 @@ side by side. Groups of a body are known as "body.group". What works on one mesh
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,7 +47,8 @@ class Assembly:
     points : (n_point, 3) reference points [m]; each counts as two nodes, the first for its translation, the second for
         its rotation [rad] about x, y, z
     doflocs, boundaries, subdomains, nelements : as of a mesh; facets and elements are numbered body by body
-    node_sets : "body.group" -> nodes; "body" -> all nodes of a body; "point" and "point.turn" of a reference point
+    node_sets : "body.group", see `named_in`, -> nodes; "body" -> all nodes of a body; "point" and "point.turn" of a
+        reference point
     Raises  ValueError where two bodies have one name
     """
 
@@ -70,7 +71,6 @@ class Assembly:
         self.boundaries: dict[str, np.ndarray] = {}
         self.subdomains: dict[str, np.ndarray] = {}
         for body, piece in zip(self.bodies, self.pieces, strict=True):
-            prefix = f"{body.name}." if body.name else ""
             if body.name:
                 self.node_sets[body.name] = piece.node + np.arange(body.mesh.doflocs.shape[1])
                 self.subdomains[body.name] = piece.element + np.arange(body.mesh.t.shape[1])
@@ -79,7 +79,8 @@ class Assembly:
                 (body.mesh.boundaries or {}, self.boundaries, piece.facet),
                 (body.mesh.subdomains or {}, self.subdomains, piece.element),
             ):
-                shared.update({f"{prefix}{name}": np.asarray(of) + start for name, of in own.items()})
+                named = {named_in(body.name, name, body.node_sets): np.asarray(of) + start for name, of in own.items()}
+                shared.update(named)
         for name, (node, turn) in self.points.items():
             self.node_sets[name] = np.array([node])
             self.node_sets[f"{name}.turn"] = np.array([turn])
@@ -88,6 +89,15 @@ class Assembly:
     def material(self) -> dict[str, Materials]:
         """Body -> its material."""
         return {body.name: body.material for body in self.bodies}
+
+
+def named_in(body: str, group: str, groups: Container[str]) -> str:
+    """Name of a group of a body in an assembly: "body.group"; a group that its deck names so already keeps its name.
+
+    groups : of the body; where "group" is one of them too, "body.group" is that one's name
+    """
+    inner = group.removeprefix(f"{body}.")
+    return group if not body or (inner != group and inner not in groups) else f"{body}.{group}"
 
 
 def pieces(mesh: Any) -> tuple[Piece, ...]:

@@ -131,6 +131,10 @@ class BranchPoint:
     steps: int
 
 
+OnPoint = Callable[[int, int, BranchPoint], None]
+"""Called as a branch grows with points done, points expected, and the last point."""
+
+
 class BranchBuilder:
     """Collects solutions into a Branch.
 
@@ -170,11 +174,11 @@ class BranchBuilder:
         del self.value[n_point:], self.x[n_point:], self.points[n_point:]
         self.folds = [i for i in self.folds if i < n_point]
 
-    def tell(self, on_point: Callable[[int, int], None] | None, stop: float, most: int) -> None:
-        """Call `on_point`, where there is one, with points done and points expected at the present pace."""
+    def tell(self, on_point: OnPoint | None, stop: float, most: int) -> None:
+        """Call `on_point`, where there is one, with points done, points expected at the present pace, the last one."""
         if on_point is not None:
             done, share = len(self.value), abs(self.value[-1] - self.value[0]) / abs(stop - self.value[0])
-            on_point(done, max(done, min(most, round(done / max(share, 1e-3)))))
+            on_point(done, max(done, min(most, round(done / max(share, 1e-3)))), self.points[-1])
 
     def finish(self, end: Outcome[BranchEnd]) -> Branch:
         """The branch; `end` says why it ends where it ends."""

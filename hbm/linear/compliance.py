@@ -98,6 +98,12 @@ class ContactCompliance:
         self._points: dict[float, CompliancePoint] = {}
         self._active: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] | None = None
 
+    def stuck_frequencies(self, harmonic: int) -> np.ndarray:
+        """(n,) lowest natural frequencies of the structure that a harmonic sees, its contacts stuck, undamped [Hz]."""
+        position = self.basis.harmonics.index(harmonic)
+        lam = next(expansion.lam for expansion, positions in self.groups if position in positions)
+        return np.sqrt(np.maximum(lam, 0.0)) / (2 * np.pi)
+
     def _one_real(self) -> bool:
         """Whether one real symmetric system serves all harmonics."""
         first = self.groups[0][0]

@@ -262,7 +262,7 @@ def test_it_says_where_it_ends():
     with pytest.raises(ValueError, match="wear depth"):
         parameter.wear(balance, 1.0, np.zeros(1))
     seen = []
-    arc_length.follow(balance, 0.5, 1.0, on_point=lambda done, wanted: seen.append((done, wanted)))
+    arc_length.follow(balance, 0.5, 1.0, on_point=lambda done, wanted, _: seen.append((done, wanted)))
     assert all(wanted >= done > 0 for done, wanted in seen)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
 

@@ -172,7 +172,7 @@ def _timed(
     for _ in range(REPEATS):
         times = [process_time()]
 
-        def on_point(_done: int, _wanted: int, times: list[float] = times) -> None:
+        def on_point(_done: int, _wanted: int, _point: object, times: list[float] = times) -> None:
             times.append(process_time())
 
         branch = natural.follow(balance, high, low, options, on_point)

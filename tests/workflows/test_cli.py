@@ -167,6 +167,16 @@ def test_a_number_has_the_digits_that_its_error_allows(value: float, unit: str, 
     assert last <= 10 * error * (abs(value) or 1)
 
 
+def test_a_sparkline_has_its_highest_block_at_the_resonance():
+    x = np.linspace(2.0, 4.0, 400)
+    line = readable.sparkline(x, 1 / np.abs(3.3**2 - x**2 + 0.1j), 10)
+    assert line.index("█") == 6
+    assert (line.count("█"), len(line)) == (1, 10)
+    assert "▁" in line
+    assert readable.sparkline(np.array([1.0]), np.array([0.0]), 10).strip() == "▁"
+    assert readable.sparkline(x[::-1], x[::-1], 4)[-1] == "█"
+
+
 def test_what_is_beyond_the_linear_model_is_warned_of() -> None:
     made = result()
     assert made.wear is not None

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import gmsh
 import numpy as np
@@ -15,9 +16,12 @@ from PIL import Image
 import tribodyn as td
 from tests.helpers.command import leave
 from tests.helpers.pages import ROOT
+from tribodyn.fem.assembly import named_in
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.style import BLUE, RED
+from tribodyn.workflows.run import modelling, sanity_checks
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.draft import draft
 
@@ -85,6 +89,26 @@ def test_a_scene_is_begun_from_a_file_and_is_one(
     assert draft(tmp_path / f"far{file.suffix}", unit="m").unit == "m"
 
 
+def test_contact_pairs_of_a_deck_come_first_under_the_names_that_it_has(tmp_path: Path, capsys: Any) -> None:
+    file, faces = deck(tmp_path / "lap.inp"), "*Surface, type=ELEMENT, name=Over\n 1, S2\n 2, S2\n"
+    faces += "*Surface, type=ELEMENT, name=Under\n 1, S1\n 2, S1\n*End Part"
+    pair = "*Contact Pair, interaction=rough\nUpper.Under, Lower.Over\n*Boundary"
+    file.write_text(file.read_text().replace("*End Part", faces).replace("*Boundary", pair))
+    code, said, _ = leave(["new", str(file), "--out", str(tmp_path / "begun")], capsys)
+    assert code == 0
+    assert "Lower.Over and Upper.Under: 0 mm apart" in said
+    (joint,) = scene_file.read(str(tmp_path / "begun/lap.toml")).scene.joints.values()
+    assert (joint.group, joint.opposite) == ("Lower.Over", "Upper.Under")
+    assert len(td.build(str(tmp_path / "begun/lap.toml")).part.interface.area) > 4  # the deck is found from there
+
+
+def test_a_group_that_bears_the_name_of_its_body_keeps_it_unless_another_has_it() -> None:
+    assert named_in("A", "A.Top", ["A.Top"]) == "A.Top"
+    assert named_in("A", "A.Top", ["A.Top", "Top"]) == "A.A.Top"
+    assert named_in("A", "Top", ["A.Top", "Top"]) == "A.Top"
+    assert named_in("", "Top", ["Top"]) == "Top"
+
+
 def test_what_is_no_file_of_a_mesh_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     code, _, why = leave(["new", "beam"], capsys)
     assert code == 2
@@ -97,6 +121,19 @@ def test_the_smallest_scene_has_at_most_fifteen_lines() -> None:
     assert (scene.response.group, scene.response.direction) == ("shaker", (0.0, 1.0, 0.0))
     whole = f'{SMALLEST}group = "response"\ndirection = "x"\n'
     assert scene_file.parse(whole, "small.toml", (), Path()).mesh_scene.response.group == "response"
+
+
+@pytest.mark.parametrize(("direction", "loose"), [("[0, 0, 1]", True), ("[0, 0, -1]", False)])
+def test_a_contact_that_nothing_presses_is_said(direction: str, loose: bool) -> None:
+    press = f'static = {{ press = {{ group = "contact", direction = {direction}, value = "1 kN" }} }}\n'
+    coarse = ("geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=2")
+    for text, said in (
+        (SMALLEST, True),
+        (SMALLEST.replace("[loads.harmonic]", f"[loads]\n{press}[loads.harmonic]"), loose),
+    ):
+        file = scene_file.parse(text, "small.toml", coarse, Path())
+        found = list(sanity_checks.lines(file, modelling.build(file, None, Progress())))
+        assert any("nothing presses" in line for line in found) == said
 
 
 def test_a_plan_draws_the_scene_with_its_contact_supports_and_loads(

@@ -117,6 +117,8 @@ def test_references_peak_where_the_modes_are(finished: Result) -> None:
     spacing = hertz[1] - hertz[0]
     free = finished.facts.free_hz[0]
     assert hertz[np.argmax(references.free)] == pytest.approx(free, abs=2 * spacing)
+    there = finished.facts.stuck_hz[(finished.facts.stuck_hz > hertz[0]) & (finished.facts.stuck_hz < hertz[-1])]
+    assert np.abs(hertz[np.argmax(references.stuck)] - there).min(initial=np.inf) <= 2 * spacing
     assert finished.wear is not None
     # without contact the peak is the free one, 1 % damping: amplitudes agree where the grid of 5 Hz allows
     assert finished.wear.amplitude[-1] >= 0.99 * references.free.max()

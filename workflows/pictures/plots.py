@@ -74,7 +74,7 @@ def response(result: Result) -> Figure:
             wear = result.wear
             hertz = wear.omega / (2 * np.pi)
             unit_cycles, scale_cycles = _cycles(shown_cycles(wear))
-            axes.plot(*_with_gaps(wear, hertz, scale * wear.amplitude), color=ORANGE, zorder=3)
+            axes.plot(*with_gaps(wear, hertz, scale * wear.amplitude), color=ORANGE, zorder=3)
             dots = axes.scatter(
                 hertz, scale * wear.amplitude, 16, scale_cycles * wear.cycles, cmap=WEAR_MAP, zorder=4,
                 vmax=scale_cycles * shown_cycles(wear), label="cycle at each wear step",
@@ -322,7 +322,7 @@ def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
 
 def _course(axes: Any, scale: float, wear: WearHistory, values: np.ndarray, color: str) -> None:
     """Values against cycles, with a gap where the response jumped; hollow where they are means of a motion in time."""
-    axes.plot(*_with_gaps(wear, scale * wear.cycles, values), "-", color=color, zorder=2)
+    axes.plot(*with_gaps(wear, scale * wear.cycles, values), "-", color=color, zorder=2)
     axes.plot(scale * wear.cycles, values, "o", color=color, ms=3)
     if wear.in_time.any():
         of_time = scale * wear.cycles[wear.in_time], values[wear.in_time]
@@ -330,7 +330,7 @@ def _course(axes: Any, scale: float, wear: WearHistory, values: np.ndarray, colo
         axes.legend(loc="best")
 
 
-def _with_gaps(wear: WearHistory, *columns: np.ndarray) -> list[np.ndarray]:
+def with_gaps(wear: WearHistory, *columns: np.ndarray) -> list[np.ndarray]:
     """Columns by wear step with a gap where the response jumped, so that no jump looks like a slope."""
     return [np.insert(column, wear.jumps + 1, np.nan) for column in columns]
 

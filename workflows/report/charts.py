@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.workflows.pictures.loops import loop_size, pair_name
+from tribodyn.workflows.pictures.plots import with_gaps
 from tribodyn.workflows.pictures.style import CYCLE, GREY, INK
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import state_of
@@ -85,7 +86,7 @@ def _response(results: Sequence[tuple[str, Result]]) -> Chart:
                 label = state_of(result, int(row)).label
                 data.append(_line(f"{name}: {label}", omega / (2 * np.pi), 1e3 * height))
         if result.wear is not None and result.wear_steps:
-            hertz, height = result.wear.omega / (2 * np.pi), 1e3 * result.wear.amplitude
+            hertz, height = with_gaps(result.wear, result.wear.omega / (2 * np.pi), 1e3 * result.wear.amplitude)
             data.append(_line(f"{name}: peak under wear", hertz, height, mode="lines+markers", marker={"size": 4}))
     return _chart(data, "frequency / Hz", "amplitude / mm", log=True)
 
@@ -98,7 +99,8 @@ def _wear(results: Sequence[tuple[str, Result]], what: str, label: str, scale: f
         values = np.asarray(getattr(result.wear, what))
         if values.ndim == 2:
             values = values.max(axis=1) if what == "depth" else values.sum(axis=1)
-        data.append(_line(name, result.wear.cycles, scale * values, mode="lines+markers", marker={"size": 4}))
+        cycles, shown = with_gaps(result.wear, result.wear.cycles, scale * values)
+        data.append(_line(name, cycles, shown, mode="lines+markers", marker={"size": 4}))
     return _chart(data, "vibration cycles", label)
 
 

@@ -77,6 +77,6 @@ function viewer(holder) {
 const webgl = document.createElement("canvas").getContext("webgl") !== null;
 document.querySelectorAll("[data-solid]").forEach((holder) => {
   if (webgl) viewer(holder);
-  else holder.textContent = "This browser has no WebGL: the pictures of the part are among the figures below.";
+  else holder.textContent = "This browser has no WebGL: the pictures of the part are above it and among the figures below.";
 });
 window.reportReady = true;

@@ -7,13 +7,15 @@ import hashlib
 import io
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from tribodyn.version import __version__
 from tribodyn.workflows.pictures import offscreen, plots, render
@@ -23,6 +25,7 @@ from tribodyn.workflows.report.charts import charts
 from tribodyn.workflows.report.solid import solid
 from tribodyn.workflows.result.result import Result
 
+HEADING = "part"  # the picture that heads the page
 DPI = 110  # of the figures on the page
 LARGEST = 15e6  # bytes of a page
 HERE = Path(__file__).parent
@@ -42,7 +45,7 @@ def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
     named = [(name, result) for name, result, _ in results]
     data: dict[str, Any] = {"charts": charts(named), "solids": [solid(result) for _, result in named]}
     title = ", ".join(name for name, _ in named)
-    parts = [f"<h1>{escape(_title(named[0][1]) if len(named) == 1 else title)}</h1>"]
+    parts = [_head(named)]
     if len(named) > 1:
         parts.append(_section("Side by side", _comparison(named), "compare"))
     for number, (name, result, path) in enumerate(results):
@@ -109,6 +112,19 @@ def _chart_holder(title: str) -> str:
 def _section(title: str, body: str, name: str) -> str:
     heading = title[:1].upper() + title[1:]
     return f'<section id="{name}"><h2>{escape(heading)}</h2>\n{body}\n</section>'
+
+
+def _head(named: Sequence[tuple[str, Result]]) -> str:
+    """The title block: what was run, by which program, when, how it ended, and the parts in their vibration."""
+    rows, pictures = [], []
+    for name, result in named:
+        given, seconds = result.provenance, result.summary()["seconds"]
+        started = given.get("started", "")[:16].replace("T", " ")
+        rows.append((name, given.get("versions", "").split(",")[0], started, f"{result.state}, {seconds:.0f} s"))
+        pictures += [_embedded(kind, make) for kind, make in _renders(result).items() if kind == HEADING]
+    title = _title(named[0][1]) if len(named) == 1 else ", ".join(name for name, _ in named)
+    table = _table(rows, ("scene", "program", "started", "state"))
+    return f"<header><h1>{escape(title)}</h1>{table}{''.join(pictures)}</header>"
 
 
 def _title(result: Result) -> str:
@@ -182,7 +198,8 @@ def _inspection(result: Result) -> str:
         "elements": "elements", "nodes": "nodes", "scaled_jacobian": "smallest scaled Jacobian (1 is best)",
         "full_dofs": "DOFs of the full model", "model_dofs": "DOFs of the reduced model",
         "retained_modes": "retained modes",
-        "first_omitted_hz": "first omitted mode / Hz", "free_hz": "free modes / Hz", "contact_pairs": "contact pairs",
+        "first_omitted_hz": "first omitted mode / Hz", "free_hz": "modes, contact open / Hz",
+        "stuck_hz": "modes, contact stuck / Hz", "contact_pairs": "contact pairs",
         "unknowns": "unknowns of the balance", "harmonics": "harmonics", "compliance_error": "error of the compliance",
         "factorisation": "factorisation", "prestress_residual": "residual of the prestress",
         "prestress_rotation": "largest static rotation / rad", "sectors": "sectors", "engine_order": "engine order",
@@ -218,17 +235,20 @@ def _changes(result: Result) -> str:
 
 def _figures(result: Result) -> str:
     """Every figure as an embedded picture; renders only where this machine can draw them."""
-    made = []
-    for name, make in {**plots.figures(result), **_renders(result)}.items():
-        with mpl.rc_context(STYLE):
-            buffer = io.BytesIO()
-            make(result).savefig(buffer, format="png", dpi=DPI)
-        code = base64.b64encode(buffer.getvalue()).decode()
-        made.append(f'<figure><img alt="{escape(name)}" src="data:image/png;base64,{code}"></figure>')
+    made = [_embedded(name, partial(make, result)) for name, make in plots.figures(result).items()]
+    made += [_embedded(name, make) for name, make in _renders(result).items() if name != HEADING]
     return '<div class="grid">' + "".join(made) + "</div>"
 
 
-def _renders(result: Result) -> dict[str, Any]:
+def _embedded(name: str, make: Callable[[], Figure]) -> str:
+    with mpl.rc_context(STYLE):
+        buffer = io.BytesIO()
+        make().savefig(buffer, format="png", dpi=DPI)
+    code = base64.b64encode(buffer.getvalue()).decode()
+    return f'<figure><img alt="{escape(name)}" src="data:image/png;base64,{code}"></figure>'
+
+
+def _renders(result: Result) -> dict[str, Callable[[], Figure]]:
     found = render.figures(result)
     if not found:
         return {}
@@ -236,7 +256,7 @@ def _renders(result: Result) -> dict[str, Any]:
         offscreen.check()
     except offscreen.RenderingUnavailable:
         return {}
-    return {name: (lambda _, make=make: make()) for name, make in found.items()}
+    return found
 
 
 def _viewer(number: int) -> str:

@@ -41,9 +41,13 @@ def _model_in_brief(result: Result, found: dict[str, Any]) -> list[str]:
         pieces.append(f"{around.sectors} sectors, engine order {around.engine_order}")
     if found["harmonics"]:
         pieces.append(f"harmonics {', '.join(map(str, found['harmonics']))}")
-    lowest = found["free_hz"][:4]
-    free = ", ".join(rounded(hertz, 4) if hertz > 1e-4 * max(lowest) else "0" for hertz in lowest)
-    return ["; ".join(pieces), *([f"modes with the contact open: {free} Hz"] if free else [])]
+    modes = {"open": found["free_hz"][:3], "stuck": found["stuck_hz"][:3]}
+    known = [f"{how} {_hertz(lowest)}" for how, lowest in modes.items() if lowest]
+    return ["; ".join(pieces), *([f"modes with the contact {', '.join(known)}"] if known else [])]
+
+
+def _hertz(modes: list[float]) -> str:
+    return ", ".join(rounded(hertz, 4) if hertz > 1e-4 * max(modes) else "0" for hertz in modes) + " Hz"
 
 
 def _of(judged: dict[str, Statement], name: str, default: int = 3) -> int:

@@ -36,7 +36,7 @@ class Facts:
     """What was modelled and how long it took; None is what does not apply to a model.
 
     full_dofs, model_dofs : before and after the reduction; contact_pairs; unknowns : of a balance solve
-    harmonics : kept ones; free_hz : (n,) natural frequencies with the contact absent [Hz]
+    harmonics : kept ones; free_hz, stuck_hz : (n,) natural frequencies with the contact absent, and stuck [Hz]
     seconds, processor_seconds : of computing, interrupted runs included: on the wall, and of the processor
     compliance_error : relative, of the dynamic compliance of the contact
     elements, nodes, scaled_jacobian : of the mesh, the last is the smallest one, 1 is best
@@ -56,6 +56,7 @@ class Facts:
     unknowns: int = 0
     harmonics: tuple[int, ...] = ()
     free_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    stuck_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
     seconds: float = 0.0
     processor_seconds: float = 0.0
     compliance_error: float | None = None
@@ -100,8 +101,8 @@ class Facts:
         known = {item.name: plain[item.name] for item in fields(cls) if item.name in plain}
         if "harmonics" in known:
             known["harmonics"] = tuple(int(h) for h in np.atleast_1d(known["harmonics"]))
-        if "free_hz" in known:
-            known["free_hz"] = np.atleast_1d(known["free_hz"])
+        for name in {"free_hz", "stuck_hz"} & known.keys():
+            known[name] = np.atleast_1d(known[name])
         if "sectors" in plain:
             known["around"] = Around(plain["sectors"], plain["engine_order"], np.asarray(plain["axis"], float))
         return cls(**known)

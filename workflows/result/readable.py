@@ -6,6 +6,7 @@ import numpy as np
 
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 COUNTED = {9: " billion", 6: " million", 0: ""}
+BLOCKS = "▁▂▃▄▅▆▇█"
 UNKNOWN, USUAL, MOST = 2, 3, 6  # digits of a value whose error was looked for in vain, of one without, at the most
 
 
@@ -40,3 +41,16 @@ def measured(value: float, unit: str, count: int = USUAL) -> str:
     size = abs(value) / 10 if unit == "Hz" else abs(value)
     power = next((power for power in PREFIXES if size >= 10.0**power), 0)
     return f"{rounded(value / 10.0**power, count)} {PREFIXES[power]}{unit}"
+
+
+def sparkline(x: np.ndarray, y: np.ndarray, width: int = 20) -> str:
+    """A curve in one line of blocks: the largest y in each of `width` parts of x, from the left, on a log scale."""
+    part = np.minimum((width * (x - x.min()) / max(np.ptp(x), 1e-300)).astype(int), width - 1)
+    level = np.full(width, -np.inf)
+    np.maximum.at(level, part, np.log(np.maximum(y, 1e-300)))
+    low, high = level[np.isfinite(level)].min(), level.max()
+    marks = [
+        " " if not np.isfinite(v) else BLOCKS[int((len(BLOCKS) - 1) * (v - low) / max(high - low, 1e-300))]
+        for v in level
+    ]
+    return "".join(marks)

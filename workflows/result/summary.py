@@ -60,7 +60,7 @@ def numbers(result: Result) -> dict[str, Any]:
         found[name] = getattr(result.facts, name)
     found |= _curve(result)
     found["joints"] = by_joint(result)
-    found["free_hz"] = result.facts.free_hz.tolist()
+    found |= {"free_hz": result.facts.free_hz.tolist(), "stuck_hz": result.facts.stuck_hz.tolist()}
     found["verdict"] = verdict.record(result.verdict)
     found["changes"] = verdict.table(result.verdict)
     return found

@@ -10,7 +10,7 @@ import numpy as np
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import control, harmonic_choice, peaks, residual_shear
-from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.branch import Branch, BranchPoint, amplitude
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
@@ -18,6 +18,7 @@ from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.stability import exponents
+from tribodyn.workflows.result.readable import measured, sparkline
 from tribodyn.workflows.result.result import CurveStability, Result, ShearBounds, WornResponses
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.scene.schema import Scene
@@ -43,8 +44,16 @@ def follow_response(
         return control.phase_resonance(balance, settings.OUTPUT, low, high, *asked.amplitude, way)
     ends = (low, high) if asked.sweep == "up" else (high, low)
 
+    seen: list[tuple[float, float]] = []
+    at = balance.compliance.output_names.index(settings.OUTPUT)
+
+    def told(done: int, wanted: int, point: BranchPoint) -> None:
+        seen.append((point.omega, float(amplitude(point.response[at]))))
+        hertz, height = measured(point.omega / (2 * np.pi), "Hz", 4), measured(seen[-1][1], "m")
+        advance(done / wanted, f"{sparkline(*np.array(seen).T)} {hertz}, {height}")
+
     def along(problem: HarmonicBalance) -> Branch:
-        found: Branch = method.follow(problem, *ends, options, lambda done, wanted: advance(done / wanted, ""))
+        found: Branch = method.follow(problem, *ends, options, told)
         return found
 
     if asked.control == "amplitude":

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem.assembly import Assembly, Body
+from tribodyn.fem.assembly import Assembly, Body, named_in
 from tribodyn.fem.constraints import AXES, Clamp, ClampAlong, Constraint
 from tribodyn.fem.couplings import DistributedCoupling, Equation, RigidCoupling, Tie
 from tribodyn.fem.loads import Load, Moment, NodalForce, Pressure, Sum
@@ -99,6 +99,7 @@ class _Carrying:
         self.materials = materials
         self.faces: dict[str, list[str]] = {}  # group of the deck -> its names in the assembly
         self.sets: dict[str, list[str]] = {}
+        self.body_of: dict[str, str] = {}  # of such a name
         self._refuse()
         self.made = CarriedDeck([self._body(body) for body in source.bodies])
         self.notes = self.made.notes
@@ -154,7 +155,9 @@ class _Carrying:
         made = material(self.deck, name, mesh, self.table, self.materials, self.name)
         for group in {*node_sets, *(mesh.boundaries or {})}:
             kept = self.faces if group in (mesh.boundaries or {}) else self.sets
-            kept.setdefault(group, []).append(f"{name}.{group}")
+            place = named_in(name, group, node_sets)
+            kept.setdefault(group, []).append(place)
+            self.body_of[place] = name
         return Body(name, mesh, node_sets, made)
 
     # constraints
@@ -259,8 +262,7 @@ class _Carrying:
                 raise ValueError(f"a moment acts on '{one.group}', which has no rotation; couple it to a point")
             else:
                 for place in self._groups(one.group, "a force"):
-                    body = next(name for name in self.source.bodies if place == f"{name}.{one.group}")
-                    count = self.source.counts[one.group][body]
+                    count = self.source.counts[one.group][self.body_of[place]]
                     parts.append((NodalForce(place, direction, "nodes"), count * one.value))
         self._load(parts)
 

@@ -33,6 +33,7 @@ VTK_KIND = {
     8: ("hexahedron27", "hexahedron"),
 }
 PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "h5py", "pydantic")
+SHOWN = 6  # modes with the contact stuck that a result keeps
 SEED = 0  # of every random start vector and probe in the packages used
 
 
@@ -52,6 +53,7 @@ def described(
         unknowns=balance.n_unknown,
         harmonics=tuple(balance.basis.harmonics),
         free_hz=np.zeros(0) if reduced.info.free_frequency is None else reduced.info.free_frequency,
+        stuck_hz=balance.compliance.stuck_frequencies(next(filter(None, balance.basis.harmonics)))[:SHOWN],
         compliance_error=balance.compliance.error,
         prestress_residual=reduced.info.prestress_residual,
         prestress_rotation=reduced.info.prestress_rotation,

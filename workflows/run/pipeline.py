@@ -15,6 +15,7 @@ from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
+from tribodyn.workflows.result.readable import measured
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, modelling, references, sanity_checks, settings, wear_run
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
@@ -74,7 +75,11 @@ def run(
                     start, stop = (2 * np.pi * f for f in scene.response.references or scene.response.range)
                     linear = references.linear_references(model.balance, settings.OUTPUT, start, stop)
             result = keep(replace(result, response=frf, references=linear, stage=Stage.RESPONSE))
-        check_branch(result.response)
+        found = result.response
+        check_branch(found)
+        if scene.wears and found is not None and (peak := found.peak(settings.OUTPUT)) is not None:
+            at, height = found.omega[peak] / (2 * np.pi), float(found.amplitude(settings.OUTPUT)[peak])
+            progress.say(f"response: peak {measured(at, 'Hz', 4)}, {measured(height, 'm')}, unworn")
         result = keep(judged(scene, model.balance, result, progress))
         if scene.wears:
             with progress.track("wear") as advance:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn
 from rich.progress import Progress as Bar
 
 NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a bar on
@@ -43,7 +43,7 @@ class Progress:
         if self._console is None:
             yield self._lines(name, start) if self._log else lambda share, note: None
         elif self._console.is_terminal:
-            columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+            columns = (TextColumn("{task.description}"), BarColumn(12), TaskProgressColumn())
             left, before = TextColumn("{task.fields[left]}{task.fields[note]}"), compiled()
             with Bar(*columns, left, console=self._console, transient=True) as bar:
                 task = bar.add_task(name, total=1.0, left="", note="")

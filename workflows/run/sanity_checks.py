@@ -21,6 +21,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry.facts import facts
 from tribodyn.geometry.sources import cad
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.result.summary import LARGEST_BEND
 from tribodyn.workflows.run import bodies, matrix_model, part_reduction
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
@@ -91,7 +92,21 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
     remarks += check_speed(scene, model.reduced.info.line_error)
     if model.reduced.at_harmonic(1)[0].damping is None:
         remarks.append("there is no damping but that of friction: give [damping]")
+    if _unpressed(model.balance, 2 * np.pi * max(scene.response.range)):
+        remarks.append(
+            "nothing presses the contact together at rest, so that it rubs by chance: give [loads.static.NAME]"
+        )
     yield from (f"warning: {remark}" for remark in remarks)
+
+
+def _unpressed(balance: HarmonicBalance, omega: float) -> bool:
+    """Whether pairs that touch without a gap bear nothing under the static loads, every contact stuck."""
+    contact = balance.contact
+    if "n" not in contact.components or not balance.basis.has_static or contact.gap.min() > 0:
+        return False
+    x = balance.stuck(omega)
+    x[..., 1:] = 0.0
+    return balance.preload(balance.evaluate(omega, x, jacobian=False)) == 0.0
 
 
 def notes(file: SceneFile, part: Part) -> Iterator[str]:

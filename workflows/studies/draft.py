@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -12,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tribodyn.fem.assembly import named_in
 from tribodyn.geometry.sources import cad
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources.picking import outline
@@ -40,18 +43,27 @@ LIMITS = Limits()
 
 @dataclass(frozen=True)
 class Candidate:
-    """Two faces that may touch: "body.face" of each, least distance [m], share of the smaller one that is near."""
+    """Two faces that may touch: "body.face" of each, least distance [m], share of the smaller one that is near.
+
+    normal : of the first face, outward; declared : whether the deck has them as a contact pair
+    """
 
     first: str
     second: str
     distance: float
     share: float
+    normal: tuple[float, float, float]
+    declared: bool = False
 
 
 @dataclass(frozen=True)
 class Draft:
-    """text : of the scene; name : of its file; unit : of length in the file, and why; candidates : nearest first"""
+    """A scene and what it is made of.
 
+    text : of the scene beside the file; name : of it; unit : of length in the file, and why; candidates : best first
+    """
+
+    file: Path
     text: str
     name: str
     unit: str
@@ -77,7 +89,8 @@ class Draft:
         if scene.exists():
             raise ValueError(f"{scene} is there already: move it, or give another folder with --out")
         folder.mkdir(parents=True, exist_ok=True)
-        scene.write_text(self.text, encoding="utf-8")
+        place = Path(os.path.relpath(self.file, folder)).as_posix()
+        scene.write_text(self.text.replace(json.dumps(self.file.name), json.dumps(place)), encoding="utf-8")
         schema.write_text(json.dumps(json_schema(), indent=1), encoding="utf-8")
         return [scene, schema]
 
@@ -101,7 +114,7 @@ def draft(what: AnyPath, *, unit: str | None = None) -> Draft:
     groups = {name: sorted(body.node_sets) for name, body in source.bodies.items()}
     is_deck = bool(source.deck.materials or source.deck.supports)
     text = "\n".join(_text(path, source, unit, why, candidates, is_deck)) + "\n"
-    return Draft(text, path.stem.replace(".", "_"), unit, why, groups, candidates)
+    return Draft(path, text, path.stem.replace(".", "_"), unit, why, groups, candidates)
 
 
 def _guessed(source: Any, path: Path) -> tuple[str, str]:
@@ -127,17 +140,25 @@ def _candidates(source: Any) -> Iterator[Candidate]:
         for name, own in (solid.mesh.boundaries or {}).items():
             of = np.isin(facets, own)
             if of.sum() < len(facets):  # a group of the whole skin says nothing
-                faces.append((body, name, centre[of], normal[of], wide[of]))
-    pairs = (_near(one, two, near) for one, two in combinations(faces, 2) if one[0] != two[0])
-    best: dict[str, Candidate] = {}  # one for each face: of groups that overlap the one that is covered best
-    for pair in sorted(filter(None, pairs), key=lambda pair: (-round(pair.share, 2), pair.distance)):
-        if pair.first not in best and pair.second not in best:
-            best[pair.first] = best[pair.second] = pair
-    yield from dict.fromkeys(best.values())
+                faces.append((body, name, {*facets[of].tolist()}, centre[of], normal[of], wide[of]))
+    declared = [{one.slave, one.master} for one in source.deck.contacts]
+    found = []
+    for one, two in combinations(faces, 2):
+        if one[0] != two[0] and (met := _near(one[3:], two[3:], near)) is not None:
+            names = [named_in(body, face, source.bodies[body].node_sets) for body, face, *_ in (one, two)]
+            found.append((Candidate(names[0], names[1], *met, {one[1], two[1]} in declared), one, two))
+    taken: dict[tuple[str, str], set[int]] = defaultdict(set)  # bodies that touch -> facets of the first one
+    for pair, one, two in sorted(found, key=lambda at: (not at[0].declared, -round(at[0].share, 2), at[0].distance)):
+        ends = ((taken[one[0], two[0]], one[2]), (taken[two[0], one[0]], two[2]))
+        if all(known.isdisjoint(own) for known, own in ends):  # of groups that overlap the best one
+            for known, own in ends:
+                known |= own
+            yield pair
 
 
-def _near(one: Any, two: Any, near: float) -> Candidate | None:
-    (body, face, centre, normal, wide), (other, opposite, places, normals, widths) = one, two
+def _near(one: Any, two: Any, near: float) -> tuple[float, float, Any] | None:
+    """Least distance of two faces [m], share of the smaller one near, normal there; None where they are apart."""
+    (centre, normal, wide), (places, normals, widths) = one, two
     _, at = cKDTree(places).query(centre)
     apart = places[at] - centre
     gap = np.abs((apart * normal).sum(axis=1))
@@ -146,11 +167,14 @@ def _near(one: Any, two: Any, near: float) -> Candidate | None:
     share = good.sum() / min(len(centre), len(places))
     if share < LIMITS.share:
         return None
-    return Candidate(f"{body}.{face}", f"{other}.{opposite}", float(gap[good].min()), float(min(share, 1.0)))
+    mean = normal[good].mean(axis=0)
+    return float(gap[good].min()), float(min(share, 1.0)), tuple((mean / np.linalg.norm(mean)).round(3).tolist())
 
 
 def _said(pair: Candidate) -> str:
-    return f"{pair.first} and {pair.second}: {1e3 * pair.distance:.3g} mm apart, {pair.share:.0%} of it near"
+    return f"{pair.first} and {pair.second}: {1e3 * pair.distance:.3g} mm apart, {pair.share:.0%} of it near" + (
+        ", a contact pair of the deck" if pair.declared else ""
+    )
 
 
 def _text(
@@ -169,7 +193,9 @@ def _text(
     for at, (name, body) in enumerate(source.bodies.items()):
         faces = sorted(body.mesh.boundaries or {}) or sorted(body.node_sets)
         if is_deck:
-            yield f"# {name}: {', '.join(body.node_sets) or 'no group'}"
+            named = [named_in(name, group, body.node_sets) for group in body.node_sets if group != name]
+            named = [group for group in named if not group.removeprefix(f"{name}.").startswith("_")]  # Abaqus's own
+            yield f"# {name}: {', '.join(named) or 'no group'}"
             continue
         yield from ("", f"[bodies.{_key(name)}]", f"mesh = {json.dumps(path.name)}")
         if len(source.bodies) > 1:
@@ -184,13 +210,20 @@ def _text(
         yield from (f"first = {json.dumps(pair.first)}", f"second = {json.dumps(pair.second)}")
         yield from ('tangential_stiffness = "100 N/um"  # GUESS', 'normal_stiffness = "100 N/um"  # GUESS')
         yield "friction = 0.5  # GUESS"
-    moved = list(source.bodies)[-1]
-    face = json.dumps(f"{moved}.{first_face[moved]}")
+    held = {name for name, body in source.bodies.items() for s in source.deck.supports if s.group in body.node_sets}
+    moved = [*held, *(name for name in source.bodies if name not in held)][-1]
+    face = json.dumps(named_in(moved, first_face[moved], source.bodies[moved].node_sets))
+    own = [(pair, end) for pair in candidates for end in (pair.first, pair.second) if end.startswith(f"{moved}.")]
+    if own and not (source.deck.forces or source.deck.pressures):
+        pair, end = own[0]
+        towards = [(1 if end == pair.first else -1) * one + 0.0 for one in pair.normal]
+        yield from ("", "# [loads.static.press]  # presses the faces together: its resultant has to lie between them")
+        yield from (f"# group = {json.dumps(end)}", f"# direction = {towards}", '# value = "1 kN"')
     yield from ("", "[loads.harmonic.drive]  # GUESS", f"group = {face}", 'direction = "x"', 'value = "10 N"')
     yield from (
         "",
         "[response]",
-        'frequency = ["100 Hz", "1 kHz"]  # GUESS; inspect FILE --modes 6 shows modes',
+        'frequency = ["100 Hz", "1 kHz"]  # GUESS; a run says its modes, contact open and stuck',
     )
     yield from ("", "[damping]", 'modal = "1 %"  # GUESS', "", "# [wear]  # take the marks off to let it wear")
     yield from ('# coefficient = "2e3 um3/J"', '# at = "peak"')
@@ -206,12 +239,13 @@ def _far(source: Any, candidates: Sequence[Candidate]) -> dict[str, str]:
     found = {}
     for body, solid in source.bodies.items():
         mesh, groups = solid.mesh, solid.node_sets
-        near = [mesh.doflocs[:, nodes] for name, nodes in groups.items() if f"{body}.{name}" in touching]
+        names = {name: named_in(body, name, groups) for name in groups}
+        near = [mesh.doflocs[:, nodes] for name, nodes in groups.items() if names[name] in touching]
         centre = np.concatenate(near, axis=1).mean(axis=1) if near else mesh.doflocs.mean(axis=1)
         far = {
             name: np.linalg.norm(mesh.doflocs[:, groups[name]].mean(axis=1) - centre)
             for name in mesh.boundaries or groups
-            if f"{body}.{name}" not in touching and name in groups
+            if name in groups and names[name] not in touching
         }
         found[body] = max(far, key=lambda name: far[name], default=next(iter(groups), "NAME"))
     return found

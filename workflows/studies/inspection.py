@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from tribodyn.fem.assembly import Assembly, Body
+from tribodyn.fem.assembly import Assembly, Body, named_in
 from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
@@ -218,7 +218,11 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
     for kind, one in [*(("tie", tie) for tie in source.deck.ties), *(("contact", c) for c in source.deck.contacts)]:
         name = f"{kind} '{one.name}'"
         first, second = (
-            [face for body in source.bodies if (face := f"{body}.{group}") in whole.boundaries]
+            [
+                face
+                for name, body in source.bodies.items()
+                if (face := named_in(name, group, body.node_sets)) in whole.boundaries and group in body.node_sets
+            ]
             for group in (one.slave, one.master)
         )
         slaves = [of.mesh for of in source.bodies.values() if one.slave in (of.mesh.boundaries or {})]

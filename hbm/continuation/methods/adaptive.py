@@ -8,7 +8,6 @@ as a measured one does, and says where.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +16,7 @@ from tribodyn.declare import number, require_limits
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
-from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.branch import Branch, BranchBuilder, OnPoint
 from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
 from tribodyn.hbm.continuation.methods.natural import EXTRAPOLATION_DEGREE, extrapolate
 from tribodyn.hbm.continuation.parameter import Parameter
@@ -85,12 +84,12 @@ def follow(
     start: float,
     stop: float,
     options: Options | None = None,
-    on_point: Callable[[int, int], None] | None = None,
+    on_point: OnPoint | None = None,
 ) -> Branch:
     """Follow the response from one frequency, or value of a parameter, to another.
 
     start, stop : [rad/s] or in the unit of the parameter, either order
-    on_point : called with points done and points expected at the present pace
+    on_point : called with points done, points expected at the present pace, and the last point
     Returns a Branch; `end` says where it ends and why, and where the response jumped to another branch on the way
     """
     options = options or Options()

@@ -12,7 +12,6 @@ Source  Keller 1977 (pseudo arc length); step control and kinks ours.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +20,7 @@ from tribodyn.declare import number, require_limits
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
-from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.branch import Branch, BranchBuilder, OnPoint
 from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.continuation.sliding import solve_along_friction
@@ -103,12 +102,12 @@ def follow(
     start: float,
     stop: float,
     options: Options | None = None,
-    on_point: Callable[[int, int], None] | None = None,
+    on_point: OnPoint | None = None,
 ) -> Branch:
     """Follow the solution curve from `start` towards `stop`, folds included, until it leaves the bounds.
 
     start, stop : [rad/s] or in the unit of the parameter, either order
-    on_point : called with points done and points expected at the present pace
+    on_point : called with points done, points expected at the present pace, and the last point
     Returns a Branch with its folds; its end says whether it reached the stop, came back, closed on itself or got stuck
     Raises  ValueError where start and stop are the same or out of the bounds
     """

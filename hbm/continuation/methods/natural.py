@@ -6,7 +6,7 @@ sweep jumps as a measured one does, to where the curve comes to the next value o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from tribodyn.declare import number, require_limits
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
-from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.branch import Branch, BranchBuilder, OnPoint
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
@@ -67,12 +67,12 @@ def follow(
     start: float,
     stop: float,
     options: Options | None = None,
-    on_point: Callable[[int, int], None] | None = None,
+    on_point: OnPoint | None = None,
 ) -> Branch:
     """Follow the response from one frequency, or value of a parameter, to another.
 
     start, stop : [rad/s] or in the unit of the parameter, either order
-    on_point : called with points done and points wanted
+    on_point : called with points done, points wanted, and the last point
     Returns a Branch; its end says at which folds the response jumped, and where and why a branch ends early. Points
         of the branch that are folds are marked
     """
@@ -81,7 +81,7 @@ def follow(
     while end is None:
         end = sweep.advance()
         if on_point is not None and sweep.done:
-            on_point(sweep.done + 1, options.n_points)
+            on_point(sweep.done + 1, options.n_points, sweep.builder.points[-1])
     return sweep.builder.finish(end)
 
 
