@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.wheel_scene import WHEEL
-from tests.workflows.test_flutter_scene import FLOW
+from tests.helpers.wheel_scene import FLOW, WHEEL
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.continuation.limit_cycles import LimitCycle

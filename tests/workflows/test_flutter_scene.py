@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.wheel_scene import WHEEL
+from tests.helpers.wheel_scene import FLOW, WHEEL
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic
 from tribodyn.workflows.command import main as cli
@@ -19,10 +19,6 @@ from tribodyn.workflows.studies.wheels import flutter
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
 COEFFICIENTS = {0: 0.012j, 1: 0.012 + 0.002j, -1: -0.012 + 0.002j}
-FLOW = """
-[flow]
-influence = [[0, 0, 0.012], [1, 0.012, 0.002], [-1, -0.012, 0.002]]
-"""
 
 
 @pytest.fixture(scope="module")
