@@ -63,7 +63,8 @@ def limit_cycles(
     low, high = np.log(np.array([start, stop]) / problem.per_amplitude)
     solved, end = walk(problem, float(low), float(high), options)
     points = [point for point, outcome, _ in solved if outcome == CONVERGED]
-    found, missing = [], []
+    found: list[LimitCycle] = []
+    missing: list[str] = []
     for before, after in pairwise(points):
         if np.sign(before.zeta) != np.sign(after.zeta):
             share = before.zeta / (before.zeta - after.zeta)
