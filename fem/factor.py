@@ -35,14 +35,20 @@ class Factor(Protocol):
     def solve(self, rhs: np.ndarray) -> np.ndarray: ...
 
 
-def factorise(K: Any, definite: bool = True, solver: str | None = None, shapes: np.ndarray | None = None) -> Factor:
+def factorise(
+    K: Any,
+    definite: bool = True,
+    solver: str | None = None,
+    shapes: np.ndarray | None = None,
+    few: np.ndarray | None = None,
+) -> Factor:
     """Factorise a sparse symmetric real matrix once, for many right-hand sides.
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
     solver : "pardiso" or "superlu", the best available by default; "mumps" in MPI processes of another Python;
         "single_precision" has a factor of half the size and refines, "multigrid" has none and iterates, both for a
         definite K
-    shapes : (n, k) motions that K hardly resists, for multigrid
+    shapes : (n, k) motions that K hardly resists, for multigrid; few : rows that `solve_few` is to be fast for
     Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
     K = csr_matrix(K)
@@ -63,7 +69,7 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None, shapes: 
         elif solver == "mumps":
             factor = Mumps(K, definite)
         else:
-            factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K, definite)
+            factor = Pardiso(K, definite, few=few) if solver == "pardiso" else SuperLU(K, definite)
         regular = softest_residual(K, factor.solve) < SINGULAR
     except (RuntimeError, ArithmeticError):
         regular = False
@@ -73,6 +79,14 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None, shapes: 
             "clamp it, or keep some of its nodes as masters"
         )
     return factor
+
+
+def solve_few(factor: Factor, rhs: np.ndarray) -> np.ndarray:
+    """The solution in the `few` rows that the factor was made for, where rhs (n, k) vanishes in all others.
+
+    What stands in the other rows is no solution
+    """
+    return factor.solve(rhs, few=True) if isinstance(factor, Pardiso) else factor.solve(rhs)
 
 
 def eigenvalues_below(K: Any, M: Any, value: float) -> int:
@@ -118,12 +132,18 @@ def pardiso_available() -> bool:
 
 
 class Pardiso:
-    """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite), where `single` in float32."""
+    """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite), where `single` in float32.
+
+    few : rows that are eliminated last, so that a solution in them from forces on them visits no others
+    """
 
     NO_MEMORY = -2  # error code
     ANALYSE_AND_FACTORISE, SOLVE = 12, 33  # phases
+    PARTIAL = 31  # place of the switch
 
-    def __init__(self, K: csr_matrix, definite: bool = True, single: bool = False) -> None:
+    def __init__(
+        self, K: csr_matrix, definite: bool = True, single: bool = False, few: np.ndarray | None = None
+    ) -> None:
         from pypardiso import PyPardisoSolver
 
         self.name = "MKL PARDISO, " + ("Cholesky" if definite else "LDL^T")
@@ -140,6 +160,11 @@ class Pardiso:
         # METIS, and no iterative refinement unless pivots were perturbed: MKL's defaults refine twice, 5 times slower
         for place, value in {1: 1, 2: 2, 8: 0, 10: 8, 28: int(single)}.items():
             self._solver.set_iparm(place, value)
+        self._few = few is not None
+        if few is not None:
+            self._solver.perm = np.zeros(K.shape[0], np.int32)
+            self._solver.perm[few] = 1
+            self._solver.set_iparm(self.PARTIAL, 1)
         self._call(self.ANALYSE_AND_FACTORISE, np.zeros(K.shape[0], self._kind))
 
     @property
@@ -147,8 +172,9 @@ class Pardiso:
         """How many eigenvalues of an indefinite K are negative: the signs of its pivots, by Sylvester's law."""
         return int(self._solver.get_iparm(23))
 
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution of the same shape as rhs, (n,) or (n, k)."""
+    def solve(self, rhs: np.ndarray, few: bool = False) -> np.ndarray:
+        """Solution of the same shape as rhs, (n,) or (n, k); of the few rows alone where asked for, see `solve_few`."""
+        self._solver.set_iparm(self.PARTIAL, int(few and self._few))
         return np.ascontiguousarray(self._call(self.SOLVE, np.asfortranarray(rhs, dtype=self._kind)))
 
     def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:

@@ -144,8 +144,11 @@ def solve(
 def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions) -> Solution:
     """The same with a residual flexibility: it is held while Newton solves, then taken anew, until nothing changes.
 
-    Each correction is smaller by about what the modes leave out; one that is not gives way to Newton's method on all
+    Each correction is smaller by about what the modes leave out; one that is not gives way to Newton's method on all.
+    Where the change of the forces is too small to matter, by the largest share left out, nothing is taken anew
     """
+    residual = balance.model.residual
+    assert residual is not None
     steps = products = 0
     before = np.inf
     exact = balance.evaluate(omega, start)
@@ -164,6 +167,9 @@ def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, 
         steps, products = steps + held.steps, products + held.products
         if not held.converged:
             return replace(held, steps=steps, products=products)
+        most = relative_residual(held.state, x_lin) + residual.at_most(held.state.g - exact.g, held.state.flat)
+        if most <= min(options.tolerance, _finer(balance, held.state, x_lin)):
+            return Solved(held.state, CONVERGED, steps, products, (*history, most))
         exact = balance.with_own_rest(held.state, rest)
     found = _solve(balance, omega, exact, options)
     return replace(found, steps=steps + found.steps, products=products + found.products)

@@ -30,7 +30,7 @@ import scipy.linalg as sla
 from scipy.sparse import csc_matrix, csr_matrix, hstack
 from threadpoolctl import threadpool_limits
 
-from tribodyn.fem.factor import Factor, factorise
+from tribodyn.fem.factor import Factor, factorise, solve_few
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.system import SecondOrderSystem
@@ -65,7 +65,7 @@ class ResidualFlexibility:
     @cached_property
     def factor(self) -> Factor:
         """Of K_s; it does not travel between processes, each makes its own."""
-        return factorise(self.matrix, solver=self.solver)
+        return factorise(self.matrix, solver=self.solver, few=np.unique(self.B.indices))
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "factor"}
@@ -77,15 +77,24 @@ class ResidualFlexibility:
 
     def field(self, force: np.ndarray) -> np.ndarray:
         """Displacement (n_full, k) [m] under contact forces (n_contact, k) [N] that the coordinates leave out."""
-        return self._static(force) - self.shapes @ (self.at_contact.T @ force / self.squares[:, None])
+        return self.factor.solve(self._push(force)) - self.shapes @ (self.at_contact.T @ force / self.squares[:, None])
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         """R f: displacement of the contact (n_contact, k) [m] under contact forces (n_contact, k) [N]."""
-        moved: np.ndarray = self.B @ self._static(force)
+        moved: np.ndarray = self.B @ solve_few(self.factor, self._push(force))
         return moved - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
 
-    def _static(self, force: np.ndarray) -> np.ndarray:
-        return self.factor.solve(np.asfortranarray(self.B.T @ force))
+    def _push(self, force: np.ndarray) -> np.ndarray:
+        return np.asfortranarray(self.B.T @ force)
+
+    def at_most(self, force: np.ndarray, moved: np.ndarray) -> float:
+        """What |k^1/2 R f| is at most over |k^1/2 x|, Euclidean, for x (n_contact, k): from `left_out` alone.
+
+        Infinite for a force where there is no spring
+        """
+        root = np.sqrt(self.stiffness)[:, None]
+        pushed = np.divide(force, root, out=np.where(force == 0.0, 0.0, np.inf), where=root > 0)
+        return self.left_out * float(np.linalg.norm(pushed) / (np.linalg.norm(root * moved) or 1.0))
 
     @cached_property
     def left_out(self) -> float:
@@ -141,7 +150,7 @@ def residual_flexibility(
     K = csr_matrix(system.stiffness)
     K_s = stuck_stiffness(K, interface.B, k)
     M, B = csr_matrix(system.mass), csr_matrix(interface.B)
-    factor = factorise(K_s, solver=solver)
+    factor = factorise(K_s, solver=solver, few=np.unique(csr_matrix(interface.B).indices))
     omega, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
     del K_s
     forces = [np.asarray(v, float) for v in (*system.loads.values(), *system.outputs.values())]

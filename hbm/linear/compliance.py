@@ -19,6 +19,7 @@ import numpy as np
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
+from tribodyn.hbm.linear.all_harmonics import few_rows
 from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
 from tribodyn.hbm.linear.ritz_expansion import RitzExpansion
 from tribodyn.reduction.model import ReducedModel
@@ -125,7 +126,8 @@ class ContactCompliance:
         other.__dict__.update(self.__dict__)
         other.basis = basis
         other._active, other._points = None, {}
-        other.__dict__.pop("outside", None)
+        for made in ("outside", "coarse_parts"):
+            other.__dict__.pop(made, None)
         other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
         other.base = None if self.base is None else self.basis.transfer(self.base, basis)
         kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
@@ -137,6 +139,12 @@ class ContactCompliance:
     def preconditioned(self) -> np.ndarray:
         """(n_contact, r) the first of the coarse modes, as many as so many coefficients afford."""
         return self.coarse[:, : max(RULES.fewest_coarse, RULES.most_coarse // self.basis.n_coeff)]
+
+    @cached_property
+    def coarse_parts(self) -> list[np.ndarray]:
+        """Share of the modes of each group in the `preconditioned` shapes, Q^T sqrt(k) b: (r, m)."""
+        weighted = self.preconditioned.T * np.sqrt(self.k)
+        return [weighted @ expansion.b[: self.n_contact] for expansion, _ in self.groups]
 
     def _coarse_modes(self) -> np.ndarray:
         """(n_contact, r) shapes Q of sqrt(k) x, orthonormal, that carry the contact flexibility but for a small share.
@@ -303,7 +311,8 @@ class CompliancePoint:
         """The same for one real system: every matrix meets all harmonics in one real product."""
         n, x = self.compliance.n_contact, self.compliance.groups[0][0]
         rows = np.ascontiguousarray(g.T)
-        return self._from_rows(rows @ x.columns[:n], self.compliance.moving(rows) @ x.single[:n], x.left, n)
+        moved, higher = few_rows(rows, x.columns[:n]), few_rows(self.compliance.moving(rows), x.single[:n])
+        return self._from_rows(moved, higher, x.left, n)
 
     def _from_rows(self, moved: np.ndarray, higher: np.ndarray, left: np.ndarray, n: int | None = None) -> np.ndarray:
         """(n, n_coeff) displacement of the first n ports of `left` from forces times [W_0, modes] and W_k, as rows."""
@@ -357,10 +366,9 @@ class CompliancePoint:
     def _coarse_compliance(self) -> np.ndarray:
         """Q^T sqrt(k) G sqrt(k) Q by the modes alone, on all coefficients; Q is `preconditioned`."""
         c, basis = self.compliance, self.compliance.basis
-        weighted = c.preconditioned.T * np.sqrt(c.k)
-        blocks = np.zeros((len(weighted), basis.n_coeff, len(weighted), basis.n_coeff))
-        for (expansion, positions), ports in zip(c.groups, self.ports, strict=True):
-            modes = weighted @ expansion.b[: c.n_contact]
+        size = c.preconditioned.shape[1]
+        blocks = np.zeros((size, basis.n_coeff, size, basis.n_coeff))
+        for modes, (_, positions), ports in zip(c.coarse_parts, c.groups, self.ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
                 amplitude = modes @ port.through_core(modes.conj().T)  # acts on X_h = a_h - i b_h
                 cosine, *sine = np.flatnonzero(basis.order == basis.harmonics[p])
@@ -369,8 +377,7 @@ class CompliancePoint:
                     blocks[:, column, :, column] = amplitude.real
                     blocks[:, cosine, :, column] = amplitude.imag
                     blocks[:, column, :, cosine] = -amplitude.imag
-        size = len(weighted) * basis.n_coeff
-        return blocks.reshape(size, size)
+        return blocks.reshape(size * basis.n_coeff, size * basis.n_coeff)
 
 
 class JacobianProduct:

@@ -6,13 +6,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
 from scipy.sparse import eye_array, random_array
 
 from tests.helpers.digest import digest
 from tribodyn.fem import factor
-from tribodyn.fem.factor import eigenvalues_below, factorise
+from tribodyn.fem.factor import eigenvalues_below, factorise, solve_few
 
 FRESH = """
 import sys
@@ -41,6 +42,22 @@ def test_eigenvalues_are_counted_by_one_factorisation(pardiso: bool, monkeypatch
     values = eigvalsh(K.toarray(), M.toarray())
     for place in (1, 40, 75, 149):
         assert eigenvalues_below(K, M, 0.5 * (values[place - 1] + values[place])) == place
+
+
+@pytest.mark.parametrize("solver", ["pardiso", "superlu"])
+def test_few_rows_are_those_of_the_whole_solution(solver: str) -> None:
+    """Also where a force on them vanishes, and between solutions in all rows."""
+    some = random_array((400, 400), density=0.02, rng=1)
+    K = some @ some.T + 4 * eye_array(400)
+    few = np.array([3, 50, 51, 52, 399])
+    made = factorise(K, solver=solver, few=few)
+    force, every = np.zeros((400, 3)), np.random.default_rng(2).normal(size=(400, 2))
+    force[few[:4], :2] = np.random.default_rng(3).normal(size=(4, 2))
+    for _ in range(2):
+        assert np.allclose(
+            solve_few(made, force)[few], np.linalg.solve(K.toarray(), force)[few], rtol=1e-10, atol=1e-14
+        )
+        assert np.allclose(made.solve(every), np.linalg.solve(K.toarray(), every), rtol=1e-10, atol=1e-13)
 
 
 @pytest.mark.parametrize("before", ["", WORN], ids=["fresh", "after_other_work"])

@@ -4,6 +4,11 @@ Both follow the same frequencies with the same predictor, contact law, samples a
 windows of consecutive points spread over the range, started from the fast one's solution outside the clock; the ratio
 compares the two on just these points. Both are repeated and the least time of each point is taken: what else the
 machine does can only add to it.
+
+The roofline is what the matrix products of a curve would take at least: for each kind of product the larger of its
+bytes at the rate at which this core sums an array that fits no cache, and of its operations at the rate of large square
+products.
+Source  Williams, Waterman and Patterson, CACM 52(4) (2009) 65, doi 10.1145/1498765.1498785
 """
 
 from __future__ import annotations
@@ -51,6 +56,8 @@ class Timing:
         these; dense_lost : points that it did not converge at in 40 steps, which do not count
     max_difference : of the contact displacement, both refined to rounding, relative to its largest value
     contact, balance, direction : share of our time by routine; thesis_seconds : published, one core, or None
+    work : matrix products of the curve by kind; products : share of our time that is in these
+    roofline : the seconds that `work` takes at least on this machine
     """
 
     harmonics: str
@@ -71,6 +78,67 @@ class Timing:
     direction: float
     dense_inversion: float | None
     thesis_seconds: float | None
+    work: tuple[Work, ...]
+    products: float
+    roofline: float
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What one core gives: bytes a second from memory, operations a second of large products by bytes of a number."""
+
+    memory: float
+    operations: dict[int, float]
+
+    @classmethod
+    def measured(cls) -> Machine:
+        """The best of several."""
+        large, square = np.ones(8_000_000), np.random.default_rng(0).normal(size=(1000, 1000))
+
+        def best(work: Callable[[], object]) -> float:
+            taken = []
+            for _ in range(REPEATS):
+                clock = process_time()
+                work()
+                taken.append(process_time() - clock)
+            return min(taken)
+
+        kinds = [square, square.astype(np.float32)]
+        return cls(
+            large.nbytes / best(large.sum), {a.itemsize: 2 * len(a) ** 3 / best(lambda a=a: a @ a) for a in kinds}
+        )
+
+    def seconds(self, work: Work) -> float:
+        """What the work takes at least."""
+        compute = sum(flops / self.operations[size] for size, flops in work.flops.items())
+        return work.calls * max(compute, work.bytes / self.memory)
+
+
+@dataclass(frozen=True)
+class Work:
+    """Products of one kind with matrices of the compliance.
+
+    calls : over the curve; bytes : of the matrices that one call reads; flops : of one call, by bytes of a number
+    """
+
+    name: str
+    calls: int
+    bytes: int
+    flops: dict[int, int]
+
+
+def _work(balance: HarmonicBalance, calls: dict[str, int]) -> tuple[Work, ...]:
+    """The products of a curve, as `CompliancePoint.apply` and `JacobianProduct` make them."""
+    c, m = balance.compliance, balance.basis.n_coeff
+    x, n, cores = c.groups[0][0], c.n_contact, len(balance.basis.dynamic)
+    whole, powers = x.columns[:n], x.single[:n]
+    core, solved = 16 * cores * x.n_mode**2, 8 * cores * x.n_mode**2
+    exact = {8: 2 * m * (whole.size + x.left.size) + solved, 4: 2 * (m - balance.basis.has_static) * powers.size}
+    nearly = {8: solved, 4: 2 * m * (n * n + 2 * n * x.n_mode)}
+    return (
+        Work("evaluation", calls["apply"], whole.nbytes + powers.nbytes + x.left.nbytes + core, exact),
+        Work("Krylov product", calls["__call__"], x.w0_single.nbytes + 2 * x.b_single.nbytes + core, nearly),
+    )
 
 
 def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
@@ -78,11 +146,13 @@ def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
     plans = [("0+1", (8, 3)), ("0+3", (2, 2))] if quick else [("0+1", (10, 4)), ("0+3", (4, 2)), ("0+5", (3, 1))]
     problem = _problem()
     rows = []
+    with limited(1):
+        machine = Machine.measured()
     for harmonics, windows in plans:
         say(f"harmonics {harmonics}")
         with limited(1):
-            rows.append(_measure(problem(harmonics), harmonics, windows))
-        say(_line(rows[-1]))  # what is measured is not lost where a later row is ended
+            rows.append(_measure(problem(harmonics), harmonics, windows, machine))
+        say(f"{_line(rows[-1])}\n{_limit(rows[-1])}")  # what is measured is not lost where a later row is ended
     return rows
 
 
@@ -101,16 +171,17 @@ def _problem() -> Callable[[str], HarmonicBalance]:
     return of
 
 
-def _measure(balance: HarmonicBalance, harmonics: str, windows: tuple[int, int]) -> Timing:
+def _measure(balance: HarmonicBalance, harmonics: str, windows: tuple[int, int], machine: Machine) -> Timing:
     low, high = settings.response_range(scene_file.read("beam_thesis", ()).scene)
     options = natural.Options(n_points=POINTS, newton=NewtonOptions(TOLERANCE))
     natural.follow(balance, high, high * 0.999, replace(options, n_points=2))  # compiles outside the clock
     branch, steps = _timed(balance, high, low, options)
     per_point = np.min(steps, axis=0)
     halves = [float(np.min(steps[i::2], axis=0).sum()) for i in (0, 1)]
-    profiler = cProfile.Profile()
+    profiler = cProfile.Profile(process_time)
     profiler.runcall(natural.follow, balance, high, low, options)
-    shares = _shares(pstats.Stats(profiler))
+    shares, calls = _shares(pstats.Stats(profiler))
+    work = _work(balance, calls)
 
     dense = DenseBalance(balance)
     wanted = np.linspace(high, low, POINTS)
@@ -161,6 +232,9 @@ def _measure(balance: HarmonicBalance, harmonics: str, windows: tuple[int, int])
         direction=shares["direction"],
         dense_inversion=p.inversion / max(p.contact + p.balance + p.inversion, 1e-300),
         thesis_seconds=THESIS_SECONDS.get(harmonics),
+        work=work,
+        products=shares["apply"] + shares["__call__"],
+        roofline=sum(map(machine.seconds, work)),
     )
 
 
@@ -192,18 +266,23 @@ def _refined(
     return found
 
 
-def _shares(stats: pstats.Stats) -> dict[str, float]:
-    """Share of the profiled time by routine, named as in the thesis: contact, balance, direction of the Newton step."""
+def _shares(stats: pstats.Stats) -> tuple[dict[str, float], dict[str, int]]:
+    """Share of the profiled time by routine, named as in the thesis: contact, balance, direction of the Newton step.
+
+    Beside them the share and the calls of the matrix products, which are parts of balance and direction
+    """
     names = {("contact/joint.py", "cycle"): "contact", ("hbm/balance.py", "solve"): "direction"}
-    seconds = dict.fromkeys(names.values(), 0.0)
+    names |= {("linear/compliance.py", of): of for of in ("apply", "__call__")}
+    seconds, calls = dict.fromkeys(names.values(), 0.0), dict.fromkeys(names.values(), 0)
     entries = stats.stats  # type: ignore[attr-defined]
-    for (path, _, function), (_, _, _, cumulative, _) in entries.items():
+    for (path, _, function), (_, count, _, cumulative, _) in entries.items():
         name = names.get(("/".join(Path(path).parts[-2:]), function))
         if name is not None:
             seconds[name] += cumulative
+            calls[name] += count
     total = max(cumulative for *_, cumulative, _ in entries.values())
     shares = {name: value / total for name, value in seconds.items()}
-    return shares | {"balance": 1.0 - sum(shares.values())}
+    return shares | {"balance": 1.0 - shares["contact"] - shares["direction"]}, calls
 
 
 def as_records(rows: list[Timing]) -> list[dict[str, object]]:
@@ -224,6 +303,21 @@ def _line(r: Timing) -> str:
     )
 
 
+def _limit(r: Timing) -> str:
+    """How near a row is to its roofline, and where the rest of its time is."""
+    counts = " and ".join(f"{work.calls / r.points:.1f} {work.name}s" for work in r.work)
+    read = sum(work.calls * work.bytes for work in r.work) / r.points
+    flops = sum(work.calls * sum(work.flops.values()) for work in r.work) / r.points
+    point = r.seconds / r.points
+    return (
+        f"roofline {r.harmonics}: {counts} a point, {read / 1e6:.0f} MB, {flops / 1e6:.0f} MFlop: "
+        f"{1e3 * r.roofline / r.points:.2f} of {1e3 * point:.2f} ms, {r.roofline / r.seconds:.0%}. "
+        f"Products take {r.products:.0%} of the time, {r.roofline / (r.products * r.seconds):.0%} of it their limit; "
+        f"contact law {r.contact:.0%}; the rest, {1 - r.products - r.contact:.0%}, is between: factors of the cores, "
+        "preconditioner, orthogonalisation, calls from Python"
+    )
+
+
 def as_text(rows: list[Timing]) -> str:
     """The rows for people, the thesis's figures beside ours."""
     lines = [
@@ -236,6 +330,7 @@ def as_text(rows: list[Timing]) -> str:
         "ratio: seconds of the dense algorithm over ours on the same points "
         f"({', '.join(f'{r.harmonics}: {r.dense_points}' for r in rows)} points)"
     )
+    lines += map(_limit, rows)
     missed = [f"{r.dense_lost} at {r.harmonics}" for r in rows if r.dense_lost]
     if missed:
         lines.append(f"the dense algorithm did not converge at further points, which do not count: {', '.join(missed)}")

@@ -131,6 +131,37 @@ def test_the_error_is_that_of_the_mass_left_out(beam) -> None:
         assert 0.2 * size < rest.error(omega) < 20 * size
 
 
+def test_what_a_solve_does_not_ask_for_is_below_its_tolerance(beam, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A solve ends on a bound of the residual flexibility; its state has the residual wanted with all of it, too."""
+    file, part, springs = beam
+    balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
+    rest, asked = balance.model.residual, []
+    assert rest is not None
+    assert balance.corrects_rest
+    force = np.random.default_rng(0).normal(size=(75, 4)) * np.sqrt(springs.ravel())[:, None]
+    moved, x = rest.apply(force), np.random.default_rng(1).normal(size=(75, 4))
+    root = np.sqrt(springs.ravel())[:, None]
+    share = np.linalg.norm(root * moved) / np.linalg.norm(root * x)
+    assert 0.1 * rest.at_most(force, x) < share < rest.at_most(force, x)
+    one_row = np.eye(75)[:, :1]
+    assert replace(rest, stiffness=springs.ravel() * (1 - one_row[:, 0])).at_most(one_row, x[:, :1]) == np.inf
+    plain = type(rest).apply
+    monkeypatch.setattr(type(rest), "apply", lambda self, f: (asked.append(1), plain(self, f))[1])
+    start = newton.solve_from_rest(balance, OMEGA, NewtonOptions(tolerance=1e-8)).state.x
+    bounded = 0
+    for omega in OMEGA * np.linspace(1.0, 1.005, 6):
+        before = len(asked)
+        found = newton.solve(balance, omega, start, NewtonOptions(tolerance=1e-8))
+        spent = len(asked) - before
+        exact = newton.relative_residual(balance.evaluate(omega, found.state.x), balance.x_lin(omega))
+        assert found.converged
+        assert exact <= found.history[-1] <= 1e-8
+        bounded += exact < found.history[-1]
+        assert spent < len(found.history) or exact == found.history[-1]
+        start = found.state.x
+    assert bounded >= 3
+
+
 def test_matrices_of_velocity_are_projected(beam) -> None:
     _, part, springs = beam
     M = part.system.mass

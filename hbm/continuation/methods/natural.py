@@ -6,6 +6,7 @@ sweep jumps as a measured one does, to where the curve comes to the next value o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -204,5 +205,6 @@ def predict(builder: BranchBuilder, value: float, least_spacing: float = Rules.l
 
 def extrapolate(known: np.ndarray, values: Sequence[np.ndarray] | np.ndarray, at: float) -> np.ndarray:
     """Lagrange polynomial through values known at points (n,), taken at another point."""
-    weights = [np.prod((at - np.delete(known, i)) / (known[i] - np.delete(known, i))) for i in range(len(known))]
-    return np.sum([w * value for w, value in zip(weights, values, strict=True)], axis=0)
+    places = known.tolist()
+    apart = [[(at - b) / (a - b) for b in places if b != a] for a in places]
+    return np.sum([math.prod(w) * value for w, value in zip(apart, values, strict=True)], axis=0)
