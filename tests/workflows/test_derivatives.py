@@ -66,7 +66,7 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name):
 
     def solved(key, factor):
         with limited(1):
-            balance = Varying.of(file.changed(f"{key}={value[key] * factor!r}"), Progress()).model.balance
+            balance = Varying(file.changed(f"{key}={value[key] * factor!r}"), Progress()).model.balance
             there = exact.at_frequency(balance, fixed.state, "response", ())
             return there.values, exact.at_peak(balance, along.state, "response", ()).values
 

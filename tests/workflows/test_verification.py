@@ -61,13 +61,13 @@ def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = {}
-    for hertz in (500, 640):
+    for hertz in (900, 640):
         code, out, err = leave(["verify", str(folder), "--at", f"{hertz}Hz", "--steps", "128", "--json"], capsys)
         assert code == 0, err
         found[hertz] = json.loads(out)
-    assert not found[500]["stable"]
-    assert abs(found[500]["outputs"]["response"]["difference"]) > 0.1
-    assert found[500]["left_alone"]["periods"] == verification.LEFT_ALONE
+    assert not found[900]["stable"]
+    assert abs(found[900]["outputs"]["response"]["difference"]) > 0.1
+    assert found[900]["left_alone"]["periods"] == verification.LEFT_ALONE
     assert found[640]["left_alone"] is None
     assert found[640]["stable"]
     assert abs(found[640]["outputs"]["response"]["difference"]) < 0.1
@@ -98,7 +98,7 @@ def test_more_harmonics_come_closer(folder: Path) -> None:
     assert alone.energy == pytest.approx(5.15, rel=0.05)
     assert 0.1 < alone.energy_spread < 0.6
     assert alone.drift > 0.1
-    assert any(line[0] == "left alone" for line in comparison.lines())
+    assert any(line.startswith("left alone") for line in comparison.lines())
 
 
 def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
