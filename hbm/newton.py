@@ -328,5 +328,8 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
         factor = lead(factor, 1.0, SHARES, loaded)
     if factor == 1.0:
         return Solution(last.state, CONVERGED, steps, products, last.history)
-    outcome = first.outcome.kind.say(f"{first.outcome.detail}; load ramp stopped at {factor:.0%}: {CURES}")
+    if last.converged:
+        outcome = first.outcome.kind.say(f"{first.outcome.detail}; load ramp stopped at {factor:.0%}: {CURES}")
+    else:
+        outcome = SolveEnd.NO_REST.say(f": the part, or a body of it, may tip or slide ({last.outcome})")
     return Solution(first.state, outcome, steps, products, first.history)

@@ -43,6 +43,7 @@ class SolveEnd(End):
     NOT_FINITE = "the residual is not a finite number"
     SINGULAR = "singular Jacobian at relative residual"
     NO_DIRECTION = "no direction to correct along:"
+    NO_REST = "no state of rest was found under the static loads alone"
     SLIDES_AWAY = "the contact slides away,"
     SITE_NOT_FOUND = "the site of a duty was not found in"
     AT_FOLD = "the curve turns back at a fold,"

@@ -22,6 +22,7 @@ import scipy.linalg as sla
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
 from tribodyn.hbm.homotopy import DECADES, lead
+from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
@@ -67,7 +68,10 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
 
     def solved(level: float, start: np.ndarray | None = None) -> bool:
         nonlocal soft, spent
-        soft = _softened(balance, level, soft)
+        try:
+            soft = _softened(balance, level, soft)
+        except SingularStuckSystem:  # so soft that what the contact alone holds counts as free
+            return False
         found, steps = _damped(soft, omega, soft.stuck(omega) if start is None else start, hasty)
         spent += steps
         if found is not None:

@@ -15,17 +15,20 @@ import numpy as np
 
 from tribodyn.fem.assembly import pieces
 from tribodyn.fem.constraints import free_dofs, named
+from tribodyn.fem.couplings import Tie
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.limits import LIMITS
-from tribodyn.workflows.run import matrix_model
+from tribodyn.workflows.run import bodies, matrix_model
 from tribodyn.workflows.run import memory as memory_use
 from tribodyn.workflows.run.modelling import clamps, make_mesh
 from tribodyn.workflows.run.part_reduction import components, without_masters
+from tribodyn.workflows.run.sanity_checks import check_opening
 from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
+from tribodyn.workflows.scene.structure import StructureScene
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,10 @@ COSTS = Costs()
 
 @dataclass(frozen=True)
 class Plan:
-    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it is not known, 0 without wear."""
+    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it is not known, 0 without wear.
+
+    remarks : on faces that are glued or rub and lie apart
+    """
 
     elements: int
     nodes: int
@@ -73,6 +79,7 @@ class Plan:
     wear_solves: int
     solve_seconds: float
     verdict: bool
+    remarks: tuple[str, ...] = ()
 
     @property
     def computing_seconds(self) -> float:
@@ -95,6 +102,7 @@ class Plan:
             ("wear", f"{steps} steps, about {wear}" if self.wear_solves else "none"),
             ("errors", "measured on a finer model after the run" if self.verdict else "not measured"),
             ("whole run", f"about {_time(self.computing_seconds)} on one core, to a factor of three, without errors"),
+            *(("warning", remark) for remark in self.remarks),
         ]
 
 
@@ -104,6 +112,7 @@ def plan(file: SceneFile) -> Plan:
     check_names(scene, own_files=False)
     elements = nodes = held = 0
     sparse = False
+    remarks: list[str] = []
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
         pairs, masters = reduced.interface.n_pair, reduced.system.n_dof
@@ -118,6 +127,8 @@ def plan(file: SceneFile) -> Plan:
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
+        if isinstance(built, StructureScene):
+            remarks = _openings(built, mesh, node_sets, file.folder)
         free = free_dofs(3 * nodes, clamps(built, file.folder), node_sets)
         full = len(free)
         pairs, masters = _contact(built, mesh, node_sets, free)
@@ -154,7 +165,30 @@ def plan(file: SceneFile) -> Plan:
         wear_solves=solves,
         solve_seconds=5e-3 + basis.n_coeff * (COSTS.sparse * full if sparse else COSTS.solve * contact**2),
         verdict=scene.verdict.enabled and scene.response.control == "force",
+        remarks=tuple(remarks),
     )
+
+
+def _openings(scene: StructureScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path) -> list[str]:
+    """Remarks on tied faces, and on those in contact whose gap is that of the geometry, that lie apart.
+
+    Raises  ValueError for constraints that the run refuses
+    """
+    pairs = [
+        Tie(f"contacts.{name}", face, contact.opposite, contact.reach)
+        for name, contact in scene.joints.items()
+        for face in contact.groups
+        if contact.opposite is not None and contact.gap is None
+    ]
+    for one in bodies.constraints(scene, folder):
+        one.build(mesh, node_sets)
+        if isinstance(one, Tie):
+            pairs.append(one)
+    found = []
+    for pair in pairs:
+        first, _, shared = pair.meeting(mesh)
+        found += check_opening(pair.what, shared.gap, first.length)
+    return found
 
 
 def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:

@@ -53,6 +53,7 @@ class Usual:
 
 
 USUAL = Usual()
+APART = 0.005  # of the length of a face: an opening or overlap from which on a pair is remarked
 
 
 def lines(file: SceneFile, model: Model) -> Iterator[str]:
@@ -125,6 +126,15 @@ def notes(file: SceneFile, part: Part) -> Iterator[str]:
 
 def _mm(point: np.ndarray, between: str = ", ") -> str:
     return between.join(f"{1e3 * c:.4g}" for c in point)
+
+
+def check_opening(pair: str, gap: np.ndarray, length: float) -> list[str]:
+    """Remarks on the opening (n,) [m], negative in an overlap, of two faces; length : of the first one [m]."""
+    return [
+        f"the faces of {pair} lie up to {1e3 * far:.3g} mm {how}: correct their places"
+        for far, how in ((float(gap.max()), "apart"), (-float(gap.min()), "inside each other"))
+        if far > APART * length
+    ]
 
 
 def check_size(size: np.ndarray, cure: str) -> list[str]:

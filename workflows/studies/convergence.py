@@ -133,7 +133,7 @@ def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: 
         known = [(s.size, v) for s, grid in zip(settings, measured, strict=True) if (v := _values(grid, quantity))]
         if len(known) >= 3:
             limits[quantity] = limit_of([size for size, _ in known], [values for _, values in known])
-    finest = next((grid[0] for grid in reversed(measured) if grid[0].outcome == ANSWERED), None)
+    finest = next((grid[0] for grid in reversed(measured) if _responds(grid[0])), None)
     if finest is None:
         raise RuntimeError(f"{ladder.name}: no grid has an answer, the finest says: {measured[-1][0].outcome}")
     own = scene_file.read(scene, base).scene
@@ -156,10 +156,15 @@ def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: 
 
 
 def _values(grid: Sequence[Measured], quantity: str) -> list[float]:
-    """What the placements of a grid answer, the grid itself first; none where that failed."""
-    if grid[0].outcome != ANSWERED or grid[0].values[quantity] is None:
+    """What the placements of a grid answer, the grid itself first; none where that has no answer."""
+    if grid[0].values[quantity] is None:
         return []
-    return [v for one in grid if one.outcome == ANSWERED and (v := one.values[quantity]) is not None]
+    return [v for one in grid if (v := one.values[quantity]) is not None]
+
+
+def _responds(one: Measured) -> bool:
+    """Whether the response has a peak; its wear may have no end of life."""
+    return one.values["peak_m"] is not None
 
 
 def _off(value: float | None, end: Limit | None) -> float | None:
@@ -214,6 +219,9 @@ def _lines(study: Study) -> Iterator[str]:
         failed = "" if row.outcome == ANSWERED else f"  {row.outcome}"
         cells = [_cell(row, q) for q in shown]
         yield _line(row.setting.ljust(width), str(row.pairs), f"{row.seconds:.1f}", cells, maps + failed)
+    if not shown:
+        yield "no limit is known: it needs three grids that answer"
+        return
     limits = [f"{(one := study.limits[q]).value:.5g} ({_order(one)})" for q in shown]
     yield _line("limit".ljust(width), "", "", limits, "")
     yield "in brackets: error; of the worst placement of the nodes, with the doubt in the limit"
@@ -258,7 +266,7 @@ def _judgement(row: GridRow, quantities: Sequence[str]) -> str:
 
 def picture(study: Study) -> Figure:
     """Errors against the number of pairs, the work on the finest grid, and where coarser grids differ from it."""
-    shown = [m for m in study.measured if m.outcome == ANSWERED]
+    shown = [m for m in study.measured if _responds(m)]
     finest, some = shown[-1], shown[:-1][-3:]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.1 + 2.5 * len(some), 3.6), layout="constrained")
@@ -291,7 +299,8 @@ def _draw_errors(pane: Any, study: Study) -> None:
     pane.xaxis.set_minor_locator(NullLocator())
     pane.set(xlabel="node pairs" if by_pairs else "size of the mesh", ylabel="relative error, worst placement")
     pane.set_title(f"{study.scene}: {study.ladder.replace('_', ' ')}")
-    pane.legend(fontsize=8, loc="upper right")
+    if pane.get_legend_handles_labels()[0]:
+        pane.legend(fontsize=8, loc="upper right")
 
 
 def _map(pane: Any, one: Measured, field: np.ndarray, colours: dict[str, Any]) -> Any:

@@ -27,7 +27,6 @@ from tribodyn.workflows.scene.fields import Number, Pressure, quantity
 from tribodyn.workflows.scene.source import AnyPath, Overrides, read_scene
 from tribodyn.workflows.scene.structure import DeckTable
 
-APART = 0.005  # of the length of a face: an opening or overlap from which on a pair is remarked
 
 
 @dataclass(frozen=True)
@@ -217,17 +216,14 @@ def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, flo
         gaps = np.concatenate([shared.gap for *_, shared in met])
         facing = [(a.normal[s.first] * b.normal[s.second]).sum(axis=1) @ s.weight for a, b, s in met]
         shared = sum(float(own.weight.sum()) for *_, own in met)
-        low, high = float(gaps.min()), float(gaps.max())
         found[name] = {
             "shared_m2": shared,
             "area_m2": sum(area(mesh, mesh.boundaries[one.slave]) for mesh in slaves),
-            "least_m": low,
-            "largest_m": high,
+            "least_m": float(gaps.min()),
+            "largest_m": float(gaps.max()),
             "angle_deg": float(np.degrees(np.arccos(np.clip(-sum(facing) / shared, -1.0, 1.0)))),
         }
-        for far, how in ((high, "apart"), (-low, "inside each other")):
-            if far > APART * met[0][0].length:
-                remarks.append(f"the faces of {name} lie up to {1e3 * far:.3g} mm {how}: correct their places")
+        remarks += sanity_checks.check_opening(name, gaps, met[0][0].length)
     return found, refused, remarks
 
 
