@@ -35,7 +35,7 @@ ELSEWHERE = {
 }  # fmt: skip
 
 KINDS = {
-    "frf": "Response between its free and stuck references, and the path of the peak under wear.",
+    "frf": "Response between its free and stuck references, and the cycle that wears at each step.",
     "outputs": "Amplitude of every observed output.",
     "cycles_per_step": "Cycles that each wear step stands for.",
     "peak": "Amplitude and frequency of the cycle that wears.",

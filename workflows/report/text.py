@@ -61,14 +61,15 @@ def _response_in_brief(result: Result, found: dict[str, Any], judged: dict[str, 
     if found["peak_hz"] is None:
         return []
     count = _of(judged, "peak_frequency", 4), _of(judged, "amplitude")
+    given = found["wear_steps"] and not worn_at_peak(result)
     peaks = [
-        f"{measured(hertz, 'Hz', count[0])}, {measured(height, 'm', count[1])}"
+        f"{f'{hertz:g} Hz' if given else measured(hertz, 'Hz', count[0])}, {measured(height, 'm', count[1])}"
         for hertz, height in zip(found["peak_hz"], found["peak_m"], strict=True)
     ]
     shown = [f"peak      {peaks[0]}{', unworn' if found['wear_steps'] else ''}"]
-    if found["wear_steps"] and worn_at_peak(result):
+    if found["wear_steps"] and not given:
         shown.append(f"          {peaks[1]}, at the end of wear")
-    elif found["wear_steps"]:
+    elif given:
         shown = [f"worn at   {peaks[0]}, unworn", f"          {peaks[1]}, at the end of wear"]
         if (frf := result.response) is not None and (top := frf.peak(frf.output_names[0])) is not None:
             highest = measured(frf.frequency[top], "Hz", 4), measured(frf.amplitude(frf.output_names[0])[top], "m")
