@@ -24,7 +24,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from tribodyn.hbm import processes
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
 from tribodyn.hbm.continuation import parameter
@@ -175,32 +174,26 @@ def mark(
     path = parameter.of(problem)
     if path.name != branch.parameter_name:
         raise ValueError(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
-    count = len(branch.outcome)
-
-    def at(i: int) -> Stability | None:
-        if branch.outcome[i] != CONVERGED:
-            return None
-        balance, omega = path.place(float(branch.parameter[i]))
-        flat = branch.contact[i]
-        state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
-        return stability(balance, state)
-
-    found = processes.shared(at, count, None if on_point is None else lambda done: on_point(done, count))
+    found: list[Stability | None] = []
+    for value, flat, outcome in zip(branch.parameter, branch.contact, branch.outcome, strict=True):
+        here = None
+        if outcome == CONVERGED:
+            balance, omega = path.place(float(value))
+            state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
+            here = stability(balance, state)
+        found.append(here)
+        if on_point is not None:
+            on_point(len(found), len(branch.outcome))
+    places = [Direction(x, float(value)) for x, value in zip(branch.contact, branch.parameter, strict=True)]
     changes = [
-        (i, (before, now))
+        _locate(path, i, (before, now), (places[i], places[i + 1]))
         for i, (before, now) in enumerate(itertools.pairwise(found))
         if before is not None and now is not None and before.n_unstable != now.n_unstable
     ]
-
-    def located(k: int) -> Bifurcation:
-        i, sides = changes[k]
-        ends = [Direction(branch.contact[j], float(branch.parameter[j])) for j in (i, i + 1)]
-        return _locate(path, i, sides, (ends[0], ends[1]))
-
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
         leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),
-        bifurcations=tuple(processes.shared(located, len(changes))),
+        bifurcations=tuple(changes),
     )
 
 
