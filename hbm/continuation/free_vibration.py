@@ -259,6 +259,11 @@ class FreeVibration:
         still = float(np.linalg.norm(self.rest[:, :, 0])) if self.basis.has_static else 0.0
         return np.where(self.basis.order == 0, still or a * vibration, a * vibration)
 
+    def weights(self, a: float) -> np.ndarray:
+        """(n_contact * n_coeff,) of the coordinates of x in an arc length: x_0 counts over rest or the vibration."""
+        units = self._units(a)
+        return np.tile((units / np.maximum(units, units[-1])) ** 2, len(self.k))
+
     def evaluate(self, coordinates: np.ndarray) -> Point:
         """Everything at one point."""
         omega, a = (float(np.exp(c)) for c in coordinates[[-3, -1]])

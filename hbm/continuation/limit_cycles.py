@@ -1,7 +1,7 @@
 """Limit cycles: free vibrations whose damping, that of flow and friction together, vanishes.
 
 On the backbone of the least damped mode the damping ratio zeta depends on the amplitude. Where it passes zero nothing
-needs to be added to sustain the motion: it is a limit cycle. It attracts the motions of its own wave beside it where
+needs to be added to sustain the motion: it is a limit cycle. It attracts the motions of its own mode beside it where
 zeta grows with the amplitude there. The phase is fixed by the reference mode, as on the backbone.
 Source  Krack 2015, section 2 (a nonlinear mode with zero damping is a limit cycle)
 """
@@ -16,7 +16,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, newton_on, walk
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd
 from tribodyn.hbm.threads import single
 
 
@@ -24,7 +24,8 @@ from tribodyn.hbm.threads import single
 class LimitCycle:
     """One limit cycle.
 
-    amplitude : of the output in the reference mode [m]; omega : [rad/s]; attracts : motions of its own wave beside it
+    amplitude : of the output in the reference mode [m]; omega : [rad/s]; attracts : motions of its own mode
+        beside it; whether others leave it is asked of `stability`
     response : (n_output, n_coeff) of the outputs [m]; state : of the balance without harmonic loads
     point : where it lies in the coordinates of its problem
     """
@@ -50,11 +51,11 @@ def limit_cycles(
     mode: int | None = None,
     output: str | None = None,
     options: BackboneOptions | None = None,
-) -> list[LimitCycle]:
-    """Limit cycles between two amplitudes [m] of an output, by rising amplitude; none where the damping keeps its sign.
+) -> tuple[list[LimitCycle], str]:
+    """Limit cycles between two amplitudes [m] of an output, by rising amplitude, and why there may be others, or none.
 
     mode, output : as for `backbone`; the least damped mode by default
-    Raises  ValueError as `backbone` does, and where the backbone does not reach the last amplitude
+    Raises  ValueError as `backbone` does
     """
     options = options or BackboneOptions()
     if not 0 < start < stop:
@@ -63,18 +64,30 @@ def limit_cycles(
     low, high = np.log(np.array([start, stop]) / problem.per_amplitude)
     solved, end = walk(problem, float(low), float(high), options)
     points = [point for point, outcome, _ in solved if outcome == CONVERGED]
-    found = []
+    found: list[LimitCycle] = []
+    missing: list[str] = []
     for before, after in pairwise(points):
         if np.sign(before.zeta) != np.sign(after.zeta):
             share = before.zeta / (before.zeta - after.zeta)
-            guess = before.coordinates + share * (after.coordinates - before.coordinates)
+            between = before.coordinates + share * (after.coordinates - before.coordinates)
             rises = (after.zeta - before.zeta) * (after.a - before.a) > 0
-            if (cycle := _without_damping(problem, guess, rises, options)) is not None:
-                found.append(cycle)
-    if not found and solved[-1][1] != CONVERGED:
-        reached = points[-1].a * problem.per_amplitude if points else 0.0
-        raise ValueError(f"the damping was followed up to {reached:.3g} m only: the backbone {end}")
-    return sorted(found, key=lambda cycle: cycle.amplitude)
+            guesses = between, after.coordinates, before.coordinates  # two where friction has a kink between them
+            tried = (_without_damping(problem, guess, rises, options) for guess in guesses)
+            if (cycle := next((one for one in tried if one is not None), None)) is None:
+                missing.append(f"one near {before.a * problem.per_amplitude:.3g} m was not solved")
+            elif not any(np.allclose(cycle.point.coordinates, one.point.coordinates, 1e-4, 1e-4) for one in found):
+                found.append(cycle)  # a backbone that turned back may pass it twice
+    if end.kind is not BranchEnd.REACHED:
+        reached = max((point.a for point in points), default=0.0) * problem.per_amplitude
+        missing.append(f"the damping was followed up to {reached:.3g} m only: the backbone {end}")
+    elif not found and not missing:
+        first, last = points[0].zeta, points[-1].zeta
+        does, beyond = ("decays", "below the first") if first > 0 else ("grows", "above the last")
+        missing.append(
+            f"none between these amplitudes: the motion {does} at all of them (damping {first:+.3%} to {last:+.3%}), "
+            f"so that one can only lie {beyond}"
+        )
+    return sorted(found, key=lambda cycle: cycle.amplitude), "; ".join(missing)
 
 
 def _without_damping(

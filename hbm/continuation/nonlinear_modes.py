@@ -136,21 +136,31 @@ def backbone(
 
 
 def walk(
-    problem: FreeVibration, start: float, goal: float, options: BackboneOptions
+    problem: FreeVibration, start: float, goal: float, options: BackboneOptions, below: int = 4
 ) -> tuple[list[_Solved], Outcome[BranchEnd]]:
-    """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends."""
+    """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends.
+
+    below : decades under `start` from which it is walked to, one after another, where the reference mode is too far off
+    """
     first = problem.first_guess(np.exp(start))
     fixed = np.zeros(len(first.coordinates))
     fixed[-1] = 1.0
     solved = [newton_on(problem, first, fixed, options.newton)]
     if solved[0][1] != CONVERGED:
-        return solved, BranchEnd.ENDED.say(f" the start: {solved[0][1]}")
+        why = BranchEnd.ENDED.say(f" the start: {solved[0][1]}")
+        if below == 0:
+            return solved, why
+        lower, end = walk(problem, start - np.log(10.0), start, options, below - 1)
+        if end.kind is not BranchEnd.REACHED:
+            return solved, why
+        solved = lower[-1:]
     longest = abs(goal - start) / max(options.n_points - 1, 1)
     step, tangent = longest, np.sign(goal - start) * fixed
     weight = np.ones(len(fixed))
     weight[-3:-1] = options.frequency_weight**2
     while len(solved) < options.max_points:
         here = solved[-1][0].coordinates
+        weight[:-3] = problem.weights(solved[-1][0].a)
         ahead = here + step * tangent
         last = (ahead[-1] - goal) * (start - goal) <= 0
         if last:

@@ -122,10 +122,16 @@ def integrate(
 
 @single
 def leave_alone(
-    balance: HarmonicBalance, omega: float, start: State, periods: int, options: Options | None = None
+    balance: HarmonicBalance,
+    omega: float,
+    start: State,
+    periods: int,
+    options: Options | None = None,
+    added: float = 0.0,
 ) -> LeftAlone:
     """March from a balance state and see where the motion goes, periodic or not.
 
+    added : damping ratio that sustains the start where it is a point of a nonlinear mode, gone at t = 0
     An unstable periodic motion is left, for another one or for one that never repeats itself; means over many periods
     then are what a machine shows
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
@@ -136,7 +142,7 @@ def leave_alone(
     stepper = TimeStepper(whole, omega, options)
     search = PeriodSearch(stepper, replace(options, max_periods=periods, patience=periods), False)
     energy, amplitude = [], []
-    motion = stepper.start_from(begin)
+    motion = stepper.start_from(begin, added=added)
     for _ in range(periods):
         found = search.step(motion)
         seen = _of_sector(balance, motion_of(stepper, found, search.periods, CONVERGED, motion))

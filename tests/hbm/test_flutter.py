@@ -100,7 +100,8 @@ def test_damping_and_frequency_of_a_wave_are_what_the_coefficients_say():
 
 @pytest.fixture(scope="module")
 def cycle():
-    found = limit_cycles(wave(), 1e-5, 2e-2, output="tip", options=BackboneOptions(n_points=30))
+    found, why = limit_cycles(wave(), 1e-5, 2e-2, output="tip", options=BackboneOptions(n_points=30))
+    assert not why
     assert found
     assert found[0].attracts
     return found[0]
@@ -132,7 +133,7 @@ def test_the_limit_cycle_of_a_mistuned_wheel_is_what_time_integration_comes_to()
     model = whole([1.02, 0.985, 1.0, 0.99, 1.005])
     problem = balance_of(model, tiny.N)
     names = problem.compliance.output_names
-    found = limit_cycles(problem, 1e-5, 2e-2, output="tip@0", options=BackboneOptions(n_points=30))
+    found, _ = limit_cycles(problem, 1e-5, 2e-2, output="tip@0", options=BackboneOptions(n_points=30))
     assert found
     assert found[0].attracts
     rows = [names.index(f"tip@{n}") for n in range(tiny.N)]

@@ -140,9 +140,9 @@ def cycle(
         force[:, :, 0] -= k * np.column_stack([memory, parameters.gap])
     spring = np.repeat(k, x.shape[2], axis=1)
     jac = spring[..., None] * np.eye(spring.shape[1]) if jacobian else None
-    start = np.concatenate([memory, samples[:, :, -1]], axis=1)[moving]  # where the first chord begins
+    touching = np.concatenate([memory, memory, parameters.gap[:, None]], axis=1)  # without shear, wherever x(0) is
     law = cast(ModuleType, SimpleNamespace(step=chord))
-    found = march(law, x[moving], parameters.taken(moving), start, basis, jacobian)
+    found = march(law, x[moving], parameters.taken(moving), touching[moving], basis, jacobian)
     force[moving], status[moving] = found.force, found.status
     if jac is not None:
         jac[moving] = found.jacobian

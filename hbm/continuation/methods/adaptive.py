@@ -66,6 +66,8 @@ class Options:
     """(n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default."""
     load_paths: bool = field(default=True, kw_only=True)
     """Whether a jump that Newton does not make is made along the load, which takes as long as many points."""
+    jumps: bool = field(default=True, kw_only=True)
+    """Whether the response is followed beyond a jump; otherwise the branch ends there."""
 
     def __post_init__(self) -> None:
         require_limits(self, "adaptive continuation")
@@ -158,7 +160,7 @@ class _Sweep:
             value, solution = self._solve(here)
             if not solution.converged:
                 if self._step <= self._options.min_step:
-                    return "" if self._jump(here) else str(solution.outcome)
+                    return "" if self._options.jumps and self._jump(here) else str(solution.outcome)
                 self._step = max(0.25 * self._step, self._options.min_step)
                 continue
             response = self._outputs(value, solution)
@@ -171,8 +173,11 @@ class _Sweep:
             self._crawled += error > self._options.rules.rejected_error
             if self._crawled == self._options.rules.crawled:
                 self._crawled, self._shortest = 0, min(2 * self._shortest, self._options.max_step)
-            self._accept(value, solution, response, jumped=error > self._options.rules.jump_error)
-            if error <= self._options.rules.jump_error:
+            jumped = error > self._options.rules.jump_error
+            if jumped and not self._options.jumps:
+                return f"the response jumps at {self._path.say(value)}"
+            self._accept(value, solution, response, jumped)
+            if not jumped:
                 self._step = float(np.clip(step * self._factor(error), self._shortest, self._options.max_step))
             return ""
 

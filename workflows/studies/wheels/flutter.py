@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.limit_cycles import LimitCycle, limit_cycles
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.threads import limited
@@ -30,12 +31,12 @@ class Flutter:
     """What a flow does to a wheel.
 
     eigenvalues : index of the wave, above 0 with the rotation -> eigenvalue with contacts stuck [1/s]
-    cycles : index of a wave that flutters -> its limit cycles, or why they were not found
+    cycles : index of a wave that flutters -> its limit cycles, and why there may be others, or none
     """
 
     name: str
     eigenvalues: dict[int, complex]
-    cycles: dict[int, list[LimitCycle] | str]
+    cycles: dict[int, tuple[list[LimitCycle], str]]
 
     @property
     def damping(self) -> dict[int, float]:
@@ -51,11 +52,10 @@ class Flutter:
             ],
             "limit_cycles": [
                 {"index": j, "m": one.amplitude, "hz": one.frequency, "attracts": one.attracts}
-                for j, found in self.cycles.items()
-                if not isinstance(found, str)
+                for j, (found, _) in self.cycles.items()
                 for one in found
             ],
-            "not_found": {str(j): why for j, why in self.cycles.items() if isinstance(why, str)},
+            "not_found": {str(j): why for j, (_, why) in self.cycles.items() if why},
         }
 
     def lines(self) -> list[str]:
@@ -65,17 +65,15 @@ class Flutter:
             + (", flutters" if value.real > 0 else "")
             for j, value in self.eigenvalues.items()
         ]
-        for j, found in self.cycles.items():
-            if isinstance(found, str):
-                said.append(f"limit cycles of wave {j}: {found}")
-            elif not found:
-                said.append(f"limit cycles of wave {j}: none between these amplitudes")
-            else:
-                said += [
-                    f"limit cycle of wave {j}: {one.amplitude:.4g} m at {one.frequency:.6g} Hz, "
-                    + ("attracts" if one.attracts else "repels")
-                    for one in found
-                ]
+        for j, (found, why) in self.cycles.items():
+            said += [
+                f"limit cycle of wave {j}: {one.amplitude:.4g} m at {one.frequency:.6g} Hz, "
+                + ("attracts" if one.attracts else "repels")
+                + " along its mode"
+                for one in found
+            ]
+            if why:
+                said.append(f"limit cycles of wave {j}: {why}")
         return said
 
     def write(self, folder: Path) -> list[Path]:
@@ -128,20 +126,26 @@ def of_scene(file: SceneFile, start: float | None = None, stop: float | None = N
     with limited(scene.solver.threads):
         wheel = wheels.build(file)
         flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)
-        springs = wheel.springs
         calm = modelling.damped(scene, travelling_wave(wheel.reduced, 1))
-        eigenvalues = aeroelastic(calm, springs, flow)
-        cycles: dict[int, list[LimitCycle] | str] = {}
+        eigenvalues = aeroelastic(calm, wheel.springs, flow)
+        cycles: dict[int, tuple[list[LimitCycle], str]] = {}
         for index, value in sorted(eigenvalues.items(), key=lambda item: -item[1].real):
             if start is None or stop is None or value.real <= 0:
                 break
-            assert scene.wheel is not None
-            there = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"engine_order": index})})
-            wave = with_flow(modelling.damped(there, travelling_wave(wheel.reduced, index)), springs, flow)
-            balance = modelling.make_model(there, wheel.part, wave).balance
             options = BackboneOptions(points, newton=settings.newton_options(scene))
             try:
-                cycles[index] = limit_cycles(balance, start, stop, None, OUTPUT, options)
+                cycles[index] = limit_cycles(in_flow(file, wheel, index), start, stop, None, OUTPUT, options)
             except ValueError as error:
-                cycles[index] = str(error)
+                cycles[index] = [], str(error)
     return Flutter(file.name, eigenvalues, cycles)
+
+
+def in_flow(file: SceneFile, wheel: wheels.Wheel, index: int) -> HarmonicBalance:
+    """The balance of the wave of an index with the forces of the flow of its scene."""
+    scene = file.mesh_scene
+    assert scene.wheel is not None
+    assert scene.flow is not None
+    there = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"engine_order": index})})
+    flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)
+    wave = with_flow(modelling.damped(there, travelling_wave(wheel.reduced, index)), wheel.springs, flow)
+    return modelling.make_model(there, wheel.part, wave).balance

@@ -22,7 +22,7 @@ from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import highest_peak
-from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.linear.travelling_wave import at_sector
@@ -117,14 +117,15 @@ class Blades:
         return _converged(settings.peak_of(self.file.scene).first(self.wheel.wave), "sectors alike")
 
     @cached_property
-    def beginning(self) -> np.ndarray:
-        """(n_pair, n_component, n_coeff) of sectors alike at the lowest frequency, from which every pattern begins."""
-        low, _ = settings.response_range(self.file.scene)
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n_pair, n_component, n_coeff) of sectors alike at both ends of the range, where patterns begin."""
         one, info = self.wheel.wave, self.wheel.wave.model.info
         assert info.engine_order is not None
-        x = arc_length.solve_along_load(one, low, settings.newton_options(self.file.scene)).state.x
-        n = self.wheel.n_sectors
-        return np.concatenate([at_sector(one.basis, x, info.engine_order, n, k) for k in range(n)])
+        found, n = [], self.wheel.n_sectors
+        for omega in settings.response_range(self.file.scene):
+            x = arc_length.solve_along_load(one, omega, settings.newton_options(self.file.scene)).state.x
+            found.append(np.concatenate([at_sector(one.basis, x, info.engine_order, n, k) for k in range(n)]))
+        return found[0], found[1]
 
     def balance(self, pattern: Pattern) -> HarmonicBalance:
         """The whole wheel of a pattern."""
@@ -152,14 +153,29 @@ class Blades:
             max_step=LONGEST,
             min_step=SHORTEST,
             newton=settings.newton_options(scene),
-            guess=self.beginning,
+            guess=self.ends[0],
         )
-        branch = adaptive.follow(balance, low, high, scan)
-        if not branch.arrived:
-            raise SolveFailed(f"the frequency response {branch.end}")
-        heights = amplitude(branch.response[:, [branch.output_names.index(name) for name in names]])
-        if heights.argmax() // len(names) in (0, len(heights) - 1):
-            raise SolveFailed("the response still rises at an end of response.frequency: extend it")
+
+        def tall(branch: Branch) -> np.ndarray:
+            return amplitude(branch.response[:, [branch.output_names.index(name) for name in names]])
+
+        def passed(branch: Branch) -> bool:
+            return tall(branch).argmax() // len(names) not in (0, len(branch.omega) - 1)
+
+        # friction softens: from above the response is followed over its peak, and jumps behind it if at all
+        branch = adaptive.follow(balance, high, low, replace(scan, guess=self.ends[1], jumps=False))
+        if not branch.arrived and passed(branch):
+            below = adaptive.follow(balance, low, branch.omega[-1], replace(scan, jumps=False))
+            whole = below.arrived and tall(below).max() < tall(branch).max()
+        else:
+            whole = branch.arrived and passed(branch)
+        if not whole:
+            branch = adaptive.follow(balance, low, high, scan)
+            if not branch.arrived:
+                raise SolveFailed(f"the frequency response {branch.end}")
+            if not passed(branch):
+                raise SolveFailed("the response still rises at an end of response.frequency: extend it")
+        heights = tall(branch)
         best, blade = highest_peak.highest(balance, branch, names, settings.peak_of(scene))
         if best is None or best.amplitude < (1 - asked_of(self.file).tolerance) * heights.max():
             raise SolveFailed(f"the highest peak, near {_hertz(branch.omega[heights.argmax() // len(names)])}, is lost")
@@ -230,7 +246,7 @@ def solve(task: PatternTask) -> Row:
                 file = scene_file.parse(task.text, f"{task.name}.toml", task.overrides, task.folder)
                 _ready = task.wheel, Blades.of(file)
             blades = _ready[1]
-            alike, _ = blades.alike, blades.beginning  # of all patterns
+            alike, _ = blades.alike, blades.ends  # of all patterns
             start = time.process_time()
             found, blade = blades.peak(blades.pattern(task.number))
         except (ValueError, RuntimeError, np.linalg.LinAlgError, MemoryError) as error:

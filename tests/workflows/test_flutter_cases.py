@@ -1,0 +1,91 @@
+"""Ten wheels that flutter: every wave has its limit cycle or the reason why not, and time integration comes to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.wheel_scene import FLOW, WHEEL
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.free_vibration import FreeVibration
+from tribodyn.hbm.continuation.limit_cycles import LimitCycle
+from tribodyn.hbm.continuation.nonlinear_modes import newton_on
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.stability.exponents import stability
+from tribodyn.hbm.time.stepper import Options
+from tribodyn.hbm.time.time_integration import leave_alone
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.wheels import flutter
+from tribodyn.workflows.studies.wheels import wheel as wheels
+
+SCENE = WHEEL.replace("friction = 5.0", "friction = 0.3").replace('"2 %"', '"0.1 %"') + FLOW
+BY_DIAMETER = "[[-2, 0, 0.01], [-1, 0, 0.01], [0, 0, 0.01], [1, 0, -0.01], [2, 0, -0.02], [3, 0, 0.0]]"
+CASES = {
+    "plain": (),
+    "little preload": ("contact.gap='-0.01 mm'",),
+    "little friction": ("contact.friction=0.05",),
+    "much friction": ("contact.friction=1.0",),
+    "eight harmonics": ("harmonics.kept=[0, 1, 2, 3, 4, 5, 6, 7]", "harmonics.samples=128"),
+    "strong flow": ("flow.influence=[[0, 0, 0.012], [1, 0.06, 0.002], [-1, -0.06, 0.002]]",),
+    "second family": ("flow.influence=", f"flow.by_diameter={BY_DIAMETER}", "flow.mode=1"),
+    "eight sectors": ("wheel.sectors=8", "geometry.n_blades=8"),
+    "every wave": ("flow.influence=[[0, 0, -0.01]]",),
+    "spinning": ("wheel.speed='6000 rpm'",),
+}
+PERIODS = 200
+WITHIN = 0.03  # of a cycle
+ATTRACTING = {  # waves with a limit cycle that attracts
+    "plain": {1},
+    "little preload": {1},
+    "little friction": {1, 2},
+    "much friction": set(),
+    "eight harmonics": {1},
+    "strong flow": {1, 2},
+    "second family": {2},
+    "eight sectors": {1, 2, 3},
+    "every wave": {-1, 1, -2},
+    "spinning": {1, 2},
+}
+
+
+def keeps(balance: HarmonicBalance, cycle: LimitCycle) -> bool:
+    """Whether Hill's method finds no other motion of the cycle's own wave that grows."""
+    found = stability(balance, cycle.state, top=9)
+    own = found.exponents[found.diameters == 0]
+    return bool(np.delete(own, np.argmin(np.abs(own))).real.max() < 2e-3 * cycle.omega)
+
+
+@pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.slow) for c in CASES])
+def test_every_wave_that_flutters_has_a_limit_cycle_or_a_reason(case: str) -> None:
+    """An attracting cycle is what time integration comes to from 0.95 of its amplitude in the reference mode."""
+    kept = ("harmonics.kept=[0, 1, 2, 3]", *CASES[case])
+    file = scene_file.parse(SCENE, "wheel.toml", kept, Path())
+    found = flutter.of_scene(file, 1e-8, 1e-3, 30)
+    assert set(found.cycles) == {index for index, ratio in found.damping.items() if ratio < 0}
+    wheel = wheels.build(file)
+    attracting = set()
+    for index, (cycles, why) in found.cycles.items():
+        assert cycles or why
+        balance = replace(flutter.in_flow(file, wheel, index), load_factor=0.0)
+        problem = FreeVibration(balance, None, "response")
+        row = balance.compliance.output_names.index("response")
+        for cycle in (one for one in cycles if one.attracts and keeps(balance, one)):
+            attracting.add(index)
+            coordinates = cycle.point.coordinates.copy()
+            coordinates[-1] += np.log(0.95)
+            held = np.zeros(len(coordinates))
+            held[-1] = 1.0
+            begin, outcome, _ = newton_on(problem, problem.evaluate(coordinates), held, NewtonOptions())
+            assert outcome == CONVERGED
+            assert begin.zeta < 0  # it grows
+            start = balance.evaluate(begin.omega, begin.x)
+            alone = leave_alone(balance, cycle.omega, start, PERIODS, Options(steps=128), begin.zeta)
+            wanted = np.sqrt((cycle.response[row, 1:] ** 2).sum())
+            assert np.sqrt((problem.outputs(begin)[row, 1:] ** 2).sum()) < 0.97 * wanted
+            print(f"{case}: wave {index}, {wanted:.4g} m, time {alone.amplitude[row] / wanted - 1:+.2%}")
+            assert alone.amplitude[row] == pytest.approx(wanted, rel=WITHIN)
+    assert attracting == ATTRACTING[case]
