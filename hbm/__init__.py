@@ -7,7 +7,7 @@ rest                                  the preloaded state that friction begins f
 mistuning                             wheels whose blades differ
 outcome                               how a solve or a run ended
 derivatives                           what a solution changes by with every number of it
-threads, processes                    how many threads may work, and a second process that shares the work
+threads                               how many threads may work
 contact/                              joints and their laws
 linear/                               compliance of the structure where it touches
 continuation/                         response curves, folds, peaks, nonlinear modes

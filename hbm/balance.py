@@ -169,10 +169,14 @@ class HarmonicBalance:
         """(n_contact, n_coeff) response with every contact stuck and closed, the gap ignored [m]."""
         return self.loaded(self.at(omega).x_lin)
 
+    def shaped(self, flat: np.ndarray) -> np.ndarray:
+        """Rows of the contact (n_contact, n_coeff) as x (n_pair, n_component, n_coeff)."""
+        return flat.reshape(self.contact.n_pair, len(self.contact.components), flat.shape[-1])
+
     def stuck(self, omega: float) -> np.ndarray:
         """The same as a first guess x (n_pair, n_component, n_coeff) [m], about the state at rest where it is known."""
         x = self.x_lin(omega)
-        guess = x.reshape(self.contact.n_pair, len(self.contact.components), x.shape[-1])
+        guess = self.shaped(x)
         if self.at_rest is not None and self.basis.has_static:
             guess = np.concatenate([self.at_rest[..., None], guess[..., 1:]], axis=-1)
         return guess

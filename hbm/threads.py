@@ -2,8 +2,7 @@
 
 The solver makes many small products; BLAS threads that wait for each other make them many times slower, and two pay
 nowhere that was measured. So each entry of the solver is `single`: BLAS has one thread in it, however it is called.
-`limited` asks for more: BLAS has them outside of the solver, and what the solver can share among processes is shared,
-see `processes.shared`.
+`limited` asks for more: BLAS has them outside of the solver.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from threadpoolctl import ThreadpoolController
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_asked: ContextVar[int] = ContextVar("tribodyn_threads", default=1)
 _blas: ContextVar[int | None] = ContextVar("tribodyn_blas_threads", default=None)  # None: nobody has limited them yet
 
 
@@ -38,21 +36,11 @@ def usable(count: int) -> int:
     return min(count, ours or 1)
 
 
-def asked() -> int:
-    """Threads, or processes, that may work here: those of `limited`, else one."""
-    return _asked.get()
-
-
 @contextmanager
 def limited(count: int) -> Iterator[None]:
     """So many threads within the context, but not more than `usable`; BLAS has one of them in what is `single`."""
-    count = usable(count)
-    before = _asked.set(count)
-    try:
-        with _blas_threads(count):
-            yield
-    finally:
-        _asked.reset(before)
+    with _blas_threads(usable(count)):
+        yield
 
 
 @contextmanager

@@ -203,7 +203,7 @@ class _Place:
     @classmethod
     def at(cls, path: Parameter, value: float, flat: np.ndarray) -> _Place:
         balance, omega = path.place(value)
-        state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[-1]))
+        state = balance.evaluate(omega, balance.shaped(flat))
         error = relative_residual(state, balance.x_lin(omega))
         return cls(value, state, error if np.isfinite(error) else np.inf)
 

@@ -40,7 +40,7 @@ def driven(held: HarmonicBalance, branch: Branch) -> Branch:
     """A curve of `constant_response` with the load factor of each point, in the phase of the loads as they stand."""
     force = np.empty(len(branch.omega), complex)
     for i, omega in enumerate(branch.omega):
-        state = held.evaluate(omega, _shaped(held, branch.contact[i]), jacobian=False)
+        state = held.evaluate(omega, held.shaped(branch.contact[i]), jacobian=False)
         point = held.at(omega)
         assert isinstance(point, HeldPoint)
         force[i] = point.force(state.g, held.load_factor)
@@ -148,7 +148,3 @@ def _in_phase(balance: HarmonicBalance, branch: Branch, force: np.ndarray) -> Br
         for rows in (branch.response, branch.contact)
     ]
     return replace(branch, response=moved[0], contact=moved[1], load_factor=np.abs(force))
-
-
-def _shaped(balance: HarmonicBalance, flat: np.ndarray) -> np.ndarray:
-    return flat.reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)

@@ -241,7 +241,7 @@ def _sharp_tangent(path: Parameter, point: CurvePoint, metric: Metric, options: 
     """The tangent of a point, more accurate than the walk has it; raises BorderFailed."""
     balance, omega = path.place(point.value)
     flat = point.place.x
-    state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[-1]))
+    state = balance.evaluate(omega, balance.shaped(flat))
     return bordered.tangent(path, point.value, state, point.tangent, metric, options, RULES.fold_tangent_accuracy)
 
 

@@ -265,7 +265,7 @@ class _Surface:
     def _null(self, response: Parameter, guess: Direction, metric: Metric) -> Direction:
         """Tangent of the response curve at a guess, with the vibration itself as the border."""
         balance = response.make(guess.p)
-        state = balance.evaluate(guess.p, guess.x.reshape(balance.contact.n_pair, -1, guess.x.shape[-1]))
+        state = balance.evaluate(guess.p, balance.shaped(guess.x))
         border = metric.unit(Direction(np.where(balance.basis.order > 0, guess.x, 0.0), 0.0))
         try:
             return bordered.tangent(response, guess.p, state, border, metric, self._newton, self._options.accuracy)
@@ -289,7 +289,7 @@ class _Surface:
         def scalar(v: float, place: Direction) -> float:
             response = self._response(v)
             balance = response.make(v)
-            state = balance.evaluate(place.p, place.x.reshape(balance.contact.n_pair, -1, place.x.shape[-1]))
+            state = balance.evaluate(place.p, balance.shaped(place.x))
             return (
                 bordered.tangent(response, place.p, state, along, metric, self._newton, self._options.accuracy).p
                 / metric.width

@@ -252,7 +252,7 @@ class AtPeak:
             beside = branch.omega[best - 1 : best + 2]
             width = float(np.ptp(beside)) / 2
             within = float(beside.min()) - self.reach * width, float(beside.max()) + self.reach * width
-            x = _point(balance, branch, best)
+            x = balance.shaped(branch.contact[best])
             found = self._refine(balance, branch.omega[best], x, 0.5 * width, within)
             solves += found.solves
             if found.solution.converged:
@@ -319,7 +319,7 @@ class AtPeak:
         scanned = self._highest(few, branch, maxima[might])
         if self._is_rough(few) and not scanned.solution.converged:  # no slope vanishes: the highest point of the sweep
             best = maxima[might][0]
-            scanned = self._at(few, branch.omega[best], _point(few, branch, best), scanned.solves)
+            scanned = self._at(few, branch.omega[best], few.shaped(branch.contact[best]), scanned.solves)
         if not self._is_higher(scanned, point):
             return Overtaking(None, scanned.solves, nearness)
         found = self._raised(few, balance, scanned, far_enough=True)
@@ -435,11 +435,6 @@ class AtPeak:
             )
             found = replace(found, outcome=lost)
         return OperatingPoint.of(balance, found, self.output, solves)
-
-
-def _point(balance: HarmonicBalance, branch: Branch, i: int) -> np.ndarray:
-    """x of a point of a branch."""
-    return branch.contact[i].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
 
 
 def _carried(known: HarmonicBalance, point: OperatingPoint, to: HarmonicBalance) -> np.ndarray:

@@ -66,7 +66,7 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
         if candidate.turns:
             point = along_arc(balance, branch, i, site)
         else:
-            x, omega = _shaped(balance, branch, i), float(branch.omega[i])
+            x, omega = balance.shaped(branch.contact[i]), float(branch.omega[i])
             try:
                 point = site.within(balance, omega, x, candidate.low, candidate.high)
             except NoPeak:  # it still rises at the highest frequency that is modelled
@@ -120,15 +120,11 @@ def _hidden(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> f
     if not low < pole.real < high:
         return 0.0
     for k, way in ((i, 1.0), (i + 1, -1.0)):
-        state = balance.evaluate(float(branch.omega[k]), _shaped(balance, branch, k))
+        state = balance.evaluate(float(branch.omega[k]), balance.shaped(branch.contact[k]))
         slope = Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), site.output).slope
         if slope * way * (w[1] - w[0]) <= 0:
             return 0.0
     return float(abs(a) * abs(pole - w[0]) / max(abs(pole.imag), 1e-12 * abs(pole)))
-
-
-def _shaped(balance: HarmonicBalance, branch: Branch, i: int) -> np.ndarray:
-    return branch.contact[i].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
 
 
 def _lies_behind(branch: Branch, i: int, omega: float, flat: np.ndarray) -> bool:

@@ -211,7 +211,7 @@ class Stepper:
     def _legs(self, ahead: Direction) -> list[Direction]:
         """Directions in which the curve may continue, from the derivative at a place that need not lie on the curve."""
         balance, omega = self._path.place(ahead.p)
-        state = balance.evaluate(omega, ahead.x.reshape(balance.contact.n_pair, -1, ahead.x.shape[-1]))
+        state = balance.evaluate(omega, balance.shaped(ahead.x))
         o = self._options.newton
         try:
             leg = bordered.tangent(

@@ -1,4 +1,4 @@
-"""Stability of periodic solutions: Floquet exponents by Hill's method, or multipliers of the integrated motion.
+"""Stability of periodic solutions: Floquet exponents by Hill's method.
 
 Hill: a perturbation exp(lambda t) p(t), p periodic, of the modal coordinates of the stuck structure obeys
 
@@ -9,7 +9,7 @@ so the contact is eliminated exactly and what is left is a small quadratic eigen
 statically (W_0), and the contact law answers as to a steady vibration (its derivative by alternating frequency/time):
 exact where lambda = 0, so that a fold is where an exponent passes zero, and an approximation for laws with memory
 where it is not. Of small contacts an exponent that grows by it is solved for again with the law's answer to just that
-exponent (perturbed_contact). Floquet multipliers of the integrated motion (method "floquet") need neither assumption.
+exponent (perturbed_contact). Floquet multipliers of the integrated motion (`floquet`) need neither assumption.
 Source  Hill's method and the choice of exponents by their centre: Lazarus and Thomas 2010; Guillot et al. 2020; the
 elimination of the contact is ours
 """
@@ -24,7 +24,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from tribodyn.hbm import processes
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
 from tribodyn.hbm.continuation import parameter
@@ -34,7 +33,7 @@ from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.stability import crossing, floquet, wave_exponents
+from tribodyn.hbm.stability import crossing, wave_exponents
 from tribodyn.hbm.stability.perturbed_contact import answer_of
 from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
@@ -65,14 +64,12 @@ class Stability:
 
     omega : [rad/s]
     exponents : (n,) complex, growth rates lambda [1/s], largest real part first; imaginary parts within (-w/2, w/2]
-    method : "hill" or "floquet"
     diameters : (n,) of a travelling wave, index of each perturbation's wave beside that of the solution, 0 where it
         repeats itself from sector to sector as the solution does; None of a motion that is no wave
     """
 
     omega: float
     exponents: np.ndarray
-    method: str
     diameters: np.ndarray | None = None
 
     @property
@@ -132,33 +129,28 @@ class BranchStability:
 
 
 @single
-def stability(
-    balance: HarmonicBalance, state: State, method: str = "hill", n_modes: int | None = None, top: int | None = None
-) -> Stability:
+def stability(balance: HarmonicBalance, state: State, n_modes: int | None = None, top: int | None = None) -> Stability:
     """Stability of one solution.
 
-    state : converged; method : "hill", or "floquet" for small models, by time integration
-    n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic,
-        at least RULES.fewest_modes and at most RULES.most_modes of them
-    top : highest harmonic of the perturbation in Hill's method, by default that of the balance
+    state : converged
+    n_modes : modes that move dynamically, by default those below three times the highest harmonic, at least
+        RULES.fewest_modes and at most RULES.most_modes of them
+    top : highest harmonic of the perturbation, by default that of the balance
     A displacement that is prescribed in harmonic 0 alone is free to grow: the force that holds it stays as it is.
-    Raises  ValueError for unknown methods and for models whose harmonics see different systems, but for such a
-        displacement, and for travelling waves by Hill's method
+    Raises  ValueError for models whose harmonics see different systems, but for such a displacement and travelling
+        waves
     """
-    if method not in ("hill", "floquet"):
-        raise ValueError(f"no stability method '{method}': there are hill, floquet")
     balance = balance.standing(state.omega)
     model = balance.model
     model.require_masters("stability")
-    if method == "hill" and model.per_index is not None:
+    if model.per_index is not None:
         return _of_wave(balance, state, n_modes, top)
     if model.per_harmonic is not None and model.info.reaction is None:
         raise ValueError(
             "stability needs one system for all harmonics: perturbations of a stored cyclic part see other systems "
             "than the solution does"
         )
-    found = floquet.exponents(balance, state) if method == "floquet" else _hill(balance, state, n_modes, top)
-    return Stability(state.omega, _sorted(found, state.omega)[0], method)
+    return Stability(state.omega, _sorted(_hill(balance, state, n_modes, top), state.omega)[0])
 
 
 @single
@@ -175,32 +167,26 @@ def mark(
     path = parameter.of(problem)
     if path.name != branch.parameter_name:
         raise ValueError(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
-    count = len(branch.outcome)
-
-    def at(i: int) -> Stability | None:
-        if branch.outcome[i] != CONVERGED:
-            return None
-        balance, omega = path.place(float(branch.parameter[i]))
-        flat = branch.contact[i]
-        state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
-        return stability(balance, state)
-
-    found = processes.shared(at, count, None if on_point is None else lambda done: on_point(done, count))
+    found: list[Stability | None] = []
+    for value, flat, outcome in zip(branch.parameter, branch.contact, branch.outcome, strict=True):
+        here = None
+        if outcome == CONVERGED:
+            balance, omega = path.place(float(value))
+            state = balance.evaluate(omega, balance.shaped(flat))
+            here = stability(balance, state)
+        found.append(here)
+        if on_point is not None:
+            on_point(len(found), len(branch.outcome))
+    places = [Direction(x, float(value)) for x, value in zip(branch.contact, branch.parameter, strict=True)]
     changes = [
-        (i, (before, now))
+        _locate(path, i, (before, now), (places[i], places[i + 1]))
         for i, (before, now) in enumerate(itertools.pairwise(found))
         if before is not None and now is not None and before.n_unstable != now.n_unstable
     ]
-
-    def located(k: int) -> Bifurcation:
-        i, sides = changes[k]
-        ends = [Direction(branch.contact[j], float(branch.parameter[j])) for j in (i, i + 1)]
-        return _locate(path, i, sides, (ends[0], ends[1]))
-
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
         leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),
-        bifurcations=tuple(processes.shared(located, len(changes))),
+        bifurcations=tuple(changes),
     )
 
 
@@ -258,7 +244,7 @@ def _of_wave(balance: HarmonicBalance, state: State, n_modes: int | None, top: i
     slope, answer = _departure_slope(balance, state, basis), _answer(balance, state, basis)
     found, diameters = wave_exponents.exponents(balance, modes, state.omega, slope, answer)
     exponents, order = _sorted(found, state.omega)
-    return Stability(state.omega, exponents, "hill", diameters[order])
+    return Stability(state.omega, exponents, diameters[order])
 
 
 def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int | None) -> np.ndarray:

@@ -47,7 +47,7 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
     if _size(stepper) > RULES.max_states:
-        raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use the method hill")
+        raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
     if not motion.periodic:
         raise ValueError(f"no periodic motion near this state: {motion.outcome}")

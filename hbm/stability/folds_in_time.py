@@ -75,7 +75,7 @@ def solutions_at(
     for i in np.flatnonzero(beyond[:-1] * beyond[1:] < 0):
         share = beyond[i] / (beyond[i] - beyond[i + 1])
         x = (1 - share) * branch.contact[first + i] + share * branch.contact[first + i + 1]
-        solution = newton.solve(balance, omega, _shaped(balance, x))
+        solution = newton.solve(balance, omega, balance.shaped(x))
         if solution.converged:
             found.append(solution.state)
     return found
@@ -101,7 +101,7 @@ def fold_in_time(
         raise ValueError(f"point {fold} of the branch is no fold, the folds are {list(branch.folds)}")
     own, partner = _stable_side(balance, branch, fold)
     elsewhere = [stretch for stretch in _stretches(branch) if stretch not in (own, partner)]
-    at_fold = balance.evaluate(branch.omega[fold], _shaped(balance, branch.contact[fold]))
+    at_fold = balance.evaluate(branch.omega[fold], balance.shaped(branch.contact[fold]))
     side = np.sign(branch.omega[fold - 1] - branch.omega[fold])
     inside, outside = (float(branch.omega[fold] * (1 + s * bracket)) for s in (side, -side))
     last, stayed, left = float(branch.amplitude(output)[fold]), False, False
@@ -126,10 +126,6 @@ def fold_in_time(
     return FoldInTime(fold, float(branch.omega[fold]), inside, last, 2 * bracket / 2**bisections, outcome)
 
 
-def _shaped(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
-    return x.reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
-
-
 def _stretches(branch: Branch) -> list[tuple[int, int]]:
     """First and last point of each stretch of a curve between its folds."""
     ends = [0, *sorted(branch.folds), len(branch.omega) - 1]
@@ -142,6 +138,6 @@ def _stable_side(balance: HarmonicBalance, branch: Branch, fold: int) -> tuple[t
     before, after = (next(s for s in stretches if s[end] == fold) for end in (1, 0))
     growth = []
     for point in (max(fold - POINTS_BESIDE, before[0]), min(fold + POINTS_BESIDE, after[1])):
-        state = balance.evaluate(branch.omega[point], _shaped(balance, branch.contact[point]))
+        state = balance.evaluate(branch.omega[point], balance.shaped(branch.contact[point]))
         growth.append(float(exponents.stability(balance, state).exponents.real.max()))
     return (before, after) if growth[0] <= growth[1] else (after, before)

@@ -72,7 +72,7 @@ def ring_down(balance: HarmonicBalance, mode: Backbone, periods: int, steps: int
     free = balance.with_load(0.0)
     omega = float(mode.omega[-1])
     stepper = TimeStepper(free, omega, Options(steps=steps))
-    x = mode.contact[-1].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    x = balance.shaped(mode.contact[-1])
     moving = stepper.start_from(free.evaluate(omega, x), added=float(mode.damping[-1]))
     row = balance.compliance.output_names.index(mode.output)
     return from_decay(*_marched(stepper, moving, row, periods, least), omega)

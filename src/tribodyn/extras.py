@@ -6,7 +6,10 @@ import importlib
 from typing import Any
 
 EXTRA = {
+    "distributed": "cluster",
+    "emcee": "lives",
     "imageio_ffmpeg": "pictures",
+    "plotly": "pictures",
     "pyvista": "pictures",
     "pyarrow": "exports",
     "pyuff": "exports",
@@ -23,6 +26,5 @@ def package(name: str) -> Any:
     except ImportError:
         root = name.partition(".")[0]
         raise ValueError(
-            f"this needs the package {root.replace('_', '-')}: install it with "
-            f'pip install "tribodyn[{EXTRA[root]}]", or all that there is with pip install "tribodyn[all]"'
+            f'this needs the package {root.replace("_", "-")}: install it with pip install "tribodyn[{EXTRA[root]}]"'
         ) from None

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
+from tests.helpers.fits import plain
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.multigrid import rigid_motions
-from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 
@@ -26,8 +26,7 @@ SMALL = (
 def test_a_model_is_that_of_the_direct_solver() -> None:
     models = {}
     for solver in ("direct", "multigrid"):
-        bench = Bench()
-        models[solver] = bench.plain(scene_file.read("beam", (*SMALL, f"reduction.solver={solver}")))
+        models[solver] = plain(scene_file.read("beam", (*SMALL, f"reduction.solver={solver}")))
     direct, other = models["direct"], models["multigrid"]
     assert other.info.factorisation == "conjugate gradients with algebraic multigrid"
     assert other.info.free_frequency == pytest.approx(direct.info.free_frequency, rel=1e-8)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, diags_array, identity
 
+from tests.helpers.fits import plain
 from tribodyn.fem import mumps
 from tribodyn.fem.factor import SingularStiffness, factorise
-from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 
 
@@ -53,7 +53,7 @@ def spring_chain(n: int) -> csr_matrix:
 @installed
 @pytest.mark.usefixtures("two_processes")
 def test_two_processes_give_the_model_of_the_direct_solver() -> None:
-    found = [Bench().plain(scene_file.read("beam", (*SMALL, f"reduction.solver={s}"))) for s in ("direct", "mumps")]
+    found = [plain(scene_file.read("beam", (*SMALL, f"reduction.solver={s}"))) for s in ("direct", "mumps")]
     assert "2 MPI processes" in str(found[1].info.factorisation)
     assert found[1].info.free_frequency == pytest.approx(found[0].info.free_frequency, rel=1e-9)
     K, own = (model.system.stiffness for model in found)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, diags_array
 
+from tests.helpers.fits import plain
 from tribodyn.fem.factor import Pardiso, SingularStiffness, factorise, pardiso_available
-from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 
 pytestmark = pytest.mark.skipif(not pardiso_available(), reason="pypardiso is not installed")
@@ -50,7 +50,7 @@ def test_a_model_is_that_of_the_direct_solver(method: str) -> None:
     found = {}
     for solver in ("direct", "single_precision"):
         changes = (*SMALL, "reduction.modes=6", f"reduction.method={method}", f"reduction.solver={solver}")
-        found[solver] = Bench().plain(scene_file.read("beam", changes))
+        found[solver] = plain(scene_file.read("beam", changes))
     direct, other = found["direct"], found["single_precision"]
     assert other.info.factorisation == "MKL PARDISO in single precision, with conjugate gradients"
     assert other.info.free_frequency == pytest.approx(direct.info.free_frequency, rel=1e-9)

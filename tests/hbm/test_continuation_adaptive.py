@@ -9,8 +9,23 @@ from tests.helpers.continuation_models import Duffing, rubbing_mass
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive, natural
-from tribodyn.hbm.continuation.methods.adaptive import Options, interpolate
+from tribodyn.hbm.continuation.methods.adaptive import Options
+from tribodyn.hbm.continuation.methods.natural import EXTRAPOLATION_DEGREE, extrapolate
 from tribodyn.hbm.outcome import BranchEnd
+
+
+def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
+    """Response between the points of a branch, by the cubic through the four nearest points.
+
+    values : (n,) of the stepped parameter, within the branch
+    Returns (n, n_output, n_coeff) Fourier coefficients of the outputs [m]
+    """
+    order = np.argsort(branch.parameter)
+    known, response = branch.parameter[order], branch.response[order]
+    window = min(EXTRAPOLATION_DEGREE + 1, len(known))
+    first = np.clip(np.searchsorted(known, values) - window // 2, 0, len(known) - window)
+    pieces = [(slice(i, i + window), value) for i, value in zip(first, values, strict=True)]
+    return np.stack([extrapolate(known[piece], list(response[piece]), value) for piece, value in pieces])
 
 
 def worst(branch: Branch, reference: Branch) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.helpers.stability_in_time import stability_in_time
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
 from tests.helpers.verification_models import interface, oscillator
 from tribodyn.fem.system import SecondOrderSystem
@@ -25,8 +26,8 @@ from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 
 
-@pytest.mark.parametrize(("method", "smallest", "error"), [("hill", 0.0, 1e-9), ("floquet", 0.5, 0.02)])
-def test_exponents_of_a_stuck_contact_are_eigenvalues(method, smallest, error):
+@pytest.mark.parametrize(("in_time", "smallest", "error"), [(False, 0.0, 1e-9), (True, 0.5, 0.02)])
+def test_exponents_of_a_stuck_contact_are_eigenvalues(in_time, smallest, error):
     balance = three_pairs(friction=1e9, static=0.0, shaker=1.0, top=3)
     balance = balance.with_gap(np.full(3, -1e-4))  # pressed together by interference
     solution = newton.solve_from_rest(balance, FLIPS_AT)
@@ -37,7 +38,8 @@ def test_exponents_of_a_stuck_contact_are_eigenvalues(method, smallest, error):
     inverse = np.linalg.inv(system.mass)
     first_order = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ system.damping]])
     expected = np.exp(np.linalg.eigvals(first_order) * 2 * np.pi / FLIPS_AT)
-    result = stability(balance, solution.state, method, n_modes=n)
+    state = solution.state
+    result = stability_in_time(balance, state) if in_time else stability(balance, state, n_modes=n)
     assert result.stable
     assert len(result.exponents) == 2 * n
     for value in expected[np.abs(expected) > smallest]:
@@ -84,7 +86,7 @@ def test_hill_and_floquet_agree_on_a_flip_from_which_a_plain_march_departs():
     balance = three_pairs(friction=0.0, static=30.0, shaker=60.0, top=15)
     state = newton.solve_from_rest(balance, FLIPS_AT).state
     assert np.all(state.cycle.status == 6)
-    hill, floquet = stability(balance, state), stability(balance, state, "floquet")
+    hill, floquet = stability(balance, state), stability_in_time(balance, state)
     assert not hill.stable
     assert not floquet.stable
     assert hill.crossing == floquet.crossing == "flip"
@@ -122,7 +124,7 @@ def test_folds_of_a_lifting_mass_are_marked_where_the_branch_turns():
     assert np.all(marks.stable[second + 2 :])
     between = (first + second) // 2
     unstable = balance.evaluate(branch.omega[between], branch.contact[between].reshape(1, 1, -1))
-    by_time, by_hill = stability(balance, unstable, "floquet"), stability(balance, unstable)
+    by_time, by_hill = stability_in_time(balance, unstable), stability(balance, unstable)
     assert by_time.multipliers[0].real > 1
     assert by_time.multipliers[0] == pytest.approx(by_hill.multipliers[0], rel=0.02)
 
@@ -146,15 +148,13 @@ def test_names_and_refusals():
         model, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
     )
     state = newton.solve_from_rest(balance, 100.0).state
-    with pytest.raises(ValueError, match="no stability method"):
-        stability(balance, state, "guess")
     cyclic = ReducedModel(model.system, model.interface, per_harmonic=lambda h: (model.system, np.eye(2)))
     other = HarmonicBalance.of(
         cyclic, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
     )
     with pytest.raises(ValueError, match="one system for all harmonics"):
         stability(other, state)
-    assert Stability(10.0, np.array([1.0 + 3j]), "hill").crossing == "Neimark-Sacker"
+    assert Stability(10.0, np.array([1.0 + 3j])).crossing == "Neimark-Sacker"
 
 
 def self_excited(ratio: float, force: float) -> HarmonicBalance:
@@ -174,7 +174,7 @@ def test_growth_that_friction_limits_is_that_of_the_motion_in_time(ratio, force,
     """The answer to a steady vibration has no friction for the perturbation: by it every such motion grows."""
     balance = self_excited(ratio, force)
     state = newton.solve_from_rest(balance, omega).state
-    found, reference = (exponents.stability(balance, state, method) for method in ("hill", "floquet"))
+    found, reference = (way(balance, state) for way in (stability, stability_in_time))
     assert found.stable == reference.stable == stable
     assert np.abs(found.multipliers).max() == pytest.approx(np.abs(reference.multipliers).max(), rel=0.02)
     monkeypatch.setattr(exponents, "_answer", lambda *of: None)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import tiny_wheel as tiny
+from tests.helpers.stability_in_time import stability_in_time
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS
 from tribodyn.hbm.stability import exponents
@@ -54,7 +55,7 @@ def test_exponents_of_a_lifting_wave_are_those_of_the_monodromy_matrix_of_the_wh
     assert (here.cycle.status & SEPARATES).all()
     found = stability(one, here)
     assert len(found.exponents) == len(found.diameters) == 2 * 4 * tiny.N
-    reference = stability(wheel, there, "floquet")
+    reference = stability_in_time(wheel, there)
     unit = 2 * np.pi / found.omega
     assert matched(np.exp(found.exponents * unit), reference.multipliers) < 4e-4
     assert matched(reference.multipliers, np.exp(found.exponents * unit)) < 4e-4
@@ -78,7 +79,7 @@ def test_growth_that_friction_limits_is_that_of_the_whole_wheel_in_time(omega, m
     one, wheel = tiny.wave_and_wheel(slipping, "jenkins", 2, (0, 1, 2, 3, 4, 5), 12.0, damping=0.005, friction=0.4)
     here, there = solved(one, wheel, omega, 2)
     assert (here.cycle.status & SLIPS).all()
-    found, reference = stability(one, here), stability(wheel, there, "floquet")
+    found, reference = stability(one, here), stability_in_time(wheel, there)
     largest = np.abs(reference.multipliers).max()
     assert np.abs(found.multipliers).max() == pytest.approx(largest, rel=2e-4)
     monkeypatch.setattr(exponents, "_answer", lambda *of: None)

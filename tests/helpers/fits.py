@@ -6,12 +6,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tribodyn.workflows.run.reuse import Bench
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies.fits.curve_target import CurveTarget
 from tribodyn.workflows.studies.fits.fit_file import Answers, Asked
 
 
-def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
+def plain(file: SceneFile) -> ReducedModel:
+    """The reduction of a scene, not damped, with nothing prescribed."""
+    part, _ = modelling.with_surfaces(file.mesh_scene, modelling.part_of(file, Progress()), file.folder)
+    return modelling.plain_of(file, part)
+
+
+def predict(file: SceneFile, measured: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
     """(n_measured,) what a scene says to each measured number, to a curve at each of its points."""
-    return Answers(file, bench.model(file)).all_to(measured)
+    return Answers(file, modelling.build(file, Progress())).all_to(measured)

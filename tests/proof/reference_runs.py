@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.helpers.stability_in_time import stability_in_time
 from tests.proof.extremes_models import Body, lattice, rigid
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
@@ -21,7 +22,6 @@ from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
@@ -289,7 +289,7 @@ def in_time() -> Numbers:
         }
     stuck = rigid(1).balance(replace(rigid(1).ordinary, force=5.0, damping=0.05))
     still = newton.solve_from_rest(stuck, 1100.0).state
-    exponents = stability(stuck, still, "floquet").exponents
+    exponents = stability_in_time(stuck, still).exponents
     return found | {"Floquet exponents": np.array([exponents.real.max(), np.abs(exponents.imag).max()])}
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import tribodyn as td
 from tests.helpers.coarse_scenes import BLADE, RIG
-from tests.helpers.fits import predict
+from tests.helpers.fits import plain, predict
 from tests.helpers.pages import ROOT, fences
 from tests.helpers.structures import BLOCKS
 from tests.proof.problems import cycle_at
@@ -21,7 +21,6 @@ from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file
 from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
@@ -39,7 +38,7 @@ BEAM = (
 def found_again(scene, overrides, true, looked, measured):
     """Measure the scene with the true numbers, then look for them from the scene as it stands."""
     known = {name: Known(value=1.0, **table) for name, table in measured.items()}
-    answers = predict(Bench(), scene_file.read(scene, (*overrides, *true)), known)
+    answers = predict(scene_file.read(scene, (*overrides, *true)), known)
     assert (answers > 0).all()
     task = Task.model_validate(
         {
@@ -100,36 +99,34 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
     assert 1e-6 < found.values[0] < 4e-6
     assert changes[0].endswith(" m")
     file = scene_file.read("rig", (*RIG, *changes, "loads.harmonic.shaker.value=0"))
-    balance = Bench().model(file).balance
+    balance = modelling.build(file, Progress()).balance
     assert balance.preload(cycle_at(file, balance, 290.0)) == pytest.approx(36.0, rel=1e-4)
 
 
-def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypatch):
+def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypatch, tmp_path):
     measured = {
         "open": Known(of="open frequency", mode=3, value=300.0),
         "energy": Known(of="energy", at="290 Hz", value=1.0),
         "shaken": Known(of="preload", at="290 Hz", value=31.0),
     }
-    bench, answers = Bench(), []
+    made, answers, original = [], [], modelling.plain_model
+    monkeypatch.setenv("TRIBODYN_CACHE", str(tmp_path))
+    monkeypatch.setattr(modelling, "plain_model", lambda *args: made.append(1) or original(*args))
     for overrides in ((), ("springs.base_across.stiffness=5e8",), ("springs.base_across.stiffness=5e8", "wear=")):
-        file = scene_file.read("rig", (*RIG, *overrides))
-        plain = bench.reduced
-        answers.append(predict(bench, file, measured))
-        assert (bench.reduced is plain) == ("wear=" in overrides)
+        before = len(made)
+        answers.append(predict(scene_file.read("rig", (*RIG, *overrides)), measured))
+        assert (len(made) == before) == ("wear=" in overrides)
     assert answers[1][0] < 0.99 * answers[0][0]
     assert answers[2] == pytest.approx(answers[1])
     file = scene_file.read("rig", RIG)
-    balance = Bench().model(file).balance
+    balance = modelling.build(file, Progress()).balance
     state = cycle_at(file, balance, 290.0)
     assert answers[0][1:] == pytest.approx([balance.energy(state).sum(), balance.preload(state)], rel=1e-6)
 
 
 def test_a_wheel_has_the_frequencies_of_its_wave():
     known = {"first": Known(of="stuck frequency", mode=1, value=341.0)}
-    bench = Bench()
-    one, two = (
-        predict(bench, scene_file.read("blade_thesis", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2)
-    )
+    one, two = (predict(scene_file.read("blade_thesis", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2))
     assert 300 < one[0] < 400 < two[0] < 550
 
 
@@ -185,9 +182,9 @@ def test_a_bad_file_is_one_sentence_and_exit_code_2(text, words, tmp_path, capsy
 def test_a_life_without_wear_and_a_run_that_stops_early_are_told():
     life = {"life": Known(of="life", left=0.1, value=1e6)}
     with pytest.raises(ValueError, match=r"the scene has no \[wear\]"):
-        predict(Bench(), scene_file.read("beam", (*BEAM, "wear=")), life)
+        predict(scene_file.read("beam", (*BEAM, "wear=")), life)
     with pytest.raises(SolveFailed, match=r"measured.life: the preload did not fall to 0.1 .* stopped"):
-        predict(Bench(), scene_file.read("beam", (*BEAM, "wear.max_steps=1")), life)
+        predict(scene_file.read("beam", (*BEAM, "wear.max_steps=1")), life)
 
 
 def test_the_file_that_comes_with_the_program_is_sound_and_the_command_prints(tmp_path, capsys):
@@ -227,11 +224,13 @@ def test_friction_is_found_again_from_a_measured_curve(tmp_path):
 def test_residual_flexibility_is_that_beside_the_springs_of_each_trial():
     """What a reduction without masters leaves out depends on the contact springs; a trial with others has its own."""
     own = (*BEAM, "harmonics.kept=[0, 1]", "reduction.method=residual_flexibility")
-    bench, found = Bench(), []
+    found = []
     for stiffness in ("470 N/um", "200 N/um"):
         file = scene_file.read("beam_thesis", (*own, f"contact.tangential_stiffness={stiffness}"))
-        found.append(bench.plain(file).residual.stiffness)
-        np.testing.assert_array_equal(found[-1], Bench().plain(file).residual.stiffness)
+        found.append(plain(file).residual.stiffness)
+        own_part = modelling.part_of(file, Progress())
+        fresh = modelling.plain_model(file.mesh_scene, own_part)
+        np.testing.assert_array_equal(found[-1], fresh.residual.stiffness)
     assert not np.array_equal(*found)
 
 
@@ -257,7 +256,7 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
     assert found.rms < 1e-3
     file = scene_file.read(scene, own)
     opened = modelling.build(file, Progress()).reduced.interface.gap
-    np.testing.assert_allclose(Bench().plain(file).interface.gap, opened, rtol=0, atol=1e-20)
+    np.testing.assert_allclose(plain(file).interface.gap, opened, rtol=0, atol=1e-20)
     assert np.ptp(opened) > 1e-9
     assert fit_file.value_of(file.mesh_scene, "bodies.lower.length") == pytest.approx(0.1)
 

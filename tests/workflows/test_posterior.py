@@ -13,7 +13,6 @@ import tribodyn as td
 from tests.helpers.command import leave
 from tests.helpers.fits import predict
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import posterior
 from tribodyn.workflows.studies.fits.fit_file import Asked
@@ -100,7 +99,7 @@ AHEAD = {"amplitude": {"of": "amplitude", "at": "700 Hz", "load": 1.5}}
 
 def test_a_planted_truth_of_a_scene_is_in_its_interval(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     both = {name: Asked.model_validate(table) for name, table in (ASKED | AHEAD).items()}
-    truth = predict(Bench(), scene_file.read("beam", (*BEAM, *TRUTH)), both)
+    truth = predict(scene_file.read("beam", (*BEAM, *TRUTH)), both)
     off = (1 + 0.004, 1 - 0.03)  # what was measured misses the truth by some of its errors
     task = {
         "parameters": {

@@ -27,7 +27,7 @@ from tribodyn.workflows.scene import source
 from tribodyn.workflows.scene.fields import Quantity
 
 NAMES = {"start": "--from", "stop": "--to", "overrides": "--set"}
-Into = Literal["results", "beside", "pictures", "here", "asked"]
+Into = Literal["results", "beside", "here", "asked"]
 SUPPLIED = ("progress", "folder", "overrides")  # parameters that are not given as options of their own names
 
 
@@ -120,8 +120,8 @@ def word(
     """The function behind a word of the command line.
 
     words : such as "curve track", to tell how to continue
-    into : where --out is not given, tables and pictures go to results/NAME, beside the result, into pictures/ beside
-        it, beside the file that is given, or nowhere
+    into : where --out is not given, tables and pictures go to results/NAME, beside the result, beside the file
+        that is given, or nowhere
     """
     hints = get_type_hints(study, include_extras=True)
     parameters = inspect.signature(study).parameters
@@ -181,7 +181,6 @@ QUIET = Annotated[Flag, Parameter(help="Print no progress.")]
 _OUT = {
     "results": "Folder of tables and pictures; results/NAME by default.",
     "beside": "Folder of tables and pictures; that of the result by default.",
-    "pictures": "Folder of tables and pictures; pictures/ beside the result by default.",
     "here": "Folder of what is written; that of the file by default.",
     "asked": "Folder of tables and pictures; none are written by default.",
 }
@@ -237,8 +236,7 @@ def _folder(first: Any, into: str) -> Path | None:
         return None if into == "asked" else Path(first).parent
     if into == "results":
         return Path("results") / (Path(first).name.removesuffix(".toml") if first is not None else "study")
-    beside = store.result_file(first).parent
-    return beside / "pictures" if into == "pictures" else beside
+    return store.result_file(first).parent
 
 
 def _not_none(hint: Any) -> Any:

@@ -85,7 +85,7 @@ def _peak(file: SceneFile, model: modelling.Model, refined: bool) -> OperatingPo
     pipeline.check_branch(branch)
     height = branch.amplitude(settings.OUTPUT)
     best = int(np.argmax(np.where(branch.converged, height, -1.0)))
-    x = branch.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
+    x = balance.shaped(branch.contact[best])
     omega = float(branch.omega[best])
     if refined:
         return site.next(balance, omega, x)

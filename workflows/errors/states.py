@@ -88,7 +88,7 @@ class OnCurve:
 def highest_of(branch: Branch, balance: HarmonicBalance) -> OperatingPoint:
     """The highest point of a response curve, as it is; raises NoPeak where that is an end of it."""
     best = _highest(branch)
-    state = balance.evaluate(float(branch.omega[best]), _shaped(branch.contact[best], balance))
+    state = balance.evaluate(float(branch.omega[best]), balance.shaped(branch.contact[best]))
     height = branch.amplitude(branch.output_names[0])
     return OperatingPoint.of(balance, Solution(state, CONVERGED, 0, 0, ()), branch.output_names[0], len(height))
 
@@ -98,10 +98,6 @@ def _highest(branch: Branch) -> int:
     if best is None:
         raise NoPeak("the response is highest at an end of response.frequency, which is no peak: widen the range")
     return best
-
-
-def _shaped(flat: np.ndarray, balance: HarmonicBalance) -> np.ndarray:
-    return flat.reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
 
 
 def turns_back(branch: Branch) -> bool:
@@ -125,7 +121,7 @@ def first_state(file: SceneFile, balance: HarmonicBalance, result: Result) -> St
     if turns_back(branch):
         return State(0.0, balance, OnCurve(scene), highest_of(branch, balance))
     best, site = _highest(branch), settings.peak_of(scene)
-    point = site.next(balance, float(branch.omega[best]), _shaped(branch.contact[best], balance))
+    point = site.next(balance, float(branch.omega[best]), balance.shaped(branch.contact[best]))
     return _solved(State(0.0, balance, site, point))
 
 
@@ -136,7 +132,7 @@ def worn_state(file: SceneFile, balance: HarmonicBalance, result: Result, row: i
     duty = settings.mission(file.scene)[0]
     basis = HarmonicBasis(result.harmonics, balance.basis.n_samples)
     worn = balance.with_gap(balance.contact.gap + wear.depth[row]).with_load(duty.load)
-    x = _shaped(basis.transfer(wear.displacement[row], balance.basis), balance)
+    x = balance.shaped(basis.transfer(wear.displacement[row], balance.basis))
     return _solved(State(float(wear.cycles[row]), worn, duty.site, duty.site.next(worn, float(wear.omega[row]), x)))
 
 

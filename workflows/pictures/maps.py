@@ -125,7 +125,7 @@ def backbone_maps(balance: HarmonicBalance, found: Backbone, scene: str = "", co
 def backbone_motion(balance: HarmonicBalance, found: Backbone, at: int) -> Motion:
     """What the pairs do at a point of the backbone; a gap is negative where the faces stay in touch."""
     contact = balance.contact
-    x = found.contact[at].reshape(contact.n_pair, -1, balance.basis.n_coeff)
+    x = balance.shaped(found.contact[at])
     state = balance.evaluate(float(found.omega[at]), x, jacobian=False)
     slide, gap = slide_and_gap(balance.model.interface.components, x, balance.basis, contact.gap)
     return slide, gap, balance.energy(state) / balance.model.interface.area

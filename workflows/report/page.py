@@ -17,6 +17,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from tribodyn.extras import package
 from tribodyn.version import __version__
 from tribodyn.workflows.pictures import offscreen, plots, render
 from tribodyn.workflows.pictures.style import STYLE
@@ -97,11 +98,7 @@ def write(results: Sequence[tuple[str, Result, Path | None]], path: Path) -> Pat
 
 
 def _plotly() -> str:
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError:
-        raise ValueError('a report needs the package plotly: install it with pip install "plotly"') from None
-    return str(get_plotlyjs()).replace("</script", "<\\/script")
+    return str(package("plotly.offline").get_plotlyjs()).replace("</script", "<\\/script")
 
 
 def _chart_holder(title: str) -> str:

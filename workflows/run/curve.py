@@ -123,7 +123,7 @@ def shear_bounds(
     stuck, failed = np.zeros(n), np.zeros(n, int)
     for i in range(n):
         if branch.converged[i]:
-            x = branch.contact[i].reshape(balance.contact.n_pair, -1, branch.contact.shape[2])
+            x = balance.shaped(branch.contact[i])
             found = residual_shear.response_bounds(balance, branch.omega[i], x, None, newton)
             failed[i] = np.sum(~found.converged)
             if found.converged.any():

@@ -14,12 +14,14 @@ import os
 import pickle
 import platform
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
-import numpy as np
 from filelock import FileLock
 
 from tribodyn.fem.part import Part
@@ -51,6 +53,7 @@ OF_JOINT = {
 """... and a contact of it, besides the numbers of its law."""
 
 T = TypeVar("T")
+_last: ContextVar[dict[str, tuple[Any, Any]] | None] = ContextVar("tribodyn_last", default=None)
 
 
 def early_of(scene: MeshScene) -> str:
@@ -66,24 +69,33 @@ def early_of(scene: MeshScene) -> str:
     return json.dumps(scene.model_dump(mode="json", exclude=late), sort_keys=True)
 
 
+@contextmanager
+def at_hand() -> Iterator[None]:
+    """Within it the last part and the last reduction stay in memory too, for scenes that differ little."""
+    before = _last.set({})
+    try:
+        yield
+    finally:
+        _last.reset(before)
+
+
 def part(file: SceneFile, make: Callable[[], Part]) -> Part:
     """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
     early = json.loads(early_of(file.mesh_scene))
     del early["reduction"]
-    return _kept(file, lambda: _key(file, early), make)
+    return _kept(file, "part", (early,), make)
 
 
 def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) -> ReducedModel:
-    """The reduction of a part, not damped, with nothing prescribed: as it is kept, else made and kept."""
-    scene, interface = file.mesh_scene, whole.interface
+    """The reduction of a part, not damped, with nothing prescribed: as it is kept, else made and kept.
 
-    def key() -> str:
-        springs = b""
-        if scene.wheel or part_reduction.without_masters(scene, interface.B.shape[0], len(whole.held) > 0):
-            springs = joints.contact_stiffness(scene, joints.unreduced(whole)).tobytes()
-        return _key(file, json.loads(early_of(scene)), springs, np.asarray(interface.gap, float).tobytes())
-
-    return _kept(file, key, make)
+    It does not depend on the gaps, which are those of the part
+    """
+    scene, interface, springs = file.mesh_scene, whole.interface, b""
+    if scene.wheel or part_reduction.without_masters(scene, interface.B.shape[0], len(whole.held) > 0):
+        springs = joints.contact_stiffness(scene, joints.unreduced(whole)).tobytes()
+    found = _kept(file, "reduction", (json.loads(early_of(scene)), springs), make)
+    return replace(found, interface=replace(found.interface, gap=interface.gap))
 
 
 def folder() -> Path | None:
@@ -115,14 +127,21 @@ def _reads_others(path: Path, changed: int) -> bool:
     return path.suffix == ".py" or INCLUDES.search(path.read_bytes()) is not None
 
 
-def _kept(file: SceneFile, key_of: Callable[[], str], make: Callable[[], T]) -> T:
+def _kept(file: SceneFile, what: str, own: tuple[Any, ...], make: Callable[[], T]) -> T:
+    """own : what it is made of, its tables first."""
+    room, last = folder(), _last.get()
+    if last is not None and what in last and last[what][0] == own:
+        found: T = last[what][1]
+        return found
     with limited(file.scene.solver.threads):  # who makes it: another count rounds differently
-        return _kept_in(folder(), key_of, make)
+        found = make() if room is None else _kept_in(room, _key(file, *own), make)
+    if last is not None:
+        last[what] = own, found
+    return found
 
 
-def _kept_in(room: Path | None, key_of: Callable[[], str], make: Callable[[], T]) -> T:
-    key = "" if room is None else key_of()
-    if room is None or not key:
+def _kept_in(room: Path, key: str, make: Callable[[], T]) -> T:
+    if not key:
         return make()
     path, lock = room / f"{key}.pickle", FileLock(room / f"{key[:2]}.lock")
     try:

@@ -67,7 +67,7 @@ def _from_response(duty: Duty, branch: Branch, balance: HarmonicBalance) -> Duty
     peak = branch.peak(settings.OUTPUT)
     if peak is None or duty.load != 1 or duty.balance is not None or not isinstance(duty.site, AtPeak):
         return duty
-    x = branch.contact[peak].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    x = balance.shaped(branch.contact[peak])
     return replace(duty, start=(float(branch.omega[peak]), x))
 
 

@@ -306,5 +306,4 @@ class Solver(Table):
     krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
     """How exactly each Newton direction is solved, at the least."""
     threads: Annotated[StrictInt, Field(ge=1)] = 1
-    """Threads of the linear algebra while the model is made. With two or more, two processes mark the stability of a
-    response, on systems that can fork, such as Linux; all that is solved besides takes one."""
+    """Threads of the linear algebra while the model is made; all that is solved takes one."""

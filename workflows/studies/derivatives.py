@@ -204,7 +204,7 @@ def _found(
     balance, scene = varying.model.balance, varying.scene
     height = np.where(branch.converged, branch.amplitude(settings.OUTPUT), -1.0)
     near = int(np.argmax(height)) if at is None else int(np.argmin(np.abs(branch.frequency - at)))
-    x = branch.contact[near].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    x = balance.shaped(branch.contact[near])
     state = balance.evaluate(branch.omega[near] if at is None else 2 * np.pi * at, x)
     changes = []
     for i, (key, value) in enumerate(wanted.items()):

@@ -295,7 +295,7 @@ def _start(
 
 def _carried(flat: np.ndarray, basis: HarmonicBasis, balance: HarmonicBalance) -> np.ndarray:
     """A solution (n_contact, n_coeff) on the harmonics of a balance, as x (n_pair, n_component, n_coeff)."""
-    return basis.transfer(flat, balance.basis).reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    return balance.shaped(basis.transfer(flat, balance.basis))
 
 
 def _walk(

@@ -111,20 +111,6 @@ def _begin(path: Parameter, start: float, stop: float, options: Options) -> _Swe
     return _Sweep(path, options, first, start, stop)
 
 
-def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
-    """Response between the points of a branch, by the cubic through the four nearest points.
-
-    values : (n,) of the stepped parameter, within the branch
-    Returns (n, n_output, n_coeff) Fourier coefficients of the outputs [m]
-    """
-    order = np.argsort(branch.parameter)
-    known, response = branch.parameter[order], branch.response[order]
-    window = min(EXTRAPOLATION_DEGREE + 1, len(known))
-    first = np.clip(np.searchsorted(known, values) - window // 2, 0, len(known) - window)
-    pieces = [(slice(i, i + window), value) for i, value in zip(first, values, strict=True)]
-    return np.stack([extrapolate(known[piece], list(response[piece]), value) for piece, value in pieces])
-
-
 class _Sweep:
     """The last points, the step to come, and points solved ahead."""
 

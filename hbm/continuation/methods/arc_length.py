@@ -258,7 +258,7 @@ class _Walk:
         """Solve at the bound that the curve crosses; None where that leads elsewhere, and shorter steps are to come."""
         balance, omega = self._path.place(bound)
         flat = part.guess_at(bound)
-        guess = flat.reshape(balance.contact.n_pair, -1, flat.shape[-1])
+        guess = balance.shaped(flat)
         last = newton.solve(balance, omega, guess, self._options.newton)
         astray = last.converged and not self._stepper.arrives(part, bound, last)
         if astray and part.length > self._options.min_step and self._landings < self._options.rules.max_landings:

@@ -197,7 +197,7 @@ def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: i
         )
     at = sorted(branch.folds, key=lambda i: -branch.omega[i])[number - 1]
     balance = path.make(start)
-    x = branch.contact[at].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    x = balance.shaped(branch.contact[at])
     line = track_fold(path, start, stop, branch.omega[at], x, FoldOptions(max_points=points, newton=newton))
     amplitude = line.amplitude(settings.OUTPUT)
     frequency = line.omega / (2 * np.pi)

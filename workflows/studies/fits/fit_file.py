@@ -24,10 +24,9 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.derivatives import Change, Derivatives, NoDerivative, Posed
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.workflows.run import joints, modelling, settings, wear_run
+from tribodyn.workflows.run import joints, kept, modelling, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
-from tribodyn.workflows.run.reuse import Bench, early_of
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
@@ -183,7 +182,7 @@ def best(file: SceneFile, task: Task, progress: Progress) -> Fit:
     own = {name: value_of(file.mesh_scene, one.keys[0]) for name, one in task.parameters.items()}
     before = {name: value for name, value in own.items() if value is not None}
     known = before if len(before) == len(looked.parameters) else None
-    with threadpool_limits(1):
+    with threadpool_limits(1), kept.at_hand():
         found = fit(
             looked.parameters,
             looked.measured,
@@ -216,7 +215,7 @@ def posterior(
     asked = {**looked.targets, **wanted.predict}
     units = {name: MEASURED_IN[one.of] for name, one in wanted.predict.items()}
     priors = {name: looked.prior(name, one.prior) for name, one in wanted.parameters.items() if one.prior is not None}
-    with threadpool_limits(1):
+    with threadpool_limits(1), kept.at_hand():
         return posteriors.sample(
             looked.parameters, looked.measured, lambda values: looked.trial(values, asked), units, priors, trials, seed
         )
@@ -239,7 +238,7 @@ class _Looking:
         curves = {f"curves.{name}": CurveTarget.of(name, one, file) for name, one in task.curves.items()}
         self.measured += [number for one in curves.values() for number in one.numbers()]
         self.targets: Mapping[str, Asked | CurveTarget] = {**task.measured, **curves}
-        self._bench, self._count = Bench(), 0
+        self._count = 0
         self._last: Answers | None = None
 
     def changes(self, values: Mapping[str, float], digits: int = 17) -> list[str]:
@@ -253,7 +252,7 @@ class _Looking:
         """What the scene says with values; nearby : its cycles are found from those of the trial before."""
         self._count += 1
         trial = self.file.changed(*self.changes(values))
-        self._last = Answers(trial, self._bench.model(trial), self._last if nearby else None)
+        self._last = Answers(trial, modelling.build(trial, Progress()), self._last if nearby else None)
         found = self._last.all_to(asked)
         self._progress.say(
             f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items())
@@ -283,8 +282,7 @@ class _Looking:
     def _beside(self, values: Mapping[str, float]) -> Answers:
         """The scene with other values, of which nothing is solved yet."""
         file = self.file.changed(*self.changes(values))
-        same = early_of(file.mesh_scene) == self._bench.early
-        return Answers(file, (self._bench if same else Bench()).model(file))
+        return Answers(file, modelling.build(file, Progress()))
 
     @staticmethod
     def prior(name: str, table: Distribution) -> Marginal:

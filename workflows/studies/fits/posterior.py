@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.stats import qmc
 
+from tribodyn.extras import package
 from tribodyn.workflows.pictures.style import BLUE, INK, RED, STYLE
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.files import write_files
@@ -255,7 +256,7 @@ def _chains(
     box: _Box, levels: Sequence[Surrogate], target: np.ndarray, errors: np.ndarray, seed: int
 ) -> tuple[np.ndarray, float]:
     """Samples (n, k) as shares, and how many autocorrelation times the chains are long."""
-    emcee = _library()
+    emcee = package("emcee")
     k = len(box.parameters)
 
     def log_probability(share: np.ndarray) -> np.ndarray:
@@ -299,14 +300,6 @@ def _apart(share: np.ndarray, uncertainty: np.ndarray, known: np.ndarray) -> np.
         chosen.append(share[best])
         there = np.vstack([there, share[best]])
     return np.array(chosen)
-
-
-def _library() -> Any:
-    try:
-        import emcee
-    except ImportError:
-        raise ValueError('a posterior needs the package emcee: install it with pip install "tribodyn[lives]"') from None
-    return emcee
 
 
 def _picture(found: Posterior) -> Figure:

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from tribodyn.extras import package
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.many.task import Row, Task, solve
 
@@ -48,11 +49,6 @@ def _row(future: Any, task: Task, address: str) -> Row:
 
 
 def _library() -> Any:
-    try:
-        import distributed
-    except ImportError:
-        raise ValueError(
-            '--scheduler needs the package distributed: install it with pip install "tribodyn[cluster]"'
-        ) from None
+    distributed = package("distributed")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told in one sentence
     return distributed

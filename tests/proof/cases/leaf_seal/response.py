@@ -17,7 +17,8 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.stability.exponents import BranchStability
 from tribodyn.hbm.stability.exponents import mark as mark_stability
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.reuse import Bench
+from tribodyn.workflows.run.modelling import build
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies.supports import support_work
@@ -112,9 +113,8 @@ def respond(file: SceneFile) -> LeafResponse:
     """
     start = time.process_time()
     scene = file.part_scene
-    bench = Bench()
-    balance = bench.model(file).balance
-    part = bench.part
+    model = build(file, Progress())
+    balance, part = model.balance, model.part
     assert part is not None
     branch = follow_response(file, balance)
     seconds = time.process_time() - start

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tests.helpers.fits import plain
 from tests.proof.problems import cycle_at
 from tribodyn.hbm.balance import State
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.modelling import Model
-from tribodyn.workflows.run.reuse import Bench
+from tribodyn.workflows.run.modelling import Model, build
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.source import read_scene
@@ -48,18 +49,16 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Rig:
-    """file : the scene, with what was changed; opening : (n_pair,) of its gaps beyond it [m]; bench : shared."""
+    """file : the scene, with what was changed; opening : (n_pair,) of its gaps beyond it [m]."""
 
     file: SceneFile
-    bench: Bench
     opening: np.ndarray
 
     @classmethod
     def of(cls, file: SceneFile) -> Rig:
         """The rig of a scene; raises SceneError as `check` does."""
         check(file)
-        bench = Bench()
-        return cls(file, bench, np.zeros(bench.plain(file).interface.n_pair))
+        return cls(file, np.zeros(plain(file).interface.n_pair))
 
     @property
     def scene(self) -> PartScene:
@@ -109,11 +108,12 @@ class Rig:
 
     def plain(self) -> ReducedModel:
         """The reduced model, not damped, nothing prescribed."""
-        return self.bench.plain(self.file, self.opening)
+        return plain(self.file)
 
     def model(self) -> Model:
         """The nonlinear problem."""
-        return self.bench.model(self.file, self.opening)
+        found = build(self.file, Progress())
+        return replace(found, balance=found.balance.with_gap(found.balance.contact.gap + self.opening))
 
     def at_rest(self) -> Cycle:
         """The static state: the rig without its shaker force."""

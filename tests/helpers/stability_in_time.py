@@ -1,0 +1,15 @@
+"""Stability by Floquet multipliers of the integrated motion, to hold Hill's method against."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.stability import floquet
+from tribodyn.hbm.stability.exponents import Stability
+
+
+def stability_in_time(balance: HarmonicBalance, state: State) -> Stability:
+    """The stability of the motion that time integration finds from a state: no assumption of Hill's method."""
+    found = floquet.exponents(balance.standing(state.omega), state)
+    return Stability(state.omega, found[np.lexsort((found.imag, -found.real))])
