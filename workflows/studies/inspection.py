@@ -28,7 +28,6 @@ from tribodyn.workflows.scene.source import AnyPath, Overrides, read_scene
 from tribodyn.workflows.scene.structure import DeckTable
 
 
-
 @dataclass(frozen=True)
 class Inspection:
     """What was found, in SI units; see `record` for the fields. solids : the bodies, material {} where none is known"""
