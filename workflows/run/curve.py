@@ -124,7 +124,7 @@ def shear_bounds(
     for i in range(n):
         if branch.converged[i]:
             x = balance.shaped(branch.contact[i])
-            found = residual_shear.response_bounds(balance, branch.omega[i], x, None, newton)
+            found = residual_shear.response_bounds(balance, branch.omega[i], x, output, newton)
             failed[i] = np.sum(~found.converged)
             if found.converged.any():
                 low[:, i], high[:, i] = zip(found.amplitude_range(output), found.energy_range(), strict=True)
