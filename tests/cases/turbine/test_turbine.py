@@ -17,6 +17,7 @@ from tribodyn.workflows.studies.forces import BodyForces
 
 COARSE = (
     *("bodies.blade.n_span=2", "bodies.blade.n_along=3", "bodies.blade.n_up=2", "bodies.disk.n_axial=2"),
+    *("bodies.blade.n_through=1", "bodies.blade.n_side=1", "harmonics.kept=[0, 1]"),
     *("bodies.damper.n_damper=1", "bodies.blade.hub_radius=200 mm"),
 )
 __all__ = ["chromium"]
