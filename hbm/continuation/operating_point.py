@@ -161,34 +161,20 @@ class AtPeak:
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Scan the range, points dense where the response bends, then refine its highest maximum.
 
-        The scan has few harmonics where the balance has more, unless what it finds is no peak with all of them. Where
-        one with all of them ends early, as at a micro-fold, one with fewer follows.
+        The scan has few harmonics where the balance has more, unless what it finds is no peak with all of them.
         Where no maximum that may be the highest can be refined, as at a fold, none of the lower ones is taken for it
         Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
         """
         few = self._few(balance, self.scanned)
-        found = None if few.basis == balance.basis else self._first_by(few, balance)
-        if found is not None:
-            return found
+        if few.basis != balance.basis:
+            branch = self._scan(few)
+            with suppress(NoPeak):
+                scanned = self._highest(few, branch, self._candidates(branch))
+                found = self._raised(few, balance, scanned)
+                if found.solution.converged:
+                    return replace(found, solves=found.solves + scanned.solves)
         branch = self._scan(balance)
-        try:
-            return self._highest(balance, branch, self._candidates(branch))
-        except NoPeak:
-            few = self._few(balance, self.scanned_above)
-            ended_early = not branch.converged[-1] and few.basis != balance.basis
-            found = self._first_by(few, balance) if ended_early else None
-            if found is None:
-                raise
-            return found
-
-    def _first_by(self, few: HarmonicBalance, balance: HarmonicBalance) -> OperatingPoint | None:
-        """The highest peak of a scan with few harmonics, solved with all; None where it is none with all."""
-        with suppress(NoPeak):
-            scanned = self._highest(few, branch := self._scan(few), self._candidates(branch))
-            found = self._raised(few, balance, scanned)
-            if found.solution.converged:
-                return replace(found, solves=found.solves + scanned.solves)
-        return None
+        return self._highest(balance, branch, self._candidates(branch))
 
     def _is_rough(self, balance: HarmonicBalance) -> bool:
         """Whether a response may have micro-folds with so many harmonics: many jumps, slopes that say little."""

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from tests.helpers.pressed_body import balance_of, pressed_body
-from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import highest_peak
-from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.highest_peak import Sample
 from tribodyn.hbm.continuation.methods import adaptive
-from tribodyn.hbm.continuation.operating_point import AtPeak, NoPeak
+from tribodyn.hbm.continuation.operating_point import AtPeak
 
 
 def resonance(omega: np.ndarray, at: float, width: float, height: float) -> np.ndarray:
@@ -51,24 +49,3 @@ def test_the_peak_is_the_one_that_its_slope_finds() -> None:
     assert which == 0
     assert found.amplitude == pytest.approx(exact.amplitude, rel=1e-4)
     assert found.state.omega == pytest.approx(exact.state.omega, rel=1e-3)
-
-
-def test_where_a_scan_with_all_harmonics_ends_early_one_with_fewer_finds_the_peak(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    balance, site = balance_of(pressed_body(), (0, 1, 2, 3, 4, 5)), AtPeak("tip", 300.0, 700.0)
-    exact = site.first(balance)
-    scan = AtPeak._scan
-
-    def short(self: AtPeak, balance: HarmonicBalance, guess: np.ndarray | None = None) -> Branch:
-        if balance.basis.harmonics[-1] <= self.scanned_above:
-            return scan(self, balance, guess)
-        branch = scan(replace(self, stop=330.0), balance, guess)
-        return replace(branch, converged=np.arange(len(branch.omega)) < len(branch.omega) - 1)
-
-    monkeypatch.setattr(AtPeak, "_scan", short)
-    found = site.first(balance)
-    assert found.amplitude == pytest.approx(exact.amplitude, rel=1e-6)
-    assert found.state.omega == pytest.approx(exact.state.omega, rel=1e-3)
-    with pytest.raises(NoPeak, match="still rises towards the upper end"):
-        replace(site, stop=330.0).first(balance)
