@@ -1,6 +1,6 @@
 """Until the contact is lost
 
-Preload against cycles: the preload is lost slowly, then at once.
+Preload against cycles: what is pressed less wears less, so that the last of the preload fades away.
 """
 
 import tribodyn as td

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tests.helpers.reduced import reduce_part
 from tribodyn.fem.factor import factorise
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
@@ -96,7 +97,7 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
         clock = [time.process_time()]
         part = modelling.make_part(scene, mesh, node_sets)
         clock.append(time.process_time())
-        reduced = modelling.reduce_part(scene, part)
+        reduced = reduce_part(scene, part)
         balance = modelling.make_model(scene, part, reduced).balance
         clock.append(time.process_time())
         low, high = settings.response_range(scene)

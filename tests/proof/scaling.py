@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
+from tests.helpers.reduced import reduce_part
 from tribodyn.hbm.continuation.methods import natural
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
@@ -70,7 +71,7 @@ def measure(n_patch: int, points: int = POINTS) -> SizeCost:
         clock = [time.process_time()]
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
         part = modelling.make_part(scene, mesh, node_sets)
-        reduced = modelling.reduce_part(scene, part)
+        reduced = reduce_part(scene, part)
         clock.append(time.process_time())
         balance = modelling.make_model(scene, part, reduced).balance
         clock.append(time.process_time())

@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import tribodyn as td
+from tests.helpers.pages import ROOT, fences
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part
 from tribodyn.workflows.pictures import view
-from tribodyn.workflows.run import bodies, modelling
+from tribodyn.workflows.run import bodies, modelling, planning
 from tribodyn.workflows.run.description import part_mesh
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies import convergence
 
 LAP = (Path(__file__).parents[1] / "geometry" / "decks" / "lap.inp").read_text()
 # the deck's second block stands beside its first one: move it over
@@ -176,3 +179,62 @@ def test_faces_are_picked_by_rule_where_the_body_is_made(tmp_path: Path) -> None
     np.testing.assert_array_equal(of.node_sets["Block-2.patch"], np.flatnonzero(inside))
     with pytest.raises(ValueError, match=r"bodies.Block-2: faces.left: .* satisfies all its rules together"):
         part(PICKED.replace('normal = "-x"', 'normal = "-x"\nbox = [[0, 0, 0], ["40 mm", "20 mm", 0]]'), tmp_path)
+
+
+def of_page(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The deck and the scene of the page on decks, the deck changed; where the scene lies."""
+    for fence in fences(ROOT / "docs/howto/deck.md"):
+        text = fence.text
+        if fence.word == "lap.inp":
+            for old, new in changes:
+                assert old in text
+                text = text.replace(old, new)
+        if fence.word in ("lap.inp", "joint.toml"):
+            (folder / fence.word).write_text(text)
+    return folder / "joint.toml"
+
+
+COARSE = ("harmonics.kept=[0, 1]", "verdict.enabled=false", "response.points=5")
+GRIDS = """
+[converge.mesh]
+sizes = [1, 2, 4]
+set = [["decks.lap.halved=0"], ["decks.lap.halved=1"], ["decks.lap.halved=2"]]
+life_up_to = 1
+"""
+
+
+def test_a_convergence_keeps_the_peaks_of_grids_whose_wear_has_no_end(tmp_path: Path) -> None:
+    scene = of_page(tmp_path)
+    (tmp_path / "joint.study.toml").write_text(GRIDS)
+    found = convergence.converge(scene, overrides=COARSE)
+    (study,) = found.studies
+    assert [row.outcome for row in study.rows] == ["stopped after 1 wear steps", "converged", "converged"]
+    assert [row.pairs for row in study.rows] == [11, 35, 117]
+    finest = study.rows[-1].values["peak_hz"]
+    assert finest is not None
+    assert study.limits["peak_hz"].value == pytest.approx(finest, rel=2e-3)
+    assert any(line.startswith("1 % on peak frequency needs halved=1") for line in found.lines())
+    assert [path.name for path in found.write(tmp_path)] == ["converge_joint_mesh.png"]
+
+
+def test_a_body_that_tips_over_has_no_state_of_rest(tmp_path: Path) -> None:
+    scene = of_page(tmp_path, ("5., 0., 10.", "15., 0., 10."))  # 5 of its 20 mm lie on the lower one
+    with pytest.raises(RuntimeError, match="no state of rest was found under the static loads alone: .* may tip"):
+        td.run(str(scene), tmp_path / "out", overrides=(*COARSE, "wear="))
+
+
+GLUED = "*Tie, name=glue, position tolerance=5.\n Sole, Top\n*End Assembly"
+
+
+def test_a_plan_tells_faces_that_lie_apart(tmp_path: Path) -> None:
+    assert planning.plan(scene_file.read(of_page(tmp_path))).remarks == ()
+    lifted = ("5., 0., 10.", "5., 0., 12.")
+    (contact,) = planning.plan(scene_file.read(of_page(tmp_path, lifted))).remarks
+    assert contact == "the faces of contacts.joint lie up to 2 mm apart: correct their places"
+    plan = planning.plan(scene_file.read(of_page(tmp_path, lifted, ("*End Assembly", GLUED))))
+    tie = "the faces of tie 'glue' of deck lap lie up to 2 mm apart: correct their places"
+    assert plan.remarks == (contact, tie)
+    assert ("warning", tie) in plan.lines()
+    refused = GLUED.replace(", position tolerance=5.", "")
+    with pytest.raises(ValueError, match="2 mm apart on average"):
+        planning.plan(scene_file.read(of_page(tmp_path, lifted, ("*End Assembly", refused))))

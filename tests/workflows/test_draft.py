@@ -132,7 +132,7 @@ def test_a_contact_that_nothing_presses_is_said(direction: str, loose: bool) -> 
         (SMALLEST.replace("[loads.harmonic]", f"[loads]\n{press}[loads.harmonic]"), loose),
     ):
         file = scene_file.parse(text, "small.toml", coarse, Path())
-        found = list(sanity_checks.lines(file, modelling.build(file, None, Progress())))
+        found = list(sanity_checks.lines(file, modelling.build(file, Progress())))
         assert any("nothing presses" in line for line in found) == said
 
 

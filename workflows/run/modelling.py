@@ -117,7 +117,12 @@ def part_of(file: SceneFile, progress: Progress) -> Part:
 
 def plain_of(file: SceneFile, part: Part) -> ReducedModel:
     """The reduction of a part, not damped and with nothing prescribed; made once on a machine, see kept."""
-    return kept.reduction(file, part, lambda: plain_model(file.mesh_scene, part))
+
+    def made() -> ReducedModel:
+        memory.check(part.system.n_dof, file.mesh_scene.reduction.solver)
+        return plain_model(file.mesh_scene, part)
+
+    return kept.reduction(file, part, made)
 
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.helpers.reduced import reduce_part
 from tests.proof.cases.leaf_seal import figures as leaf_figures
 from tests.proof.cases.leaf_seal import fit as leaf_fit
 from tests.proof.cases.leaf_seal import record as leaf_record
@@ -41,7 +42,7 @@ def built(folder, *overrides):
     file = scene_file.read("leaf_seal_thesis", overrides)
     mesh, node_sets = modelling.make_mesh(file, folder)
     part = modelling.make_part(file.scene, mesh, node_sets)
-    return modelling.make_model(file.scene, part, modelling.reduce_part(file.scene, part))
+    return modelling.make_model(file.scene, part, reduce_part(file.scene, part))
 
 
 def dense_response(balance, omega):
