@@ -46,7 +46,7 @@ class Tie:
         reach = MORTAR.reach * one.length if self.reach is None else self.reach
         shared = common(one, two, reach)
         if not len(shared.weight):
-            raise ValueError(f"{self.what}: {apart(one, two, reach).replace('contact faces', 'tied faces')}")
+            raise ValueError(f"{self.what}: {apart(one, two, reach)}")
         return one, two, shared
 
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:

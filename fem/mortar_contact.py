@@ -105,7 +105,7 @@ def apart(one: Side, two: Side, reach: float) -> str:
     nearest = int(distance.argmin())
     facing = float(one.normal[nearest] @ two.normal[other[nearest]])
     if distance.min() <= reach + one.length and facing > 0:
-        return "the two contact faces look the same way: give faces that look at each other"
+        return "the two faces look the same way: give faces that look at each other"
     between = two.centre[other[nearest]] - one.centre[nearest]
     inside = float(between @ one.normal[nearest])
     beside = float(np.linalg.norm(between - inside * one.normal[nearest]))
@@ -116,7 +116,7 @@ def apart(one: Side, two: Side, reach: float) -> str:
             f"{reach:.3g} m where faces are looked for; move a body, or give reach"
         )
     return (
-        f"the two contact faces do not meet: they are about {distance.min():.3g} m apart, farther than the "
+        f"the two faces do not meet: they are about {distance.min():.3g} m apart, farther than the "
         f"reach of {reach:.3g} m; move a body, or give reach"
     )
 

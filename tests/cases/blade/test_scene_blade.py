@@ -226,7 +226,7 @@ def test_rotation_leads_to_the_left(finished):
         ("motion.shroud_right.direction=z", "motion has no meaning for a sector of a wheel"),
         ("wheel.sectors=1", "wheel.sectors: expected a value at least 2"),
         ("wheel.sectors=39", "wheel.sectors = 39, but the part is made for n_blades = 40"),
-        ("wheel.axis=-x", "the two contact faces do not meet"),
+        ("wheel.axis=-x", "faces do not meet"),
         ('loads.static={p = {group = "tip", opposite = "clamp", pressure = 1}}', "opposite only with value and direc"),
         ('loads.static={p = {group = "tip", opposite = "no", direction = "y", value = 1}}', "has no node set 'no'"),
         ("geometry.disk_radius=0.15", r"wheel.seam is missing, .* give wheel.seam = \["),
