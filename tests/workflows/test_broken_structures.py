@@ -59,7 +59,7 @@ BROKEN: dict[str, tuple[str, tuple[Change, ...], str, str]] = {  # name : scene,
     ),
     "tie that is apart": (
         BLOCKS, (), '[ties.g]\nfirst = "upper.x_min"\nsecond = "lower.x_max"\n',
-        "ties.g: the two tied",
+        "ties.g: the two faces do not meet: they",
     ),
     "nodes that do not match": (BLOCKS, ((BY, BY + '\npairing = "nodes"'),), "", "do not match: 20 of 21 .*same grid"),
     "tangent along the normal": (BLOCKS, (('t1 = "x"', 't1 = "z"'),), "", "t1 = .* give one along the face"),
