@@ -11,6 +11,7 @@ import pytest
 from tribodyn.geometry.gmsh_session import save, session
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_a_mesh_that_the_disk_does_not_take_whole_is_told(tmp_path: Path, share: float) -> None:
     """Gmsh says nothing where a disk is full; here its file is cut."""
@@ -34,6 +35,7 @@ def test_a_mesh_that_the_disk_does_not_take_whole_is_told(tmp_path: Path, share:
                 save(there, path)
 
 
+@pytest.mark.faults
 def test_a_session_that_was_cut_off_before_it_could_end_is_ended_first(capfd):
     gmsh = pytest.importorskip("gmsh")
     gmsh.initialize(readConfigFiles=False, interruptible=False)

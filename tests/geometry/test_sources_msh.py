@@ -124,6 +124,7 @@ def test_sets_of_corner_nodes_hold_the_nodes_added_between_them():
     assert "edge" not in body.mesh.boundaries
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize(("version", "binary"), [(4.1, 1), (4.1, 0), (2.2, 0)])
 def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, version, binary):
     """Cut anywhere, one bit turned, some bytes lost."""

@@ -218,12 +218,14 @@ exits.guard(command)
 """
 
 
+@pytest.mark.faults
 def test_ctrl_c_is_not_lost_while_an_object_is_freed() -> None:
     command = [sys.executable, "-c", CTRL_C_WHILE_AN_OBJECT_IS_FREED]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (exits.INTERRUPTED, "tribodyn: stopped.\n")
 
 
+@pytest.mark.faults
 def test_a_full_disk_is_told_by_name(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     def writes() -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "a.png"))

@@ -19,6 +19,8 @@ from tests.helpers import synthetic_result
 from tribodyn.workflows.result import store
 from tribodyn.workflows.scene import scene_file
 
+pytestmark = pytest.mark.faults
+
 TINY = ("harmonics.kept=[0, 1]",
     "geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "wear=",
         "verdict.enabled=false", "response.points=5")  # fmt: skip

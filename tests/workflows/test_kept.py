@@ -178,6 +178,7 @@ def empty(path: Path) -> None:
     path.write_bytes(b"")
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("damage", [cut, flipped, empty])
 def test_a_damaged_entry_is_made_again(made: list[str], tmp_path: Path, damage: Callable[[Path], None]) -> None:
     whole = built().reduced.system.stiffness

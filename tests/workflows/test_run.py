@@ -145,6 +145,7 @@ def test_transitions_are_located_where_every_law_can(tmp_path: Path) -> None:
         assert modelling.build(file, Progress()).balance.basis.transitions == wanted
 
 
+@pytest.mark.faults
 def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:
     whole = pipeline.run(read("beam", SMALLER), tmp_path / "whole", Progress())
     assert whole.wear is not None
@@ -160,6 +161,7 @@ def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:
     assert_same_wear(store.load(path), whole)
 
 
+@pytest.mark.faults
 def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
     finished: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -178,6 +180,7 @@ def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
         assert_same_wear(replace(earlier, stage=finished.stage, wear=told), finished)
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
 def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) -> None:
     smallest = (*SMALLER, "geometry.n_length=2", "reduction.modes=3", "harmonics.samples=32", "response.points=5")
@@ -217,6 +220,7 @@ def assert_same_wear(resumed: Result, whole: Result) -> None:
         assert np.array_equal(getattr(resumed.wear, name), getattr(whole.wear, name)), name
 
 
+@pytest.mark.faults
 def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
     process = start(tmp_path, "--set", "wear.step=0.01 %")  # of more steps than any machine takes in the meantime
     wait_for_rows(process, tmp_path / "result.h5", 2)

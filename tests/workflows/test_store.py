@@ -69,6 +69,7 @@ def test_mismatched_arrays_are_refused_and_leave_the_old_file(tmp_path: Path) ->
     assert [path.name for path in tmp_path.iterdir()] == ["result.h5"]
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("delay", [0.013, 0.021, 0.034, 0.055, 0.089])
 def test_a_kill_at_any_moment_leaves_a_whole_checkpoint(tmp_path: Path, delay: float) -> None:
     path = tmp_path / "result.h5"

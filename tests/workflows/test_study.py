@@ -196,6 +196,7 @@ def test_the_key_of_a_run_follows_its_files(tmp_path: Path) -> None:
     assert one.key != before
 
 
+@pytest.mark.faults
 def test_a_process_that_dies_takes_no_other_run_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     good = Task(1, "none", "", (), tmp_path)
     tasks = [replace(good, number=n) for n in (1, 2, 3, 4)]
@@ -204,6 +205,7 @@ def test_a_process_that_dies_takes_no_other_run_with_it(tmp_path: Path, monkeypa
     assert "died 3 times" in rows[2].sentence
 
 
+@pytest.mark.faults
 def test_the_command_resumes_a_study_that_was_killed(
     done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

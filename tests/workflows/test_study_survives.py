@@ -19,6 +19,7 @@ from tribodyn.workflows.studies.many import pool
 from tribodyn.workflows.studies.many.journal import Journal
 
 pytest.importorskip("distributed")
+pytestmark = pytest.mark.faults
 
 KEYS = {
     "loads.static.press.value": ["15 kN", "18 kN", "20 kN"],
