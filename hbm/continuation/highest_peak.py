@@ -49,7 +49,9 @@ def vertex(points: Sequence[Sample]) -> tuple[float, float]:
     """Frequency [rad/s] and height [m] of the peak through three points whose middle one is the highest."""
     middle = points[1]
     unit = abs(points[2].omega - points[0].omega)
-    w = np.array([point.omega - middle.omega for point in points]) / unit
+    w = np.array([point.omega - middle.omega for point in points]) / (unit or 1.0)
+    if unit == 0 or np.linalg.matrix_rank(np.vander(w)) < 3:  # no parabola where a curve stands or turns back on itself
+        return middle.omega, middle.height
     ratio = np.array([middle.height / max(point.height, 1e-6 * middle.height) for point in points])
     bend, slope, least = np.polyfit(w, ratio**2, 2)
     at = float(np.clip(-0.5 * slope / bend, *sorted((w[0], w[2])))) if bend > 0 else 0.0

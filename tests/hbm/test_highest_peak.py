@@ -30,6 +30,14 @@ def test_points_that_are_no_resonance_are_taken_as_they_are() -> None:
     assert highest_peak.vertex(points) == (1000.0, 1.0)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("omega", [(1.0, 2.0, 2.0), (2.0, 2.0, 2.0), (2.0, 3.0, 2.0), (1.0, 2.0, 2.0 + 1e-15)])
+def test_points_where_a_curve_stands_or_turns_back_have_no_parabola(omega: tuple[float, ...]) -> None:
+    """Met by arc length of two blocks out of a CAD file, which came back on the frequencies it had been at."""
+    points = [highest_peak.Sample(w, np.empty(0), height) for w, height in zip(omega, (1.0, 2.0, 1.5), strict=True)]
+    assert highest_peak.vertex(points) == (omega[1], 2.0)
+
+
 def test_the_higher_of_two_outputs_comes_first_and_a_low_one_not_at_all() -> None:
     omega = np.linspace(900.0, 1100.0, 41)
     heights = np.stack([resonance(omega, at, 8.0, high) for at, high in ((951.0, 1.0), (1003.0, 1.06), (1060.0, 0.5))])

@@ -145,8 +145,10 @@ def faults(*, tree: Path = Path(), seconds: float = 20.0, out: Path = Path("faul
 
 
 def fuzz(
-    scene: str,
+    scene: str | None = None,
     *,
+    count: int = 1000,
+    only: str = "",
     values: int | None = None,
     runs: int | None = None,
     seed: int = 0,
@@ -156,15 +158,20 @@ def fuzz(
     overrides: Overrides = (),
     as_json: Json = False,
 ) -> None:
-    """Give every key of a scene thirty fuzz inputs, one at a time, and report how the runs end.
+    """Give every key of a scene thirty fuzz inputs, one at a time, and report how the runs end; or damage all input.
 
-    All are read; the scenes that come out of those which reading accepts are run. Each ends well, is refused, or fails
-    with a sentence; exit code 3 where one does not.
+    With a scene, all are read; the scenes that come out of those which reading accepts are run. Without, several keys
+    and tables at once of small scenes, files of studies, optima and fits, decks and matrices, each run. Each ends well,
+    is refused, or fails with a sentence; exit code 3 where one does not.
 
     Parameters
     ----------
     scene
         Name of a scene or a .toml file; make it small with --set, so that a run takes a second.
+    count
+        Cases without a scene, drawn at random.
+    only
+        Beginning of the names of what is damaged, such as run or "study fit".
     values
         How many pairs of key and value, drawn at random; all of them by default.
     runs
@@ -172,7 +179,7 @@ def fuzz(
     seed
         Of the draws.
     seconds
-        Processor seconds that a run may take.
+        Processor seconds that a run may take; without a scene, without a word of progress.
     workers
         Runs at a time.
     out
@@ -181,39 +188,22 @@ def fuzz(
         Print JSON for machines.
     """
     from tests.proof import fuzz as measured
+    from tests.proof import fuzz_mixed
     from tribodyn.workflows.command import main as command
 
     make_room(out)
-    tried = measured.fuzz(scene, overrides, values, runs, seed, seconds, workers, aside, out, command=command.main)
+    if scene is None:
+        tried = fuzz_mixed.tries(count, seed, seconds, aside, workers, only, command=command.main)
+    else:
+        tried = measured.fuzz(scene, overrides, values, runs, seed, seconds, workers, aside, out, command=command.main)
     wrong = [one for one in tried if not one.good and not one.like]
     if as_json:
-        print(json.dumps({"counts": measured.counts(tried), "wrong": [one.record() for one in wrong]}, indent=2))
+        counts = {} if scene is None else {"counts": measured.counts(tried)}
+        print(json.dumps({**counts, "wrong": [one.record() for one in wrong]}, indent=2))
     else:
-        print(measured.as_text(tried))
+        print(fuzz_mixed.as_table(tried) if scene is None else measured.as_text(tried))
     if wrong:
         raise RuntimeError(f"{len(wrong)} of {sum(not one.like for one in tried)} values did not end as they may")
-
-
-def damage(*, cases: int = 1000, seed: int = 0, seconds: float = 10.0) -> None:
-    """Damage scenes in several keys and tables at once, files of studies, optima and fits, decks and matrices.
-
-    Each is read, a deck inspected and a scene planned besides; exit code 3 where one does not end well or refused.
-
-    Parameters
-    ----------
-    cases
-        How many, drawn at random; half of them are scenes.
-    seed
-        Of the draws.
-    seconds
-        Processor seconds that a case may take.
-    """
-    from tests.proof import fuzz_mixed
-
-    tried = fuzz_mixed.tries(cases, seed, seconds, aside)
-    print(fuzz_mixed.as_table(tried))
-    if wrong := sum(not one.good for one in tried):
-        raise RuntimeError(f"{wrong} of {cases} cases did not end as they may")
 
 
 def branches(*, problems: int = 20, first: int = 0, as_json: Json = False) -> None:
@@ -395,7 +385,6 @@ for word in (
     branches,
     ablations,
     fuzz,
-    damage,
     mistuned,
     motion,
     wear,

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tests.proof.fuzz_runs import ACCEPTED, REFUSED, Case, Command, Runs, Tried
+from tests.proof.fuzz_runs import ACCEPTED, REFUSED, Case, Command, Runs, Tried, scene_job
 from tests.proof.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.scene import scene_file
 
@@ -37,16 +37,17 @@ Row = TypeVar("Row", "_Meant", "Tried")
 
 def keys(scene: str, overrides: Sequence[str] = ()) -> list[str]:
     """Every section and key of a scene, "section.key", those at their defaults included."""
-    return sorted(set(_names(scene_file.read(scene, overrides).scene.model_dump(), "")))
+    return sorted(set(names_of(scene_file.read(scene, overrides).scene.model_dump())))
 
 
-def _names(table: dict[str, Any], above: str) -> Iterator[str]:
+def names_of(table: dict[str, Any], above: str = "") -> Iterator[str]:
+    """Every section and key of the tables of a scene."""
     for name, value in table.items():
         own = name == "parameters"  # of a part: keys of the table around them
         if not own:
             yield f"{above}{name}"
         if isinstance(value, dict):
-            yield from _names(value, above if own else f"{above}{name}.")
+            yield from names_of(value, above if own else f"{above}{name}.")
 
 
 def cases(scene: str, overrides: Sequence[str], count: int | None = None, seed: int = 0) -> list[Case]:
@@ -88,8 +89,9 @@ def fuzz(
     order = np.random.default_rng(seed).permutation(len(scenes))[:runs]
     drawn = [scenes[i][0] for i in sorted(order)] + unclear
     missing = [case for case in drawn if case not in rows.run or not rows.run[case].good]
-    runner = Runs(scene, tuple(overrides), seconds, workers, command)
-    for left, one in zip(reversed(range(len(missing))), runner.of(missing) if missing else (), strict=True):
+    runner = Runs((scene_job(scene, overrides),), seconds, workers, command)
+    todo = [scene_job(scene, overrides, *case) for case in missing]
+    for left, one in zip(reversed(range(len(missing))), runner.of(todo) if todo else (), strict=True):
         rows.add(one)
         if left % 20 == 0 or not one.good:
             say(f"{scene}: {len(drawn) - left} runs of {len(drawn)}, {one.key}={one.value}: {one.end}")

@@ -1,54 +1,237 @@
 """Damage of several kinds at once: keys two and three together, tables, files of studies and fits, decks, matrices.
 
-Each case is a text that something reads: a scene with its changes, a study, a search for an optimum, a fit, a deck of
-three programs, or matrices. It is read, a deck inspected besides, and a scene planned. It ends well, is refused with
-one sentence, or is wrong: another exception, a warning of a library, more than the seconds of the processor.
+Each case is a command with the files that it reads: small scenes are run, other shipped scenes planned, studies,
+searches for an optimum, lives and fits done, decks inspected and run in a scene, matrices run. It ends well, fails or
+is refused with one sentence, or is wrong: another exception, a warning of a library, a number that is not finite, more
+than ten seconds of the processor without a word of progress.
 """
 
 from __future__ import annotations
 
 import re
-import time
-import warnings
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import tomli_w
 from pyyeti.nastran import op4
 
 from tests.helpers import foreign_files
-from tests.helpers.pages import ROOT, fences
+from tests.helpers.coarse_scenes import BEAM
+from tests.helpers.matrix_scene import SCENE, matrix_folder
+from tests.helpers.pages import ROOT
+from tests.helpers.structures import BLOCKS
 from tests.proof import fuzz
-from tests.proof.time_limit import TimeUp, processor_seconds
-from tribodyn.reduction.foreign import read_matrices
-from tribodyn.workflows.run import planning
+from tests.proof.fuzz_runs import GOING, RUN, Command, Job, Runs, Tried
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import inspection
-from tribodyn.workflows.studies.fits import fit_file
-from tribodyn.workflows.studies.many import study_file
 
-READ, REFUSED = "read", "refused"
+QUIET = ("verdict.enabled=false", "harmonics.kept=[0, 1]", "harmonics.samples=32", "wear.max_steps=1")
+SMALL = {
+    "beam": (*BEAM, "verdict.enabled=false", "wear.max_steps=1"),
+    "leaf_seal": (
+        "geometry.n_column=9", "geometry.pin_column=2", "geometry.n_web=1", "reduction.modes=4",
+        "verdict.enabled=false", "harmonics.kept=[0, 1]", "response.frequency=['30 Hz', '45 Hz']",
+    ),
+    "blade": ("geometry.n_along=2", "geometry.n_up=2", "reduction.cutoff=3 kHz", "response.points=6", *QUIET),
+}  # fmt: skip
+"""Changes with which a run of a shipped scene takes a second or two of the processor."""
+
+VARY = {"contact.friction": [0.3, 0.5], "loads.static.press.value": ["10 kN", "20 kN"]}
+DRAWN = {
+    "contact.friction": {"distribution": "uniform", "low": 0.3, "high": 0.6},
+    "damping.modal": {"distribution": "loguniform", "low": "0.5 %", "high": "2 %"},
+}
+UNWORN = ["geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "wear=",
+          "harmonics.kept=[0, 1]", "harmonics.samples=32", "response.points=6"]  # fmt: skip
+FIT = {
+    "parameters": {"kt": {"keys": ["contact.tangential_stiffness"], "low": "200 N/um", "high": "900 N/um"}},
+    "measured": {"mode": {"of": "stuck frequency", "mode": 1, "value": "420 Hz"}},
+}
+APART = "          0.,           0.,          10.\n          0.,"  # where the second block stands beside the first one
+BESIDE = "0., -10., 10.\n 0.,"  # where it stands upon it
+DECK = """
+[scene]
+title = "A deck"
+[decks.lap]
+file = "lap.inp"
+unit = "mm"
+[loads.harmonic.shake]
+group = "Block-2"
+direction = "y"
+value = "1 N"
+[response]
+group = "Block-2"
+direction = "y"
+frequency = ["1 kHz", "2 kHz"]
+points = 5
+[reduction]
+modes = 4
+"""
+ROWS = """
+[scene]
+title = "Two DOFs and the ground"
+[model]
+{}
+[contact]
+dofs = [[0, 1, 2]]
+area = "10 mm2"
+tangential_stiffness = "1 N/m"
+normal_stiffness = "1 N/m"
+friction = 0.4
+[loads.static.press]
+dofs = [2]
+value = "1 N"
+[loads.harmonic.shaker]
+dofs = [0]
+value = "0.1 N"
+[response]
+dofs = [0]
+frequency = ["0.1 Hz", "0.4 Hz"]
+points = 5
+"""
 
 
 @dataclass(frozen=True)
-class Tried:
-    """One case. what : it is; end : read, refused, or what is wrong; said : the sentence; seconds : of the processor"""
+class Base:
+    """What cases are made of: a command, its files, and which of them is damaged.
+
+    tables : whether whole tables of it are damaged too; keys : of a scene, changed by --set
+    """
 
     what: str
-    changes: str
-    end: str
-    said: str
-    seconds: float
+    words: tuple[str, ...]
+    files: dict[str, bytes | Path]
+    damaged: str
+    tables: bool = False
+    keys: tuple[str, ...] = ()
+    own: dict[str, Any] = field(default_factory=dict)
 
-    @property
-    def good(self) -> bool:
-        """Whether it ended as it may."""
-        return self.end in (READ, REFUSED)
+    def job(self, changes: str = "", content: str | None = None, more: Sequence[str] = ()) -> Job:
+        """The command with changed contents of the file and more changes of keys."""
+        files = self.files if content is None else {**self.files, self.damaged: content.encode("latin-1", "replace")}
+        return Job(self.what, changes, "", (*self.words, *_set(more)), files)
+
+
+def _set(changes: Iterable[str]) -> tuple[str, ...]:
+    return tuple(word for text in changes for word in ("--set", text))
+
+
+def bases(folder: Path) -> list[Base]:
+    """All inputs as they are; folder : keeps files for them."""
+    return [*_scenes(), *_structures(folder), *_studies(), *_decks(folder), *_matrices(folder)]
+
+
+def _scene(what: str, text: str, words: Callable[[str], tuple[str, ...]], changes: Sequence[str], place: Path) -> Base:
+    """A scene in a file of its own, beside the files of a place."""
+    dump = scene_file.parse(text, "own.toml", changes, place).scene.model_dump()
+    beside: dict[str, bytes | Path] = {one.name: one for one in place.iterdir() if one.is_file()}
+    files = {**beside, "own.toml": text.encode()}
+    keys = tuple(sorted(set(fuzz.names_of(dump))))
+    return Base(what, (*words("own.toml"), *_set(changes)), files, "own.toml", True, keys, dump)
+
+
+def _run(name: str) -> tuple[str, ...]:
+    return "run", name, *RUN
+
+
+def _scenes() -> list[Base]:
+    """Shipped scenes: small ones run, all planned."""
+    found = []
+    for name in scene_file.names():
+        place = scene_file.find(name)
+        text = place.read_text(encoding="utf-8")
+        found.append(_scene(f"plan {name}", text, lambda file: ("plan", file), (), place.parent))
+        if name in SMALL:
+            found.append(_scene(f"run {name}", text, _run, SMALL[name], place.parent))
+    return found
+
+
+def _structures(folder: Path) -> list[Base]:
+    """Several bodies, a deck in a scene, and matrices in a scene."""
+    (empty := folder / "empty").mkdir()
+    (decks := folder / "decks").mkdir()
+    (rows := folder / "rows").mkdir()
+    lap = (ROOT / "tests/geometry/decks/lap.inp").read_text(encoding="utf-8")
+    lap = lap.replace(APART, BESIDE)
+    (decks / "lap.inp").write_text(lap, encoding="utf-8")
+    matrix_folder(rows)
+    (rows / "own.toml").unlink()
+    small = (*QUIET[:3], "response.points=5")
+    scene = _scene("run deck", DECK, _run, small, decks)
+    return [
+        _scene("run bodies", BLOCKS, _run, small, empty),
+        scene,
+        replace(scene, what="run deck damaged", files={**scene.files, "lap.inp": lap.encode()}, damaged="lap.inp",
+                tables=False),
+        _scene("run matrices", SCENE, _run, (*QUIET, "response.points=6"), rows),
+    ]  # fmt: skip
+
+
+def _studies() -> list[Base]:
+    """A study, lives, a search for an optimum and a fit of a small beam."""
+    shared = {"scene": "beam", "set": UNWORN}
+    peak = {"number": "peak_m_first"}
+    drawn = {"study": {**shared, "design": "sobol", "runs": 2, "seed": 1}, "vary": DRAWN}
+    best = {"aims": [{**peak, "want": "low"}], "evaluations": 3}
+    tables = {
+        "grid": {"study": {**shared, "design": "grid"}, "vary": VARY},
+        "lives": {**drawn, "study": {**drawn["study"], "runs": 9}, "lives": peak},
+        "optimise": {**drawn, "optimise": best},
+        "fit": FIT,
+    }
+    found = []
+    for word, table in tables.items():
+        text: bytes = tomli_w.dumps(table).encode()
+        words = ("study", word, "own.toml", "--workers", "1", "--out", "out")
+        if word == "fit":
+            words = ("study", "identify", "beam", "own.toml", *_set([*UNWORN, "verdict.enabled=false"]))
+        found.append(Base(f"study {word}", words, {"own.toml": text}, "own.toml", True))
+    return found
+
+
+def _decks(folder: Path) -> list[Base]:
+    """Decks of three programs with modes."""
+    mesh, found = foreign_files.bricks(folder), []
+    texts = {
+        ending: foreign_files.write(mesh, folder / f"deck{ending}", "").read_text()
+        for ending in (".inp", ".bdf", ".cdb")
+    }
+    texts[".cdb"] += "MP,DENS,1,7860.\n"
+    texts["_lap.inp"] = (ROOT / "tests/geometry/decks/lap.inp").read_text(encoding="utf-8").replace(APART, BESIDE)
+    for ending, text in texts.items():
+        words = ["inspect", f"own{ending}", "--unit", "mm", "--modes", "2"]
+        if "lap" not in ending:
+            words += ["--young", "210GPa", "--density", "7860 kg/m3"]
+        found.append(Base(f"inspect {ending}", tuple(words), {f"own{ending}": text.encode()}, f"own{ending}"))
+    return found
+
+
+def _matrices(folder: Path) -> list[Base]:
+    """Matrices of three formats in a scene, the file of the matrices damaged."""
+    K, M = np.diag([2.0, 3.0, 4.0]) - np.eye(3, k=1) - np.eye(3, k=-1), np.eye(3)
+    op4.write(str(folder / "two.op4"), {"k": K, "m": M}, binary=False)
+    entries = [f"DMIG,{name},{j + 1},1,,{i + 1},1,{m[i, j]}" for name, m in (("K", K), ("M", M))
+               for j in range(3) for i in range(j, 3)]  # fmt: skip
+    rows = {name: "".join(f"{i + 1},1,{j + 1},1,{m[i, j]}\n" for i in range(3) for j in range(i + 1))
+            for name, m in (("K", K), ("M", M))}  # fmt: skip
+    texts = {
+        "two.op4": (folder / "two.op4").read_text(),
+        "two.pch": "\n".join(["DMIG,K,0,6,2,0,,,3", "DMIG,M,0,6,2,0,,,3", *entries, ""]),
+        "K.mtx": rows["K"],
+    }
+    found = []
+    for name, text in texts.items():
+        model = 'mass = "M.mtx"\nstiffness = "K.mtx"' if name == "K.mtx" else f'file = "{name}"'
+        files: dict[str, bytes | Path] = {name: text.encode(), "own.toml": ROWS.format(model).encode()}
+        if name == "K.mtx":
+            files["M.mtx"] = rows["M"].encode()
+        words = (*_run("own.toml"), *_set(QUIET[:3]))
+        found.append(Base(f"run {name}", words, files, name))
+    return found
 
 
 def lines_damaged(text: str, rng: np.random.Generator) -> tuple[str, str]:
@@ -103,23 +286,21 @@ def tables_damaged(text: str, rng: np.random.Generator) -> tuple[str, str]:
     return "".join([*parts[:i], *changed[kind], *parts[i + 1 :]]), f"table {parts[i][:30].splitlines()[:1]} {kind}"
 
 
-def _scene(name: str, rng: np.random.Generator) -> tuple[Callable[[], object], str]:
-    """A shipped scene with two or three keys changed, or with damage to its text and a key."""
-    texts, said = scene_file.find(name).read_text(encoding="utf-8"), ""
-    if rng.random() < 0.5:
-        texts, said = (tables_damaged if rng.random() < 0.5 else lines_damaged)(texts, rng)
-    dump, every = scene_file.read(name).scene.model_dump(), fuzz.keys(name)
-    if rng.random() < 0.6:
-        every = [key for key in every if isinstance(_own(dump, key), bool | int | float)]
-    keys = rng.choice(every, int(rng.integers(0 if said else 2, 4)), replace=False)
-    changes = tuple(f"{key}={_value(_own(dump, str(key)), rng)}" for key in keys)
-    place = scene_file.find(name).parent
-
-    def read() -> object:
-        file = scene_file.parse(texts, f"{name}.toml", changes, place)
-        return planning.plan(file)
-
-    return read, " ".join([said, *changes])
+def case(base: Base, rng: np.random.Generator) -> Job:
+    """An input with two or three keys changed, or with damage to its text and some keys."""
+    content = said = None
+    if not base.keys or rng.random() < 0.4:
+        text = base.files[base.damaged]
+        assert isinstance(text, bytes)
+        damage = tables_damaged if base.tables and rng.random() < 0.4 else lines_damaged
+        content, said = damage(text.decode(), rng)
+    changes: list[str] = []
+    if base.keys:
+        numbers = [key for key in base.keys if isinstance(_own(base.own, key), bool | int | float)]
+        every = numbers if rng.random() < 0.8 else base.keys
+        keys = rng.choice(every, int(rng.integers(0 if said else 2, 4)), replace=False)
+        changes = [f"{key}={_value(_own(base.own, str(key)), rng)}" for key in keys]
+    return base.job(" ".join([*([said] if said else []), *changes]), content, changes)
 
 
 def _own(dump: Any, key: str) -> Any:
@@ -131,120 +312,53 @@ def _own(dump: Any, key: str) -> Any:
 
 def _value(own: Any, rng: np.random.Generator) -> str:
     """A fuzz input for a key, or, more often, its own number somewhat changed or its switch the other way."""
-    if rng.random() < 0.2 or not isinstance(own, bool | int | float):
+    if rng.random() < 0.1 or not isinstance(own, bool | int | float):
         return str(rng.choice(fuzz.INPUTS))
     if isinstance(own, bool):
         return str(not own).lower()
-    factor = float(rng.choice([0.0, 0.1, 0.5, 1.0, 2.0, 10.0]))
+    factor = float(rng.choice([0.0, 0.1, 0.5, 0.9, 1.0, 1.1, 2.0, 10.0]))
     return str(round(own * factor) if isinstance(own, int) else own * factor)
 
 
-def _texts() -> dict[str, tuple[str, Callable[[Path], object]]]:
-    """Files of studies, lives, optima and fits as the pages and the cases have them, with what reads each."""
-    found: dict[str, tuple[str, Callable[[Path], object]]] = {}
-    for page in ("study", "optimise", "lives"):
-        for k, fence in enumerate(fences(ROOT / f"docs/howto/{page}.md")):
-            if fence.language == "toml" and fence.word and "[vary" in fence.text:
-                found[f"{page} {k}"] = fence.text, study_file.read
-    fit = next(scene_file.CASES.glob("*/*.fit.toml"))
-    found["fit"] = fit.read_text(encoding="utf-8"), fit_file.read
-    return found
+def tries(
+    count: int,
+    seed: int = 0,
+    seconds: float = 10.0,
+    say: Callable[[str], None] = lambda _: None,
+    workers: int = 1,
+    only: str = "",
+    *,
+    command: Command,
+) -> list[Tried]:
+    """So many cases drawn at random, each run.
 
-
-def _files(folder: Path) -> dict[str, tuple[str, Callable[[Path], object]]]:
-    """Decks of three programs, and matrices in text, with what reads each."""
-    mesh, found = foreign_files.bricks(folder), {}
-
-    def look(path: Path) -> object:
-        return inspection.inspect(path, unit="m", modes=2 if "*" in path.read_text(errors="replace") else 0)
-
-    for ending in (".inp", ".bdf", ".cdb"):
-        found[f"deck {ending}"] = foreign_files.write(mesh, folder / f"deck{ending}", "").read_text(), look
-    lap = ROOT / "tests/geometry/decks/lap.inp"
-    found["deck lap.inp"] = lap.read_text(encoding="utf-8"), look
-    K = np.diag([2.0, 3.0, 4.0]) - np.eye(3, k=1) - np.eye(3, k=-1)
-    op4.write(str(folder / "two.op4"), {"k": K, "m": np.eye(3)}, binary=False)
-    found["matrices .op4"] = (folder / "two.op4").read_text(), read_matrices
-    entries = [f"DMIG,{name},{j + 1},1,,{i + 1},1,{m[i, j]}" for name, m in (("K", K), ("M", np.eye(3)))
-               for j in range(3) for i in range(j, 3)]  # fmt: skip
-    found["matrices .pch"] = "\n".join(["DMIG,K,0,6,2,0,,,3", "DMIG,M,0,6,2,0,,,3", *entries, ""]), read_matrices
-    rows = "".join(f"{i + 1},1,{j + 1},1,{K[i, j]}\n" for i in range(3) for j in range(i + 1))
-    found["matrices .mtx"] = rows, lambda path: read_matrices(mass=path, stiffness=path)
-    return found
-
-
-def tries(count: int, seed: int = 0, seconds: float = 10.0, say: Callable[[str], None] = lambda _: None) -> list[Tried]:
-    """So many cases drawn at random, each tried; half of them are scenes.
-
-    seconds : of the processor that each may take
+    seconds : of the processor that each may take without a word of progress; six times as many in all
+    only : the beginning of the names of what is taken
+    command : what `tribodyn` does with the words of a command line; it leaves by SystemExit
     """
     rng, found = np.random.default_rng(seed), []
     with TemporaryDirectory() as name:
-        folder = Path(name)
-        texts = {**_texts(), **_files(folder)}
-        scenes = scene_file.names()
-        for number in range(count):
-            if number % 2 == 0:
-                what = str(rng.choice(scenes))
-                read, changes = _scene(what, rng)
-            else:
-                what = str(rng.choice(list(texts)))
-                text, reader = texts[what]
-                ending = re.search(r"\.\w+$", what)
-                damage = tables_damaged if ending is None and rng.random() < 0.4 else lines_damaged
-                text, changes = damage(text, rng)
-                path = folder / f"damaged{ending[0] if ending else '.toml'}"
-                path.write_bytes(text.encode("latin-1", "replace"))
-                read = partial(reader, path)
-            found.append(_try(what, changes, read, seconds))
-            if not found[-1].good:
-                say(f"{what}: {changes}: {found[-1].end}: {found[-1].said}")
+        known = [base for base in bases(Path(name)) if base.what.startswith(only)]
+        jobs = [case(known[int(rng.integers(len(known)))], rng) for _ in range(count)]
+        first = tuple(base.job() for base in known if not base.what.startswith("plan"))
+        for one in Runs(first, seconds, workers, command, 6 * seconds).of(jobs):
+            found.append(one)
+            if not one.good or len(found) % 50 == 0:
+                say(f"{len(found)} of {count}: {one.scene}: {one.key}: {one.end}: {one.said[-300:]}")
     return found
 
 
-def _try(what: str, changes: str, read: Callable[[], object], seconds: float) -> Tried:
-    clock, end, said = time.process_time(), READ, ""
-    try:
-        with warnings.catch_warnings(), processor_seconds(seconds):
-            warnings.simplefilter("error")
-            read()
-    except ValueError as error:
-        end, said = REFUSED, str(error)
-        if "\n" in said or not said or len(said) > 2000:
-            end = "no single sentence"
-        if _alien(error):
-            end = f"a ValueError of a library, {_alien(error)}"
-    except TimeUp:
-        end = f"longer than {seconds:g} s"
-    except Warning as warning:
-        end, said = "a warning of a library", repr(warning)
-    except Exception as error:
-        end, said = "traceback", f"{type(error).__name__}: {error} at {_alien(error)}"
-    return Tried(what, changes, end, said, time.process_time() - clock)
-
-
-def _alien(error: BaseException) -> str:
-    """Where an exception was raised, if not in this tree."""
-    trace = error.__traceback__
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
-    file = "" if trace is None else trace.tb_frame.f_code.co_filename
-    own = "site-packages" not in file and ("tribodyn" in file or str(ROOT) in file)  # the environment lies in the tree
-    if not own or not isinstance(error, ValueError):
-        return f"{Path(file).name}:{trace.tb_lineno if trace else 0}"
-    return ""
-
-
 def as_table(tried: Sequence[Tried]) -> str:
-    """A row for each kind of file, and a line for each wrong end."""
+    """A row for each kind of input, and a line for each wrong end."""
     kinds: dict[str, list[Tried]] = {}
     for one in tried:
-        kind = one.what.split()[0] if " " in one.what else "fit" if one.what == "fit" else "scene"
-        kinds.setdefault(kind, []).append(one)
-    rows = ["| what | cases | read | refused with a sentence | wrong | slowest |", "|---|---|---|---|---|---|"]
-    for kind, ours in sorted(kinds.items()):
-        ends = Counter(one.end for one in ours)
-        wrong = sum(not one.good for one in ours)
-        slowest = max(one.seconds for one in ours)
-        rows.append(f"| {kind} | {len(ours)} | {ends[READ]} | {ends[REFUSED]} | {wrong} | {slowest:.1f} s |")
-    return "\n".join(rows + [f"{o.what} {o.changes}: {o.end}: {o.said[:300]}" for o in tried if not o.good])
+        kinds.setdefault(one.scene, []).append(one)
+    ends = ("success", "refused", "failed", GOING)
+    rows = [f"| what | cases | {' | '.join(ends)} | wrong | slowest | longest without a word |", "|---" * 9 + "|"]
+    for kind, ours in [*sorted(kinds.items()), ("all", list(tried))]:
+        how = Counter(one.end for one in ours)
+        cells = [str(how[end]) for end in ends]
+        wrong, slow, mute = (sum(not one.good for one in ours), *(max(getattr(one, of) for one in ours)
+                             for of in ("seconds", "silent")))  # fmt: skip
+        rows.append(f"| {kind} | {len(ours)} | {' | '.join(cells)} | {wrong} | {slow:.1f} s | {mute:.1f} s |")
+    return "\n".join(rows + [f"{o.scene}: {o.key}: {o.end}: {o.said[-300:]}" for o in tried if not o.good])

@@ -16,6 +16,7 @@ import numpy as np
 from tribodyn.fem.assembly import pieces
 from tribodyn.fem.constraints import free_dofs, named
 from tribodyn.fem.couplings import Tie
+from tribodyn.fem.surface import surface
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.workflows.run import bodies, matrix_model
@@ -212,7 +213,11 @@ def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free
         if contact.plane is not None and contact.components == ("n",):
             axes = np.flatnonzero(contact.plane)
         masters += [(side[:, None] * 3 + axes).ravel() for side in (nodes[:1] if scene.reduction.relative else nodes)]
-        pairs += sum(len(side) for side in nodes[: len(contact.groups)])
+        sides = nodes[: len(contact.groups)]
+        if contact.face_centres:
+            facets = (named(mesh.boundaries, name) for name in contact.groups)
+            sides = [surface(mesh, of, contact.vertices_only).faces for of in facets]
+        pairs += sum(len(side) for side in sides)
     masters += [named(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
     touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= LIMITS.point_load]

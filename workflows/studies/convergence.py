@@ -146,7 +146,7 @@ def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: 
             values=grid[0].values,
             errors={q: _off(grid[0].values[q], limits.get(q)) for q in QUANTITIES},
             worst={q: _worst(_values(grid, q), limits.get(q)) for q in QUANTITIES},
-            map_difference=None if grid[0] is finest else map_difference(grid[0], finest),
+            map_difference=map_difference(grid[0], finest) if _responds(grid[0]) and grid[0] is not finest else None,
             seconds=sum(one.seconds for one in grid),
             outcome=next((one.outcome for one in grid if one.outcome != ANSWERED), ANSWERED),
         )
