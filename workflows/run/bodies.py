@@ -23,8 +23,8 @@ from tribodyn.geometry.placing import rotation
 from tribodyn.geometry.sources import cad, picking
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
-from tribodyn.workflows.scene.body import Geometry
-from tribodyn.workflows.scene.structure import AXES, SolidMaterial, StructureScene
+from tribodyn.workflows.scene.body import Geometry, SolidMaterial
+from tribodyn.workflows.scene.structure import AXES, StructureScene
 
 
 def part_mesh(part: str, parameters: Mapping[str, int | float], path: Path) -> tuple[Any, dict[str, np.ndarray]]:
@@ -56,8 +56,7 @@ def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
     if scene.geometry is not None:
         assert scene.material is not None
         mesh, node_sets, notes = geometry_mesh(scene.geometry, folder, scratch)
-        one = scene.material
-        bodies = [Body("", mesh, node_sets, Material(one.young, one.poisson, one.density, one.expansion), notes)]
+        bodies = [Body("", mesh, node_sets, solid(scene.material), notes)]
     else:
         bodies = []
         for name, table in scene.bodies.items():
