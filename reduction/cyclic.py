@@ -18,7 +18,7 @@ import scipy.linalg as sla
 from scipy.sparse import vstack
 
 from tribodyn.fem import wheel
-from tribodyn.fem.cyclic import Sector, at_index, projected, seam_map
+from tribodyn.fem.cyclic import Sector, at_index, seam_map
 from tribodyn.fem.modes import StaticDivergence, hermitian_modes, turning_frequencies
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import craig_bampton
@@ -158,7 +158,7 @@ class WaveIndices:
         if not node_to_node(once):
             return *at_index(self._sector, index), seam_map(self._sector, index).toarray()
         T = relative_map(once, index)[0]
-        system = projected(self._sector.system, T)
+        system = self._sector.system.projected(T)
         return system, np.eye(len(once.left), system.n_dof)[of_row], T
 
     def _small(
@@ -171,7 +171,7 @@ class WaveIndices:
             V = stuck_ritz(system, B, self._springs)
         except np.linalg.LinAlgError:  # it can move with its contacts stuck, which the compliance reports
             return system, B, T
-        return projected(system, V), B @ V, T @ V
+        return system.projected(V), B @ V, T @ V
 
 
 @dataclass(frozen=True)

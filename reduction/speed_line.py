@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.fem.cyclic import Sector, at_index, projected
+from tribodyn.fem.cyclic import Sector, at_index
 from tribodyn.fem.modes import hermitian_modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, in_coordinates, reduce_sector, stuck_ritz, wave_of
@@ -38,7 +38,7 @@ def reduce_alike(
     own = independent(np.concatenate(columns, axis=1), sectors[0].system.stiffness)
     basis = np.concatenate([first.basis[:, :m], own], axis=1)
     info = replace(first.info, n_modes=own.shape[1])
-    return [in_coordinates(sector, projected(sector.system, basis), basis, info) for sector in sectors]
+    return [in_coordinates(sector, sector.system.projected(basis), basis, info) for sector in sectors]
 
 
 def independent(columns: np.ndarray, stiffness: Any) -> np.ndarray:
@@ -98,7 +98,7 @@ class SpeedLine:
             if systems[0].n_dof > LIMITS.many_along:
                 shapes = [stuck_ritz(s, B, self.springs, LIMITS.modes_along) for s in (systems[0], systems[-1])]
                 V = independent(np.concatenate(shapes, axis=1), stuck_stiffness(systems[0].stiffness, B, self.springs))
-                systems, B, T = tuple(projected(s, V) for s in systems), B @ V, T @ V
+                systems, B, T = tuple(s.projected(V) for s in systems), B @ V, T @ V
             self.made[index] = systems, B, T
         return self.made[index]
 

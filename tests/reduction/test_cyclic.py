@@ -9,7 +9,7 @@ import scipy.linalg as sla
 from tests.helpers import small_wheel as small
 from tribodyn.fem import cyclic, wheel
 from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.cyclic import at_index, projected
+from tribodyn.fem.cyclic import at_index
 from tribodyn.fem.modes import hermitian_modes
 from tribodyn.reduction import cyclic as waves
 from tribodyn.reduction.damping import modal_damping
@@ -80,7 +80,7 @@ def test_relative_coordinates_are_the_contact_itself(reduced):
         assert B @ q[kept] == pytest.approx(z[:n_contact], abs=1e-12)
         assert T.shape[1] == system.n_dof
         assert n_masters == n_contact + 4  # two of the couple, the driven node, the tip
-        small_system = projected(reduced.sector.system, T)
+        small_system = reduced.sector.system.projected(T)
         same = [hermitian_modes(s.stiffness, s.mass, system.n_dof)[0] for s in (system, small_system)]
         assert same[1] == pytest.approx(same[0], rel=1e-7)
 
