@@ -325,18 +325,15 @@ class StructureScene(MeshScene):
             raise ValueError('response.method: without contact the response is linear: give "natural"')
         if self.contact is not None and self.contacts:
             raise ValueError("expected either [contact] or [contacts.NAME], and not both")
-        for name, body in self.bodies.items():
+        for name in self.bodies:
             if "." in name or name == GROUND:
                 raise ValueError(f'bodies.{name}: give a name without a dot that is not "{GROUND}"')
-            for material in body.materials:
-                if material not in self.materials:
-                    raise ValueError(f"bodies.{name}: {unknown_key(f'materials.{material}', [*self.materials])}")
-        for name, deck in self.decks.items():
-            if deck.material is not None and deck.material not in self.materials:
-                raise ValueError(f"decks.{name}: {unknown_key(f'materials.{deck.material}', [*self.materials])}")
-        for name, bolt in self.bolts.items():
-            if bolt.material is not None and bolt.material not in self.materials:
-                raise ValueError(f"bolts.{name}: {unknown_key(f'materials.{bolt.material}', [*self.materials])}")
+        made_of = [(f"bodies.{name}", one) for name, body in self.bodies.items() for one in body.materials]
+        made_of += [(f"decks.{name}", deck.material) for name, deck in self.decks.items() if deck.material is not None]
+        made_of += [(f"bolts.{name}", bolt.material) for name, bolt in self.bolts.items() if bolt.material is not None]
+        for where, material in made_of:
+            if material not in self.materials:
+                raise ValueError(f"{where}: {unknown_key(f'materials.{material}', [*self.materials])}")
         taken = [*self.loads.static, *self.loads.harmonic]
         for name in self.bolts:
             if name in taken or name == CENTRIFUGAL:
