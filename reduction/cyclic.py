@@ -19,7 +19,7 @@ from scipy.sparse import vstack
 
 from tribodyn.fem import wheel
 from tribodyn.fem.cyclic import Sector, at_index, seam_map
-from tribodyn.fem.modes import StaticDivergence, hermitian_modes, turning_frequencies
+from tribodyn.fem.modes import StaticDivergence, modes, turning_frequencies
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.limits import LIMITS
@@ -89,7 +89,7 @@ def nodal_diameters(
         system, B = at_index(sector, index)
         K = system.stiffness if stiffness is None else stuck_stiffness(system.stiffness, B, stiffness)
         if system.gyroscopic is None:
-            omega = hermitian_modes(K, system.mass, n_modes)[0]
+            omega = modes(K, system.mass, n_modes)[0]
         else:
             omega = turning_frequencies(K, system.mass, system.gyroscopic, n_modes)
         found.append(omega / (2 * np.pi))
@@ -108,7 +108,7 @@ def travelling_wave(reduced: ReducedSector, engine_order: int, springs: np.ndarr
     model = wave_of(reduced, engine_order, WaveIndices(reduced, springs))
     try:
         system = model.system
-        omega, _ = hermitian_modes(system.stiffness, system.mass, min(LIMITS.reported_modes, system.n_dof))
+        omega, _ = modes(system.stiffness, system.mass, min(LIMITS.reported_modes, system.n_dof))
         model = replace(model, info=replace(model.info, free_frequency=omega / (2 * np.pi)))
     except StaticDivergence:  # rotation carries away what only the contact holds
         pass

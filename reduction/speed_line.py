@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.cyclic import Sector, at_index
-from tribodyn.fem.modes import hermitian_modes
+from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, in_coordinates, reduce_sector, stuck_ritz, wave_of
 from tribodyn.reduction.limits import LIMITS
@@ -109,7 +109,7 @@ class SpeedLine:
         """
         system, B = at_index(there.sector, self.engine_order)
         nodes = [at_index(one.sector, self.engine_order)[0] for one in self.reduced]
-        omega, phi = hermitian_modes(stuck_stiffness(system.stiffness, B, self.springs), system.mass, n_modes)
+        omega, phi = modes(stuck_stiffness(system.stiffness, B, self.springs), system.mass, n_modes)
         missed = self.between(nodes, speed).stiffness - system.stiffness
         return float(np.abs(np.einsum("ij,ij->j", phi.conj(), missed @ phi) / (2 * omega**2)).max())
 
