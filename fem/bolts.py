@@ -24,7 +24,7 @@ from tribodyn.fem.surface import surface
 class Bolt:
     """name : for errors; head, nut : names of the faces; stiffness : k [N/m], 0 for a constant force.
 
-    As a load it is 1 N in the shank; as an output it is the elongation e [m/m].
+    As a load it is 1 N in the shank, which is minus the row of its elongation e.
     """
 
     name: str
@@ -84,14 +84,3 @@ def _outward(mesh: Any, name: str) -> np.ndarray:
         return np.zeros(3)
     face = surface(mesh, faces[name])
     return np.asarray(face.area @ face.normals / face.area.sum())
-
-
-@dataclass(frozen=True)
-class Elongation:
-    """The elongation of a bolt as an output."""
-
-    bolt: Bolt
-
-    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
-        """Row e (3 n_node,)."""
-        return self.bolt.elongation(mesh, node_sets)

@@ -17,9 +17,10 @@ from scipy.sparse import coo_matrix, csr_matrix, diags_array, eye_array, kron
 
 from tribodyn.fem.constraints import Following, named
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.mortar import MORTAR, Common, Side, coefficients, common, dual, side, tabulate
+from tribodyn.fem.mortar import MORTAR, Common, Side, coefficients, common, dual, side
 from tribodyn.fem.mortar_contact import apart
 from tribodyn.fem.springs import shares
+from tribodyn.fem.surface import tabulate
 
 SMALL = 1e-13  # of a coefficient that is left out
 

@@ -154,28 +154,4 @@ def at_index(sector: Sector, index: int) -> tuple[SecondOrderSystem, Any]:
     """The system and the contact map (n_c, m) that a wave of this index sees; Hermitian, real for 0 and N/2."""
     T = seam_map(sector, index)
     ahead = np.conj(sector.phase(index))
-    return projected(sector.system, T), (sector.interface.B - ahead * sector.left) @ T  # 3.17
-
-
-def projected(system: SecondOrderSystem, T: Any) -> SecondOrderSystem:
-    """The system in coordinates z with q = T z; T (n, n_z) dense or sparse, real or complex."""
-
-    def congruent(matrix: Any) -> Any:
-        small = T.conj().T @ (matrix @ T)
-        return (small + small.conj().T) / 2
-
-    def swirling(matrix: Any) -> Any:
-        if matrix is None:
-            return None
-        small = T.conj().T @ (matrix @ T)
-        return (small - small.conj().T) / 2
-
-    return SecondOrderSystem(
-        congruent(system.mass),
-        congruent(system.stiffness),
-        None if system.damping is None else congruent(system.damping),
-        {name: T.conj().T @ load for name, load in system.loads.items()},
-        {name: T.T @ row for name, row in system.outputs.items()},
-        swirling(system.gyroscopic),
-        swirling(system.circulatory),
-    )
+    return sector.system.projected(T), (sector.interface.B - ahead * sector.left) @ T  # 3.17

@@ -49,24 +49,6 @@ class NodalForce:
 
 
 @dataclass(frozen=True)
-class Couple:
-    """1 N in a direction on one node set and 1 N against it on another: a torque without resultant.
-
-    nodes, opposite : names of the node sets; direction : (3,), need not be a unit vector; shared : as of NodalForce
-    """
-
-    nodes: str
-    opposite: str
-    direction: Sequence[float]
-    shared: str = "nodes"
-
-    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
-        """Force vector (3 n_node,) [N/N]."""
-        one, two = (NodalForce(name, self.direction, self.shared) for name in (self.nodes, self.opposite))
-        return one.vector(mesh, node_sets) - two.vector(mesh, node_sets)
-
-
-@dataclass(frozen=True)
 class Moment:
     """1 N m about a direction on a reference point of an assembly. point : its name; direction : (3,)."""
 
@@ -130,7 +112,7 @@ class Sum:
 
     parts: Sequence[tuple[Load, float]]
 
-    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any) -> np.ndarray:
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
         """Force vector (3 n_node,)."""
         force = np.zeros(3 * mesh.doflocs.shape[1])
         for load, factor in self.parts:

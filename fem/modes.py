@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, eigvalsh
-from scipy.sparse import block_array, csr_matrix, issparse
+from scipy.sparse import block_array, issparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
@@ -44,7 +44,7 @@ def modes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The n lowest modes, mass-normalised.
 
-    K, M : (N, N) sparse or dense symmetric [N/m], [kg], M positive definite, K positive semidefinite
+    K, M : (N, N) sparse or dense, symmetric or Hermitian [N/m], [kg], M positive definite, K positive semidefinite
     sigma : shift [rad^2/s^2] below the wanted modes; by default 0, or a little below where K is singular
     factor : factorisation of K - sigma M that exists already
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its
@@ -67,8 +67,8 @@ def modes(
                     k=n,
                     M=M,
                     sigma=sigma or 0.0,
-                    OPinv=LinearOperator(K.shape, matvec=factor.solve, dtype=float),
-                    v0=np.random.default_rng(0).standard_normal(size),
+                    OPinv=LinearOperator(K.shape, matvec=factor.solve, dtype=K.dtype),
+                    v0=np.random.default_rng(0).standard_normal(size).astype(K.dtype),
                     maxiter=EIGEN.restarts,
                     tol=getattr(factor, "tolerance", 0.0),  # of solutions by iteration
                 )
@@ -82,48 +82,16 @@ def modes(
     return frequencies(values, K, M), phi * _signs(phi)
 
 
-def hermitian_modes(K: Any, M: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """The n lowest modes of K phi = omega^2 M phi.
-
-    K, M : (N, N) sparse or dense, real symmetric or complex Hermitian [N/m], [kg]; both positive definite where sparse
-    Returns omega (n,) ascending [rad/s]; phi (N, n) [1/sqrt(kg)], mass-normalised, their phase arbitrary where complex
-    Raises  ValueError where n is not between 1 and N, or a large sparse K is singular
-
-    A large sparse K = R + iS is factorised as the real [[R, -S], [S, R]], so that one factorisation serves all parts
-    """
-    size = K.shape[0]
-    if not (issparse(K) and np.iscomplexobj(K)) or size <= EIGEN.dense_below or 2 * n >= size:
-        return modes(K, M, n)
-    K = csr_matrix(K)
-    factor = factorise(csr_matrix(block_array([[K.real, -K.imag], [K.imag, K.real]])))
-
-    def solve(v: np.ndarray) -> np.ndarray:
-        z = factor.solve(np.concatenate([v.real, v.imag]).ravel())
-        return z[:size] + 1j * z[size:]
-
-    with threadpool_limits(1):
-        values, phi = eigsh(
-            K,
-            k=n,
-            M=M,
-            sigma=0.0,
-            OPinv=LinearOperator(K.shape, matvec=solve, dtype=complex),
-            v0=np.random.default_rng(0).standard_normal(size).astype(complex),
-        )
-    order = np.argsort(values)
-    return frequencies(values[order], K, M), phi[:, order]
-
-
 def turning_frequencies(K: Any, M: Any, G: Any, n: int) -> np.ndarray:
     """The n lowest frequencies omega > 0 (n,) [rad/s] of motions q exp(i omega t).
 
-    K, M : (N, N) sparse or dense, Hermitian, as for `hermitian_modes`; G : (N, N) anti-Hermitian [N s/m]
+    K, M : (N, N) sparse or dense, Hermitian, as for `modes`; G : (N, N) anti-Hermitian [N s/m]
     Of a wave of index j these are the motions that run with the rotation where j > 0; those against it belong to -j.
     The pencil is linearised as A y = omega B y, A = diag(K, M), B = [[-H, M], [M, 0]], H = iG, y = (q, omega q)
-    Raises  ValueError where n is too large, StaticDivergence as `hermitian_modes` does
+    Raises  ValueError where n is too large, StaticDivergence as `modes` does
     Source  Meirovitch, Computational Methods in Structural Dynamics, 1980, chapter 5
     """
-    lowest, phi = hermitian_modes(K, M, min(K.shape[0], max(EIGEN.spanned, 2 * n)))
+    lowest, phi = modes(K, M, min(K.shape[0], max(EIGEN.spanned, 2 * n)))
     m = len(lowest)
     H = 1j * (phi.conj().T @ (G @ phi))
     H = (H + H.conj().T) / 2
@@ -155,16 +123,34 @@ def stiffest(K: Any, M: Any) -> float:
 def _factorise_shifted(K: Any, M: Any, sigma: float | None) -> tuple[Factor, float]:
     """Factorisation of K - sigma M, with a small negative shift where K alone is singular."""
     if sigma is not None:
-        return factorise(K - sigma * M if sigma else K, definite=sigma <= 0), sigma
+        return _factorise(K - sigma * M if sigma else K, definite=sigma <= 0), sigma
     try:
-        return factorise(K), 0.0
+        return _factorise(K), 0.0
     except ValueError:
         sigma = -1e-9 * stiffest(K, M)
     try:
-        return factorise(K - sigma * M), sigma
+        return _factorise(K - sigma * M), sigma
     except ValueError:
-        factorise(K, definite=False)  # singular is another matter
+        _factorise(K, definite=False)  # singular is another matter
         raise StaticDivergence(f"{UNSTABLE}, omega^2 is negative: {CURE}") from None
+
+
+@dataclass(frozen=True)
+class _OfHermitian:
+    """Solutions of a Hermitian R + iS by a factor of the real [[R, -S], [S, R]], one for both parts."""
+
+    factor: Factor
+    name: str = "of a Hermitian matrix"
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        real, imaginary = np.split(self.factor.solve(np.concatenate([rhs.real, rhs.imag]).ravel()), 2)
+        return np.asarray(real + 1j * imaginary)
+
+
+def _factorise(K: Any, definite: bool = True) -> Factor:
+    if not np.iscomplexobj(K):
+        return factorise(K, definite)
+    return _OfHermitian(factorise(block_array([[K.real, -K.imag], [K.imag, K.real]]), definite))
 
 
 def _dense(matrix: Any) -> np.ndarray:

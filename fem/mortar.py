@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex1
+from skfem import ElementTriP1, MeshHex1
 from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.surface import facet_nodes, outside
+from tribodyn.fem.surface import facet_nodes, outside, tabulate
 
 
 @dataclass(frozen=True)
@@ -114,14 +114,6 @@ def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> S
     sign = np.sign(np.einsum("fx,fx->f", normal, centre - inner))
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     return Side(nodes, points, centre, normal * sign[:, None], sign, turn, mesh.doflocs.shape[1])
-
-
-def tabulate(k: int, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (k, n) and slopes (k, 2, n) of a facet of k nodes (9, 6, 4 or 3) at xi (2, n)."""
-    element = {9: ElementQuad2, 6: ElementTriP2, 4: ElementQuad1, 3: ElementTriP1}[k]()
-    found = [element.lbasis(xi, a) for a in range(k)]
-    slopes = [np.stack(np.broadcast_arrays(*slope, xi[0])[:2]) for _, slope in found]
-    return np.stack([np.broadcast_to(value, xi.shape[1:]) for value, _ in found]), np.stack(slopes)
 
 
 @dataclass(frozen=True)

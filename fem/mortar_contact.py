@@ -19,8 +19,8 @@ from scipy.spatial import cKDTree
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
 from tribodyn.fem.matching import Mismatch
-from tribodyn.fem.mortar import MORTAR, Side, common, tabulate
-from tribodyn.fem.surface import NINE_NODE_QUADS, side_functions, side_polygons
+from tribodyn.fem.mortar import MORTAR, Side, common
+from tribodyn.fem.surface import NINE_NODE_QUADS, side_functions, side_polygons, tabulate
 
 
 def mortar_halves(

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex1, MeshHex2
+from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex1
 from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
@@ -143,26 +143,27 @@ def face_integrals(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -
     Returns (n_facet, k) [m2] and (n_facet, k, 3) [m2]; k nodes of the facet, or its vertices
     """
     piece, facets = piece_of_facets(mesh, facets)
-    mesh = piece.mesh
-    hexahedra = isinstance(mesh, MeshHex1)
-    linear: Any = ElementQuad1() if hexahedra else ElementTriP1()
-    geometry: Any = ElementQuad2() if isinstance(mesh, MeshHex2) else linear if hexahedra else ElementTriP2()
-    X, w = get_quadrature(geometry, 6)  # exact for a shape function times the normal of a flat face
-    nodes, points = _facet_nodes(mesh, facets), coordinates(mesh)
-    slopes = np.stack([_tabulate(geometry.lbasis(X, a)[1]) for a in range(nodes.shape[1])])  # n_a, 2, n_q
+    mesh, nodes, points = piece.mesh, _facet_nodes(piece.mesh, facets), coordinates(piece.mesh)
+    k, corners = nodes.shape[1], 4 if isinstance(mesh, MeshHex1) else 3
+    X, w = get_quadrature(ELEMENTS[k], 6)  # exact for a shape function times the normal of a flat face
+    N, slopes = tabulate(k, X)  # n_a, n_q and n_a, 2, n_q
     tangents = np.einsum("aiq,fax->fiqx", slopes, points[nodes])
     normal = np.cross(tangents[:, 0], tangents[:, 1])  # |normal| is the area element
     body = points[mesh.t[:, mesh.f2t[0, facets]]].mean(axis=0)
     outward = points[nodes].mean(axis=1) - body
     normal *= np.sign(np.einsum("fqx,fx->f", normal, outward))[:, None, None]
     if vertices_only:
-        N = np.stack([_tabulate(linear.lbasis(X, a)[0]) for a in range(4 if hexahedra else 3)])
-    else:
-        N = np.stack([_tabulate(geometry.lbasis(X, a)[0]) for a in range(nodes.shape[1])])
+        N = tabulate(corners, X)[0]
     vectors = np.einsum("aq,fqx,q->fax", N, normal, w)
     return np.einsum("aq,fq,q->fa", N, np.linalg.norm(normal, axis=2), w), vectors
 
 
-def _tabulate(values: Any) -> np.ndarray:
-    """One array of values that scikit-fem may give as a tuple of arrays of several shapes."""
-    return np.stack(np.broadcast_arrays(*values)) if isinstance(values, tuple | list) else np.asarray(values)
+ELEMENTS: dict[int, Any] = {9: ElementQuad2, 6: ElementTriP2, 4: ElementQuad1, 3: ElementTriP1}
+
+
+def tabulate(k: int, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (k, n) and slopes (k, 2, n) of a facet of k nodes (9, 6, 4 or 3) at xi (2, n)."""
+    element = ELEMENTS[k]()
+    found = [element.lbasis(xi, a) for a in range(k)]
+    slopes = [np.stack(np.broadcast_arrays(*slope, xi[0])[:2]) for _, slope in found]
+    return np.stack([np.broadcast_to(value, xi.shape[1:]) for value, _ in found]), np.stack(slopes)

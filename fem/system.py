@@ -41,3 +41,22 @@ class SecondOrderSystem:
         if self.gyroscopic is None or self.damping is None:
             return self.damping if self.gyroscopic is None else self.gyroscopic
         return self.damping + self.gyroscopic
+
+    def projected(self, T: Any) -> SecondOrderSystem:
+        """The system in coordinates z with q = T z; T (n, n_z) dense or sparse, real or complex."""
+
+        def congruent(matrix: Any, sign: float = 1.0) -> Any:
+            if matrix is None:
+                return None
+            small = T.conj().T @ (matrix @ T)
+            return (small + sign * small.conj().T) / 2
+
+        return SecondOrderSystem(
+            congruent(self.mass),
+            congruent(self.stiffness),
+            congruent(self.damping),
+            {name: T.conj().T @ load for name, load in self.loads.items()},
+            {name: T.T @ row for name, row in self.outputs.items()},
+            congruent(self.gyroscopic, -1.0),
+            congruent(self.circulatory, -1.0),
+        )

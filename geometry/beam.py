@@ -38,11 +38,7 @@ class Parameters:
     height_grading: float = 1.0
 
     def __post_init__(self) -> None:
-        checks.positive(self, "length", "width", "height", "patch_length")
-        checks.positive(self, "grading", "length_grading", "height_grading", unit="a ratio, 1 is uniform")
-        checks.odd(self, "n_patch")
-        checks.whole(self, "n_length", least=2)
-        checks.whole(self, "n_height", least=1)
+        checks.numbers(self, ("n_patch",), n_length=2)
         if self.patch_length >= self.length / 2:
             raise ValueError(
                 f"geometry.patch_length is {self.patch_length}: keep it below half of geometry.length "

@@ -75,17 +75,11 @@ class Parameters:
     n_disk: int = 4
 
     def __post_init__(self) -> None:
-        checks.positive(self, "hub_radius", "span", "root_chord", "tip_chord", "root_thickness", "tip_thickness")
-        checks.positive(self, "contact_length", "contact_height", "shroud_length", "clearance")
-        checks.positive(self, "root_height", "root_length")
-        checks.positive(self, "edge", "disk_taper", unit="a ratio")
-        checks.within(self, "camber", least=-0.5, most=0.5, unit="a ratio")
-        checks.within(self, "couple_height", least=0.0, most=1.0, unit="a fraction of the span")
-        checks.within(self, "root_fill", least=0.1, most=0.99, unit="a fraction of the pitch")
-        checks.within(self, "root_stagger", "tip_stagger", "shroud_angle", least=-1.3, most=1.3, unit="radians")
-        checks.whole(self, "n_blades", least=3)
-        checks.whole(self, "n_along", "n_up", least=2)
-        checks.whole(self, "n_span", "n_through", "n_side", "n_end", "n_root", "n_disk", least=1)
+        angle = (-1.3, 1.3)
+        checks.numbers(
+            self, camber=(-0.5, 0.5), couple_height=(0.0, 1.0), root_fill=(0.1, 0.99), disk_radius=None,
+            root_stagger=angle, tip_stagger=angle, shroud_angle=angle, n_blades=3, n_along=2, n_up=2,
+        )  # fmt: skip
         along_axis = self.contact_length * cos(self.shroud_angle)
         if along_axis >= self.shroud_length:
             raise ValueError(

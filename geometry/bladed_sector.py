@@ -108,14 +108,8 @@ class Parameters:
     n_damper: int = 3
 
     def __post_init__(self) -> None:
-        checks.positive(self, "platform_height", "platform_length", "gap_bottom", "gap_top")
-        checks.positive(self, "neck_width", "bulb_width", "neck_height", "flank_height", "bulb_height")
-        checks.positive(self, "disk_radius", "damper_length", "post_gap", "root_gap")
-        checks.within(self, "lap", least=0.0, most=0.5, unit="a ratio")
-        checks.positive(self, "disk_taper", unit="a ratio")
-        checks.within(self, "damper_low", "damper_high", least=0.0, most=1.0, unit="a fraction")
-        checks.whole(self, "n_platform", "n_neck", "n_flank", "n_axial", "n_slot", "n_post", least=1)
-        checks.whole(self, "n_disk", "n_damper", least=1)
+        own = dict.fromkeys(("camber", "root_stagger", "tip_stagger", "shroud_angle"))  # limits of geometry.blade
+        checks.numbers(self, lap=(0.0, 0.5), damper_low=(0.0, 1.0), damper_high=(0.0, 1.0), **own)
         _ = self.upper  # refuses what airfoil and shroud cannot be
         if self.bulb_width <= self.neck_width:
             raise ValueError(

@@ -32,8 +32,7 @@ class Parameters:
     pad_end: float = 0.0
 
     def __post_init__(self) -> None:
-        checks.positive(self, "length", "width", "height")
-        checks.whole(self, "n_length", "n_width", "n_height", least=1)
+        checks.numbers(self, pad_start=None, pad_end=None)
         if not 0 <= self.pad_start <= self.pad_end <= self.length:
             raise ValueError(
                 f"geometry.pad_end is {self.pad_end}: give a strip from geometry.pad_start ({self.pad_start}) to "

@@ -38,9 +38,7 @@ class Parameters:
     n_head: int = 1
 
     def __post_init__(self) -> None:
-        checks.positive(self, "diameter", "length", "flats", "head_height", "seat_diameter", "grip", "nut_height")
-        checks.within(self, "core", least=0.1, most=0.7, unit="a ratio")
-        checks.whole(self, "n_around", "n_grip", "n_nut", "n_end", "n_head", least=1)
+        checks.numbers(self, core=(0.1, 0.7))
         if self.n_around % 12:
             raise ValueError(
                 f"geometry.n_around is {self.n_around}: give a multiple of 12, for a hexagon about a square"

@@ -38,9 +38,7 @@ class Parameters:
     n_length: int = 14
 
     def __post_init__(self) -> None:
-        checks.positive(self, "length", "height", "width", "thickness", "hole", "pad_length")
-        checks.whole(self, "holes", least=0)
-        checks.whole(self, "n_length", "sides", least=3)
+        checks.numbers(self, holes=0, n_length=3, sides=3)
         if self.thickness >= self.height or self.thickness + self.pad_length >= self.length:
             raise ValueError(
                 f"geometry.thickness is {self.thickness}: keep it below height, and with pad_length below length"

@@ -3,43 +3,35 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
 MOST = 2000  # elements or nodes along one edge of a part
 
 
-def positive(parameters: Any, *names: str, unit: str = "metres") -> None:
-    """Refuse parameters that are not finite numbers above zero."""
-    for name in names:
-        value = getattr(parameters, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value <= 0:
-            raise ValueError(f"geometry.{name} is {value!r}: give a number above zero ({unit})")
+def numbers(parameters: Any, odd: Sequence[str] = (), /, **limits: float | tuple[float, float] | None) -> None:
+    """Refuse parameters that are not what their defaults are: whole numbers from 1 to MOST, else numbers above zero.
 
-
-def within(parameters: Any, *names: str, least: float, most: float, unit: str) -> None:
-    """Refuse parameters that are not numbers from `least` to `most`."""
-    for name in names:
-        value = getattr(parameters, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
-            raise ValueError(f"geometry.{name} is {value!r}: give a number from {least:g} to {most:g} ({unit})")
-
-
-def whole(parameters: Any, *names: str, least: int) -> None:
-    """Refuse parameters that are not whole numbers from `least` to MOST."""
-    for name in names:
-        value = getattr(parameters, name)
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+    odd : node counts, which second-order elements make odd, 2 n + 1 for n elements
+    limits : least value of a whole number, least and largest of another one; None where the part itself refuses
+    """
+    for one in fields(parameters):
+        name, value = one.name, getattr(parameters, one.name)
+        least: Any = limits.get(name, 3 if name in odd else 1)
+        if least is None:
+            continue
+        number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if not isinstance(one.default, int):
+            low, high = least if isinstance(least, tuple) else (0.0, math.inf)
+            if not number or not low <= value <= high or (value == 0 and high == math.inf):
+                wanted = f"from {low:g} to {high:g}" if high < math.inf else "above zero"
+                raise ValueError(f"geometry.{name} is {value!r}: give a number {wanted}")
+        elif not number or not isinstance(value, int) or value < least:
             raise ValueError(f"geometry.{name} is {value!r}: give a whole number of at least {least}")
-        if value > MOST:
+        elif value > MOST:
             raise ValueError(f"geometry.{name} is {value}: give at most {MOST}, a mesh of more has no use")
-
-
-def odd(parameters: Any, *names: str, least: int = 3) -> None:
-    """Refuse node counts that second-order elements cannot have: they are odd, 2 n + 1 for n elements."""
-    whole(parameters, *names, least=least)
-    for name in names:
-        value = getattr(parameters, name)
-        if value % 2 == 0:
+        elif name in odd and value % 2 == 0:
             raise ValueError(
                 f"geometry.{name} is {value}: give an odd number of nodes, {value - 1} or {value + 1}, "
                 "because second-order elements share their end nodes"

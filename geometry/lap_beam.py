@@ -44,8 +44,7 @@ class Parameters:
     grading: float = 2.0
 
     def __post_init__(self) -> None:
-        checks.positive(self, "length", "width", "height", "lap", "pitch", "hole", "pad", "grading")
-        checks.whole(self, "holes", "n_side", "n_pad", "n_field", "n_lap", "n_end", "n_length", least=1)
+        checks.numbers(self)
         if not self.hole < self.pad < min(self.pitch, self.width):
             raise ValueError("geometry.pad must lie between geometry.hole and the smaller of geometry.pitch and width")
         if not self.holes * self.pitch < self.lap < self.length:

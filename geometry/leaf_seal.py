@@ -44,12 +44,7 @@ class Parameters:
     n_thickness: int = 1
 
     def __post_init__(self) -> None:
-        checks.positive(self, "radius", "height", "thickness", "patch_height", "pin_width")
-        checks.positive(self, "angle", unit="radians")
-        checks.odd(self, "n_column", least=5)
-        checks.odd(self, "n_row")
-        checks.whole(self, "n_web", "n_thickness", least=1)
-        checks.whole(self, "pin_column", least=0)
+        checks.numbers(self, ("n_column", "n_row"), n_column=5, bow=None, pin_height=None, pin_column=0)
         if self.angle >= np.pi:
             raise ValueError(f"geometry.angle is {self.angle}: keep the sector below pi radians")
         if self.height >= 2 * self.radius:

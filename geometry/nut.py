@@ -27,8 +27,7 @@ class Parameters:
     n_height: int = 1
 
     def __post_init__(self) -> None:
-        checks.positive(self, "bore", "flats", "height", "seat_diameter")
-        checks.whole(self, "n_around", "n_height", least=1)
+        checks.numbers(self)
         if self.n_around % 6:
             raise ValueError(
                 f"geometry.n_around is {self.n_around}: give a multiple of 6, for the corners of a hexagon"

@@ -94,11 +94,7 @@ class Parameters:
     n_half: int = 2
 
     def __post_init__(self) -> None:
-        checks.positive(self, "free_length", "height", "thickness", "contact_length", "contact_width", "slot_length")
-        checks.positive(self, "slot_height", "protrusion", "foot", "root_length", "shaker_distance", "longest")
-        checks.positive(self, "column_length", "column_depth", "column_height")
-        checks.odd(self, "n_contact_length", "n_contact_width")
-        checks.whole(self, "n_root", "n_half", least=1)
+        checks.numbers(self, ("n_contact_length", "n_contact_width"))
         for name, largest, what in (
             ("contact_length", OURS.shank, "the shank of the upper specimen"),
             ("contact_width", self.thickness, "geometry.thickness"),

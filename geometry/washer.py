@@ -23,8 +23,7 @@ class Parameters:
     n_across: int = 2
 
     def __post_init__(self) -> None:
-        checks.positive(self, "bore", "diameter", "thickness")
-        checks.whole(self, "n_around", "n_across", least=1)
+        checks.numbers(self)
         if self.n_around < 4:
             raise ValueError(f"geometry.n_around is {self.n_around}: give 4 or more")
         if not self.bore < self.diameter:

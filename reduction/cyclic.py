@@ -18,8 +18,8 @@ import scipy.linalg as sla
 from scipy.sparse import vstack
 
 from tribodyn.fem import wheel
-from tribodyn.fem.cyclic import Sector, at_index, projected, seam_map
-from tribodyn.fem.modes import StaticDivergence, hermitian_modes, turning_frequencies
+from tribodyn.fem.cyclic import Sector, at_index, seam_map
+from tribodyn.fem.modes import StaticDivergence, modes, turning_frequencies
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.limits import LIMITS
@@ -89,7 +89,7 @@ def nodal_diameters(
         system, B = at_index(sector, index)
         K = system.stiffness if stiffness is None else stuck_stiffness(system.stiffness, B, stiffness)
         if system.gyroscopic is None:
-            omega = hermitian_modes(K, system.mass, n_modes)[0]
+            omega = modes(K, system.mass, n_modes)[0]
         else:
             omega = turning_frequencies(K, system.mass, system.gyroscopic, n_modes)
         found.append(omega / (2 * np.pi))
@@ -108,7 +108,7 @@ def travelling_wave(reduced: ReducedSector, engine_order: int, springs: np.ndarr
     model = wave_of(reduced, engine_order, WaveIndices(reduced, springs))
     try:
         system = model.system
-        omega, _ = hermitian_modes(system.stiffness, system.mass, min(LIMITS.reported_modes, system.n_dof))
+        omega, _ = modes(system.stiffness, system.mass, min(LIMITS.reported_modes, system.n_dof))
         model = replace(model, info=replace(model.info, free_frequency=omega / (2 * np.pi)))
     except StaticDivergence:  # rotation carries away what only the contact holds
         pass
@@ -158,7 +158,7 @@ class WaveIndices:
         if not node_to_node(once):
             return *at_index(self._sector, index), seam_map(self._sector, index).toarray()
         T = relative_map(once, index)[0]
-        system = projected(self._sector.system, T)
+        system = self._sector.system.projected(T)
         return system, np.eye(len(once.left), system.n_dof)[of_row], T
 
     def _small(
@@ -171,7 +171,7 @@ class WaveIndices:
             V = stuck_ritz(system, B, self._springs)
         except np.linalg.LinAlgError:  # it can move with its contacts stuck, which the compliance reports
             return system, B, T
-        return projected(system, V), B @ V, T @ V
+        return system.projected(V), B @ V, T @ V
 
 
 @dataclass(frozen=True)

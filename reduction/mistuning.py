@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.cyclic import at_index, seam_map
-from tribodyn.fem.modes import hermitian_modes
+from tribodyn.fem.modes import modes
 from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
@@ -49,9 +49,9 @@ def nominal_shapes(
         forces = np.array([system.loads[name] for name in loads]).reshape(len(loads), -1).T
         for share in (1.0, LIMITS.nearly_free):
             K = np.asarray(stuck_stiffness(system.stiffness, np.asarray(B), share * springs))
-            modes = hermitian_modes(K, system.mass, min(families, len(K)))[1]
+            phi = modes(K, system.mass, min(families, len(K)))[1]
             static = sla.solve(K, forces, assume_a="her")
-            moved = seam_map(sector, index) @ np.concatenate([modes, static], axis=1)
+            moved = seam_map(sector, index) @ np.concatenate([phi, static], axis=1)
             columns += [moved.real, moved.imag]
     return orthonormal(stiffness, np.concatenate(columns, axis=1), left_out)
 

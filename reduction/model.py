@@ -109,22 +109,9 @@ class ReducedModel:
 
     def projected(self, basis: np.ndarray) -> ReducedModel:
         """The model in coordinates p, q = basis @ p, basis (n, n_p) real; matrices are made symmetric to rounding."""
-
-        def congruent(matrix: np.ndarray) -> np.ndarray:
-            product = basis.T @ matrix @ basis
-            return (product + product.T) / 2
-
-        s = self.system
-        system = SecondOrderSystem(
-            congruent(s.mass),
-            congruent(s.stiffness),
-            None if s.damping is None else congruent(s.damping),
-            {name: basis.T @ load for name, load in s.loads.items()},
-            {name: basis.T @ row for name, row in s.outputs.items()},
-        )
         interface = replace(self.interface, B=np.asarray(self.interface.B) @ basis)
         full = None if self.basis is None else self.basis @ basis
-        return replace(self, system=system, interface=interface, basis=full)
+        return replace(self, system=self.system.projected(basis), interface=interface, basis=full)
 
     def with_damping(self, make: Damping) -> ReducedModel:
         """The same model with another damping: `make` gives the matrix of every system that a harmonic sees.

@@ -42,15 +42,8 @@ def relative(
     place = csr_matrix((np.ones(len(own)), (np.arange(len(own)), own)), shape=(3 * n_pair, n))
     keep = csr_matrix(eye_array(n).tocsr().multiply(other[:, None]))
     T = csr_matrix(keep + back @ place - back @ (B.multiply(other[None, :])))
-    moved = SecondOrderSystem(
-        mass=csr_matrix(T.T @ system.mass @ T),
-        stiffness=csr_matrix(T.T @ system.stiffness @ T),
-        damping=None if system.damping is None else csr_matrix(T.T @ system.damping @ T),
-        loads={name: T.T @ load for name, load in system.loads.items()},
-        outputs={name: T.T @ row for name, row in system.outputs.items()},
-    )
     place = place if means.nodes is None else csr_matrix(kron(means.mean, eye_array(3)) @ place)
-    return moved, replace(means, B=place, nodes=None, mean=None), T
+    return system.projected(T), replace(means, B=place, nodes=None, mean=None), T
 
 
 def body_1_dofs(interface: ContactInterface) -> np.ndarray:

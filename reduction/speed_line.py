@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.fem.cyclic import Sector, at_index, projected
-from tribodyn.fem.modes import hermitian_modes
+from tribodyn.fem.cyclic import Sector, at_index
+from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, in_coordinates, reduce_sector, stuck_ritz, wave_of
 from tribodyn.reduction.limits import LIMITS
@@ -38,7 +38,7 @@ def reduce_alike(
     own = independent(np.concatenate(columns, axis=1), sectors[0].system.stiffness)
     basis = np.concatenate([first.basis[:, :m], own], axis=1)
     info = replace(first.info, n_modes=own.shape[1])
-    return [in_coordinates(sector, projected(sector.system, basis), basis, info) for sector in sectors]
+    return [in_coordinates(sector, sector.system.projected(basis), basis, info) for sector in sectors]
 
 
 def independent(columns: np.ndarray, stiffness: Any) -> np.ndarray:
@@ -98,7 +98,7 @@ class SpeedLine:
             if systems[0].n_dof > LIMITS.many_along:
                 shapes = [stuck_ritz(s, B, self.springs, LIMITS.modes_along) for s in (systems[0], systems[-1])]
                 V = independent(np.concatenate(shapes, axis=1), stuck_stiffness(systems[0].stiffness, B, self.springs))
-                systems, B, T = tuple(projected(s, V) for s in systems), B @ V, T @ V
+                systems, B, T = tuple(s.projected(V) for s in systems), B @ V, T @ V
             self.made[index] = systems, B, T
         return self.made[index]
 
@@ -109,7 +109,7 @@ class SpeedLine:
         """
         system, B = at_index(there.sector, self.engine_order)
         nodes = [at_index(one.sector, self.engine_order)[0] for one in self.reduced]
-        omega, phi = hermitian_modes(stuck_stiffness(system.stiffness, B, self.springs), system.mass, n_modes)
+        omega, phi = modes(stuck_stiffness(system.stiffness, B, self.springs), system.mass, n_modes)
         missed = self.between(nodes, speed).stiffness - system.stiffness
         return float(np.abs(np.einsum("ij,ij->j", phi.conj(), missed @ phi) / (2 * omega**2)).max())
 

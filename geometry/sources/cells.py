@@ -52,7 +52,6 @@ VOLUMES: dict[str, tuple[Solid, bool, bool, bool]] = {
 }
 # kind -> its corners
 SURFACES = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
-EDGES_AND_POINTS = {"line": 2, "line3": 2, "vertex": 1}
 COMMON_NAMES = {
     "tetra": "tetrahedra",
     "hexahedron": "hexahedra",

@@ -1,22 +1,15 @@
-"""Gmsh's own files, MSH 2.2 and 4.1, text or binary, with what else Gmsh has put in where all is saved.
-
-meshio reads what it can without Gmsh's system libraries. It fails where some elements belong to no group, does not know
-groups without a name and loses the groups of MSH 2.2: there Gmsh reads its file itself.
-"""
+"""Gmsh's own files, MSH 2.2 and 4.1, text or binary, with what else Gmsh has put in where all is saved."""
 
 from __future__ import annotations
 
 import re
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import meshio
 import numpy as np
 
 from tribodyn.geometry.gmsh_session import session
-from tribodyn.geometry.sources.cells import EDGES_AND_POINTS, SURFACES, VOLUMES
+from tribodyn.geometry.sources.cells import SURFACES
 from tribodyn.geometry.sources.raw import Cells, RawMesh
 
 _ORDER_19 = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]
@@ -41,27 +34,12 @@ _KINDS: dict[int, tuple[str, list[int] | None]] = {
     18: ("wedge15", _WEDGE_15),
     19: ("pyramid13", _PYRAMID_13),
 }
-_LEFT_BY_MESHIO = {name: order for name, order in _KINDS.values() if name in ("wedge18", "pyramid14")}
 _KIND_OF_GROUP = ("point", "curve", "surface", "volume")
 
 
 def read(path: Path) -> RawMesh:
-    """Read a Gmsh file. Raises ValueError: it is none, or broken."""
-    version = _version(path)
-    _check_ends(path)
-    if version.startswith("4.1"):
-        try:
-            with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
-                file = meshio.gmsh.read(path)
-            if _all_named(file):
-                return from_meshio(file)
-        except (Exception, SystemExit):  # the reader raises what it meets; Gmsh tells below whether the file is broken
-            pass
-    return through_gmsh(path)
-
-
-def through_gmsh(path: Path) -> RawMesh:
-    """Let Gmsh read one of its files. Raises ValueError where it cannot."""
+    """Let Gmsh read one of its files. Raises ValueError: it is none, or broken."""
+    _check(path)
     with session() as gmsh:
         try:
             gmsh.merge(str(path))
@@ -73,7 +51,7 @@ def through_gmsh(path: Path) -> RawMesh:
 def from_gmsh(gmsh: Any) -> RawMesh:
     """The mesh that a Gmsh session holds; where volumes belong to groups, those that do not are left out.
 
-    Every surface with elements is a group too, "face N" by its number in Gmsh or in the CAD model.
+    A surface with elements that no group has is one itself, "face N" by its number in Gmsh or in the CAD model.
     """
     model = gmsh.model
     labels, coordinates, _ = model.mesh.getNodes()
@@ -122,71 +100,21 @@ def from_gmsh(gmsh: Any) -> RawMesh:
             faces[name] = [nodes[:, : SURFACES[kind]] for tag in entities for kind, nodes, _ in elements((2, tag))]
         else:
             nodes_of[name] = np.unique(rows(model.mesh.getNodesForPhysicalGroup(dimension, number)[0]))
-    for _, tag in model.getEntities(2):
+    named = {int(tag) for d, g in groups if d == 2 for tag in model.getEntitiesForPhysicalGroup(2, g)}
+    for tag in (tag for _, tag in model.getEntities(2) if tag not in named):
         if parts := [nodes[:, : SURFACES[kind]] for kind, nodes, _ in elements((2, tag))]:
-            faces.setdefault(f"face {tag}", parts)
+            faces[f"face {tag}"] = parts
     return RawMesh(points, labels, cells, volumes, faces, nodes_of, unused=unused)
 
 
-def from_meshio(file: meshio.Mesh) -> RawMesh:
-    """What meshio read of a Gmsh file."""
-    blocks, first, start = [], {}, 0
-    for i, block in enumerate(file.cells):
-        if block.type in VOLUMES:
-            nodes = np.asarray(block.data, dtype=int)
-            nodes = nodes[:, _LEFT_BY_MESHIO.get(block.type) or slice(None)]
-            first[i] = start
-            blocks.append(Cells(block.type, nodes, np.arange(start + 1, start + 1 + len(nodes))))
-            start += len(nodes)
-    volumes, faces, nodes_of, unused = {}, {}, {}, []
-    for name, parts in file.cell_sets.items():
-        if name.startswith("gmsh:"):
-            continue
-        members = {i: np.asarray(ids, dtype=int) for i, ids in enumerate(parts) if ids is not None and len(ids)}
-        dimension = {file.cells[i].dim for i in members}
-        if dimension == {3} and all(i in first for i in members):
-            volumes[name] = np.sort(np.concatenate([ids + first[i] for i, ids in members.items()]))
-        elif dimension == {2} and all(file.cells[i].type in SURFACES for i in members):
-            faces[name] = [file.cells[i].data[ids][:, : SURFACES[file.cells[i].type]] for i, ids in members.items()]
-        elif dimension <= {0, 1} and dimension and all(file.cells[i].type in EDGES_AND_POINTS for i in members):
-            nodes_of[name] = np.unique(np.concatenate([file.cells[i].data[ids].ravel() for i, ids in members.items()]))
-        else:
-            unused.append(f"group '{name}', which {'holds no elements' if not members else 'mixes dimensions'}")
-    other = sorted({block.type for block in file.cells if block.dim == 3} - set(VOLUMES))
-    if other:
-        raise ValueError(
-            f"volume elements {', '.join(other)} are of a kind that is not known: write first or second order"
-        )
-    points = np.asarray(file.points, dtype=float)
-    return RawMesh(points, np.arange(1, len(points) + 1), blocks, volumes, faces, nodes_of, unused=unused)
-
-
-def _version(path: Path) -> str:
-    with path.open("rb") as stream:
-        head = stream.read(4096).split(b"\n")
-    for i, line in enumerate(head[:-1]):
-        if line.strip() == b"$MeshFormat":
-            return head[i + 1].decode("ascii", "replace").strip()
-    raise ValueError(_cannot(path, "it does not begin with $MeshFormat"))
-
-
-def _check_ends(path: Path) -> None:
-    """Refuse a file that stops inside a section: Gmsh itself would read on in silence."""
+def _check(path: Path) -> None:
+    """Refuse another file, and one that stops inside a section: Gmsh itself would read on in silence."""
     text = path.read_bytes()
+    if not any(line.strip() == b"$MeshFormat" for line in text[:4096].split(b"\n")[:-1]):
+        raise ValueError(_cannot(path, "it does not begin with $MeshFormat"))
     for section in re.findall(rb"(?m)^\$(?!End)([A-Za-z]+)\s*$", text):
         if b"$End" + section not in text:
             raise ValueError(_cannot(path, f"it ends inside ${section.decode()}, so it is not complete"))
-
-
-def _all_named(file: meshio.Mesh) -> bool:
-    """Whether meshio knows a name for every group: it keeps those of groups without a name as bare numbers."""
-    known = {(int(dimension), int(tag)) for tag, dimension in file.field_data.values()}
-    tags = file.cell_data.get("gmsh:physical")
-    if tags is None:
-        return False
-    return all(
-        (block.dim, int(tag)) in known for block, ids in zip(file.cells, tags, strict=True) for tag in np.unique(ids)
-    )
 
 
 def _cannot(path: Path, why: str) -> str:

@@ -1,7 +1,7 @@
 """Studies: each is one function whose result has `record()`, `lines()` and, where there are files, `write(folder)`.
 
-A scene is a name, the path of a .toml file, its tables as a dict, or one that was read. The words `tribodyn curve`,
-`study` and `geometry` are made from these functions.
+A scene is a name, the path of a .toml file, its tables as a dict, or one that was read. The words `tribodyn curve`
+and `study` are made from these functions.
 """
 
 from tribodyn.geometry.surface import HeightMap

@@ -119,7 +119,7 @@ def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.Captur
     face, _ = gaussian(128, 1e-6, 40e-6, 12e-6, 0.3e-6, 7)
     np.savetxt(tmp_path / "scan.txt", face.z.T * 1e6)
     units = ["--spacing", "1um,1um", "--lateral-unit", "1 m", "--height-unit", "1um"]
-    out, command = tmp_path / "asperities.csv", ["geometry", "asperities", str(tmp_path / "scan.txt")]
+    out, command = tmp_path / "asperities.csv", ["study", "asperities", str(tmp_path / "scan.txt")]
     code, said, err = leave([*command, *units, "--out", str(tmp_path), "--json"], capsys)
     assert code == 0, err
     record, found = json.loads(said), identify(face)

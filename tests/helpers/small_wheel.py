@@ -5,7 +5,7 @@ import numpy as np
 from tribodyn.fem import cyclic
 from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.loads import Couple, NodalForce
+from tribodyn.fem.loads import NodalForce, Sum
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import build
 from tribodyn.geometry import blade
@@ -24,7 +24,8 @@ STEEL = Material(210e9, 0.3, 7860.0)
 AROUND = (0.0, 1.0, 0.0)
 STIFFNESS = (93e6, 113e6)  # tangential and normal, of a whole face
 CONTACT = ContactFaces("shroud_right", (1, 0, 0), "shroud_left", vertices_only=True)
-LOADS = {"couple": Couple("couple_trailing", "couple_leading", AROUND), "shaker": NodalForce("excitation", AROUND)}
+FORCES = (NodalForce("couple_trailing", AROUND), 1.0), (NodalForce("couple_leading", AROUND), -1.0)
+LOADS = {"couple": Sum(FORCES), "shaker": NodalForce("excitation", AROUND)}
 OUTPUTS = {"tip": NodalForce("tip", AROUND), "driven": NodalForce("excitation", AROUND)}
 CLAMPS = (Clamp("clamp"),)
 SEAM = ("cyclic_right", "cyclic_left")

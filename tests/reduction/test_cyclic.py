@@ -9,8 +9,8 @@ import scipy.linalg as sla
 from tests.helpers import small_wheel as small
 from tribodyn.fem import cyclic, wheel
 from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.cyclic import at_index, projected
-from tribodyn.fem.modes import hermitian_modes
+from tribodyn.fem.cyclic import at_index
+from tribodyn.fem.modes import modes
 from tribodyn.reduction import cyclic as waves
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.limits import ReductionLimits
@@ -80,8 +80,8 @@ def test_relative_coordinates_are_the_contact_itself(reduced):
         assert B @ q[kept] == pytest.approx(z[:n_contact], abs=1e-12)
         assert T.shape[1] == system.n_dof
         assert n_masters == n_contact + 4  # two of the couple, the driven node, the tip
-        small_system = projected(reduced.sector.system, T)
-        same = [hermitian_modes(s.stiffness, s.mass, system.n_dof)[0] for s in (system, small_system)]
+        small_system = reduced.sector.system.projected(T)
+        same = [modes(s.stiffness, s.mass, system.n_dof)[0] for s in (system, small_system)]
         assert same[1] == pytest.approx(same[0], rel=1e-7)
 
 
@@ -106,8 +106,8 @@ def test_model_of_a_wave(reduced):
         system, B = model.at_harmonic(h)
         assert (np.eye(n_contact, system.n_dof) == B).all()
         assert system is model.at_harmonic(h + small.N)[0]
-        expected = hermitian_modes(*(getattr(at_index(reduced.sector, index)[0], m) for m in ("stiffness", "mass")), 3)
-        assert hermitian_modes(system.stiffness, system.mass, 3)[0] == pytest.approx(expected[0], rel=1e-8)
+        expected = modes(*(getattr(at_index(reduced.sector, index)[0], m) for m in ("stiffness", "mass")), 3)
+        assert modes(system.stiffness, system.mass, 3)[0] == pytest.approx(expected[0], rel=1e-8)
         assert np.iscomplexobj(system.stiffness) == (index not in (0, 4))
         lam, phi = sla.eigh(system.stiffness, system.mass)
         modal = phi.conj().T @ system.damping @ phi

@@ -100,9 +100,9 @@ BROKEN: dict[str, tuple[str, tuple[Change, ...], str, str]] = {  # name : scene,
         '[loads.static.h]\ntemperature = "4 K"\n', "give its material an expansion",
     ),
     "point held that follows": (BLOCKS, (), POINT + 'fixed = ["x"]\n', 'couplings.point: .*give kind = "rigid"'),
-    "kind of coupling": (BLOCKS, (), POINT + 'kind = "stiff"\n', 'expected "rigid" or "distributed"'),
+    "kind of coupling": (BLOCKS, (), POINT + 'kind = "stiff"\n', "kind: expected 'rigid' or 'distributed'"),
     "bolt without stiffness": (STACK, (('stiffness = "90 N/um"\n', ""),), "", "bolts.m8: a locked bolt needs"),
-    "state of a bolt": (STACK, (('"90 N/um"', '"90 N/um"\nstate = "loose"'),), "", 'expected "locked" or "constant"'),
+    "state of a bolt": (STACK, (('"90 N/um"', '"90 N/um"\nstate = "loose"'),), "", "expected 'locked' or 'constant'"),
     # units and numbers
     "body in millimetres": (
         BLOCKS, (('length = "40 mm"', "length = 40.0"),), "",

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.pages import ROOT, follow
-from tribodyn.geometry.drawing import mesh_drawing
+from tribodyn.geometry.gmsh_session import save, session
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.summary import summary
@@ -42,7 +42,11 @@ set = [['geometry.mesh="arm_20.msh"'], ['geometry.mesh="arm_15.msh"'], ['geometr
 
 def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for size in (20, 15, 10):
-        mesh_drawing(folder / "arm.geo", folder / f"arm_{size}.msh", {"size": 1e-3 * size})
+        with session() as gmsh:
+            gmsh.parser.setNumber("size", [1e-3 * size])
+            gmsh.merge(str(folder / "arm.geo"))
+            gmsh.model.mesh.generate(3)
+            save(gmsh, folder / f"arm_{size}.msh")
     (folder / "arm.study.toml").write_text(GRIDS)
     words = [
         "study",

@@ -14,6 +14,7 @@ from tribodyn.workflows.studies.many.optimum import optimise
 from tribodyn.workflows.studies.many.study import grid
 from tribodyn.workflows.studies.measured.compare import compare
 from tribodyn.workflows.studies.supports import supports
+from tribodyn.workflows.studies.surfaces import asperities
 from tribodyn.workflows.studies.trades import trade
 
 app = App(name="study")
@@ -27,4 +28,5 @@ app.command(word(converge, "study converge"))
 app.command(word(trade, "study trade"))
 app.command(word(supports, "study supports", into="beside"))
 app.command(word(forces, "study forces"))
+app.command(word(asperities, "study asperities", into="asked"))
 app.command(word(compare, "study compare"))

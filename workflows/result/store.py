@@ -45,109 +45,46 @@ KIND = "end_kind"  # attribute with the name of the member whose sentence stands
 ENDS: dict[type, type[End]] = {Branch: BranchEnd, WearHistory: WearEnd}
 KINDS = "outcome_kind"  # attribute with the names of the members whose sentences stand in "outcome"
 
-# group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
-SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
-    "patch": (
-        Patch,
-        {
-            "nodes": (("pair",), ""),
-            "points": (("pair", "xyz"), "m"),
-            "frames": (("pair", "axis", "xyz"), ""),
-            "area": (("pair",), "m2"),
-            "gap": (("pair",), "m"),
-            "faces": (("face", "face_corner"), ""),
-            "free_deflection": (("pair",), "m"),
-        },
-    ),
-    "part": (PartMesh, {"points": (("node", "xyz"), "m"), "cells": (("cell", "cell_corner"), "")}),
-    "references": (
-        References,
-        {"omega": (("reference",), "rad/s"), "free": (("reference",), "m"), "stuck": (("reference",), "m")},
-    ),
-    "frf": (
-        Branch,
-        {
-            "omega": (("point",), "rad/s"),
-            "response": (("point", "output", "coefficient"), "m"),
-            "contact": (("point", "contact", "coefficient"), "m"),
-            "energy": (("point",), "J"),
-            "newton_steps": (("point",), ""),
-            "folds": (("fold",), ""),
-            "parameter": (("point",), ""),
-            "load_factor": (("point",), ""),
-        },
-    ),
-    "stability": (
-        CurveStability,
-        {
-            "stable": (("point",), ""),
-            "growth": (("point",), "1/s"),
-            "omega": (("bifurcation",), "rad/s"),
-            "position": (("bifurcation",), ""),
-        },
-    ),
-    "bounds": (
-        ShearBounds,
-        {
-            "amplitude_low": (("point",), "m"),
-            "amplitude_high": (("point",), "m"),
-            "energy_low": (("point",), "J"),
-            "energy_high": (("point",), "J"),
-            "stuck": (("point",), ""),
-            "failed": (("point",), ""),
-        },
-    ),
-    "wear": (
-        WearHistory,
-        {
-            "cycles": (("row",), ""),
-            "cycles_in_step": (("row",), ""),
-            "depth": (("row", "pair"), "m"),
-            "worn": (("row", "pair"), "m"),
-            "energy": (("row", "pair"), "J"),
-            "preload": (("row",), "N"),
-            "normal_force": (("row", "pair"), "N"),
-            "status": (("row", "pair"), ""),
-            "omega": (("row",), "rad/s"),
-            "amplitude": (("row",), "m"),
-            "force": (("row", "contact", "coefficient"), "N"),
-            "response": (("row", "output", "coefficient"), "m"),
-            "solves": (("row",), ""),
-            "step_error": (("row",), ""),
-            "plan": (("row", "plan"), ""),
-            "work": (("row", "pair"), "J"),
-            "duty_omega": (("row", "duty"), "rad/s"),
-            "duty_displacement": (("row", "duty", "contact", "coefficient"), "m"),
-            "preload_at_rest": (("row",), "N"),
-            "growth": (("row",), ""),
-            "spread": (("row",), ""),
-            "mean_error": (("row",), ""),
-            "settled": (("row",), ""),
-            "periods": (("row",), ""),
-            "moving": (("row", "moving"), ""),
-        },
-    ),
-    "worn": (
-        WornResponses,
-        {
-            "row": (("curve",), ""),
-            "omega": (("curve", "curve_point"), "rad/s"),
-            "amplitude": (("curve", "curve_point"), "m"),
-        },
-    ),
-    "fields": (
-        Fields,
-        {"row": (("field",), ""), "displacement": (("field", "node", "xyz", "coefficient"), "m")},
-    ),
-    "loops": (
-        Loops,
-        {
-            "row": (("field",), ""),
-            "displacement": (("field", "pair", "component", "sample"), "m"),
-            "force": (("field", "pair", "component", "sample"), "N"),
-        },
-    ),
-}
+Arrays = Mapping[str, tuple[tuple[str, ...], str]]
+"""array -> dimensions and unit"""
+
+
+def _arrays(of: Mapping[str, str]) -> Arrays:
+    """Arrays of a group from dimensions -> "array array:unit", both as words."""
+    said = ((dimensions, word.partition(":")) for dimensions, words in of.items() for word in words.split())
+    return {name: (tuple(dimensions.split()), unit) for dimensions, (name, _, unit) in said}
+
+
+# group -> (type, its arrays); what is not an array is an attribute of the group
+SCHEMA: dict[str, tuple[type, Arrays]] = {
+    name: (kind, _arrays(of))
+    for name, kind, of in (
+        ("patch", Patch, {
+            "pair": "nodes area:m2 gap:m free_deflection:m", "pair xyz": "points:m", "pair axis xyz": "frames",
+            "face face_corner": "faces",
+        }),
+        ("part", PartMesh, {"node xyz": "points:m", "cell cell_corner": "cells"}),
+        ("references", References, {"reference": "omega:rad/s free:m stuck:m"}),
+        ("frf", Branch, {
+            "point": "omega:rad/s energy:J newton_steps parameter load_factor", "fold": "folds",
+            "point output coefficient": "response:m", "point contact coefficient": "contact:m",
+        }),
+        ("stability", CurveStability, {"point": "stable growth:1/s", "bifurcation": "omega:rad/s position"}),
+        ("bounds", ShearBounds, {
+            "point": "amplitude_low:m amplitude_high:m energy_low:J energy_high:J stuck failed",
+        }),
+        ("wear", WearHistory, {
+            "row": "cycles cycles_in_step preload:N omega:rad/s amplitude:m solves step_error preload_at_rest:N growth "
+                   "spread mean_error settled periods",
+            "row pair": "depth:m worn:m energy:J normal_force:N status work:J", "row plan": "plan",
+            "row contact coefficient": "force:N", "row output coefficient": "response:m", "row moving": "moving",
+            "row duty": "duty_omega:rad/s", "row duty contact coefficient": "duty_displacement:m",
+        }),
+        ("worn", WornResponses, {"curve": "row", "curve curve_point": "omega:rad/s amplitude:m"}),
+        ("fields", Fields, {"field": "row", "field node xyz coefficient": "displacement:m"}),
+        ("loops", Loops, {"field": "row", "field pair component sample": "displacement:m force:N"}),
+    )
+}  # fmt: skip
 
 
 class ResultError(ValueError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from tribodyn.fem.constraints import Clamp, Constraint, named
 from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
 from tribodyn.fem.loads import Load
 from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
-from tribodyn.fem.springs import ElongationSpring, Mass
+from tribodyn.fem.part import Stiff
+from tribodyn.fem.springs import Mass, Spring
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry import parts, placing, refine
@@ -23,8 +25,10 @@ from tribodyn.geometry.placing import rotation
 from tribodyn.geometry.sources import cad, picking
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
-from tribodyn.workflows.scene.body import Geometry
-from tribodyn.workflows.scene.structure import AXES, SolidMaterial, StructureScene
+from tribodyn.workflows.scene.body import Geometry, Meshed, SolidMaterial
+from tribodyn.workflows.scene.loads import SpringTable
+from tribodyn.workflows.scene.schema import MeshScene, PartScene
+from tribodyn.workflows.scene.structure import AXES, StructureScene
 
 
 def part_mesh(part: str, parameters: Mapping[str, int | float], path: Path) -> tuple[Any, dict[str, np.ndarray]]:
@@ -56,8 +60,7 @@ def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
     if scene.geometry is not None:
         assert scene.material is not None
         mesh, node_sets, notes = geometry_mesh(scene.geometry, folder, scratch)
-        one = scene.material
-        bodies = [Body("", mesh, node_sets, Material(one.young, one.poisson, one.density, one.expansion), notes)]
+        bodies = [Body("", mesh, node_sets, solid(scene.material), notes)]
     else:
         bodies = []
         for name, table in scene.bodies.items():
@@ -161,48 +164,54 @@ def _middle(whole: Assembly, table: structure.CouplingTable) -> list[float]:
     return [float(c) for c in middle]
 
 
-def clamps(scene: StructureScene, folder: Path) -> list[Clamp]:
-    """What holds the bodies and the points of couplings."""
-    found = []
-    if scene.geometry is not None:
-        found += [Clamp(group) for group in scene.geometry.fixed]
-        found += [Clamp(*item) for item in scene.geometry.fixed_axes.items()]
-    for name, body in scene.bodies.items():
-        found += [Clamp(f"{name}.{group}") for group in body.fixed]
-        found += [Clamp(f"{name}.{group}", axes) for group, axes in body.fixed_axes.items()]
-    for name, table in scene.couplings.items():
-        for point, axes in ((name, AXES[:3]), (f"{name}.turn", AXES[3:])):
-            held = "".join(axis[-1] for axis in axes if axis in table.fixed)
-            found += [Clamp(point, held)] if held else []
-    return found + [clamp for deck in of_decks(scene, folder).values() for clamp in deck.clamps]
+@dataclass
+class Joined:
+    """What holds, joins and weighs the bodies of a scene: its own, and what its decks bring, these with their loads."""
+
+    clamps: list[Clamp] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    springs: list[Stiff] = field(default_factory=list)
+    masses: list[Mass] = field(default_factory=list)
+    loads: dict[str, Load] = field(default_factory=dict)
 
 
-def constraints(scene: StructureScene, folder: Path) -> list[Constraint]:
-    """Ties, couplings, links and equations."""
-    found: list[Constraint] = [Tie(f"ties.{name}", t.first, t.second, t.reach) for name, t in scene.ties.items()]
+def joined(scene: MeshScene, folder: Path) -> Joined:
+    """What holds and joins the bodies of a scene, whose files are in `folder`; raises ValueError as `of_decks` does."""
+    assert isinstance(scene, PartScene | StructureScene)
+    found = Joined(springs=[spring(table) for table in scene.springs.values()])
+    held: dict[str, Meshed] = {} if scene.geometry is None else {"": scene.geometry}
+    if isinstance(scene, StructureScene):
+        held |= {f"{name}.": body for name, body in scene.bodies.items()}
+        _of_structure(scene, found)
+        for name, deck in of_decks(scene, folder).items():
+            found.clamps += deck.clamps
+            found.constraints += deck.constraints
+            found.springs += deck.springs
+            found.masses += deck.masses
+            found.loads[decks.load_name(name)] = deck.load
+    for before, table in held.items():
+        found.clamps += [Clamp(f"{before}{group}") for group in table.fixed]
+        found.clamps += [Clamp(f"{before}{group}", axes) for group, axes in table.fixed_axes.items()]
+    return found
+
+
+def spring(table: SpringTable) -> Spring:
+    """The spring of a table of a scene."""
+    return Spring(table.group, table.direction, table.stiffness, table.opposite)
+
+
+def _of_structure(scene: StructureScene, found: Joined) -> None:
+    """Ties, couplings with what of their points is held, links and lumped masses."""
+    found.constraints += [Tie(f"ties.{name}", t.first, t.second, t.reach) for name, t in scene.ties.items()]
     coupled: dict[str, RigidCoupling | DistributedCoupling] = {}
     for name, table in scene.couplings.items():
         kind = RigidCoupling if table.kind == "rigid" else DistributedCoupling
         coupled[name] = kind(name, table.face)
-    found += coupled.values()
+        for point, axes in ((name, AXES[:3]), (f"{name}.turn", AXES[3:])):
+            held = "".join(axis[-1] for axis in axes if axis in table.fixed)
+            found.clamps += [Clamp(point, held)] if held else []
+    found.constraints += coupled.values()
     for name, link in scene.links.items():
         free = [AXES.index(axis) for axis in link.free]
-        found.append(Link(f"links.{name}", coupled[link.first], coupled[link.second], free))
-    return found + [one for deck in of_decks(scene, folder).values() for one in deck.constraints]
-
-
-def masses(scene: StructureScene, folder: Path) -> list[Mass]:
-    """Lumped masses."""
-    own = [Mass(table.at, table.mass, table.inertia) for table in scene.masses.values()]
-    return own + [mass for deck in of_decks(scene, folder).values() for mass in deck.masses]
-
-
-def deck_springs(scene: StructureScene, folder: Path) -> list[ElongationSpring]:
-    """The springs that decks bring."""
-    return [spring for deck in of_decks(scene, folder).values() for spring in deck.springs]
-
-
-def deck_loads(scene: StructureScene, folder: Path) -> dict[str, Load]:
-    """The loads that decks bring, by name."""
-    brought = of_decks(scene, folder)
-    return {decks.load_name(name): deck.load for name, deck in brought.items()}
+        found.constraints.append(Link(f"links.{name}", coupled[link.first], coupled[link.second], free))
+    found.masses += [Mass(table.at, table.mass, table.inertia) for table in scene.masses.values()]

@@ -66,13 +66,13 @@ def elastic(scene: Scene, face: str) -> tuple[float, float]:
 
     Raises  ValueError where it is orthotropic or of several materials
     """
-    if isinstance(scene, PartScene | StructureScene) and scene.material is not None:
-        return scene.material.young, scene.material.poisson
-    assert isinstance(scene, StructureScene)
-    body = scene.bodies.get(face.partition(".")[0])
-    if body is None:
-        raise ValueError(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
-    solid = None if not isinstance(body.material, str) else bodies.solid(scene.materials[body.material])
+    assert isinstance(scene, PartScene | StructureScene)
+    solid = None if scene.material is None else bodies.solid(scene.material)
+    if isinstance(scene, StructureScene) and scene.material is None:
+        body = scene.bodies.get(face.partition(".")[0])
+        if body is None:
+            raise ValueError(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
+        solid = None if not isinstance(body.material, str) else bodies.solid(scene.materials[body.material])
     if not isinstance(solid, Material):
         raise ValueError(f"the punch on '{face}' needs a body of one isotropic material: give its stiffness")
     return solid.E, solid.nu

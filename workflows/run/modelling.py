@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem import part as fem_part
-from tribodyn.fem.bolts import Elongation
-from tribodyn.fem.constraints import Clamp, NoMeanRotation
+from tribodyn.fem.constraints import NoMeanRotation
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.equilibrium import unbalanced_load
 from tribodyn.fem.interface import COMPONENTS
-from tribodyn.fem.loads import BodyForce, Centrifugal, Couple, Load, Moment, NodalForce, Pressure
+from tribodyn.fem.loads import BodyForce, Centrifugal, Load, Moment, NodalForce, Pressure, Sum
 from tribodyn.fem.part import Part
-from tribodyn.fem.springs import Spring
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at
 from tribodyn.hbm import rest
@@ -145,35 +143,33 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
     }
     if scene.wheel is not None and scene.wheel.speed:
         loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
-    if isinstance(scene, StructureScene):
-        loads |= bodies.deck_loads(scene, folder or Path())
+    joined = bodies.joined(scene, folder or Path())
+    loads |= joined.loads
     rods = tightening.rods(scene, mesh, node_sets) if isinstance(scene, StructureScene) else {}
     loads |= rods
     geometry = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
     turning = None if geometry is None else geometry.no_turning
-    brought = bodies.deck_springs(scene, folder or Path()) if isinstance(scene, StructureScene) else []
-    masses = bodies.masses(scene, folder or Path()) if isinstance(scene, StructureScene) else []
-    if masses and scene.wheel is not None and scene.wheel.speed:
+    if joined.masses and scene.wheel is not None and scene.wheel.speed:
         raise ValueError(
-            f"wheel.speed: there is a lumped mass at {masses[0].at}, whose spin softening and Coriolis forces are not "
-            "modelled: make it a body, or leave wheel.speed out"
+            f"wheel.speed: there is a lumped mass at {joined.masses[0].at}, whose spin softening and Coriolis forces "
+            "are not modelled: make it a body, or leave wheel.speed out"
         )
     return fem_part.build(
         mesh,
         node_sets,
         material,
-        clamps(scene, folder or Path()),
+        joined.clamps,
         part_reduction.contacts(scene),
         loads,
         {
             name: NodalForce(output.group, output.direction)
             for name, output in {settings.OUTPUT: scene.response, **scene.response.others}.items()
         }
-        | {tightening.output(name): Elongation(rod) for name, rod in rods.items()},
-        springs=[*springs(scene), *brought, *(rod for rod in rods.values() if rod.stiffness)],
+        | {tightening.output(name): Sum(((rod, -1.0),)) for name, rod in rods.items()},
+        springs=[*joined.springs, *(rod for rod in rods.values() if rod.stiffness)],
         held=[] if turning is None else [NoMeanRotation(turning)],
-        constraints=bodies.constraints(scene, folder or Path()) if isinstance(scene, StructureScene) else (),
-        masses=masses,
+        constraints=joined.constraints,
+        masses=joined.masses,
     )
 
 
@@ -192,20 +188,6 @@ def with_surfaces(scene: MeshScene, part: Part, folder: Path) -> tuple[Part, tup
     return replace(part, interface=replace(part.interface, gap=part.interface.gap + measured.gap)), measured.repairs
 
 
-def clamps(scene: MeshScene, folder: Path) -> list[Clamp]:
-    """What holds the part, whole groups or along some axes; files of the scene are in `folder`."""
-    if isinstance(scene, StructureScene):
-        return bodies.clamps(scene, folder)
-    assert isinstance(scene, PartScene)
-    geometry = scene.geometry
-    return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
-
-
-def springs(scene: MeshScene) -> list[Spring]:
-    """Joints that give way."""
-    return [Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()]
-
-
 def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
     """The load of a table of a scene, per unit of its amplitude; its file is in `folder`."""
     if load.pressure is not None:
@@ -220,9 +202,10 @@ def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
         return Centrifugal(load.direction, load.point)
     if load.moment is not None:
         return Moment(load.group, load.direction)
-    if load.opposite is not None:
-        return Couple(load.group, load.opposite, load.direction, load.shared)
-    return NodalForce(load.group, load.direction, load.shared)
+    force = NodalForce(load.group, load.direction, load.shared)
+    if load.opposite is not None:  # a couple
+        return Sum(((force, 1.0), (replace(force, nodes=load.opposite), -1.0)))
+    return force
 
 
 def plain_model(scene: MeshScene, part: Part) -> ReducedModel:

@@ -12,7 +12,6 @@ from tribodyn.fem.assembly import pieces
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.factor import SingularStiffness
 from tribodyn.fem.interface import COMPONENTS
-from tribodyn.fem.material import Material
 from tribodyn.fem.multigrid import rigid_motions
 from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
@@ -22,7 +21,7 @@ from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.residual_flexibility import residual_flexibility
-from tribodyn.workflows.run import joints
+from tribodyn.workflows.run import bodies, joints
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 BOLTS = "bolts."  # begins the names of outputs that are elongations of bolts
@@ -31,10 +30,7 @@ MOST_MASTERS = 3000  # contact DOFs up to which all of them remain coordinates b
 
 def material(scene: MeshScene, mesh: Any = None) -> Any:
     """What the part is made of, or what every body of an assembly is made of."""
-    if isinstance(scene, PartScene):
-        one = scene.material
-        return Material(one.young, one.poisson, one.density, one.expansion)
-    return mesh.material
+    return bodies.solid(scene.material) if isinstance(scene, PartScene) else mesh.material
 
 
 def components(scene: Scene) -> tuple[str, ...]:

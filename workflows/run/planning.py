@@ -21,7 +21,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.workflows.run import bodies, matrix_model
 from tribodyn.workflows.run import memory as memory_use
-from tribodyn.workflows.run.modelling import clamps, make_mesh
+from tribodyn.workflows.run.modelling import make_mesh
 from tribodyn.workflows.run.part_reduction import components, without_masters
 from tribodyn.workflows.run.sanity_checks import check_opening
 from tribodyn.workflows.run.settings import check_names
@@ -128,9 +128,10 @@ def plan(file: SceneFile) -> Plan:
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
+        joined = bodies.joined(built, file.folder)
         if isinstance(built, StructureScene):
-            remarks = _openings(built, mesh, node_sets, file.folder)
-        free = free_dofs(3 * nodes, clamps(built, file.folder), node_sets)
+            remarks = _openings(built, mesh, node_sets, joined)
+        free = free_dofs(3 * nodes, joined.clamps, node_sets)
         full = len(free)
         pairs, masters = _contact(built, mesh, node_sets, free)
         held = int(isinstance(built, PartScene) and built.geometry.no_turning is not None)
@@ -170,7 +171,7 @@ def plan(file: SceneFile) -> Plan:
     )
 
 
-def _openings(scene: StructureScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path) -> list[str]:
+def _openings(scene: StructureScene, mesh: Any, node_sets: dict[str, np.ndarray], joined: bodies.Joined) -> list[str]:
     """Remarks on tied faces, and on those in contact whose gap is that of the geometry, that lie apart.
 
     Raises  ValueError for constraints that the run refuses
@@ -181,7 +182,7 @@ def _openings(scene: StructureScene, mesh: Any, node_sets: dict[str, np.ndarray]
         for face in contact.groups
         if contact.opposite is not None and contact.gap is None
     ]
-    for one in bodies.constraints(scene, folder):
+    for one in joined.constraints:
         one.build(mesh, node_sets)
         if isinstance(one, Tie):
             pairs.append(one)

@@ -19,7 +19,7 @@ from tribodyn.hbm.derivatives import Change, Posed
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
-from tribodyn.workflows.run import joints, matrix_model, modelling, part_reduction
+from tribodyn.workflows.run import bodies, joints, matrix_model, modelling, part_reduction
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.loads import KINDS
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
@@ -180,7 +180,7 @@ class Varying:
         """The part with another value of a key; nothing is assembled for a spring."""
         twice, scene = self.file.changed(f"{key}={value!r}"), self.scene
         if isinstance(scene, PartScene) and key.startswith("springs."):
-            spring = modelling.springs(scene)[list(scene.springs).index(key.split(".")[1])]
+            spring = bodies.spring(scene.springs[key.split(".")[1]])
             added = spring.matrix(part.mesh, part.node_sets)[part.free][:, part.free]
             return replace(part, system=replace(part.system, stiffness=part.system.stiffness + added))
         mesh, node_sets = part.mesh, dict(part.node_sets)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     Field,
@@ -26,37 +26,48 @@ from tribodyn.workflows.scene.fields import (
 from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
 
 
-class Geometry(Table):
+class Meshed(Table):
     """A part of geometry/ or a mesh file, and the groups that are held fixed.
 
     All other keys of the table are parameters of the part; those left out have the part's own defaults.
     """
 
+    KEY: ClassVar[str] = "geometry."
+    """What stands before its keys in a sentence."""
+
     part: str | None = None
     """Name of a parametric part; its parameters are further keys of this table."""
     mesh: str | None = None
-    """Mesh file of second order, relative to the scene file, instead of a part."""
+    """Mesh file, relative to the scene file, instead of a part."""
     fixed: tuple[str, ...] = ()
-    """Groups of the mesh that are clamped."""
+    """Groups of the mesh that are clamped, by their own names."""
     fixed_axes: dict[str, str] = Field(default_factory=dict)
     """Groups held along some axes only: group = letters out of "xyz"."""
-    no_turning: Direction | None = None
-    """Axis about which the part as a whole cannot turn."""
     halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0
     """How many times every element is cut into eight of half the size, its shape kept."""
     parameters: dict[str, int | float] = Field(default_factory=dict)
     """Parameters of the part, gathered from the other keys of the table."""
 
+    _own: Path | None = PrivateAttr(None)
+
     @model_validator(mode="before")
     @classmethod
     def _gather_parameters(cls, table: Any, info: ValidationInfo) -> Any:
-        return gathered(cls, table, folder_of(info))
-
-    _own: Path | None = PrivateAttr(None)
+        """Keys that the table does not have are gathered as parameters of the part."""
+        if not isinstance(table, dict) or "parameters" in table:
+            return table
+        own = {key: value for key, value in table.items() if key in cls.model_fields}
+        other = {key: value for key, value in table.items() if key not in cls.model_fields}
+        if ("part" in own) == ("mesh" in own):
+            refuse_slips(other, ["part", "mesh"], list(cls.model_fields))
+            raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
+        if not isinstance(own.get("part"), str):
+            return own | other  # a mesh file has no parameters: the other keys are unknown ones
+        return own | {"parameters": part_parameters(own["part"], other, folder_of(info), cls)}
 
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:
-        self._own = own_file(folder_of(info), self.part, "geometry.part")
+        self._own = own_file(folder_of(info), self.part, f"{self.KEY}part")
         return self
 
     @property
@@ -65,22 +76,18 @@ class Geometry(Table):
         return self.part if self._own is None else str(self._own)
 
 
-def gathered(kind: type[Table], table: Any, folder: Path | None) -> Any:
-    """A table with a part or a mesh whose keys that its kind does not have are gathered as parameters of the part."""
-    if not isinstance(table, dict) or "parameters" in table:
-        return table
-    own = {key: value for key, value in table.items() if key in kind.model_fields}
-    other = {key: value for key, value in table.items() if key not in kind.model_fields}
-    if ("part" in own) == ("mesh" in own):
-        refuse_slips(other, ["part", "mesh"], list(kind.model_fields))
-        raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
-    if not isinstance(own.get("part"), str):
-        return own | other  # a mesh file has no parameters: the other keys are unknown ones
-    return own | {"parameters": part_parameters(own["part"], other, folder, kind)}
+class Geometry(Meshed):
+    """A part of geometry/ or a mesh file, and the groups that are held fixed.
+
+    All other keys of the table are parameters of the part; those left out have the part's own defaults.
+    """
+
+    no_turning: Direction | None = None
+    """Axis about which the part as a whole cannot turn."""
 
 
 def part_parameters(
-    part: str, given: dict[str, Any], folder: Path | None = None, kind: type[Table] = Geometry
+    part: str, given: dict[str, Any], folder: Path | None = None, kind: type[Meshed] = Geometry
 ) -> dict[str, int | float]:
     """Parameters of a part in SI units: all of them, or those given to a file of one's own, which is not run here.
 
@@ -90,20 +97,43 @@ def part_parameters(
     general = [name for name in kind.model_fields if name != "parameters"]
     if is_file(part):
         if folder is None:
-            raise ValueError(f'geometry.part: "{part}" is a file beside a scene, and this scene has no folder')
-        return numbers("geometry", read(beside(folder, part, "geometry.part")), given, general)
-    values = numbers("geometry", read(parts.file_of(part)), given, general)
+            raise ValueError(f'{kind.KEY}part: "{part}" is a file beside a scene, and this scene has no folder')
+        return numbers(kind.KEY, read(beside(folder, part, f"{kind.KEY}part")), given, general)
+    values = numbers(kind.KEY, read(parts.file_of(part)), given, general)
     return asdict(parts.load(part).Parameters(**values))
 
 
-class MaterialTable(Table):
-    """Linear isotropic elasticity and density."""
+Modulus = Annotated[float, quantity("Pa"), Field(gt=0)]
+Expansion = Annotated[float, quantity("1/K")]
 
-    young: Annotated[float, quantity("Pa"), Field(gt=0)]
-    """Young's modulus."""
+
+class SolidMaterial(Table):
+    """An isotropic material by single numbers, or an orthotropic one by three along its own axes."""
+
+    young: Modulus | tuple[Modulus, Modulus, Modulus]
+    """Young's modulus; three along the axes of an orthotropic material."""
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number] = 0.3
+    """Poisson's ratio; nu12, nu13, nu23 of an orthotropic material, the strain along the second axis when it is pulled
+    along the first."""
+    shear: tuple[Modulus, Modulus, Modulus] | None = None
+    """Shear moduli G12, G13, G23 of an orthotropic material."""
     density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
     """Density."""
-    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] = 0.3
-    """Poisson's ratio."""
-    expansion: Annotated[float, quantity("1/K")] = 0.0
-    """Coefficient of thermal expansion."""
+    axes: tuple[Direction, Direction] | None = None
+    """First and second axis of an orthotropic material; x and y by default."""
+    expansion: Expansion | tuple[Expansion, Expansion, Expansion] = 0.0
+    """Coefficient of thermal expansion; three along the axes of an orthotropic material."""
+    elements: Literal["quadratic", "linear_reduced"] = "quadratic"
+    """Elements of bodies of this material: the mesh's own, or eight linear hexahedra with reduced integration and
+    hourglass stiffness on the nodes of each 27-node one, for comparison with models of such elements."""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> SolidMaterial:
+        three = isinstance(self.young, tuple)
+        if three != isinstance(self.poisson, tuple) or three != (self.shear is not None):
+            raise ValueError("expected three values each of young, poisson and shear for an orthotropic material")
+        if not three and (self.axes is not None or isinstance(self.expansion, tuple)):
+            raise ValueError("expected axes and three expansions only with three values of young, poisson and shear")
+        if three and self.elements != "quadratic":
+            raise ValueError(f'expected no elements = "{self.elements}" with an orthotropic material')
+        return self

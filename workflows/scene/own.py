@@ -44,18 +44,18 @@ def numbers(
 ) -> dict[str, int | float]:
     """The own numbers of a law, a part or a continuation out of a table of a scene, in SI units.
 
-    table : its key, such as "contact"; given : what the table has besides `others`, its general keys
+    table : its key with a dot, such as "contact."; given : what the table has besides `others`, its general keys
     Raises  ValueError: one is unknown, missing, not in its unit or out of its limits; lists those that there are
     """
     known = {number.name: number for number in declared}
     found: dict[str, int | float] = {}
     for name, value in given.items():
         if name not in known:
-            raise ValueError(unknown_key(f"{table}.{name}", [*others, *known]))
-        found[name] = _in_si(f"{table}.{name}", known[name], value)
+            raise ValueError(unknown_key(f"{table}{name}", [*others, *known]))
+        found[name] = _in_si(f"{table}{name}", known[name], value)
     for name, number in known.items():
         if number.needed and name not in found:
-            raise ValueError(f"{table}.{name} is missing: its numbers here are {', '.join(known)}")
+            raise ValueError(f"{table}{name} is missing: its numbers here are {', '.join(known)}")
     return found
 
 
@@ -118,7 +118,7 @@ class LawTable(Table):
         if not isinstance(law, str):
             return general  # refused by the field itself
         path = beside(folder, law, f"{cls.TABLE}.law") if is_file(law) else cls.LAWS.file_of(law)
-        return general | numbers(cls.TABLE, read(path), given, fields)
+        return general | numbers(f"{cls.TABLE}.", read(path), given, fields)
 
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:

@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from tribodyn.workflows.scene.afterwards import Pictures, VerdictOptions
-from tribodyn.workflows.scene.body import Geometry, MaterialTable
+from tribodyn.workflows.scene.body import Geometry, SolidMaterial
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
 from tribodyn.workflows.scene.contact_numbers import takes_asperities, with_asperities, with_numbers_when_hot
 from tribodyn.workflows.scene.fields import (
@@ -258,7 +258,7 @@ class PartScene(MeshScene):
 
     geometry: Geometry
     """Part or mesh."""
-    material: MaterialTable
+    material: SolidMaterial
     """Material."""
     contact: FaceContact
     """The contact faces and their law."""

@@ -90,7 +90,7 @@ class Response(Table):
             declared = read(beside(folder, method, "response.method"), "Options")
         else:
             declared = continuation.declared(method)
-        return table | {"options": numbers("response.options", declared, table.get("options", {}), ())}
+        return table | {"options": numbers("response.options.", declared, table.get("options", {}), ())}
 
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:
@@ -166,19 +166,13 @@ class Reduction(Table):
     to the contact stays (SCCe)."""
 
     @model_validator(mode="after")
-    def _interface(self) -> Reduction:
+    def _whole(self) -> Reduction:
         if self.interface_modes is None and self.interface_keep is not None:
             raise ValueError("expected interface_keep only with interface_modes")
-        return self
-
-    @model_validator(mode="after")
-    def _iterates(self) -> Reduction:
         if self.solver == "multigrid" and self.relative:
             raise ValueError('expected solver = "direct" with relative = true')
-        return self
-
-    @model_validator(mode="after")
-    def _without_masters(self) -> Reduction:
+        if (self.modes is None) == (self.cutoff is None):
+            raise ValueError("expected either modes = number or cutoff = frequency, and not both")
         if self.method == "residual_flexibility" and self.needs_masters:
             raise ValueError(
                 'expected method = "craig_bampton" with relative = true, interface_modes or solver = "multigrid"'
@@ -189,12 +183,6 @@ class Reduction(Table):
     def needs_masters(self) -> bool:
         """Whether another key makes sense with contact DOFs as masters alone."""
         return self.relative or self.interface_modes is not None or self.solver == "multigrid"
-
-    @model_validator(mode="after")
-    def _one_truncation(self) -> Reduction:
-        if (self.modes is None) == (self.cutoff is None):
-            raise ValueError("expected either modes = number or cutoff = frequency, and not both")
-        return self
 
 
 def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]:

@@ -6,26 +6,23 @@ Groups of a body are named "body.group".
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
-from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from tribodyn.geometry.sources.picking import Rule
-from tribodyn.workflows.scene.body import Geometry, MaterialTable, gathered
+from tribodyn.workflows.scene.body import Geometry, Meshed, SolidMaterial
 from tribodyn.workflows.scene.contact import FaceContact
 from tribodyn.workflows.scene.fields import (
     Angle,
     Direction,
     Length,
-    Number,
     Stiffness,
     Table,
     quantity,
     refuse_slips,
     unknown_key,
 )
-from tribodyn.workflows.scene.own import folder_of, own_file
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import JointWearTable
@@ -122,16 +119,14 @@ class Rotation(Table):
     """Point on the axis."""
 
 
-class BodyTable(Table):
+class BodyTable(Meshed):
     """A body: a part of geometry/ or a mesh file, where it stands, what it is made of and what holds it.
 
     All other keys of the table are parameters of the part; those left out have the part's own defaults.
     """
 
-    part: str | None = None
-    """Name of a parametric part; its parameters are further keys of this table."""
-    mesh: str | None = None
-    """Mesh file, relative to the scene file, instead of a part."""
+    KEY: ClassVar[str] = ""
+
     volume: str | None = None
     """Volume group of the part or mesh that is this body; the whole mesh by default."""
     unit: Annotated[float, BeforeValidator(in_metres), Field(gt=0)] = 1.0
@@ -142,50 +137,22 @@ class BodyTable(Table):
     """Element sizes at faces of a CAD file: "face 6" = size."""
     faces: dict[str, FaceRule] = Field(default_factory=dict)
     """Faces that are picked by rule, by name."""
-    halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0
-    """How many times every element is cut into eight of half the size, its shape kept."""
     rotation: Rotation | tuple[Rotation, ...] = ()
     """Turn of the body, or several one after the other, before it is moved."""
     translation: Point = (0.0, 0.0, 0.0)
     """Where the origin of the body is moved to."""
     material: str | dict[str, str]
     """Name of its material, or volume group = material for each of its volumes."""
-    fixed: tuple[str, ...] = ()
-    """Groups of this body that are clamped, without its name before them."""
-    fixed_axes: dict[str, str] = Field(default_factory=dict)
-    """Groups of this body held along some axes only: group = letters out of "xyz"."""
-    parameters: dict[str, int | float] = Field(default_factory=dict)
-    """Parameters of the part, gathered from the other keys of the table."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _gather_parameters(cls, table: Any, info: ValidationInfo) -> Any:
-        for key in ("size", "face_sizes", "unit"):
-            if isinstance(table, dict) and "part" in table and "mesh" not in table and key in table:
+    @model_validator(mode="after")
+    def _sizes(self) -> Self:
+        for key in ("size", "face_sizes", "unit") if self.part is not None else ():
+            if getattr(self, key) != type(self).model_fields[key].get_default(call_default_factory=True):
                 raise ValueError(f"{key} is for a mesh or a CAD file: a part has parameters of its own")
-        try:
-            return gathered(cls, table, folder_of(info))
-        except ValueError as trouble:
-            raise ValueError(str(trouble).replace("geometry.", "")) from None
-
-    _own: Path | None = PrivateAttr(None)
-
-    @model_validator(mode="after")
-    def _remember_the_file(self, info: ValidationInfo) -> Self:
-        self._own = own_file(folder_of(info), self.part, "part")
-        return self
-
-    @model_validator(mode="after")
-    def _names_of_faces(self) -> Self:
         for name in self.face_sizes:
             if not (name.startswith("face ") and name.removeprefix("face ").isdigit()):
                 raise ValueError(f'face_sizes: expected faces by their numbers, such as "face 6", got "{name}"')
         return self
-
-    @property
-    def part_name(self) -> str | None:
-        """The part for geometry.parts: its name, or the path of the file beside the scene."""
-        return self.part if self._own is None else str(self._own)
 
     @property
     def turns(self) -> tuple[Rotation, ...]:
@@ -196,42 +163,6 @@ class BodyTable(Table):
     def materials(self) -> tuple[str, ...]:
         """Names of its materials."""
         return (self.material,) if isinstance(self.material, str) else tuple(self.material.values())
-
-
-Modulus = Annotated[float, quantity("Pa"), Field(gt=0)]
-Expansion = Annotated[float, quantity("1/K")]
-
-
-class SolidMaterial(Table):
-    """An isotropic material by single numbers, or an orthotropic one by three along its own axes."""
-
-    young: Modulus | tuple[Modulus, Modulus, Modulus]
-    """Young's modulus; three along the axes of an orthotropic material."""
-    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number] = 0.3
-    """Poisson's ratio; nu12, nu13, nu23 of an orthotropic material, the strain along the second axis when it is pulled
-    along the first."""
-    shear: tuple[Modulus, Modulus, Modulus] | None = None
-    """Shear moduli G12, G13, G23 of an orthotropic material."""
-    density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
-    """Density."""
-    axes: tuple[Direction, Direction] | None = None
-    """First and second axis of an orthotropic material; x and y by default."""
-    expansion: Expansion | tuple[Expansion, Expansion, Expansion] = 0.0
-    """Coefficient of thermal expansion; three along the axes of an orthotropic material."""
-    elements: Literal["quadratic", "linear_reduced"] = "quadratic"
-    """Elements of bodies of this material: the mesh's own, or eight linear hexahedra with reduced integration and
-    hourglass stiffness on the nodes of each 27-node one, for comparison with models of such elements."""
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> SolidMaterial:
-        three = isinstance(self.young, tuple)
-        if three != isinstance(self.poisson, tuple) or three != (self.shear is not None):
-            raise ValueError("expected three values each of young, poisson and shear for an orthotropic material")
-        if not three and (self.axes is not None or isinstance(self.expansion, tuple)):
-            raise ValueError("expected axes and three expansions only with three values of young, poisson and shear")
-        if three and self.elements != "quadratic":
-            raise ValueError(f'expected no elements = "{self.elements}" with an orthotropic material')
-        return self
 
 
 class NamedContact(FaceContact):
@@ -266,7 +197,8 @@ class TieTable(Table):
     where they are apart by more than 0.5 % of it on average."""
 
 
-AXES = ("x", "y", "z", "rx", "ry", "rz")
+Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
+AXES: tuple[Axis, ...] = get_args(Axis)
 
 
 class CouplingTable(Table):
@@ -274,20 +206,16 @@ class CouplingTable(Table):
 
     face: str
     """Face or group that is coupled."""
-    kind: str = "distributed"
+    kind: Literal["rigid", "distributed"] = "distributed"
     """"rigid": the face moves as a rigid body with the point; "distributed": the point moves as the mean of the face,
     which stays soft."""
     point: Point | None = None
     """Where the point is; the middle of the face by default."""
-    fixed: tuple[str, ...] = ()
+    fixed: tuple[Axis, ...] = ()
     """What of the point is held: out of "x", "y", "z" and the turns "rx", "ry", "rz"; only of a rigid coupling."""
 
     @model_validator(mode="after")
-    def _kinds(self) -> CouplingTable:
-        if self.kind not in ("rigid", "distributed"):
-            raise ValueError(f'kind: expected "rigid" or "distributed", got {self.kind!r}')
-        if set(self.fixed) - set(AXES):
-            raise ValueError(f"fixed: expected some of {', '.join(AXES)}, got {list(self.fixed)}")
+    def _held_if_rigid(self) -> CouplingTable:
         if self.fixed and self.kind == "distributed":
             raise ValueError('fixed: a point that follows its face cannot be held: give kind = "rigid"')
         return self
@@ -300,12 +228,12 @@ class LinkTable(Table):
     """Name of a coupling."""
     second: str
     """Name of the other one."""
-    free: tuple[str, ...] = ()
+    free: tuple[Axis, ...] = ()
     """Motions in which they stay free of each other: out of "x", "y", "z" and the turns "rx", "ry", "rz"."""
 
     @model_validator(mode="after")
     def _known(self) -> LinkTable:
-        if set(self.free) - set(AXES) or len(set(self.free)) == len(AXES):
+        if len(set(self.free)) == len(AXES):
             raise ValueError(f"free: expected some of {', '.join(AXES)}, but not all, got {list(self.free)}")
         if self.first == self.second:
             raise ValueError(f"second: expected another coupling than {self.first!r}")
@@ -335,7 +263,7 @@ class BoltTable(Table):
     """Face under the nut."""
     preload: Annotated[float, quantity("N"), Field(ge=0)]
     """Force in the shank when it is tightened, all other loads away."""
-    state: str = "locked"
+    state: Literal["locked", "constant"] = "locked"
     """"locked": the shank keeps its length after tightening, so that its force follows the structure; "constant": the
     force stays what it is."""
     diameter: Annotated[Length, Field(gt=0)] | None = None
@@ -347,8 +275,6 @@ class BoltTable(Table):
 
     @model_validator(mode="after")
     def _stiff(self) -> BoltTable:
-        if self.state not in ("locked", "constant"):
-            raise ValueError(f'state: expected "locked" or "constant", got {self.state!r}')
         shank = self.diameter is not None and self.material is not None
         if self.state == "locked" and shank == (self.stiffness is not None):
             raise ValueError("a locked bolt needs either diameter and material of its shank, or its stiffness")
@@ -366,7 +292,7 @@ class StructureScene(MeshScene):
     """Materials by name."""
     geometry: Geometry | None = None
     """A single part or mesh, instead of bodies."""
-    material: MaterialTable | None = None
+    material: SolidMaterial | None = None
     """Its material."""
     contact: FaceContact | None = None
     """A single contact, instead of contacts."""
@@ -399,18 +325,15 @@ class StructureScene(MeshScene):
             raise ValueError('response.method: without contact the response is linear: give "natural"')
         if self.contact is not None and self.contacts:
             raise ValueError("expected either [contact] or [contacts.NAME], and not both")
-        for name, body in self.bodies.items():
+        for name in self.bodies:
             if "." in name or name == GROUND:
                 raise ValueError(f'bodies.{name}: give a name without a dot that is not "{GROUND}"')
-            for material in body.materials:
-                if material not in self.materials:
-                    raise ValueError(f"bodies.{name}: {unknown_key(f'materials.{material}', [*self.materials])}")
-        for name, deck in self.decks.items():
-            if deck.material is not None and deck.material not in self.materials:
-                raise ValueError(f"decks.{name}: {unknown_key(f'materials.{deck.material}', [*self.materials])}")
-        for name, bolt in self.bolts.items():
-            if bolt.material is not None and bolt.material not in self.materials:
-                raise ValueError(f"bolts.{name}: {unknown_key(f'materials.{bolt.material}', [*self.materials])}")
+        made_of = [(f"bodies.{name}", one) for name, body in self.bodies.items() for one in body.materials]
+        made_of += [(f"decks.{name}", deck.material) for name, deck in self.decks.items() if deck.material is not None]
+        made_of += [(f"bolts.{name}", bolt.material) for name, bolt in self.bolts.items() if bolt.material is not None]
+        for where, material in made_of:
+            if material not in self.materials:
+                raise ValueError(f"{where}: {unknown_key(f'materials.{material}', [*self.materials])}")
         taken = [*self.loads.static, *self.loads.harmonic]
         for name in self.bolts:
             if name in taken or name == CENTRIFUGAL:

@@ -127,15 +127,9 @@ class JointWearTable(LawTable):
     of this table."""
 
 
-class Wear(LawTable):
+class Wear(JointWearTable):
     """Wear of the contact until it is lost or max_steps are done."""
 
-    TABLE: ClassVar[str] = "wear"
-    LAWS: ClassVar[ModuleType] = wear_law
-
-    law: str = "energy"
-    """Name of a wear law, or a file my_law.py beside the scene; its own numbers, such as coefficient, are further keys
-    of this table."""
     split: Annotated[Number, Field(ge=0, le=1)] = 0.5
     """Share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one."""
     responses: Annotated[StrictInt, Field(ge=0, le=100)] = 0
