@@ -135,10 +135,7 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "amplitude": (("curve", "curve_point"), "m"),
         },
     ),
-    "fields": (
-        Fields,
-        {"row": (("field",), ""), "displacement": (("field", "node", "xyz", "coefficient"), "m")},
-    ),
+    "fields": (Fields, {"row": (("field",), ""), "displacement": (("field", "node", "xyz", "coefficient"), "m")}),
     "loops": (
         Loops,
         {
