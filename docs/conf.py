@@ -10,6 +10,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # it names a path of this machine
 sys.path.insert(0, str(HERE.parent / "src"))
 
 import docstrings  # noqa: E402
