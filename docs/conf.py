@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # it names a path of this machine
 sys.path.insert(0, str(HERE.parent / "src"))
 
 import docstrings  # noqa: E402
@@ -19,13 +21,15 @@ from pygments.lexers.special import TextLexer  # noqa: E402
 from sphinx.application import Sphinx  # noqa: E402
 from sphinx.highlighting import lexers  # noqa: E402
 
+logging.getLogger("skfem").setLevel(logging.WARNING)  # what it says of its work is nothing for the build's log
+
 project = "tribodyn"
 author = "The authors of tribodyn"
 project_copyright = author
 version = release = generated_pages.version()
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
-exclude_patterns = ["_build", "generated", "**/results"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.viewcode", "sphinx-mathjax-offline"]
+exclude_patterns = ["_build", "generated", "examples/generated/*.ipynb", "**/results"]
 html_extra_path = ["generated/scene.schema.json"]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "colon_fence", "attrs_inline"]
 myst_heading_anchors = 3
@@ -46,6 +50,7 @@ html_theme = "furo"
 html_title = "tribodyn"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_js_files = ["copy.js"]
 html_show_sphinx = False
 html_copy_source = False
 

@@ -13,7 +13,9 @@ import shutil
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
+import nbformat
 from PIL import Image
 
 HERE = Path(__file__).parent / "examples"
@@ -34,13 +36,23 @@ def write(folder: Path) -> None:
         page += [line for picture in pictures for line in (f"![{title}]({name}/{picture})", "")]
         page += ["```{code-block} python", code.strip(), "```", ""]
         page += ["It prints:", "", "```text", printed.strip(), "```", ""] if printed.strip() else []
-        page += [f"{{download}}`Download this script <../{script.name}>`. It took {seconds:.0f} s to run.", ""]
+        nbformat.write(as_notebook(title, text.strip(), code.strip()), folder / f"{name}.ipynb")
+        page += [
+            f"{{download}}`Download this script <../{script.name}>`, or it "
+            f"{{download}}`as a notebook <{name}.ipynb>`. It took {seconds:.0f} s to run.", "",
+        ]  # fmt: skip
         (folder / f"{name}.md").write_text("\n".join(page), encoding="utf-8")
         cards += ["", ":::{container} card", f"[![{title}]({name}/thumbnail.png)]({name}.md)", ""]
         cards += [f"[{title}]({name}.md)", ":::"]
         names.append(name)
     cards += ["::::", "", "```{toctree}", ":hidden:", "", *names, "```", ""]
     (folder / "index.md").write_text("\n".join(cards), encoding="utf-8")
+
+
+def as_notebook(title: str, text: str, code: str) -> Any:
+    """The same text and code in two cells."""
+    new = nbformat.v4
+    return new.new_notebook(cells=[new.new_markdown_cell(f"# {title}\n\n{text}"), new.new_code_cell(code)])
 
 
 def run(source: str, name: str, out: Path) -> tuple[float, str, list[str]]:

@@ -14,6 +14,6 @@ COARSE = {
     "verdict.enabled": False,
 }
 
-result = td.run("beam", overrides=COARSE | {"wear": None, "response.stability": True, "response.points": 60})
+result = td.run("beam", overrides=COARSE | {"wear": None, "response.stability": True, "response.points": 24})
 print(f"{result.summary()['unstable_points']} of {len(result.response.frequency)} points are unstable")
 td.plot.response(result).savefig("stability.png")

@@ -11,6 +11,7 @@
 from tribodyn.workflows.pictures.figures import axes_of as axes
 from tribodyn.workflows.pictures.figures import length_unit
 from tribodyn.workflows.pictures.film import film
+from tribodyn.workflows.pictures.live import Live
 from tribodyn.workflows.pictures.maps import draw_field, draw_status
 from tribodyn.workflows.pictures.maps import motion_maps as motion
 from tribodyn.workflows.pictures.maps import patch_maps as patch
@@ -22,6 +23,7 @@ from tribodyn.workflows.pictures.render import draw as render
 from tribodyn.workflows.pictures.wheel_diagrams import campbell, nodal_diameters, safe, shades
 
 __all__ = [
+    "Live",
     "axes",
     "campbell",
     "draw_field",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import shutil
 from pathlib import Path
@@ -129,5 +130,36 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
+def test_names_of_python_in_pages_exist() -> None:
+    called = re.compile(r"(?<![\w./\"-])(?:td|tribodyn)\.((?!NAME)[a-zA-Z_][\w.]*\w)")
+    for page in [*pages(), *(ROOT / "docs").glob("examples/*.py"), ROOT / "docs/reference/examples.py"]:
+        for found in set(called.findall(page.read_text(encoding="utf-8"))):
+            assert exists(found.split(".")), (name(page), found)
+
+
+def exists(names: list[str]) -> bool:
+    """Whether `tribodyn.A.B` is a module, or a name of one."""
+    thing: object = td
+    for count, word in enumerate(names, 1):
+        try:
+            thing = getattr(thing, word, None) or importlib.import_module(".".join(["tribodyn", *names[:count]]))
+        except ImportError:
+            return False
+    return True
+
+
+def test_the_paper_states_what_the_first_command_prints() -> None:
+    """Its numbers are those of the README, which are those of the command."""
+    paper = (ROOT / "paper/paper.md").read_text(encoding="utf-8")
+    told = re.search(r"`tribodyn run beam`.*?half a minute", paper, re.DOTALL)
+    assert told is not None
+    (shown,) = [fence.text for fence in fences(README) if fence.language == "text"]
+    numbers = re.findall(r"\d[\d.]*(?: million cycles| DOFs| %)?", told[0])
+    assert len(numbers) >= 4
+    assert [number for number in numbers if number not in shown] == []
+
+
 def test_readme_is_short() -> None:
-    assert len(README.read_text(encoding="utf-8").splitlines()) <= 120
+    text = README.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    assert len(text.split()) <= 600

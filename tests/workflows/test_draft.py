@@ -82,6 +82,12 @@ def test_a_scene_is_begun_from_a_file_and_is_one(
     assert f"{1e3 * apart:.3g} mm apart" in said
     assert len(td.build(written).part.interface.area) > 4
     assert json.loads((tmp_path / "scene.schema.json").read_text())["$defs"]
+    before, mark, wear = written.read_text().partition("# [wear]")
+    marks_off = re.sub("^# ", "", mark + wear, flags=re.MULTILINE)
+    wanted = scene_file.parse(before + marks_off, "worn.toml", (), tmp_path).scene.wear
+    assert wanted is not None
+    assert wanted.step is not None
+    assert wanted.step.depth == 1e-6  # a share of delta_max needs a body that is held without its contact
     code, _, why = leave(["new", str(file)], capsys)
     assert code == 2
     assert "is there already" in why

@@ -61,11 +61,7 @@ def response(result: Result) -> Table:
         columns |= {"force_N": abs(result.driving_force) * frf.load_factor}
         for name in frf.output_names if 1 in result.harmonics else ():
             columns[f"{name}_phase_rad"] = np.angle(frf.fundamental(name) / result.driving_force)
-    columns |= {
-        "energy_J": frf.energy,
-        "newton_steps": frf.newton_steps,
-        "converged": frf.converged,
-    }
+    columns |= {"energy_J": frf.energy, "newton_steps": frf.newton_steps, "converged": frf.converged}
     if result.stability is not None:
         columns |= {"stable": result.stability.stable, "growth_1_per_s": result.stability.growth}
     if result.bounds is not None:

@@ -13,15 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.pictures import maps
-from tribodyn.workflows.pictures.figures import (
-    axes_of,
-    heading,
-    length_unit,
-    log_axis,
-    save,
-    status_name,
-    titled,
-)
+from tribodyn.workflows.pictures.figures import axes_of, heading, length_unit, log_axis, save, status_name, titled
 from tribodyn.workflows.pictures.loops import has_friction, loop_of, loop_size
 from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Result

@@ -80,7 +80,7 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         wide = max(LAYOUT.column, LAYOUT.least / len(states))
         tall = wide * images[0].shape[0] / images[0].shape[1]
-        figure = Figure(figsize=(wide * len(states) + 0.2, tall + 1.7), layout="constrained")
+        figure = Figure(figsize=(wide * len(states) + 0.2, tall + 2.0), layout="constrained")
         columns = np.atleast_1d(figure.subplots(1, len(states)))
         for axes, state, image, scale, (most, label) in zip(columns, states, images, scales, bars, strict=True):
             show(axes, image, moving.camera, "xyz", corner)

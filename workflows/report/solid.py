@@ -34,10 +34,7 @@ def solid(result: Result) -> dict[str, Any] | None:
     meetings = meetings_of(result)
     size = float(np.sqrt(patch.area.sum()))
     factor = wear_scale(patch, np.stack([state.depth for state in states]))
-    found: dict[str, Any] = {
-        "worn": result.wear is not None,
-        "factor": factor,
-    }
+    found: dict[str, Any] = {"worn": result.wear is not None, "factor": factor}
     nodes, offset = np.zeros(0, int), None
     points = patch.points if part is None else part.points
     found["extent"] = plain(np.ptp(points, axis=0) / np.ptp(points, axis=0).max())

@@ -21,15 +21,11 @@ from tribodyn.hbm.stability import exponents
 from tribodyn.workflows.result.readable import measured, sparkline
 from tribodyn.workflows.result.result import CurveStability, Result, ShearBounds, WornResponses
 from tribodyn.workflows.run import settings
+from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.schema import Scene
 
 
-def follow_response(
-    scene: Scene,
-    balance: HarmonicBalance,
-    advance: Callable[[float, str], None],
-    folds: bool = True,
-) -> Branch:
+def follow_response(scene: Scene, balance: HarmonicBalance, advance: Advance, folds: bool = True) -> Branch:
     """The response curve of the unworn contact by the scene's continuation method, its highest peaks solved.
 
     folds : whether a curve on which a sweep jumps is followed round its folds, where its highest peak may be; not where
@@ -50,7 +46,7 @@ def follow_response(
     def told(done: int, wanted: int, point: BranchPoint) -> None:
         seen.append((point.omega, float(amplitude(point.response[at]))))
         hertz, height = measured(point.omega / (2 * np.pi), "Hz", 4), measured(seen[-1][1], "m")
-        advance(done / wanted, f"{sparkline(*np.array(seen).T)} {hertz}, {height}")
+        advance(done / wanted, f"{sparkline(*np.array(seen).T)} {hertz}, {height}", seen[-1])
 
     def along(problem: HarmonicBalance) -> Branch:
         found: Branch = method.follow(problem, *ends, options, told)
@@ -73,11 +69,7 @@ def follow_response(
 
 
 def choose_harmonics(
-    balance: HarmonicBalance,
-    peak: AtPeak,
-    options: harmonic_choice.ChoiceOptions,
-    most: int = 3,
-    same: float = 1e-3,
+    balance: HarmonicBalance, peak: AtPeak, options: harmonic_choice.ChoiceOptions, most: int = 3, same: float = 1e-3
 ) -> HarmonicChoice:
     """Harmonics that make the response of every output right to the tolerance of the options at its resonance.
 

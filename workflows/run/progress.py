@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn
 from rich.progress import Progress as Bar
 
+Advance = Callable[..., None]  # called with the share of long work that is done, a note, and the point it has come to
 NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a bar on
 FORESEEN = 0.02  # share of the work from which on the time left is given: the first steps compile
 
@@ -37,11 +38,11 @@ class Progress:
         self.detail(f"{name}: {time.perf_counter() - start:.1f} s")
 
     @contextmanager
-    def track(self, name: str) -> Iterator[Callable[[float, str], None]]:
+    def track(self, name: str) -> Iterator[Advance]:
         """Long work: yields a function to call with the share that is done and a note."""
         start = time.perf_counter()
         if self._console is None:
-            yield self._lines(name, start) if self._log else lambda share, note: None
+            yield self._lines(name, start) if self._log else lambda *_: None
         elif self._console.is_terminal:
             columns = (TextColumn("{task.description}"), BarColumn(12), TaskProgressColumn())
             left, before = TextColumn("{task.fields[left]}{task.fields[note]}"), compiled()
@@ -49,7 +50,7 @@ class Progress:
                 task = bar.add_task(name, total=1.0, left="", note="")
                 log = self._lines(name, start, on_console=False) if self._log else None
 
-                def advance(share: float, note: str) -> None:
+                def advance(share: float, note: str, *_: object) -> None:
                     left = time_left(share, start, compiled() - before)
                     gap = "; " if left and note else ""
                     bar.update(task, completed=min(share, 1.0), left=left, note=gap + note)
@@ -61,11 +62,11 @@ class Progress:
             yield self._lines(name, start)
         self.detail(f"{name}: {time.perf_counter() - start:.1f} s")
 
-    def _lines(self, name: str, start: float, on_console: bool = True) -> Callable[[float, str], None]:
+    def _lines(self, name: str, start: float, on_console: bool = True) -> Advance:
         """Lines from time to time, without details at ever longer ones; on_console : whether they go there too."""
         last, before, wait = start, compiled(), NOTE_EVERY
 
-        def advance(share: float, note: str) -> None:
+        def advance(share: float, note: str, *_: object) -> None:
             nonlocal last, wait
             now, compiling = time.perf_counter(), compiled() - before
             if now - last >= wait and share > 0:
@@ -120,10 +121,10 @@ class CallbackProgress(Progress):
         self._callback = callback
 
     @contextmanager
-    def track(self, name: str) -> Iterator[Callable[[float, str], None]]:
+    def track(self, name: str) -> Iterator[Advance]:
         """Long work: every advance goes to the callback as it comes."""
         start = time.perf_counter()
-        yield lambda share, note: self._callback(f"{name}: {note}" if note else name, min(share, 1.0))
+        yield lambda share, note, *_: self._callback(f"{name}: {note}" if note else name, min(share, 1.0))
         self.say(f"{name}: {time.perf_counter() - start:.1f} s")
 
     def say(self, text: str) -> None:

@@ -24,15 +24,14 @@ from tribodyn.workflows.run.checkpoint import Keeper
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.full_fields import with_shown
 from tribodyn.workflows.run.modelling import Model
+from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.structure import NamedContact
 from tribodyn.workflows.scene.wear import Wear
 
 
-def wear_down(
-    file: SceneFile, model: Model, result: Result, keep: Keeper, advance: Callable[[float, str], None]
-) -> Result:
+def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advance: Advance) -> Result:
     """Wear until contact is lost; every step is kept as soon as it is done."""
     scene = file.scene
     assert scene.wear is not None
@@ -46,7 +45,8 @@ def wear_down(
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         deepest, hertz = 1e3 * float((row.depth + row.worn).max()), row.omega / (2 * np.pi)
         state = f"{row.cycles + row.cycles_in_step:.3g} cycles, peak {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"
-        advance(done, f"step {len(rows)}, {state}, preload {row.preload:.4g} N, depth {deepest:.3g} mm")
+        note = f"step {len(rows)}, {state}, preload {row.preload:.4g} N, depth {deepest:.3g} mm"
+        advance(done, note, (row.cycles + row.cycles_in_step, row.preload))
 
     problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
     if result.response is not None:

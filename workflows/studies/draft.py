@@ -220,13 +220,9 @@ def _text(
         yield from ("", "# [loads.static.press]  # presses the faces together: its resultant has to lie between them")
         yield from (f"# group = {json.dumps(end)}", f"# direction = {towards}", '# value = "1 kN"')
     yield from ("", "[loads.harmonic.drive]  # GUESS", f"group = {face}", 'direction = "x"', 'value = "10 N"')
-    yield from (
-        "",
-        "[response]",
-        'frequency = ["100 Hz", "1 kHz"]  # GUESS; a run says its modes, contact open and stuck',
-    )
+    yield from ("", "[response]", 'frequency = ["100 Hz", "1 kHz"]  # GUESS; a run says its modes, open and stuck')
     yield from ("", "[damping]", 'modal = "1 %"  # GUESS', "", "# [wear]  # take the marks off to let it wear")
-    yield from ('# coefficient = "2e3 um3/J"', '# at = "peak"')
+    yield from ('# coefficient = "2e3 um3/J"', '# step = "1 um"', "# max_steps = 20", '# at = "peak"')
 
 
 def _key(name: str) -> str:

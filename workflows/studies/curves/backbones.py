@@ -235,11 +235,7 @@ def backbone(
 
 
 def along(
-    file: SceneFile,
-    balance: HarmonicBalance,
-    asked: AmplitudeRange,
-    progress: Progress,
-    output: str = settings.OUTPUT,
+    file: SceneFile, balance: HarmonicBalance, asked: AmplitudeRange, progress: Progress, output: str = settings.OUTPUT
 ) -> Backbone:
     """The backbone of a scene whose balance is made already; output : whose motion is the amplitude."""
     with progress.stage("backbone"):
@@ -248,10 +244,7 @@ def along(
 
 
 def _changed(
-    asked: AmplitudeRange,
-    found: Backbone,
-    others: Mapping[str, SceneFile],
-    progress: Progress,
+    asked: AmplitudeRange, found: Backbone, others: Mapping[str, SceneFile], progress: Progress
 ) -> tuple[Changed, ...]:
     """The backbone of a scene again with changes of it.
 
