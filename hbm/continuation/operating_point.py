@@ -17,7 +17,7 @@ from tribodyn.hbm.continuation.bordered import Direction
 from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED, SolveEnd
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd, SolveEnd
 from tribodyn.hbm.threads import single
 
 
@@ -162,7 +162,8 @@ class AtPeak:
         """Scan the range, points dense where the response bends, then refine its highest maximum.
 
         The scan has few harmonics where the balance has more, unless what it finds is no peak with all of them.
-        Where no maximum that may be the highest can be refined, as at a fold, none of the lower ones is taken for it
+        Where no maximum that may be the highest can be refined, as at a fold, none of the lower ones is taken for it. A
+        scan that ends on its way, at a fold behind which no solution is found, is begun at the other end, too
         Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
         """
         few = self._few(balance, self.scanned)
@@ -174,6 +175,11 @@ class AtPeak:
                 if found.solution.converged:
                     return replace(found, solves=found.solves + scanned.solves)
         branch = self._scan(balance)
+        if branch.end.kind is BranchEnd.ENDED:
+            back = replace(self, start=self.stop, stop=self.start)._scan(balance)
+            branch = max(
+                branch, back, key=lambda scan: float(scan.amplitude(self.output)[scan.converged].max(initial=0.0))
+            )
         return self._highest(balance, branch, self._candidates(branch))
 
     def _is_rough(self, balance: HarmonicBalance) -> bool:

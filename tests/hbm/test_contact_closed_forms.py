@@ -120,6 +120,20 @@ def test_planar_coulomb_is_right_to_a_thousandth_at_128_samples(top):
     assert np.abs((high - low).reshape(24, -1) / 2 - along).max() < 1e-6 * np.abs(along).max()
 
 
+@pytest.mark.parametrize("more", [-1e-9, 0.0, 1e-12, 1e-9])
+@pytest.mark.parametrize("side", [0.02, 0.3])
+def test_a_planar_slider_that_can_just_stick_comes_to_the_middle_of_its_ellipse(more, side):
+    """Ellipse of half-axes 1 + more and 0.3 about (0, side), leash 1: the slider may stand across it up to
+    sqrt(1 - (1 + more)^2) off the middle, which is where it comes to from outside; each cycle moves it by the cube of
+    its distance, so that marching alone does not end.
+    """
+    basis = HarmonicBasis((0, 1), 128)
+    x = np.array([[[0.0, 1 + more, 0.0], [side, 0.0, 0.3], [1.0, 0.0, 0.0]]])
+    parameters = ContactParameters.of(("t1", "t2", "n"), [[1.0, 1.0, 1.0]], friction=1.0)
+    force = aft.cycle(contact_law.load("coulomb_planar"), x, parameters, basis, None, False).force[0, :2, 0]
+    assert force == pytest.approx([0.0, np.sqrt(max(1 - (1 + more) ** 2, 0.0))], abs=1e-5)
+
+
 def test_planar_coulomb_along_a_line_is_a_jenkins_element():
     """Any direction in the plane, sliding through the origin; with unequal springs along their axes only."""
     basis = HarmonicBasis((0, 1, 2, 3), 128)
