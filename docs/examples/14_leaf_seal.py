@@ -5,6 +5,7 @@ A normal contact alone that opens and closes: the response bends.
 
 import tribodyn as td
 
-result = td.run("leaf_seal", overrides={"verdict.enabled": False, "response.points": 24})
+coarse = {"geometry.n_column": 7, "geometry.pin_column": 2, "response.points": 24, "verdict.enabled": False}
+result = td.run("leaf_seal", overrides=coarse)
 print(f"peak at {result.summary()['peak_hz'][0]:.1f} Hz")
 td.plot.response(result).savefig("leaf_seal.png")

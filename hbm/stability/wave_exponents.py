@@ -18,9 +18,11 @@ for one sector; the extension to all nodal diameters and the elimination of the 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
+from scipy.sparse.linalg import LinearOperator, eigs
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.linear.expansion import stuck_modes
@@ -121,8 +123,7 @@ def settled(exponents: np.ndarray, at: Place, slope: np.ndarray, answer: Answer)
     for i in np.flatnonzero(exponents.real > GROWS):
         now = exponents[i]
         for share in SHARES:
-            values, _ = _of_index(*at, (1 - share) * steady + share * answer(now), rows)
-            before, now = now, values[np.argmin(np.abs(values - now))]
+            before, now = now, _nearest(now, *at, (1 - share) * steady + share * answer(now), rows)
             if share == 1 and abs(now - before) < ACCURACY:
                 found[i] = now
                 break
@@ -167,20 +168,53 @@ def _of_index(
     modes: Callable[[int], _Index], order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exponents of perturbations of index d, in units of omega, and the mean k of each; those with it within 1."""
+    numbers, constant, linear = _quadratic(modes, order, d, omega, blocks, rows)
+    unit = np.eye(len(constant))
+    companion = np.block([[np.zeros_like(unit), unit], [-constant, -linear]])
+    return _central(numbers, *np.linalg.eig(companion))
+
+
+def _nearest(now: complex, *problem: Any) -> complex:
+    """The exponent of `_of_index` that is nearest to one, by Arnoldi's method on the inverse beside it.
+
+    Source  Saad, Numerical Methods for Large Eigenvalue Problems, 2nd ed., section 8.2; a fifth of the time of all
+    """
+    numbers, constant, linear = _quadratic(*problem)
+    n, shift = len(constant), now + ACCURACY  # at an exponent itself the inverse has no bound
+    factors = sla.lu_factor(constant + shift * linear + shift**2 * np.eye(n))
+
+    def inverse(v: np.ndarray) -> np.ndarray:
+        x = -sla.lu_solve(factors, v[n:] + linear @ v[:n] + shift * v[:n])
+        return np.concatenate([x, v[:n] + shift * x])
+
+    values = np.empty(0)
+    if n > 10:
+        found, vectors = eigs(LinearOperator((2 * n, 2 * n), inverse, dtype=complex), 4, v0=np.ones(2 * n), tol=1e-11)
+        values, _ = _central(numbers, shift + 1 / found, vectors)
+    if len(values) == 0:
+        values, _ = _of_index(*problem)
+    return complex(values[np.argmin(np.abs(values - now))])
+
+
+def _quadratic(
+    modes: Callable[[int], _Index], order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """k of each harmonic (nc,), constant and linear matrix (nc m, nc m) of the eigenproblem, in units of omega."""
     nc = blocks.shape[-1]
     numbers = np.arange(nc) - nc // 2
     seen = [modes(int(k) * order + d) for k in numbers]
-    m = len(seen[0][0])
     coupling = _contact_in_modes(blocks, rows, seen)
-    rate = np.repeat(1j * numbers, m)
+    rate = np.repeat(1j * numbers, len(seen[0][0]))
     damping = sla.block_diag(*(c / omega for _, c, *_ in seen))
     spring = np.diag(np.concatenate([lam for lam, *_ in seen])) - coupling
     spring = spring + sla.block_diag(*(flow for _, _, flow, _, _ in seen))
-    constant = np.diag(rate**2) + damping * rate + spring / omega**2
-    n = len(rate)
-    companion = np.block([[np.zeros((n, n)), np.eye(n)], [-constant, -np.diag(2 * rate) - damping]])
-    values, vectors = np.linalg.eig(companion)
-    weight = (np.abs(vectors[:n].reshape(nc, m, -1)) ** 2).sum(axis=1)
+    return numbers, np.diag(rate**2) + damping * rate + spring / omega**2, np.diag(2 * rate) + damping
+
+
+def _central(numbers: np.ndarray, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Those of the values whose perturbations have their mean k within 1, and these means."""
+    shapes = vectors[: len(vectors) // 2].reshape(len(numbers), -1, len(values))
+    weight = (np.abs(shapes) ** 2).sum(axis=1)
     centre = numbers @ weight / weight.sum(axis=0)
     near = np.abs(centre) < 1.0
     return values[near], centre[near]

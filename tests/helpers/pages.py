@@ -78,12 +78,13 @@ def prepare(folder: Path, program: str = PROGRAM) -> Path:
     return folder
 
 
-def shell(text: str, folder: Path) -> None:
-    """Run the text of a fence as printed; the first command that fails ends it."""
+def shell(text: str, folder: Path) -> str:
+    """Run the text of a fence as printed, and what it prints; the first command that fails ends it."""
     done = subprocess.run(
         ["bash", "-e", "-c", text], cwd=folder, env=environment(folder), capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, f"{text}\n{done.stderr}"
+    return done.stdout
 
 
 def python(text: str, folder: Path) -> None:

@@ -113,7 +113,7 @@ def covered(seeds: range, runs: int) -> tuple[float, float]:
 
 
 def test_the_claimed_confidence_is_kept_on_planted_problems() -> None:
-    share, error = covered(range(4), 48)
+    share, error = covered(range(4), 64)
     assert share >= 0.5
     assert error < 0.05
 
@@ -139,7 +139,7 @@ def test_counting_holds_a_quantile_beside_a_jump_that_the_surrogate_smooths() ->
 
 @pytest.mark.slow
 def test_the_claimed_confidence_is_kept_on_fifty_planted_problems() -> None:
-    share, error = covered(range(50), 48)
+    share, error = covered(range(50), 64)
     assert share >= 0.8
     assert error < 0.05
 
