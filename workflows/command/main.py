@@ -23,7 +23,7 @@ WORDS = {  # word -> where it is, its help on the page of all of them
     "export": ("scenes:export", "Write a result in the formats of other programs."),
     "curve": ("curve:app", "Follow curves: backbone, ring-down, folds, track."),
     "wheel": ("wheel:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
-    "study": ("study:app", "Studies: grid, lives, optimise, identify, vary, converge, trade, supports, forces."),
+    "study": ("study:app", "Studies: grid, lives, optimise, identify, derivatives, converge, supports, forces."),
     "geometry": ("geometry:app", "Geometry: mesh a drawing, find the asperities of measured faces."),
 }  # fmt: skip
 
