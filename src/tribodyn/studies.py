@@ -22,7 +22,6 @@ from tribodyn.workflows.studies.many.table import StudyTable
 from tribodyn.workflows.studies.measured.compare import Compared, compare
 from tribodyn.workflows.studies.supports import Supports, supports
 from tribodyn.workflows.studies.surfaces import FaceAsperities, asperities
-from tribodyn.workflows.studies.trades import Traded, trade
 from tribodyn.workflows.studies.verification import Comparison
 from tribodyn.workflows.studies.worn_states import WornStates, verify_states
 
@@ -45,7 +44,6 @@ __all__ = [
     "StudyTable",
     "Supports",
     "Track",
-    "Traded",
     "WornStates",
     "asperities",
     "backbone",
@@ -62,6 +60,5 @@ __all__ = [
     "ring_down",
     "supports",
     "track",
-    "trade",
     "verify_states",
 ]

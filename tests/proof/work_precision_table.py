@@ -20,9 +20,9 @@ from tests.proof.work_precision import (
     WorkPrecision,
 )
 from tribodyn.workflows.errors.limit import Limit
-from tribodyn.workflows.errors.trade_table import plain
 from tribodyn.workflows.pictures.figures import axes_of, log_axis, named
 from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, ORANGE
+from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.result.whole_file import replacing
 
 FORMAT = "tribodyn work and precision 1"

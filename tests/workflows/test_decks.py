@@ -196,25 +196,24 @@ def of_page(folder: Path, *changes: tuple[str, str]) -> Path:
 
 COARSE = ("harmonics.kept=[0, 1]", "verdict.enabled=false", "response.points=5")
 GRIDS = """
-[converge.mesh]
+[ladders.mesh]
 sizes = [1, 2, 4]
 set = [["decks.lap.halved=0"], ["decks.lap.halved=1"], ["decks.lap.halved=2"]]
-life_up_to = 1
+worn_up_to = 1
 """
 
 
 def test_a_convergence_keeps_the_peaks_of_grids_whose_wear_has_no_end(tmp_path: Path) -> None:
     scene = of_page(tmp_path)
     (tmp_path / "joint.study.toml").write_text(GRIDS)
-    found = convergence.converge(scene, overrides=COARSE)
-    (study,) = found.studies
-    assert [row.outcome for row in study.rows] == ["stopped after 1 wear steps", "converged", "converged"]
-    assert [row.pairs for row in study.rows] == [11, 35, 117]
-    finest = study.rows[-1].values["peak_hz"]
-    assert finest is not None
-    assert study.limits["peak_hz"].value == pytest.approx(finest, rel=2e-3)
-    assert any(line.startswith("1 % on peak frequency needs halved=1") for line in found.lines())
-    assert [path.name for path in found.write(tmp_path)] == ["converge_joint_mesh.png"]
+    found = convergence.converge(scene, settings=["mesh"], overrides=COARSE)
+    (one,) = found.table.ladders
+    measured = [row.measured for row in one.rows]
+    assert [m.outcome for m in measured] == ["stopped after 1 wear steps", "converged", "converged"]
+    assert [len(m.area) for m in measured] == [11, 35, 117]
+    assert one.limits["amplitude"].value == pytest.approx(measured[-1].values["amplitude"], rel=2e-3)
+    assert any(line.startswith("1% on amplitude needs halved=2") for line in found.lines())
+    assert [path.name for path in found.write(tmp_path)] == ["converge_joint.png", "converge_joint_mesh.png"]
 
 
 def test_a_body_that_tips_over_has_no_state_of_rest(tmp_path: Path) -> None:

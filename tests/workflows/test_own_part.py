@@ -34,7 +34,8 @@ def test_the_example_runs_from_its_drawing_to_its_worn_surface(folder: Path) -> 
 
 
 GRIDS = """
-[converge.mesh]
+[ladders.mesh]
+worn_up_to = 0
 sizes = [1, 1.33, 2]
 set = [['geometry.mesh="arm_20.msh"'], ['geometry.mesh="arm_15.msh"'], ['geometry.mesh="arm_10.msh"']]
 """
@@ -52,8 +53,8 @@ def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureF
         "study",
         "converge",
         str(folder / "arm.toml"),
-        "--set",
-        "response.points=20",
+        "--setting",
+        "mesh",
         "--json",
         "--out",
         str(folder),
@@ -69,11 +70,10 @@ def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureF
 @pytest.mark.parametrize(
     ("study", "sentence"),
     [
-        ("", "has no study of its grids"),
-        ("[knobs.x]", "a study has no knobs, but parameters"),
-        ("parameters = 3", "is no study"),
-        ("[converge.x]\nsizes = [1, 2]", "needs sizes"),
-        ("[converge", "arm.study.toml"),
+        ("[knobs.x]", "a study has no knobs, but ladders"),
+        ("ladders = 3", "is no study"),
+        ("[ladders.x]\nsizes = [1, 2]", "needs sizes"),
+        ("[ladders", "arm.study.toml"),
     ],
 )
 def test_a_study_that_is_none_is_refused(

@@ -53,8 +53,7 @@ def run(
     accuracy
         Relative error wanted, such as "1 %", or of what is named, "1 % of energy": the scene is run with finer and
         finer settings until the errors of its verdict are below that; exit code 3 where they do not get there. Without
-        depth or life in it nothing is worn. "1 % of life given harmonics" leaves a setting as the scene has it, and
-        its error out.
+        depth or life in it nothing is worn.
     out
         Folder of the result; results/NAME by default.
     resume

@@ -15,7 +15,6 @@ from tribodyn.workflows.studies.many.study import grid
 from tribodyn.workflows.studies.measured.compare import compare
 from tribodyn.workflows.studies.supports import supports
 from tribodyn.workflows.studies.surfaces import asperities
-from tribodyn.workflows.studies.trades import trade
 
 app = App(name="study")
 app.command(word(grid, "study grid"))
@@ -25,8 +24,12 @@ app.command(word(identify, "study identify"))
 app.command(word(posterior, "study posterior", into="asked"))
 app.command(word(derivatives, "study derivatives"))
 app.command(word(converge, "study converge"))
-app.command(word(trade, "study trade"))
 app.command(word(supports, "study supports", into="beside"))
 app.command(word(forces, "study forces"))
 app.command(word(asperities, "study asperities", into="asked"))
 app.command(word(compare, "study compare"))
+
+
+@app.command(name="trade", show=False)
+def _trade(*given: str) -> None:
+    raise ValueError("study trade is study converge now, with the same --setting")

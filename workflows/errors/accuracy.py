@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from tribodyn.workflows.errors import refine
 from tribodyn.workflows.errors.options import DEFAULT
@@ -14,7 +15,6 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.units import to_si
 
 OF_WEAR = ("depth", "life")
-FORM = re.compile(r"(.*?)(?: ?\bof\b(.*?))?(?:,? ?\bgiven\b(.*))?")
 PER_CENT = re.compile(r" ?\bper ?cent\b")
 
 Runner = Callable[[SceneFile, int], Result]
@@ -35,11 +35,10 @@ class Rounds:
 
 @dataclass(frozen=True)
 class Wanted:
-    """error : relative; quantities : that are named, none for all that the scene has; given : refinements left out."""
+    """error : relative; quantities : that are named, none for all that the scene has."""
 
     error: float
     quantities: tuple[str, ...]
-    given: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -71,18 +70,15 @@ class Bound:
         said = f"error bound {self.wanted.error:g} {settings}, after {self.rounds} runs"
         said += f"; met: {', '.join(good)}" if good else ""
         said += f"; not met: {', '.join(bad)}" if bad else ""
-        said += f"; not counted: {', '.join(self.wanted.given)}" if self.wanted.given else ""
         return said + (f"; could not be refined: {', '.join(self.left)}" if self.left else "")
 
 
 def parsed(text: str) -> Wanted:
-    """A wanted accuracy such as "1 %", "1 % of life and peak frequency" or "1 % of life given harmonics".
+    """A wanted accuracy such as "1 %" or "1 % of life and peak frequency".
 
     Raises  ValueError with one sentence
     """
-    parts = FORM.fullmatch(" ".join(text.lower().split()).rstrip("."))
-    assert parts is not None  # anything is a number so far
-    number, names, given = parts.groups()
+    number, _, names = " ".join(text.lower().split()).rstrip(".").partition(" of ")
     try:
         error = to_si(PER_CENT.sub("%", number), "")
     except ValueError as wrong:
@@ -90,22 +86,11 @@ def parsed(text: str) -> Wanted:
     if not 0 < error < 1:
         raise ValueError(f'--accuracy "{text}": give an error above 0 and below 100 %, such as "1 %"')
     known = {_name(q): q for q in QUANTITIES}
-    asked = () if names is None else _listed(names)
+    asked = tuple(re.split(r", and |, | and ", names)) if names else ()
     for name in asked:
         if name not in known:
             raise ValueError(f'--accuracy "{text}": after "of" expected one of {", ".join(known)}, got "{name}"')
-    refinements = () if given is None else _listed(given)
-    for name in refinements:
-        if name not in REFINED:
-            raise ValueError(f'--accuracy "{text}": after "given" expected one of {", ".join(REFINED)}, got "{name}"')
-    return Wanted(error, tuple(known[name] for name in dict.fromkeys(asked)), refinements)
-
-
-def _listed(text: str) -> tuple[str, ...]:
-    """Words of a list "a, b and the c"; "mesh and contact grid" is one."""
-    whole = text.replace("mesh and contact grid", "mesh & contact grid")
-    items = (item.strip().removeprefix("the ") for item in re.split(r",(?: and\b)?| and\b", whole))
-    return tuple(item.replace("&", "and") for item in items)
+    return Wanted(error, tuple(known[name] for name in dict.fromkeys(asked)))
 
 
 def to_accuracy(
@@ -130,7 +115,7 @@ def to_accuracy(
         of = wanted.quantities or tuple(name for name, one in found.statements.items() if one.value is not None)
         if not of:
             raise RuntimeError(f"{file.name} has no error: {found.statements['peak_frequency'].reason}")
-        finer = {name: tuple(REFINED[name](current, rounds.finer)) for name in _large(found, wanted, of, rounds.share)}
+        finer = {name: _finer(current, name, rounds.finer) for name in _large(found, wanted, of, rounds.share)}
         left = tuple(name for name, texts in finer.items() if not texts)
         bound = _bound(found, wanted, of, added, left, number)
         say(f"round {number}: {bound.sentence}")
@@ -145,69 +130,39 @@ def _bound(
 ) -> Bound:
     errors, reasons = dict[str, float | None](), dict[str, str]()
     for name in of:
-        errors[name], reasons[name] = _error(found, name, wanted.given)
+        one = found.statements[name]
+        errors[name], reasons[name] = (one.error, "") if one.stated else (None, one.reason or one.status)
         error = errors[name]
-        if not reasons[name] and error is not None and error > wanted.error:
+        if error is not None and error > wanted.error:
             reasons[name] = f"its error is {error:.2g}"
     return Bound(wanted, errors, reasons, tuple(f"{k}={v}" for k, v in added.items()), left, number)
 
 
-def _error(found: Verdict, name: str, given: Sequence[str]) -> tuple[float | None, str]:
-    """Total error of a quantity without what is given, and why it is not known."""
-    one = found.statements[name]
-    if not given:
-        return (one.error, "") if one.stated else (None, one.reason or one.status)
-    own = [row for row in found.changes if row.quantity == name and row.refinement not in (*given, Refinement.COMBINED)]
-    if not own or any(row.relative is None for row in own):
-        return None, one.reason or "no refinement was measured"
-    return DEFAULT.total(sum(row.relative or 0.0 for row in own), found.ratio), ""
-
-
 def _large(found: Verdict, wanted: Wanted, of: Sequence[str], share: float) -> list[str]:
     """Refinements that change a quantity which is asked for much, the largest first."""
-    skipped = (*wanted.given, Refinement.COMBINED)
-    rows = [row for row in found.changes if row.quantity in of and row.refinement not in skipped]
+    rows = [row for row in found.changes if row.quantity in of and row.refinement != Refinement.COMBINED]
     sizes = [(float("inf") if row.relative is None else row.relative, row.refinement) for row in rows]
     large = [one for one in sizes if DEFAULT.factor(found.ratio) * one[0] > share * wanted.error]
     return list(dict.fromkeys(refinement for _, refinement in sorted(large, key=lambda one: -one[0])))
 
 
-def _harmonics(file: SceneFile, factor: float) -> Iterator[str]:
+def _finer(file: SceneFile, refinement: str, factor: float) -> tuple[str, ...]:
+    """Overrides that refine one thing of a scene; none where it cannot be refined."""
     top = max(file.scene.harmonics.kept, default=1)
-    yield from _changes(file, refine.harmonics(file, top + 2))
-
-
-def _mesh(file: SceneFile, factor: float) -> Iterator[str]:
+    wear = partial(refine.wear, file, 3.0)  # its tolerance decides on the scatter of means in time too
+    refined: dict[str, Callable[[], SceneFile | None]] = {
+        Refinement.HARMONICS: lambda: refine.harmonics(file, top + 2),
+        Refinement.MESH: lambda: refine.mesh(file, factor)[0],
+        Refinement.MODES: lambda: refine.modes(file, factor),
+        Refinement.SAMPLES: lambda: file.changed(f"harmonics.samples={2 * file.scene.harmonics.samples}"),
+        Refinement.WEAR_STEPS: wear,
+        Refinement.MOTION: wear,
+    }
     try:
-        yield from _changes(file, refine.mesh(file, factor)[0])
+        finer = refined[refinement]()
     except refine.NoMesh:
-        return
-
-
-def _modes(file: SceneFile, factor: float) -> Iterator[str]:
-    finer = refine.modes(file, factor)
-    if finer is not None:
-        yield from _changes(file, finer)
-
-
-def _samples(file: SceneFile, factor: float) -> Iterator[str]:
-    yield f"harmonics.samples={2 * file.scene.harmonics.samples}"
-
-
-def _wear_steps(file: SceneFile, factor: float) -> Iterator[str]:
-    if file.scene.wear is not None:
-        yield from _changes(file, refine.wear(file, 3.0))
-
-
-def _changes(file: SceneFile, finer: SceneFile) -> Sequence[str]:
-    return finer.overrides[len(file.overrides) :]
-
-
-REFINED: dict[str, Callable[[SceneFile, float], Iterator[str]]] = {
-    Refinement.HARMONICS: _harmonics, Refinement.MESH: _mesh, Refinement.MODES: _modes,
-    Refinement.SAMPLES: _samples, Refinement.WEAR_STEPS: _wear_steps,
-}  # fmt: skip
-"""Overrides that refine one thing of a scene; none where it cannot be refined."""
+        return ()
+    return () if finer is None else finer.overrides[len(file.overrides) :]
 
 
 def _name(quantity: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 ORDERS = (0.5, 4.0)  # slower is not taken for settling; faster is not relied on
 SAFETY = 0.25  # of the extrapolated remainder that stays in doubt (Roache: a factor of 1.25 on three grids)
@@ -27,34 +28,42 @@ class Limit:
 
 
 def limit_of(size: Sequence[float], value: Sequence[float]) -> Limit:
-    """The limit of values whose error falls with a power of the size, judged by the last three.
+    """The limit of values whose error falls with a power of the size, judged by the three finest sizes.
 
-    size : rising, the last one nan where that setting is exact; value : the last one not 0
-    Three that settle monotonically are extrapolated with their observed order. Three that alternate and come closer
-    have their limit between the last two. Else the last one stands, and the spread of the three is its doubt. Two are
-    taken to be of first order; one says nothing about itself, which is an infinite doubt.
+    size : rising, nan at the end where that setting is exact; equal ones are other placements of the same nodes, of
+        which the first counts
+    value : the last one not 0
+    Three that settle monotonically are extrapolated with their observed order, if the last step is above the scatter of
+    the finest size with several placements. Three that alternate and come closer have their limit between the last two.
+    Else the last one stands, with the spread of all values on the three as its doubt. Two are taken to be of first
+    order; one says nothing about itself, which is an infinite doubt.
     Source  Roache, J. Fluids Eng. 116, 1994
     """
     last = value[-1]
     if not np.isfinite(size[-1]):
-        return Limit(last, _slope(size[:-1], [abs(v / last - 1) for v in value[:-1]]), 0.0)
-    if len(value) == 1:
+        return Limit(last, float("nan"), 0.0)
+    groups = [[v for s, v in zip(size, value, strict=True) if s == one] for one in dict.fromkeys(size)][-3:]
+    scatter = next((float(np.ptp(some)) for some in reversed(groups) if len(some) > 1), 0.0)
+    v = np.array([some[0] for some in groups])
+    last = float(v[-1])
+    if len(v) == 1:
         return Limit(last, float("nan"), float("inf"))
-    h, v = 1 / np.maximum(size[-3:], SMALLEST), np.array(value[-3:], dtype=float)
+    h = 1 / np.maximum(list(dict.fromkeys(size))[-3:], SMALLEST)
     steps = np.diff(v)
     near = np.abs(steps) <= ROUNDING * abs(last)
-    if near[-1] and (near.all() or len(v) == 3):
+    if near[-1] and (near.all() or len(v) == 3) and not scatter:
         return Limit(last, float("nan"), float(abs(steps[-1] / last)))
     if len(v) == 2:
         return Limit(last, float("nan"), float(abs(steps[0] / last) * h[1] / (h[0] - h[1])))
-    ratio = steps[0] / steps[1]
-    if ratio > 0 and (order := _order(h, ratio)) >= ORDERS[0]:
-        p = min(order, ORDERS[1])
-        rest = steps[1] * h[2] ** p / (h[1] ** p - h[2] ** p)
-        return Limit(float(last + rest), order, float(SAFETY * abs(rest / (last + rest))))
-    if ratio < -1:
-        return Limit(last, float("nan"), float(abs(steps[1] / last)))
-    return Limit(last, float("nan"), float(np.ptp(v) / abs(last)))
+    if abs(steps[1]) > scatter:
+        ratio = steps[0] / steps[1]
+        if ratio > 0 and (order := _order(h, ratio)) >= ORDERS[0]:
+            p = min(order, ORDERS[1])
+            rest = steps[1] * h[2] ** p / (h[1] ** p - h[2] ** p)
+            return Limit(float(last + rest), order, float(SAFETY * abs(rest / (last + rest))))
+        if ratio < -1:
+            return Limit(last, float("nan"), float(abs(steps[1] / last)))
+    return Limit(last, float("nan"), float(np.ptp(np.concatenate(groups)) / abs(last)))
 
 
 def _order(h: np.ndarray, ratio: float) -> float:
@@ -68,16 +77,4 @@ def _order(h: np.ndarray, ratio: float) -> float:
 
     if excess(low) > 0:
         return float("nan")
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (low, middle) if excess(middle) > 0 else (middle, high)
-    return low
-
-
-def _slope(size: Sequence[float], error: Sequence[float]) -> float:
-    """Order by the last two errors, nan where they are rounding."""
-    known = [(s, e) for s, e in zip(size, error, strict=True) if s > 0 and e > ROUNDING][-2:]
-    if len(known) < 2:
-        return float("nan")
-    (s0, e0), (s1, e1) = known
-    return float(np.log(e0 / e1) / np.log(s1 / s0))
+    return high if excess(high) < 0 else float(brentq(excess, low, high, xtol=1e-14))

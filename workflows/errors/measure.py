@@ -242,23 +242,25 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     other = refine.wear(refine.harmonics(finer, top), steps)
     how = "" if bare else f"{ratio:.3g} times the elements along every edge, "
     how += f"more modes, harmonics 0 to {top}" + (f", {steps:g} times the wear steps" if steps > 1 else "")
-    table_of_wear = other.scene.wear
-    assert table_of_wear is not None
     try:
-        model = modelling.build(other, Progress())
-        worn = wear_run.worn_out(other, model, table_of_wear.lost_below)
-        there = life_of(worn, model, table_of_wear)
-        if worn.ended.failed or there is None:
-            raise RuntimeError(str(worn.end))
+        depth, there = worn_through(other, modelling.build(other, Progress()))
     except REFUSALS as refusal:
         table.refuse(Refinement.COMBINED, f"{how}: {refusal}", OF_WEAR)
         return
     table.worn_ratio = None if bare else ratio
-    pairs = (
-        ("depth", float(result.depth_after(-1).max()), float((worn.depth[-1] + worn.worn[-1]).max())),
-        ("life", life, there),
-    )
+    pairs = (("depth", float(result.depth_after(-1).max()), depth), ("life", life, there))
     table.rows += [Change(Refinement.COMBINED, name, a, b, relative(a, b), how) for name, a, b in pairs]
+
+
+def worn_through(file: SceneFile, model: Model) -> tuple[float, float]:
+    """Largest depth [m] and life [cycles] of a scene worn as it says; raises RuntimeError where no life ends."""
+    wear = file.scene.wear
+    assert wear is not None
+    worn = wear_run.worn_out(file, model, wear.lost_below)
+    life = life_of(worn, model, wear)
+    if worn.ended.failed or life is None:
+        raise RuntimeError(str(worn.end))
+    return float((worn.depth[-1] + worn.worn[-1]).max()), life
 
 
 def life_of(worn: WearHistory, model: Model, wear: Wear) -> float | None:

@@ -113,11 +113,16 @@ def first_state(file: SceneFile, balance: HarmonicBalance, result: Result) -> St
     """
     if not balance.contact.n_pair:
         raise ValueError("there is no contact")
-    scene, wear, branch = file.scene, result.wear, result.response
-    if wear is not None and len(wear.cycles) and scene.wear is not None:
+    wear = result.wear
+    if wear is not None and len(wear.cycles) and file.scene.wear is not None:
         return worn_state(file, balance, result, 0)
-    if branch is None:
+    if result.response is None:
         raise ValueError("there is no response")
+    return at_highest(file.scene, balance, result.response)
+
+
+def at_highest(scene: Scene, balance: HarmonicBalance, branch: Branch) -> State:
+    """The state at the peak of a response; raises NoPeak, or RuntimeError where no solution is found."""
     if turns_back(branch):
         return State(0.0, balance, OnCurve(scene), highest_of(branch, balance))
     best, site = _highest(branch), settings.peak_of(scene)

@@ -94,7 +94,7 @@ def run_to_accuracy(
 ) -> tuple[Result, Bound]:
     """Run a scene with finer and finer settings until its own verdict's errors are below the wanted one.
 
-    accuracy : such as "1 %", "1 % of energy and peak frequency", "1 % of life given harmonics"
+    accuracy : such as "1 %", "1 % of energy and peak frequency"
     folder : where result.h5 of the last run is kept, and those of all runs in rounds/1, rounds/2, ...
     resume : take the runs that the folder holds already
     Returns the last result and its errors; `met` says whether all are below the bound

@@ -14,7 +14,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.laws.impact import loading_work
 from tribodyn.workflows.result.store import Held, held
@@ -26,31 +25,8 @@ from tribodyn.workflows.studies.files import write_files
 SAMPLES = 256  # of a cycle, at the least
 
 
-@dataclass(frozen=True)
-class Support:
-    """A spring to the ground whose displacement is observed. name : of the spring; stiffness : [N/m]; output : name."""
-
-    name: str
-    stiffness: float
-    output: str
-
-
-@dataclass(frozen=True)
-class SupportWear:
-    """Wear at a support along a response curve.
-
-    work : (n_point,) that the part puts into the spring per cycle [J]
-    depth : (n_point,) of the seat per cycle [m], nan where no bearing area or coefficient was given
-    """
-
-    support: Support
-    frequency: np.ndarray
-    work: np.ndarray
-    depth: np.ndarray
-
-
-def supports_of(scene: Scene) -> list[Support]:
-    """Springs of a scene to the ground whose group and direction some output has.
+def supports_of(scene: Scene) -> dict[str, tuple[float, str]]:
+    """Springs of a scene to the ground whose group and direction some output has: stiffness [N/m] and output by name.
 
     Raises  ValueError, naming the table that is missing, where there is none
     """
@@ -59,12 +35,12 @@ def supports_of(scene: Scene) -> list[Support]:
     if not grounded or not isinstance(scene, PartScene):
         raise ValueError("the scene has no spring to the ground: a support is a table such as [springs.left_pin]")
     outputs = {"response": scene.response, **scene.response.others}
-    found = [
-        Support(name, spring.stiffness, output)
+    found = {
+        name: (spring.stiffness, output)
         for name, spring in grounded.items()
         for output, seen in outputs.items()
         if seen.group == spring.group and seen.direction == spring.direction
-    ]
+    }
     if not found:
         first, spring = next(iter(grounded.items()))
         raise ValueError(
@@ -84,41 +60,26 @@ def support_work(basis: HarmonicBasis, displacement: np.ndarray, stiffness: floa
     return np.asarray(loading_work(stiffness * z, z))
 
 
-def wear_of(
-    branch: Branch,
-    basis: HarmonicBasis,
-    support: Support,
-    area: float | None = None,
-    coefficient: float | None = None,
-) -> SupportWear:
-    """Wear at one support along a response curve. area : of its seat [m2]; coefficient : of impact wear [m3/J]."""
-    row = branch.response[:, branch.output_names.index(support.output)]
-    work = support_work(basis, row, support.stiffness)
-    known = area is not None and coefficient is not None
-    depth = work * coefficient / area if known else np.full(len(work), np.nan)  # type: ignore[operator]
-    return SupportWear(support, branch.frequency, work, depth)
-
-
 @dataclass(frozen=True)
 class Supports:
-    """Wear at every support of a part."""
+    """Wear at every support of a part along a response curve.
 
-    found: tuple[SupportWear, ...]
+    frequency : (n_point,) [Hz]; work : support -> (n_point,) that the part puts into its spring per cycle [J]
+    depth_per_work : support -> of its seat [m/J], for those whose bearing area and coefficient are given
+    """
+
+    frequency: np.ndarray
+    work: Mapping[str, np.ndarray]
+    depth_per_work: Mapping[str, float]
 
     def record(self) -> list[dict[str, Any]]:
         """For machines: every support where it takes most work."""
         rows = []
-        for one in self.found:
-            top = int(np.argmax(one.work))
-            depth = float(one.depth[top])
-            rows.append(
-                {
-                    "support": one.support.name,
-                    "hz": float(one.frequency[top]),
-                    "work_J": float(one.work[top]),
-                    "depth_m_per_cycle": depth if np.isfinite(depth) else None,
-                }
-            )
+        for name, work in self.work.items():
+            top, most = int(work.argmax()), float(work.max())
+            depth = self.depth_per_work[name] * most if name in self.depth_per_work else None
+            row = {"support": name, "hz": float(self.frequency[top]), "work_J": most, "depth_m_per_cycle": depth}
+            rows.append(row)
         return rows
 
     def lines(self) -> list[str]:
@@ -132,9 +93,9 @@ class Supports:
 
     def write(self, folder: Path) -> list[Path]:
         """Write supports.csv: work and depth per cycle of every support over frequency."""
-        work = {f"{one.support.name}_work_J": one.work for one in self.found}
-        depth = {f"{one.support.name}_depth_m_per_cycle": one.depth for one in self.found}
-        return write_files(folder, {"supports": {"frequency_Hz": self.found[0].frequency, **work, **depth}}, {})
+        work = {f"{name}_work_J": work for name, work in self.work.items()}
+        depth = {f"{n}_depth_m_per_cycle": self.depth_per_work.get(n, np.nan) * work for n, work in self.work.items()}
+        return write_files(folder, {"supports": {"frequency_Hz": self.frequency, **work, **depth}}, {})
 
 
 def supports(
@@ -151,15 +112,16 @@ def supports(
     """
     result = held(result)
     scene = scene_file.from_json(result.provenance["scene"])
-    there, areas = supports_of(scene), areas or {}
-    unknown = [name for name in areas if name not in [support.name for support in there]]
+    there, areas, curve = supports_of(scene), areas or {}, result.response
+    unknown = [name for name in areas if name not in there]
     if unknown:
-        raise ValueError(
-            f'no support is called "{unknown[0]}", there are {", ".join(support.name for support in there)}'
-        )
-    if result.response is None:
+        raise ValueError(f'no support is called "{unknown[0]}", there are {", ".join(there)}')
+    if curve is None:
         raise ValueError("the result has no response curve: run its scene")
-    highest = result.harmonics[-1]
-    basis = HarmonicBasis(result.harmonics, max(SAMPLES, 32 * highest, scene.harmonics.samples))
-    curve = result.response
-    return Supports(tuple(wear_of(curve, basis, one, areas.get(one.name), coefficient) for one in there))
+    basis = HarmonicBasis(result.harmonics, max(SAMPLES, 32 * result.harmonics[-1], scene.harmonics.samples))
+    work = {
+        name: support_work(basis, curve.response[:, curve.output_names.index(output)], stiffness)
+        for name, (stiffness, output) in there.items()
+    }
+    known = {} if coefficient is None else {name: coefficient / area for name, area in areas.items()}
+    return Supports(curve.frequency, work, known)

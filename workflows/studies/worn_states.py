@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,6 @@ from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREEN, ORANGE
 from tribodyn.workflows.result.provenance import rebuilt
-from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
@@ -26,57 +26,6 @@ from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies import verification
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.verification import Comparison
-
-
-@dataclass(frozen=True)
-class WornState:
-    """A row of a wear run and what time integration says.
-
-    energy : per cycle, as the run took it [J]; found : None where there is no comparison, for the reason `why`
-    left_alone : what a plain march does, where the motion is unstable or there is no comparison, if it could be marched
-    """
-
-    row: int
-    cycles: float
-    hertz: float
-    energy: float
-    found: Comparison | None
-    left_alone: LeftAlone | None
-    why: str = ""
-
-    @property
-    def time_energy(self) -> float:
-        """Energy per cycle of the motion that was integrated [J]; nan where none is periodic."""
-        periodic = self.found is not None and self.found.found.motion.periodic
-        return float(self.found.found.motion.energy.sum()) if self.found is not None and periodic else float("nan")
-
-    def record(self) -> dict[str, Any]:
-        """Numbers for machines; `comparison` as that of one state, `left_alone_J` mean and spread."""
-        alone = self.left_alone
-        return {
-            "row": self.row,
-            "cycles": self.cycles,
-            "frequency_hz": self.hertz,
-            "energy_of_run_J": self.energy,
-            "comparison": None if self.found is None else self.found.record(),
-            "left_alone_J": None if alone is None else [alone.energy, alone.energy_spread],
-            "no_comparison": self.why or None,
-        }
-
-    def line(self) -> str:
-        """One line of the table."""
-        head = f"{self.row:4d} {self.cycles:11.4g} {self.hertz:9.5g} {self.energy:11.5g}"
-        seen = self.left_alone
-        alone = "" if seen is None else f"   {seen.energy:.5g} +- {seen.energy_spread:.2g}"
-        if self.found is None:
-            return f"{head} {'none':>11} {'-':>11} {'-':>11} {'-':>9} {'-':>7}{alone}   {self.why}"
-        told = self.found.record()
-        energy, error = told["energy"], told["step_error"]
-        periodic = self.found.found.motion.periodic
-        integrated = f"{energy['time_J']:11.5g} {energy['difference']:11.2%}" if periodic else f"{'none':>11} {'-':>11}"
-        own = "-" if error is None else f"{error:.2%}"
-        return f"{head} {energy['balance_J']:11.5g} {integrated} {own:>9} {'yes' if told['stable'] else 'no':>7}{alone}"
-
 
 HEADER = (
     f"{'row':>4} {'cycles':>11} {'Hz':>9} {'run [J]':>11} {'balance [J]':>11} {'time [J]':>11} {'difference':>11} "
@@ -92,18 +41,51 @@ def spread(wear: WearHistory, count: int) -> list[int]:
 
 @dataclass(frozen=True)
 class WornStates:
-    """States of a wear run beside time integration."""
+    """States of a wear run beside time integration, by row of the run.
 
-    result: Result
-    states: tuple[WornState, ...]
+    found : the comparison, or why there is none; alone : what a plain march does, where the motion is unstable or there
+        is no comparison, if it could be marched
+    """
+
+    wear: WearHistory
+    found: Mapping[int, Comparison | str]
+    alone: Mapping[int, LeftAlone]
 
     def record(self) -> dict[str, Any]:
-        """For machines."""
-        return {"states": [state.record() for state in self.states]}
+        """For machines; `comparison` as that of one state, `left_alone_J` mean and spread."""
+        rows = []
+        for row, found in self.found.items():
+            seen, compared = self.alone.get(row), isinstance(found, Comparison)
+            rows.append(
+                {
+                    "row": row, "cycles": float(self.wear.cycles[row]), "frequency_hz": float(self.wear.frequency[row]),
+                    "energy_of_run_J": float(self.wear.energy[row].sum()),
+                    "comparison": found.record() if isinstance(found, Comparison) else None,
+                    "left_alone_J": None if seen is None else [seen.energy, seen.energy_spread],
+                    "no_comparison": None if compared else found,
+                }
+            )  # fmt: skip
+        return {"states": rows}
 
     def lines(self) -> list[str]:
         """For people."""
-        return [HEADER, *(state.line() for state in self.states)]
+        return [HEADER, *map(self._line, self.record()["states"])]
+
+    def _line(self, said: dict[str, Any]) -> str:
+        head = f"{said['row']:4d} {said['cycles']:11.4g} {said['frequency_hz']:9.5g} {said['energy_of_run_J']:11.5g}"
+        alone = "" if said["left_alone_J"] is None else "   {:.5g} +- {:.2g}".format(*said["left_alone_J"])
+        told = said["comparison"]
+        if told is None:
+            return f"{head} {'none':>11} {'-':>11} {'-':>11} {'-':>9} {'-':>7}{alone}   {said['no_comparison']}"
+        energy, own = told["energy"], "-" if told["step_error"] is None else f"{told['step_error']:.2%}"
+        integrated = f"{energy['time_J']:11.5g} {energy['difference']:11.2%}"
+        if not self._periodic(said["row"]):
+            integrated = f"{'none':>11} {'-':>11}"
+        return f"{head} {energy['balance_J']:11.5g} {integrated} {own:>9} {'yes' if told['stable'] else 'no':>7}{alone}"
+
+    def _periodic(self, row: int) -> bool:
+        found = self.found[row]
+        return isinstance(found, Comparison) and found.found.motion.periodic
 
     def write(self, folder: Path) -> list[Path]:
         """Write verify_states.png."""
@@ -111,16 +93,16 @@ class WornStates:
 
     def plot(self) -> Figure:
         """Energy per cycle over the cycles: of the run, of time integration, and of the motion that was left alone."""
-        assert self.result.wear is not None
+        millions = 1e-6 * self.wear.cycles
         with axes_of() as (figure, ax):
-            ax.plot(1e-6 * self.result.wear.cycles, self.result.wear.energy.sum(axis=1), color=BLUE, label="run")
-            millions = [1e-6 * state.cycles for state in self.states]
-            ax.plot(millions, [s.time_energy for s in self.states], "o", color=ORANGE, label="time integration")
-            alone = [(1e-6 * s.cycles, s.left_alone) for s in self.states if s.left_alone is not None]
-            if alone:
-                at, seen = zip(*alone, strict=True)
-                heights, spreads = [s.energy for s in seen], [s.energy_spread for s in seen]
-                ax.errorbar(at, heights, spreads, fmt="s", color=GREEN, capsize=3, label="left alone, mean and spread")
+            ax.plot(millions, self.wear.energy.sum(axis=1), color=BLUE, label="run")
+            periodic = {s["row"]: s["comparison"] for s in self.record()["states"] if self._periodic(s["row"])}
+            energy = [told["energy"]["time_J"] for told in periodic.values()]
+            ax.plot(millions[list(periodic)], energy, "o", color=ORANGE, label="time integration")
+            if self.alone:
+                heights, spreads = zip(*((s.energy, s.energy_spread) for s in self.alone.values()), strict=True)
+                look = {"fmt": "s", "color": GREEN, "capsize": 3, "label": "left alone, mean and spread"}
+                ax.errorbar(millions[list(self.alone)], heights, spreads, **look)
             ax.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
             ax.legend(loc="best")
         return figure
@@ -144,17 +126,16 @@ def verify_states(
     file = rebuilt(result, override_texts(overrides))
     with limited(file.scene.solver.threads):
         unworn = modelling.build(file, report, result.harmonics).balance
-    found = []
+    found: dict[int, Comparison | str] = {}
+    alone: dict[int, LeftAlone] = {}
     for row in spread(result.wear, states):
-        comparison, alone, why = None, None, ""
         try:
-            comparison = verification.held_against(result, file.scene, unworn, None, row, steps, report)
-            alone = comparison.left_alone
+            one = verification.held_against(result, file.scene, unworn, None, row, steps, report)
+            found[row], seen = one, one.left_alone
         except (SolveFailed, IntegrationFailed) as error:
-            why = str(error)
+            found[row], seen = str(error), None
             with suppress(IntegrationFailed):
-                alone = verification.alone(result, file.scene, unworn, row, steps)
-        wear = result.wear
-        at = (float(wear.cycles[row]), float(wear.frequency[row]), float(wear.energy[row].sum()))
-        found.append(WornState(row, *at, comparison, alone, why))
-    return WornStates(result, tuple(found))
+                seen = verification.alone(result, file.scene, unworn, row, steps)
+        if seen is not None:
+            alone[row] = seen
+    return WornStates(result.wear, found, alone)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,22 +19,10 @@ FEWEST = 5  # values that a distribution is fitted to
 TICKS = (0.01, 0.05, 0.1, 0.2, 0.5, 0.8, 0.9, 0.99)
 
 
-@dataclass(frozen=True)
-class Weibull:
-    """A Weibull distribution: share 1 - exp(-(x / scale)^shape) of the values lies below x."""
-
-    shape: float
-    scale: float
-
-    def quantile(self, share: float) -> float:
-        """The value below which a share of the values lies; 0.1 gives B10."""
-        return float(self.scale * (-np.log1p(-share)) ** (1 / self.shape))
-
-
-def fitted(values: np.ndarray) -> Weibull:
-    """Weibull distribution of most likelihood of some values (n,) above 0."""
+def fitted(values: np.ndarray) -> Any:
+    """Weibull distribution of most likelihood of some values (n,) above 0, of scipy."""
     shape, _, scale = stats.weibull_min.fit(values, floc=0)
-    return Weibull(float(shape), float(scale))
+    return stats.weibull_min(shape, scale=scale)
 
 
 def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,9 +55,9 @@ def picture(found: StudyTable, number: str = "life_cycles") -> Figure:
         if len(values) == done and np.ptp(values) > 0:
             law = fitted(values)
             line = np.array([0.3 * share[0], 1 - 0.3 * (1 - share[-1])])
-            said = f"Weibull, shape {law.shape:.3g}, scale {law.scale:.4g}"
-            axes.plot([law.quantile(s) for s in line], _paper(line), color=INK, lw=1.2, label=said)
-            ten = law.quantile(0.1)
+            said = f"Weibull, shape {law.args[0]:.3g}, scale {law.kwds['scale']:.4g}"
+            axes.plot(law.ppf(line), _paper(line), color=INK, lw=1.2, label=said)
+            ten = float(law.ppf(0.1))
             axes.plot([ten, ten], [_paper(line[0]), _paper(0.1)], ":", color=RED, label=f"B10: {ten:.4g}")
         axes.set_xscale("log")
         axes.set_yticks(_paper(np.array(TICKS)), [f"{100 * tick:g} %" for tick in TICKS])

@@ -92,7 +92,7 @@ class Optimum:
         return [] if folder is None else [folder / "optimum.json", folder / "optimum.png"]
 
     def plot(self) -> Figure:
-        """The trade of the first two aims, or how the one aim got better; the keys are in `table.plot_parallel()`."""
+        """The trade of the first two aims, or how the one aim got better."""
         return trade_picture.picture(self)
 
 

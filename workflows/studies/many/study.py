@@ -132,8 +132,6 @@ def draw(found: StudyTable, folder: Path) -> None:
     """Pictures of a study, as far as its runs make any."""
     if pictures.shown(found):
         found.plot().savefig(folder / "study.png")
-        if pictures.parallel_possible(found):
-            found.plot_parallel().savefig(folder / "parallel.png")
         if life_picture.possible(found):
             found.plot_distribution().savefig(folder / "life.png")
 

@@ -1,15 +1,13 @@
-"""The table of a study: a row a run, in the order of the design, as CSV, HDF5 and Parquet."""
+"""The table of a study: a row a run, in the order of the design."""
 
 from __future__ import annotations
 
 import csv
-import importlib.util
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
@@ -98,8 +96,8 @@ class StudyTable:
 
     @property
     def files(self) -> list[Path]:
-        """The table as files."""
-        return [] if self.folder is None else [self.folder / "study.csv", self.folder / "study.h5"]
+        """The table as a file."""
+        return [] if self.folder is None else [self.folder / "study.csv"]
 
     def record(self) -> dict[str, Any]:
         """Counts of the runs and their rank correlations, for machines."""
@@ -132,10 +130,6 @@ class StudyTable:
     def plot_distribution(self, number: str = "life_cycles") -> Figure:
         """A number of the runs on Weibull paper, see `many.life_picture`; raises ValueError where they are few."""
         return life_picture.picture(self, number)
-
-    def plot_parallel(self, number: str | None = None) -> Figure:
-        """The runs as parallel coordinates, coloured by a number; raises ValueError where they are few."""
-        return pictures.parallel(self, number)
 
     def plot(self) -> Figure:
         """Response against each of the keys that vary, see `many.pictures`."""
@@ -176,36 +170,13 @@ def _values(values: Sequence[Any], chosen: Sequence[int]) -> np.ndarray:
     return np.array([str(values[i]) for i in chosen], dtype=object)
 
 
-def write(found: StudyTable, folder: Path) -> tuple[Path, Path]:
-    """Write study.csv and study.h5, and study.parquet where pyarrow is installed; the same table gives the same bytes.
-
-    Returns the first two
-    """
-    paths = folder / "study.csv", folder / "study.h5"
-    with replacing(paths[0]) as new, new.open("w", encoding="utf-8", newline="") as file:
+def write(found: StudyTable, folder: Path) -> None:
+    """Write study.csv; the same table gives the same bytes."""
+    with replacing(folder / "study.csv") as new, new.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(found.columns)
         for i in range(len(found.columns[RUN])):
             writer.writerow([_cell(column[i]) for column in found.columns.values()])
-    with replacing(paths[1]) as new, h5py.File(new, "w") as hdf:
-        hdf.attrs["format"], hdf.attrs["study"] = "tribodyn study 1", found.name
-        for name, column in found.columns.items():
-            kind = h5py.string_dtype() if column.dtype.kind == "O" else column.dtype
-            data = hdf.create_dataset(name, data=column, dtype=kind)
-            if name == RUN:
-                data.make_scale(RUN)
-            else:
-                data.dims[0].attach_scale(hdf[RUN])
-            if name in found.varied:
-                data.attrs["varied"] = 1
-    if importlib.util.find_spec("pyarrow") is not None:
-        import pyarrow
-        from pyarrow import parquet
-
-        columns = {name: pyarrow.array(column.tolist(), from_pandas=True) for name, column in found.columns.items()}
-        with replacing(folder / "study.parquet") as new:
-            parquet.write_table(pyarrow.table(columns), new)
-    return paths
 
 
 def _cell(value: Any) -> str:

@@ -1,0 +1,177 @@
+"""Settings of a small beam: where each tends to, what it costs, which to take."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.errors import ladders
+from tribodyn.workflows.errors.ladders import Ladder, Setting
+from tribodyn.workflows.errors.limit import limit_of
+from tribodyn.workflows.errors.settling import Measured, Row, Settling, Settlings, judged
+from tribodyn.workflows.result.verdict import QUANTITIES
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies import convergence
+from tribodyn.workflows.studies.convergence import Converged
+
+SMALL = (
+    "geometry.n_length=4",
+    "geometry.n_height=1",
+    "geometry.n_patch=3",
+    "reduction.modes=4",
+    "harmonics.kept=[0, 1]",
+)
+
+
+@pytest.fixture(scope="module")
+def found() -> Converged:
+    names = ("modes", "newton", "interface_rank")
+    return convergence.converge("beam", settings=names, overrides=(*SMALL, "wear="))
+
+
+def test_each_setting_is_held_against_where_it_tends_to(found: Converged) -> None:
+    for one in found.table.ladders:
+        assert all(row.measured.outcome == "converged" and row.measured.memory > 1e7 for row in one.rows)
+        bounds = [one.bound(row, "amplitude") for row in one.rows]
+        assert bounds[-1] == min(bounds) < 5e-3
+    exact = found.table.ladders[-1].rows[-1]
+    assert np.isnan(exact.setting.size)
+    assert found.table.ladders[-1].bound(exact, "energy") == 0
+    rows = found.record()
+    assert [row["setting"] for row in rows if row["own"]] == ["modes=4", "tolerance=1e-08", "interface_modes="]
+    assert json.loads(json.dumps(rows)) == rows
+
+
+def test_where_values_tend_to() -> None:
+    for order in (1.0, 2.0, 3.0):
+        sizes = [2.0, 4.0, 6.0, 8.0]
+        found = limit_of(sizes, [5 + 3 * size**-order for size in sizes])
+        assert found.value == pytest.approx(5, rel=1e-9)
+        assert found.order == pytest.approx(order, rel=1e-6)
+        assert found.doubt == pytest.approx(0.25 * 3 * 8**-order / 5, rel=1e-6)
+    alternating = limit_of([1, 2, 4], [1.1, 0.97, 1.01])
+    assert (alternating.value, alternating.doubt) == (1.01, pytest.approx(0.04 / 1.01))
+    unsettled = limit_of([1, 2, 4], [1.0, 1.1, 1.3])
+    assert (unsettled.value, unsettled.doubt) == (1.3, pytest.approx(0.3 / 1.3))
+    assert limit_of([1, 3], [1.3, 1.1]).doubt == pytest.approx(0.1 / 1.1)  # of first order
+    assert limit_of([1], [1.3]).doubt == np.inf
+    exact = limit_of([1, 2, np.nan], [1.04, 1.01, 1.0])
+    assert (exact.value, exact.doubt) == (1.0, 0.0)
+    placed = limit_of([4, 4, 8, 8, 16], [1.04, 1.06, 1.02, 0.97, 1.01])  # settles by less than the scatter
+    assert np.isnan(placed.order)
+    assert (placed.value, placed.doubt) == (1.01, pytest.approx(0.09 / 1.01))
+    assert limit_of([2, 4, 4, 8], [1.04, 1.02, 1.019, 1.01]).order == pytest.approx(1.0, abs=0.02)
+    assert limit_of([1e4, 1e6, 1e8], [1.0, 1.0, 1.0]).doubt == 0.0
+
+
+def test_the_life_is_that_of_the_run_and_falls_within_its_doubt() -> None:
+    worn = ("wear.at=peak", "wear.motion=machine", 'wear.rule="error_controlled"', "harmonics.samples=64")
+    overrides = (*SMALL, *worn, "geometry.n_length=3", "reduction.modes=2")
+    (one,) = convergence.converge("beam", settings=["wear"], most=3, overrides=overrides).table.ladders
+    coarse, _, fine = one.rows
+    life = fine.measured.values["life"]
+    assert life is not None
+    assert coarse.measured.values["life"] == pytest.approx(life, rel=0.5)
+    assert one.bound(fine, "life") < one.bound(coarse, "life")
+    assert fine.measured.seconds > fine.measured.wearing > 0
+
+
+def test_a_setting_that_the_scene_has_not_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(ValueError, match="the scene has fe_mesh, contact_grid, placed_grid, modes"):
+        convergence.converge("beam", settings=["wheels"])
+    known = {name: ladders_of(name) for name in ("beam", "blade", "leaf_seal", "rig")}
+    has = {scene: {one.name for one in found} for scene, found in known.items()}
+    assert {"wear", "interface_rank"} <= has["beam"]
+    assert "wear" not in has["leaf_seal"]
+    assert all({"fe_mesh", "contact_grid", "harmonics", "samples", "newton"} <= found for found in has.values())
+    assert "interface_rank" not in has["blade"]
+    with pytest.raises(SystemExit) as left:
+        cli.main(["study", "trade", "beam"])
+    assert left.value.code == 2
+    assert "study converge" in capsys.readouterr().err
+
+
+def ladders_of(scene: str) -> tuple[Ladder, ...]:
+    file = scene_file.read(scene)
+    study = ladders.study_of(file)
+    return ladders.ladders_of(scene_file.read(scene, study.base).scene, study)
+
+
+def test_every_setting_of_every_ladder_is_a_scene() -> None:
+    for scene in scene_file.names():
+        base = ladders.study_of(scene_file.read(scene)).base
+        for one in ladders_of(scene):
+            for setting in one.settings:
+                given = base if one.base is None else one.base
+                file = scene_file.read(scene, (*given, *setting.overrides))
+                assert file.name == scene
+
+
+def made_up(name: str, costs: list[float], errors: list[float]) -> Settling:
+    """A ladder that ends with an exact setting, of known costs and errors in amplitude; four seconds are the base."""
+    none = dict.fromkeys(QUANTITIES)
+    sizes = [*range(1, len(costs)), np.nan]
+    rows = [
+        Row(
+            Setting(size, (f"x.{name}={cost:g}",)),
+            Measured({**none, "amplitude": 1 + error}, *np.zeros((3, 1)), cost, 0.0, 0.0, "converged"),
+            cost / 4,
+        )
+        for size, cost, error in zip(sizes, costs, errors, strict=True)
+    ]
+    return judged(Ladder(name, tuple(row.setting for row in rows)), rows, rows[0].setting.label)
+
+
+def test_the_cheapest_combination_is_found() -> None:
+    draw = np.random.default_rng(2)
+    costs = draw.uniform(1, 9, (3, 4))
+    errors = np.concatenate([draw.uniform(0.001, 0.02, (3, 3)), np.zeros((3, 1))], axis=1)
+    found = [made_up(name, list(c), list(e)) for name, c, e in zip("abc", costs, errors, strict=True)]
+    table = Settlings("made up", (), 4.0, tuple(found))
+    for wanted in (0.002, 0.01, 0.03):
+        places = itertools.product(range(4), repeat=3)
+        allowed = [p for p in places if sum(errors[i, k] for i, k in enumerate(p)) <= wanted]
+        best = min(np.prod([costs[i, k] / 4 for i, k in enumerate(p)]) for p in allowed)
+        rows, error, seconds = table.choose(wanted, "amplitude")
+        assert [row.setting.label[0] for row in rows] == ["a", "b", "c"]
+        assert seconds == pytest.approx(4 * best)
+        assert error <= wanted * (1 + 1e-9)
+    with pytest.raises(ValueError, match="no setting of made up changes life"):
+        table.choose(0.01, "life")
+
+
+def test_the_setting_that_is_needed_is_the_first_from_which_all_are_good() -> None:
+    one = made_up("n", [1, 2, 3, 4], [0.004, 0.02, 0.008, 0.0])
+    needed = one.needed("amplitude", 0.01)
+    assert needed is not None
+    assert needed.setting.label == "n=3"
+    assert made_up("n", [1, 2], [0.004, 0.0]).needed("amplitude", 0.001).setting.label == "n=2"
+    text = "\n".join(Converged(Settlings("made up", (), 4.0, (one,))).lines())
+    assert "1% on amplitude needs n=3 or finer" in text
+    assert "the setting of the scene, n=1, is good for 1% on all: amplitude 0.004" in text
+    assert "for 1% on amplitude use n=1: 0.4%, 1 s" in text
+
+
+def test_a_linear_field_is_carried_to_a_millionth_of_the_patch() -> None:
+    fine = np.array([[x, y] for x in np.linspace(0, 1, 7) for y in np.linspace(0, 2, 6)])
+    coarse = np.array([[0.0, 0.0], [0.31, 1.3], [1.0, 2.0]])
+    plane = np.array([2.0, -3.0])
+    assert convergence.on_grid(fine, fine @ plane + 1, coarse) == pytest.approx(coarse @ plane + 1, abs=1e-5)
+    beyond = coarse * (1 + 1e-15) + 1e-16  # the rim of a coarser grid, by rounding outside of the finer one
+    assert convergence.on_grid(fine, fine @ plane + 1, beyond) == pytest.approx(coarse @ plane + 1, abs=1e-5)
+
+
+def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["study", "converge", "beam", "--setting", "contact_grid", "--most", "3", "--json", "--out", str(tmp_path)]
+    words += [word for text in (*SMALL, "wear=") for word in ("--set", text)]
+    cli.app(words, result_action="return_value")
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["pairs"] for row in rows] == [25, 81, 169]
+    assert rows[0]["map_difference"] > 0
+    assert rows[2]["map_difference"] is None
+    assert {path.name for path in tmp_path.iterdir()} == {"converge_beam.png", "converge_beam_contact_grid.png"}
