@@ -135,7 +135,7 @@ def _factorise_shifted(K: Any, M: Any, sigma: float | None) -> tuple[Factor, flo
         raise StaticDivergence(f"{UNSTABLE}, omega^2 is negative: {CURE}") from None
 
 
-@dataclass(frozen=True)
+@dataclass
 class _OfHermitian:
     """Solutions of a Hermitian R + iS by a factor of the real [[R, -S], [S, R]], one for both parts."""
 
