@@ -155,7 +155,7 @@ def test_a_scene_runs_with_all_its_own_files(scene: Path) -> None:
     low, high = scene_file.read(str(scene)).scene.response.frequency
     points = np.linspace(low, high, 1 + round((high - low) / 120.0))  # solved peaks stand between them
     assert np.abs(result.response.omega / (2 * np.pi) - points[:, None]).min(axis=1).max() < 1e-6
-    assert [one.name for one in ladders.study_of(scene_file.read(str(scene))).ladders] == ["my_grid"]
+    assert [*ladders.study_of(scene_file.read(str(scene))).ladders] == ["my_grid"]
 
 
 @pytest.mark.parametrize(

@@ -70,9 +70,9 @@ def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureF
 @pytest.mark.parametrize(
     ("study", "sentence"),
     [
-        ("[knobs.x]", "a study has no knobs, but ladders"),
-        ("ladders = 3", "is no study"),
-        ("[ladders.x]\nsizes = [1, 2]", "needs sizes"),
+        ("[knobs.x]", "unknown key knobs"),
+        ("ladders = 3", "ladders: expected a table"),
+        ("[ladders.x]\nsizes = [1, 2]", "ladders.x.set is missing"),
         ("[ladders", "arm.study.toml"),
     ],
 )

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
 
 from tribodyn.hbm.contact import law
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene, Scene
 
@@ -55,8 +58,27 @@ class Ladder:
         return self.worn_up_to > 0 and not setting.size > self.worn_up_to
 
 
-@dataclass(frozen=True)
-class Study:
+class LadderTable(Table):
+    """A ladder as a study has it: sizes, and as many lists of overrides."""
+
+    sizes: Annotated[tuple[Number, ...], Field(min_length=1)]
+    set: tuple[tuple[str, ...], ...]
+    base: tuple[str, ...] | None = None
+    worn_up_to: Number = math.inf
+
+    @model_validator(mode="after")
+    def _as_many(self) -> Self:
+        if len(self.sizes) != len(self.set):
+            raise ValueError('a ladder needs sizes = [1, 2] and as many set = [["section.key=value"], []]')
+        return self
+
+    def named(self, name: str) -> Ladder:
+        """The ladder with its name."""
+        settings = (Setting(size, one) for size, one in zip(self.sizes, self.set, strict=True))
+        return Ladder(name, tuple(settings), self.base, self.worn_up_to)
+
+
+class Study(Table):
     """How a scene is refined.
 
     base : overrides that make it affordable; ladders : that only its geometry has, or with settings of its own
@@ -64,44 +86,14 @@ class Study:
     """
 
     base: tuple[str, ...] = ()
-    ladders: tuple[Ladder, ...] = ()
+    ladders: dict[str, LadderTable] = Field(default_factory=dict)
     unworn: tuple[str, ...] = ()
 
 
 def study_of(file: SceneFile) -> Study:
-    """The study beside a scene, an empty one where there is none; raises ValueError for a file that is no study."""
+    """The study beside a scene, an empty one where there is none; raises SceneError for a file that is no study."""
     path = file.folder / f"{file.name}.study.toml"
-    if not path.is_file():
-        return Study()
-    try:
-        return _study(tomllib.loads(path.read_text(encoding="utf-8")))
-    except ValueError as trouble:
-        raise ValueError(f"{path}: {trouble}") from None
-    except (TypeError, AttributeError):
-        raise ValueError(f"{path} is no study: write its tables as those in workflows/cases") from None
-
-
-def _study(table: dict[str, Any]) -> Study:
-    unknown = set(table) - {"base", "ladders", "unworn"}
-    if unknown:
-        raise ValueError(f"a study has no {', '.join(sorted(unknown))}, but ladders, base, unworn")
-    ladders = tuple(
-        Ladder(
-            name,
-            _settings(given),
-            tuple(given["base"]) if "base" in given else None,
-            float(given.get("worn_up_to", math.inf)),
-        )
-        for name, given in table.get("ladders", {}).items()
-    )
-    return Study(tuple(table.get("base", ())), ladders, tuple(table.get("unworn", ())))
-
-
-def _settings(table: dict[str, Any]) -> tuple[Setting, ...]:
-    sizes, texts = table.get("sizes", ()), table.get("set", ())
-    if not sizes or len(sizes) != len(texts) or not all(isinstance(one, list) for one in texts):
-        raise ValueError('every ladder needs sizes = [1, 2] and as many set = [["section.key=value"], []]')
-    return tuple(Setting(float(size), tuple(one)) for size, one in zip(sizes, texts, strict=True))
+    return scene_file.checked(Study, scene_file.tables(path, "study"), path.name) if path.is_file() else Study()
 
 
 def ladders_of(scene: Scene, study: Study, names: Sequence[str] = ()) -> tuple[Ladder, ...]:
@@ -109,7 +101,7 @@ def ladders_of(scene: Scene, study: Study, names: Sequence[str] = ()) -> tuple[L
 
     Raises  ValueError for one that the scene does not have
     """
-    known = {one.name: one for one in study.ladders}
+    known = {name: table.named(name) for name, table in study.ladders.items()}
     for name, settings in _of_any(scene):
         if len(settings) > 1:
             up_to = WORN_TOP if name == "harmonics" else math.inf

@@ -105,19 +105,31 @@ def read(name: str, overrides: Sequence[str] = ()) -> SceneFile:
     Raises  SceneError: one sentence that names the file, the key and what is expected
     """
     path = find(name)
+    return parse(_text(path, "scene"), path.name, overrides, path.resolve().parent)
+
+
+def tables(path: Path, what: str) -> dict[str, Any]:
+    """The tables of a TOML file of a study, fit, ...; raises SceneError for one that cannot be read."""
+    return _tables(_text(path, what), path.name)
+
+
+def _text(path: Path, what: str) -> str:
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(f'the scene file "{path}" cannot be read as text ({error})') from None
-    return parse(text, path.name, overrides, path.resolve().parent)
+        raise SceneError(f'the {what} file "{path}" cannot be read as text ({error})') from None
+
+
+def _tables(text: str, label: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{label} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
 
 
 def parse(text: str, label: str, overrides: Sequence[str] = (), folder: Path = CASES) -> SceneFile:
     """Check the text of a scene; label names it in errors. Raises SceneError."""
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{label} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
+    data = _tables(text, label)
     for override in overrides:
         _override(data, override)
     return SceneFile(Path(label).stem, text, tuple(overrides), folder, checked(kind_of(data), data, label, folder))

@@ -131,7 +131,7 @@ def _lines(one: Settling) -> Iterator[str]:
         needed = "a finer setting than these" if enough is None else f"{enough.setting.label} or finer"
         yield f"{WANTED:.0%} on {_name(q)} needs {needed}; the limit is known to {one.limits[q].doubt:.2g}"
     for row in one.rows:
-        if row.setting.label == one.own:
+        if row.setting.label == one.own and shown:
             known = {q: b for q in shown if (b := one.bound(row, q)) is not None}
             missed = [_name(q) for q, b in known.items() if b > WANTED]
             verdict = f"misses {WANTED:.0%} on {', '.join(missed)}" if missed else f"is good for {WANTED:.0%} on all"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 
 import numpy as np
 
+from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 
@@ -26,7 +26,7 @@ class PublishedBackbone:
 def published_backbone(file: SceneFile) -> PublishedBackbone | None:
     """The table [backbone] beside a scene, None where there is none; raises ValueError for one that is incomplete."""
     path = file.folder / f"{file.name}.published.toml"
-    table = tomllib.loads(path.read_text(encoding="utf-8")).get("backbone") if path.is_file() else None
+    table = scene_file.tables(path, "published").get("backbone") if path.is_file() else None
     if table is None:
         return None
     try:

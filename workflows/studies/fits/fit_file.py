@@ -6,7 +6,6 @@ their values. A scene is built anew for every trial, as far as the trial changes
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -136,13 +135,7 @@ def read(task: AnyPath | Mapping[str, Any]) -> Task:
     if isinstance(task, Mapping):
         return scene_file.checked(Task, dict(task), "fit", Path())
     path = Path(task)
-    if not path.is_file():
-        raise SceneError(f'there is no file of a fit "{path}"')
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SceneError(f"{path.name} is not valid TOML: {error}") from None
-    return scene_file.checked(Task, data, path.name, path.parent)
+    return scene_file.checked(Task, scene_file.tables(path, "fit"), path.name, path.parent)
 
 
 @dataclass(frozen=True)

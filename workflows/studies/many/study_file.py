@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -159,13 +158,7 @@ def read(study: AnyPath | Mapping[str, Any]) -> Study:
     if isinstance(study, Mapping):
         return parse(study, "study", Path().resolve())
     path = Path(study)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(f'the study file "{path}" cannot be read ({error})') from None
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{path.name} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
-    return parse(data, path.name, path.resolve().parent)
+    return parse(scene_file.tables(path, "study"), path.name, path.resolve().parent)
 
 
 def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
