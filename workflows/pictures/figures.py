@@ -9,7 +9,7 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -105,12 +105,15 @@ def area_energy_unit(largest: float) -> tuple[str, float]:
     return next((one for one in units if one[1] * largest >= 0.5), units[-1] if largest > 0 else units[0])
 
 
-def scale_bar(figure: Figure, axes: Any, map_: str, low: float, high: float, label: str) -> None:
-    """A horizontal scale with ticks below a view."""
+def scale_bar(
+    figure: Figure, axes: Any, map_: str, low: float, high: float, label: str, power: float | None = None
+) -> None:
+    """A horizontal scale with ticks below a view; power : of the values that the colours go by, 1 where None."""
     if not high > low:
         high = low + (abs(low) or 1.0) * 1e-9
         label += f": {low:.3g} everywhere"
-    bar = figure.colorbar(ScalarMappable(Normalize(low, high), map_), ax=axes, location="bottom", shrink=0.7, aspect=28)
+    norm = Normalize(low, high) if power is None else PowerNorm(power, low, high)
+    bar = figure.colorbar(ScalarMappable(norm, map_), ax=axes, location="bottom", shrink=0.7, aspect=28)
     bar.set_label(label)
     if label.endswith("everywhere"):
         bar.set_ticks([])

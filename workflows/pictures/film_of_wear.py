@@ -6,13 +6,17 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from tribodyn.workflows.pictures import opened as book
-from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, pressure_unit, status_legend
+from tribodyn.workflows.pictures.figures import (
+    force_unit,
+    heading,
+    length_unit,
+    pressure_unit,
+    scale_bar,
+    status_legend,
+)
 from tribodyn.workflows.pictures.plots import cycle_axis
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
 from tribodyn.workflows.pictures.style import BLUE, LAYOUT, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
@@ -97,16 +101,10 @@ class WearFilm:
 
     def _bars(self, figure: Any) -> None:
         unit, factor = length_unit(self._depth_top)
-        _bar(
-            figure,
-            self._panels["depth"],
-            Normalize(0, factor * self._depth_top),
-            WEAR_MAP,
-            f"total wear depth / {unit}",
-        )
+        scale_bar(figure, self._panels["depth"], WEAR_MAP, 0, factor * self._depth_top, f"total wear depth / {unit}")
         unit, factor = pressure_unit(self._pressure_top)
-        norm = PowerNorm(ROOT, 0, factor * self._pressure_top)
-        _bar(figure, self._panels["pressure"], norm, PRESSURE_MAP, f"mean pressure / {unit}")
+        most, label = factor * self._pressure_top, f"mean pressure / {unit}"
+        scale_bar(figure, self._panels["pressure"], PRESSURE_MAP, 0, most, label, ROOT)
 
 
 def _most_worn(result: Result, rows: np.ndarray) -> Meeting:
@@ -119,13 +117,6 @@ def _most_worn(result: Result, rows: np.ndarray) -> Meeting:
 
 def _pressure(state: State) -> np.ndarray:
     return np.zeros(len(state.depth)) if state.pressure is None else state.pressure
-
-
-def _bar(figure: Any, axes: Any, norm: Normalize, map_: str, label: str) -> None:
-    bar = figure.colorbar(ScalarMappable(norm, map_), ax=axes, location="bottom", shrink=0.8, aspect=28)
-    bar.set_label(label)
-    bar.locator = MaxNLocator(4)
-    bar.update_ticks()
 
 
 def _curves(result: Result, panels: Any, rows: np.ndarray) -> list[tuple[Any, np.ndarray, np.ndarray]]:

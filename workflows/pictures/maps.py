@@ -9,7 +9,6 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullLocator
 from matplotlib.tri import Triangulation
 
 from tribodyn.hbm.balance import HarmonicBalance
@@ -20,6 +19,7 @@ from tribodyn.workflows.pictures.figures import (
     length_unit,
     named,
     pressure_unit,
+    scale_bar,
     status_legend,
     titled,
 )
@@ -193,7 +193,8 @@ def _drawn(patch: Patch, rows: Sequence[Row], titles: Sequence[str], title: str)
                     draw_status(axes, patch, values)
                     continue
                 low, high = _limits(values)
-                _colour_bar(figure, axes, draw_field(axes, patch, values, colors, high, low), label, high, low)
+                draw_field(axes, patch, values, colors, high, low)
+                scale_bar(figure, axes, colors, low, high, label)
         for axes, text in zip(grid[0], titles, strict=True):
             axes.set_title(text)
         _label_axes(grid, patch)
@@ -229,14 +230,6 @@ def _label_axes(grid: np.ndarray, patch: Patch) -> None:
         axes.set_xlabel(f"{names[0]} / mm")
     for axes in grid[:, 0]:
         axes.set_ylabel(f"{names[-1]} / mm")
-
-
-def _colour_bar(figure: Figure, axes: mpl.axes.Axes, shown: Any, name: str, high: float, low: float) -> None:
-    """The scale below a map from `draw_field`; a single value is given in words."""
-    bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.85, aspect=26)
-    bar.set_label(name if high > low else f"{name}: {low:.3g} everywhere")
-    bar.locator = MaxNLocator(4) if high > low else NullLocator()
-    bar.update_ticks()
 
 
 def _name_contacts(columns: np.ndarray, result: Result) -> None:
