@@ -243,17 +243,17 @@ def dual(one: Side, shared: Common) -> tuple[np.ndarray, np.ndarray]:
     psi, d = np.zeros_like(N), np.zeros(one.nodes.shape)
     for i in np.unique(shared.first):
         g = slice(starts[i], starts[i + 1])
-        root = np.sqrt(shared.weight[g])
+        sign, root = np.sign(shared.weight[g]), np.sqrt(np.abs(shared.weight[g]))  # below 0 in parts of a hollow cut
         b = N[:, g] * root
-        d[i] = b @ root
+        d[i] = b @ (sign * root)
         scale = 1 / np.linalg.norm(b, axis=1)
         b *= scale[:, None]
-        gram = b @ b.T
+        gram = (b * sign) @ b.T
         if np.linalg.eigvalsh(gram)[0] > MORTAR.independent * k:
             best = scale[:, None] * np.linalg.solve(gram, b)
         else:
-            best = affine[i] @ np.linalg.pinv((affine[i].T @ (b / scale[:, None])).T, MORTAR.rounding)
-        psi[:, g] = d[i][:, None] * best * root
+            best = affine[i] @ np.linalg.pinv((affine[i].T @ (b / scale[:, None])).T, MORTAR.rounding) * sign
+        psi[:, g] = d[i][:, None] * best * (sign * root)
     return psi, d
 
 

@@ -28,8 +28,9 @@ NAMED_SUPPORTS = {
     "YASYMM": (0, 2, 4),
     "ZASYMM": (0, 1, 5),
 }
-# read first, as the points that they name are known by these names then
-NAMING = {"COUPLING", "KINEMATIC", "DISTRIBUTING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "RIGID BODY"}
+# read first, as the points that they name are known by these names then, and tables of materials need temperatures
+FIRST = {"COUPLING", "KINEMATIC", "DISTRIBUTING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "RIGID BODY",
+         "INITIAL CONDITIONS"}  # fmt: skip
 TABLE = CardTable(
     read="""NODE, ELEMENT, NSET, ELSET, SURFACE, SOLID SECTION, PART, END PART, INSTANCE, END INSTANCE, ASSEMBLY,
         END ASSEMBLY, INCLUDE, SYSTEM, ORIENTATION, DISTRIBUTION, MATERIAL, ELASTIC, DENSITY, EXPANSION, MASS, SPRING,
@@ -61,7 +62,7 @@ def read(path: Path) -> RawMesh:
     if not raw.cells:
         return raw
     reader = _Cards(assembly, raw, row, number)
-    for card in sorted(assembly.cards, key=lambda card: card.name not in NAMING):  # the order is kept beyond that
+    for card in sorted(assembly.cards, key=lambda card: card.name not in FIRST):  # the order is kept beyond that
         reader.take(card)
     return reader.finished()
 
@@ -92,9 +93,10 @@ class _Cards:
     material: str = ""
     coupling: Card | None = None
     solid: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool))
+    warm: np.ndarray = field(default_factory=lambda: np.empty(0))  # initial temperature of each point
 
     def __post_init__(self) -> None:
-        self.solid = np.zeros(len(self.raw.points), dtype=bool)
+        self.solid, self.warm = np.zeros(len(self.raw.points), dtype=bool), np.full(len(self.raw.points), np.nan)
         for block in self.raw.cells:
             self.solid[block.nodes] = True
         self.keys = list(self.row)
@@ -123,31 +125,41 @@ class _Cards:
 
     def _elastic(self, card: Card) -> None:
         kind = card.option("TYPE").upper() or "ISO"
-        values = [card.number(text) for line in card.data for text in line]
-        per_row = 2
-        if kind.startswith("ISO") and len(values) >= 2:
+        if kind.startswith("ISO") and (values := self._row(card, 2, 1)):
             self._give(card, young=values[0], poisson=values[1])
-            per_row = 1
-        elif kind.startswith("ENGINEERING") and len(values) >= 9:
-            self._give(card, engineering=tuple(values[:9]))
-        elif kind.startswith("ORTHO") and len(values) >= 9 and _regular(values):
-            self._give(card, engineering=engineering_constants(values[:9]))
-        elif kind.startswith("ANISO") and len(values) >= 21:
-            self._give(card, stiffness=anisotropic(values[:21]))
-            per_row = 3
+        elif kind.startswith("ENGINEERING") and (values := self._row(card, 9, 2)):
+            self._give(card, engineering=tuple(values))
+        elif kind.startswith("ORTHO") and (values := self._row(card, 9, 2)) and _regular(values):
+            self._give(card, engineering=engineering_constants(values))
+        elif kind.startswith("ANISO") and (values := self._row(card, 21, 3)):
+            self._give(card, stiffness=anisotropic(values))
         else:
             self._refused(card, kind)
-            return
-        if len(card.data) > per_row:
+
+    def _row(self, card: Card, count: int, lines: int) -> list[float]:
+        """So many constants, each row on so many lines with its temperature behind it; none where they are not there.
+
+        Several rows are taken at the initial temperature, and refused where that is not one for all
+        """
+        rows = [[card.number(text) for line in card.data[i : i + lines] for text in line]
+                for i in range(0, len(card.data), lines)]  # fmt: skip
+        if not rows or len(rows[0]) < count:
+            return []
+        warm, at = self.warm[self.solid], [row[count] for row in rows if len(row) > count]
+        if len(rows) == 1:
+            return rows[0][:count]
+        if len(at) < len(rows) or not (np.diff(at) > 0).all() or np.ptp(warm) != 0:
             self._refused(card, "at several temperatures")
+            return rows[0][:count]
+        return [float(np.interp(warm[0], at, column)) for column in list(zip(*rows, strict=False))[:count]]
 
     def _density(self, card: Card) -> None:
-        if card.data:
-            self._give(card, density=card.number(card.data[0][0]))
+        if values := self._row(card, 1, 1):
+            self._give(card, density=values[0])
 
     def _expansion(self, card: Card) -> None:
-        if card.option("TYPE").upper() in ("", "ISO") and card.data:
-            self._give(card, expansion=card.number(card.data[0][0]))
+        if card.option("TYPE").upper() in ("", "ISO") and (values := self._row(card, 1, 1)):
+            self._give(card, expansion=values[0])
         else:
             self._refused(card, card.option("TYPE").upper())
 
@@ -318,6 +330,9 @@ class _Cards:
     def _initial_conditions(self, card: Card) -> None:
         if card.option("TYPE").upper() == "TEMPERATURE":
             self.met.ignored["*INITIAL CONDITIONS, TEMPERATURE"] += 1
+            for line in (line for line in card.data if len(line) > 1):
+                with suppress(ValueError):  # of nodes that the deck has not: no table is taken at a temperature then
+                    self.warm[self._rows(line[0], card)] = card.number(line[1])
         else:
             self._refused(card, card.option("TYPE").upper())
 

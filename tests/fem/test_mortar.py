@@ -12,6 +12,7 @@ from tribodyn.fem.assembly import Assembly, Body
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import Pressure
 from tribodyn.fem.material import Material
+from tribodyn.fem.mortar import coefficients, common, dual, side, tabulate
 
 STEEL = Material(210e9, 0.3, 7860.0)
 L = np.linspace
@@ -168,3 +169,20 @@ def test_what_does_not_meet_is_one_sentence():
     both.boundaries["both"] = faces
     with pytest.raises(ValueError, match="several bodies"):
         halves(both, "both", "lower.top")
+
+
+def test_dual_functions_hold_where_a_cut_is_hollow_and_weights_are_below_zero():
+    """Meshes of bolts give such cuts: the weights were taken for areas, and a root of them was no number."""
+    both = pair(False)
+    one, two = (side(both, both.boundaries[name]) for name in ("upper.bottom", "lower.top"))
+    shared = common(one, two, 0.1)
+    weight = shared.weight.copy()
+    weight[::7] *= -0.1
+    shared = replace(shared, weight=weight)
+    psi, d = dual(one, shared)
+    k = one.nodes.shape[1]
+    N = np.linalg.inv(coefficients(k)).T @ tabulate(k, shared.xi)[0]
+    for i in np.unique(shared.first):
+        own = shared.first == i
+        np.testing.assert_allclose(psi[:, own] @ N[:, own].T, np.diag(d[i]), atol=1e-9 * np.abs(d[i]).max())
+    np.testing.assert_allclose(psi.sum(axis=0), weight, atol=1e-9 * weight.max())

@@ -314,3 +314,28 @@ def test_supports_along_axes_of_nodes_turn_with_the_body(ending: str, tmp_path: 
         found.append(frequencies(text, 8, tmp_path, ending))
     assert found[0][0] < 1e-2 * found[0][1]  # it can slide along the radius
     np.testing.assert_allclose(found[1][1:], found[0][1:], rtol=1e-6)
+
+
+WARM = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nEVERY, 50.\n"
+TABLED = (
+    bricks(SMALL, straight)
+    + f"*NSET, NSET=EVERY, GENERATE\n1, {END}, 1\n"
+    + "*MATERIAL, NAME=S\n*ELASTIC\n200000., .3, 0.\n100000., .2, 200.\n*DENSITY\n8e-9, 0.\n6e-9, 100.\n"
+    + "*SOLID SECTION, ELSET=ALL, MATERIAL=S\n*BOUNDARY\nFOOT, 1, 3\n"
+)  # fmt: skip
+
+
+def test_a_table_of_a_material_is_taken_at_the_initial_temperature(tmp_path: Path) -> None:
+    by_hand = TABLED.replace("200000., .3, 0.\n100000., .2, 200.", "175000., .275").replace(
+        "8e-9, 0.\n6e-9, 100.", "7e-9"
+    )
+    np.testing.assert_allclose(
+        frequencies(TABLED + WARM, 2, tmp_path), frequencies(by_hand, 2, tmp_path), rtol=1e-10
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("warm", ["", WARM + "3, 60.\n", WARM.replace("EVERY", "FOOT")])
+def test_a_table_is_refused_where_one_temperature_is_not_given_to_all(warm: str, tmp_path: Path) -> None:
+    (tmp_path / "own.inp").write_text(TABLED + warm)
+    refused = read.read(tmp_path / "own.inp", "mm").refused
+    assert list(refused) == ["*ELASTIC, at several temperatures", "*DENSITY, at several temperatures"]

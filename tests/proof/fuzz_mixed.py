@@ -104,7 +104,7 @@ class Base:
 
     what: str
     words: tuple[str, ...]
-    files: dict[str, bytes | Path]
+    files: dict[str, bytes]
     damaged: str
     tables: bool = False
     keys: tuple[str, ...] = ()
@@ -128,7 +128,7 @@ def bases(folder: Path) -> list[Base]:
 def _scene(what: str, text: str, words: Callable[[str], tuple[str, ...]], changes: Sequence[str], place: Path) -> Base:
     """A scene in a file of its own, beside the files of a place."""
     dump = scene_file.parse(text, "own.toml", changes, place).scene.model_dump()
-    beside: dict[str, bytes | Path] = {one.name: one for one in place.iterdir() if one.is_file()}
+    beside = {one.name: one.read_bytes() for one in place.iterdir() if one.is_file()}
     files = {**beside, "own.toml": text.encode()}
     keys = tuple(sorted(set(fuzz.names_of(dump))))
     return Base(what, (*words("own.toml"), *_set(changes)), files, "own.toml", True, keys, dump)
@@ -226,7 +226,7 @@ def _matrices(folder: Path) -> list[Base]:
     found = []
     for name, text in texts.items():
         model = 'mass = "M.mtx"\nstiffness = "K.mtx"' if name == "K.mtx" else f'file = "{name}"'
-        files: dict[str, bytes | Path] = {name: text.encode(), "own.toml": ROWS.format(model).encode()}
+        files: dict[str, bytes] = {name: text.encode(), "own.toml": ROWS.format(model).encode()}
         if name == "K.mtx":
             files["M.mtx"] = rows["M"].encode()
         words = (*_run("own.toml"), *_set(QUIET[:3]))
@@ -290,10 +290,8 @@ def case(base: Base, rng: np.random.Generator) -> Job:
     """An input with two or three keys changed, or with damage to its text and some keys."""
     content = said = None
     if not base.keys or rng.random() < 0.4:
-        text = base.files[base.damaged]
-        assert isinstance(text, bytes)
         damage = tables_damaged if base.tables and rng.random() < 0.4 else lines_damaged
-        content, said = damage(text.decode(), rng)
+        content, said = damage(base.files[base.damaged].decode(), rng)
     changes: list[str] = []
     if base.keys:
         numbers = [key for key in base.keys if isinstance(_own(base.own, key), bool | int | float)]

@@ -72,14 +72,14 @@ class Tried:
 class Job:
     """A command line, and what its folder holds.
 
-    scene, key, value : what is run, and what is changed in it; files : by name, contents or a path to link to
+    scene, key, value : what is run, and what is changed in it; files : contents by name
     """
 
     scene: str
     key: str
     value: str
     words: tuple[str, ...]
-    files: Mapping[str, bytes | Path] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
 
 def scene_job(scene: str, overrides: Sequence[str], key: str = "", value: str = "") -> Job:
@@ -229,10 +229,7 @@ class Runs:
         resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + seconds) + 1, hard))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         for name, content in job.files.items():
-            if isinstance(content, Path):
-                (place / name).symlink_to(content)
-            else:
-                (place / name).write_bytes(content)
+            (place / name).write_bytes(content)
         began = time.process_time()
         with chdir(place), _printing(place / PRINTED):
             try:
