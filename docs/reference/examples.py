@@ -130,7 +130,7 @@ bone = td.studies.backbone("beam", 1e-6, 1e-4, points=6, overrides=UNWORN)
 print(*bone.lines(), sep="\n")
 
 # td.studies.ring_down
-decay = td.studies.ring_down("beam", 1e-6, 5e-5, points=6, periods=10, steps=64, overrides=UNWORN)
+decay = td.studies.ring_down("beam", 1e-7, 1e-6, points=6, periods=10, steps=64, overrides=UNWORN)
 print(*decay.lines(), sep="\n")
 
 # td.studies.track
