@@ -4,6 +4,7 @@ A line `# td.NAME` begins one. They follow each other in one session, which `tes
 runs whole.
 """
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -130,7 +131,7 @@ bone = td.studies.backbone("beam", 1e-6, 1e-4, points=6, overrides=UNWORN)
 print(*bone.lines(), sep="\n")
 
 # td.studies.ring_down
-decay = td.studies.ring_down("beam", 1e-6, 5e-5, points=6, periods=10, steps=64, overrides=UNWORN)
+decay = td.studies.ring_down("beam", 1e-7, 1e-6, points=6, periods=10, steps=64, overrides=UNWORN)
 print(*decay.lines(), sep="\n")
 
 # td.studies.track
@@ -150,12 +151,13 @@ print(*td.studies.verify_states("results/small", 2).lines(), sep="\n")
 print(*td.studies.forces("beam", overrides=UNWORN).lines(), sep="\n")
 
 # td.studies.supports
-seal = td.run("leaf_seal", overrides={"response.points": 20, "verdict.enabled": False})
+at_springs = {f"response.others.{pin}.group": pin for pin in ("left_pin", "right_pin")}
+seal = td.run("leaf_seal", overrides=at_springs | {"response.points": 20, "verdict.enabled": False})
 areas = {"left_pin": 9.8e-6, "right_pin": 9.8e-6}  # [m2]
 print(*td.studies.supports(seal, areas, 2e-15).lines(), sep="\n")
 
 # td.studies.grid
-settings = [f"{key}={value}" for key, value in UNWORN.items() if value is not None] + ["wear="]
+settings = [f"{key}={json.dumps(value)}" for key, value in UNWORN.items() if value is not None] + ["wear="]
 study = {
     "study": {"scene": "beam", "design": "grid", "set": settings},
     "vary": {"contact.friction": [0.4, 0.5]},
@@ -225,16 +227,22 @@ critical = {order: td.wheel.critical_speeds(speeds, waves["stuck"][:, i, 0], ord
 td.plot.campbell(speeds, waves, (1, 2), critical, "blade").savefig("campbell.png")
 
 # td.wheel.mistuned
-few = {"wheel.sectors": 4, "geometry.n_along": 3, "geometry.n_up": 2, "harmonics.kept": [0, 1], "wear": None}
-few |= {"response.frequency": ["270 Hz", "300 Hz"], "response.points": 20, "verdict.enabled": False}
+few = {"wheel.sectors": 4, "geometry.n_blades": 4, "geometry.n_along": 3, "geometry.n_up": 2}
+few |= {
+    "harmonics.kept": [0, 1],
+    "wear": None,
+    "response.frequency": ["270 Hz", "300 Hz"],
+    "response.points": 20,
+    "verdict.enabled": False,
+}
 print(*td.wheel.mistuned("blade", spread=0.02, overrides=few).lines(), sep="\n")
 
 # td.wheel.patterns
-apart = {**few, "mistuning": {"frequency": "1 %", "patterns": 2}}
+apart = {**few, "mistuning.frequency": "1 %", "mistuning.patterns": 2}
 print(*td.wheel.patterns("blade", "results/patterns", workers=1, overrides=apart).lines(), sep="\n")
 
 # td.wheel.pattern_motion
-print(*td.wheel.pattern_motion("blade", 0, overrides=apart).lines(), sep="\n")
+print(*td.wheel.pattern_motion("blade", 1, overrides=apart).lines(), sep="\n")
 
 # td.matrices.from_arrays
 chain = 4e6 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))

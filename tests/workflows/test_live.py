@@ -45,3 +45,9 @@ def test_the_plot_shows_the_points_of_the_curve() -> None:
     (line,) = (axes := drawn("frequency response", [(2 * np.pi * 100.0, 2e-6)]).axes[0]).lines
     assert (line.get_xdata(), line.get_ydata()) == (pytest.approx([100.0]), pytest.approx([2.0]))
     assert axes.get_ylabel() == "amplitude / µm"
+
+
+def test_outside_of_a_notebook_nothing_is_drawn(capsys: pytest.CaptureFixture[str]) -> None:
+    with td.plot.Live(every=0).track("frequency response") as advance:
+        advance(1.0, "", (2 * np.pi * 100.0, 2e-6))
+    assert "Figure" not in capsys.readouterr().out

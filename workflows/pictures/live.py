@@ -24,10 +24,11 @@ class Live(Progress):
     @contextmanager
     def track(self, name: str) -> Iterator[Advance]:
         """Long work; that which comes by no points is not drawn."""
-        from IPython.display import display  # there is one where there is a notebook
+        from IPython import get_ipython
+        from IPython.display import display
 
         points: list[tuple[float, float]] = []
-        shown, last = None, -np.inf
+        shown, last = None, -np.inf if get_ipython() else np.inf  # outside of a notebook nothing is drawn
 
         def advance(share: float, note: str, *point: tuple[float, float]) -> None:
             nonlocal shown, last
