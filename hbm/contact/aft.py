@@ -166,9 +166,9 @@ def settle(
     A Jenkins slider settles in one cycle. Planar friction contracts slowly where it slips little, so after a few cycles
     Newton's step for the period map, s = P(s), takes over. P never widens a distance, so its fixed points are a convex
     set. One that is isolated is the only one, and one on the rim of the set that still contracts is where marching ends
-    too (a pair that slips less and less): these are taken. A pair that can just stick has a set shrunk to a point: P
-    contracts with the square of the distance, which Newton cuts by a third a step until rounding hides the contraction.
-    Otherwise the answer depends on the path, and the pair, which has come to stick, is marched on.
+    too: these are taken. A pair that can just stick has a set shrunk to a point: P contracts with the square of the
+    distance, which Newton cuts by a third a step until rounding hides the contraction. Otherwise the answer depends on
+    the path, and the pair, which has come to stick, is marched on.
 
     samples : (n_pair, n_component, n_samples) displacement [m]; p : packed parameters; memory : (n_pair, n_state)
     phi : (n_samples, n_coeff) basis functions, no columns where no derivative is wanted
