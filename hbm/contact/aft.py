@@ -166,8 +166,9 @@ def settle(
     A Jenkins slider settles in one cycle. Planar friction contracts slowly where it slips little, so after a few cycles
     Newton's step for the period map, s = P(s), takes over. P never widens a distance, so its fixed points are a convex
     set. One that is isolated is the only one, and one on the rim of the set that still contracts is where marching ends
-    too (a pair that slips less and less): these are taken. Otherwise the answer depends on the path, and the pair,
-    which has come to stick, is marched on.
+    too: these are taken. A pair that can just stick has a set shrunk to a point: P contracts with the square of the
+    distance, which Newton cuts by a third a step until rounding hides the contraction. Otherwise the answer depends on
+    the path, and the pair, which has come to stick, is marched on.
 
     samples : (n_pair, n_component, n_samples) displacement [m]; p : packed parameters; memory : (n_pair, n_state)
     phi : (n_samples, n_coeff) basis functions, no columns where no derivative is wanted
@@ -214,7 +215,7 @@ def _newton(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> np.ndar
     """
     rejected = []
     trial, trial_ds = s[i], ds[i]
-    closing = np.zeros(len(i), bool)  # the step before was small and its cycle contracted
+    closing = np.zeros(len(i), bool)  # a step before was small and its cycle contracted
     for _ in range(NEWTON_CYCLES):
         if len(i) == 0:
             break
@@ -222,12 +223,12 @@ def _newton(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> np.ndar
         left, size, right = np.linalg.svd(np.eye(s.shape[1]) - slope)
         inverse = right.transpose(0, 2, 1) @ (left.transpose(0, 2, 1) / np.maximum(size, LEAST_CONTRACTION)[..., None])
         trial_ds = trial_ds + inverse @ (after_ds - trial_ds)
-        done = drift <= PERIODIC_DRIFT
         isolated = size[:, -1] > LEAST_CONTRACTION
+        done = (drift <= PERIODIC_DRIFT) | (closing & ~isolated & (drift < POLISH_DRIFT))
         good = done & (isolated | closing)
         s[i[good]], ds[i[good]] = trial[good], trial_ds[good]
         rejected.append(i[done & ~good])
-        closing = isolated & (drift < POLISH_DRIFT)
+        closing |= isolated & (drift < POLISH_DRIFT)
         trial = trial + (inverse @ (after - trial)[..., None])[..., 0]
         i, trial, trial_ds, closing = i[~done], trial[~done], trial_ds[~done], closing[~done]
     return np.concatenate([i, *rejected])
