@@ -110,7 +110,7 @@ def evolve(
     state: WearState | None
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
-        before = replace(state_of(problem, again), solves=0, growth=again.growth)
+        before = replace(state_of(problem, again), solves=0, growth=again.growth, preload_at_rest=again.preload_at_rest)
         if machine is not None:
             machine.take_up(again)
             before = machine.of(before)
@@ -200,6 +200,7 @@ def _step_in_time(
     """A step along the machine's motion; where another peak overtakes, it ends there."""
     unit = tolerance.share * tolerance.scale / float(state.rate.max())
     stride = float(rows[-1].plan[0]) if rows and rows[-1].plan[0] > 0 else RULES.first_in_time * unit
+    stride = min(stride, _until_lost_at_rest(problem, state, rows))
     solves, means = state.solves, state.means
     assert means is not None
     periods = means.periods
@@ -282,6 +283,7 @@ def _step_of(
         if fewer_harmonics.top_harmonic(whole.balance.basis, list(rows[-1].duty_displacement)) == top:
             omega = np.array([point.state.omega for point in state.points])
             drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
+    stride = min(stride, _until_lost_at_rest(whole, state, rows))
     target = _event(problem, state, rows)
     solves, longest = state.solves, np.inf
     highest_until, low, high = 0.0, 0.0, 0.0  # stride after which the tracked peak is still the highest; nearness
@@ -348,6 +350,15 @@ def _step_of(
 def _no_plan(state: WearState, look: float = 1.0) -> np.ndarray:
     """The plan of a step behind which all but the next look for higher peaks begins anew."""
     return np.array([0.0, *np.zeros(len(state.points)), look])
+
+
+def _until_lost_at_rest(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:
+    """Cycles after which the preload at rest, which falls evenly, is just below the share that ends the run."""
+    if problem.lost_below_at_rest is None or not rows:
+        return np.inf
+    fall = (rows[-1].preload_at_rest - state.preload_at_rest) / rows[-1].cycles_in_step
+    least = RULES.event_window[0] * problem.lost_below_at_rest * rows[0].preload_at_rest
+    return float((state.preload_at_rest - least) / fall) if fall > 0 else np.inf
 
 
 def _share_left(problem: WearProblem, there: WearState, rows: Sequence[WearRow], state: WearState) -> float:

@@ -215,22 +215,32 @@ class WearHistory:
 
 
 def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float | None:
-    """Cycles after which the preload has fallen to a share of its first value, along log preload; None if it has not.
+    """Cycles after which the preload has fallen to a share of its first value; None if it has not.
 
-    This is the life that converges with the wear step. The last touch of a vibrating contact does not end in finite
-    time: near it the work falls with the power 3/2 of what is left to wear.
+    The preload is that at rest where the run ends by it. This is the life that converges with the wear step: the last
+    touch of a vibrating contact does not end in finite time, near it the work falls with the power 3/2 of what is left
+    to wear.
     """
-    return cycles_to_share(history.cycles, history.preload, share)
+    at_rest = history.preload_at_rest
+    if at_rest is None:
+        return cycles_to_share(history.cycles, history.preload, share)
+    return cycles_to_share(history.cycles, at_rest, share, at_rest=True)
 
 
-def cycles_to_share(cycles: np.ndarray, preload: np.ndarray, share: float) -> float | None:
-    """The same of any preload (n_row,) [N], such as that of one joint; cycles (n_row,) at which it is known."""
+def cycles_to_share(cycles: np.ndarray, preload: np.ndarray, share: float, at_rest: bool = False) -> float | None:
+    """The same of any preload (n_row,) [N], such as that of one joint; cycles (n_row,) at which it is known.
+
+    Between rows along the logarithm of the preload; at rest, where the wear falls on it evenly, along itself
+    """
     below = np.flatnonzero(preload < share * preload[0])
     if len(below) == 0 or below[0] == 0:
         return None
     i = int(below[0])
-    high, low = preload[i - 1], max(float(preload[i]), 1e-3 * share * float(preload[0]))
-    part = np.log(high / (share * preload[0])) / np.log(high / low)
+    high, low, wanted = (float(one / preload[0]) for one in (preload[i - 1], preload[i], share * preload[0]))
+    if at_rest:
+        part = (high - wanted) / (high - low)
+    else:
+        part = np.log(high / wanted) / np.log(high / max(low, 1e-3 * wanted))
     return float(cycles[i - 1] + part * (cycles[i] - cycles[i - 1]))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
@@ -12,6 +14,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.continuation.peaks import with_peaks
@@ -61,6 +64,22 @@ def test_a_linear_resonance_has_its_height_at_any_damping(ratio: float) -> None:
     assert found.solution.converged
     assert found.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
     assert found.state.omega == pytest.approx(problem.peak[1], rel=0.05 * ratio + 1e-9)
+
+
+def test_a_scan_that_ends_on_its_way_is_begun_at_the_other_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where no solution is found behind a fold."""
+    problem, follow = StuckOscillator(1e-2), adaptive.follow
+    below = 0.9 * problem.peak[1]
+
+    def ends(balance: HarmonicBalance, start: float, stop: float, options: adaptive.Options) -> Branch:
+        if start > stop:
+            return follow(balance, start, stop, options)
+        return replace(follow(balance, start, below, options), end=BranchEnd.ENDED.say(" here"))
+
+    monkeypatch.setattr(adaptive, "follow", ends)
+    found = AtPeak("mass", *RANGE).first(problem.balance)
+    assert found.solution.converged
+    assert found.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
 
 
 @pytest.mark.parametrize("ratio", [5e-3, 1e-5])

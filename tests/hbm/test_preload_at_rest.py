@@ -13,7 +13,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import WearProblem
-from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.hbm.wear.step_control import Tolerance
 
 
@@ -54,6 +54,9 @@ def test_a_run_ends_where_the_preload_at_rest_is_lost(problem: WearProblem, rule
     assert str(found.end) == f"{WearEnd.LOST_AT_REST.say()} 0.4 of its first value"
     assert rest[-1] <= 0.4 * rest[0] < rest[-2]
     assert found.cycles_in_step[-1] == 0.0
+    life = cycles_to_preload(found, 0.4)
+    assert life is not None
+    assert found.cycles[-2] < life <= found.cycles[-1]
     for row in (0, len(rest) // 3):
         assert rest[row] == pytest.approx(static_preload(problem, found.depth[row]), rel=1e-6)
     assert (np.diff(rest) < 0).all()

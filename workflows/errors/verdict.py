@@ -84,15 +84,19 @@ def _beside(findings: Sequence[Finding], result: Result) -> list[Finding]:
 
 
 def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEFAULT) -> tuple[float | None, str]:
-    """Total error of a quantity from its rows, and why it is not known where it is not."""
+    """Total error of a quantity from its rows, and why it is not known where it is not.
+
+    It is no less than what the wear steps say of themselves: a coarser mesh is worn with the same steps
+    """
     marched = any(row.refinement == Refinement.MOTION for row in rows)  # then means and steps scatter
-    by_chance = (Refinement.MOTION, Refinement.WEAR_STEPS) if marched else ()
-    chance = max((row.relative or 0.0 for row in rows if row.refinement in by_chance), default=0.0)
+    by_chance = [row for row in rows if row.refinement in (Refinement.MOTION, Refinement.WEAR_STEPS)]
+    least = max((row.relative or 0.0 for row in by_chance), default=0.0)
+    chance = least if marched else 0.0
     for row in rows:
         if row.refinement == Refinement.COMBINED:
             if row.relative is None:
                 return None, row.how
-            return options.total(max(row.relative, chance), ratio), ""
+            return max(options.total(max(row.relative, chance), ratio), least), ""
     return None, "no refinement was measured"
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.readable import UNKNOWN, digits, measured, rounded
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, order_of_line, size_of, worn_at_peak
+from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, life_ends, order_of_line, size_of, worn_at_peak
 from tribodyn.workflows.result.verdict import NAMES, UNITS, Refinement, Statement, Status, loaded
 
 Lines = list[tuple[str, str]]
@@ -97,8 +96,8 @@ def _wear_in_brief(result: Result, found: dict[str, Any], judged: dict[str, Stat
     shown = [f"cycles    {measured(found['cycles'], 'cycles', life)}: {found['wear_end'].split(';')[0]}"]
     lost = found["life_cycles"] and measured(found["life_cycles"], "cycles", life)
     if lost and not shown[0].startswith(f"cycles    {lost}:"):
-        joint = first_lost(result)
-        until = f"{100 * LIFE_SHARE:g} % of the preload is left" if joint is None else f"contact {joint} is lost"
+        joint, (share, whose) = first_lost(result), life_ends(result)
+        until = f"{100 * share:g} % of the {whose} is left" if joint is None else f"contact {joint} is lost"
         shown.append(f"life      {lost}, until {until}")
     if found["first_lift_cycles"] is not None:
         shown.append(f"opens     first after {measured(found['first_lift_cycles'], 'cycles', 2)}")

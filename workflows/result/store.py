@@ -119,7 +119,7 @@ def _write(file: h5py.File, result: Result) -> None:
     file.attrs["state"] = result.state
     file.attrs["stage"] = result.stage.name
     file.attrs["verdict"] = result.verdict
-    facts = result.facts.table()
+    facts, scales = result.facts.table(), dict[str, h5py.Dataset]()
     for name, table in (("provenance", result.provenance), ("facts", facts)):
         group = file.create_group(name)
         for key, value in table.items():
@@ -136,7 +136,7 @@ def _write(file: h5py.File, result: Result) -> None:
             if item.name in arrays:
                 # numpy takes an empty tuple for one of floats
                 dtype = np.int64 if isinstance(value, tuple) and not value else None
-                _write_array(file, group, item.name, np.asarray(value, dtype), *arrays[item.name])
+                _write_array(file, scales, group, item.name, np.asarray(value, dtype), *arrays[item.name])
             elif isinstance(value, Outcome):
                 group.attrs[item.name], group.attrs[KIND] = str(value), value.kind.name
             elif item.name == "outcome":
@@ -151,23 +151,25 @@ def _strings(values: Iterable[str]) -> np.ndarray:
 
 
 def _write_array(
-    file: h5py.File, group: h5py.Group, name: str, value: np.ndarray, dimensions: tuple[str, ...], unit: str
+    file: h5py.File,
+    scales: dict[str, h5py.Dataset],
+    group: h5py.Group,
+    name: str,
+    value: np.ndarray,
+    dimensions: tuple[str, ...],
+    unit: str,
 ) -> None:
+    """An array with its unit and dimensions; scales : of those that other arrays of the file have had, by name."""
     data = group.create_dataset(name, data=value)
     if unit:
         data.attrs["units"] = unit
     for axis, (dimension, size) in enumerate(zip(dimensions, value.shape, strict=True)):
-        data.dims[axis].attach_scale(_scale(file, dimension, size))
-
-
-def _scale(file: h5py.File, dimension: str, size: int) -> h5py.Dataset:
-    """The scale of a dimension: its index, shared by all arrays of the file."""
-    if dimension not in file:
-        file.create_dataset(dimension, data=np.arange(size))
-        file[dimension].make_scale(dimension)
-    if len(file[dimension]) != size:
-        raise ValueError(f"dimension {dimension} has {len(file[dimension])} entries, an array has {size}")
-    return file[dimension]
+        if dimension not in scales:
+            scales[dimension] = file.create_dataset(dimension, data=np.arange(size))
+            scales[dimension].make_scale(dimension)
+        if scales[dimension].shape != (size,):
+            raise ValueError(f"dimension {dimension} has {len(scales[dimension])} entries, an array has {size}")
+        data.dims[axis].attach_scale(scales[dimension])
 
 
 Held = Result | str | os.PathLike[str]

@@ -29,7 +29,7 @@ def summary(result: Result) -> dict[str, Any]:
     cycles : vibration cycles so far; separated_cycles : the same if the last touch has ended, else None
     first_lift_cycles, first_loss_cycles : until a closed pair first opens in the cycle, until a pair touches no more
     surface_volumes_m3 : worn off the scene's own part or first face, and off the other one
-    life_cycles : until the preload had fallen to LIFE_SHARE of its first value, None if it has not; see `life`
+    life_cycles : until the preload had fallen to a share of its first value, None if it has not; see `life`
     energy_J, volume_m3 : friction work and worn volume, accumulated
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one; the peak
@@ -93,11 +93,11 @@ def by_joint(result: Result) -> dict[str, dict[str, Any]]:
 
 
 def life(result: Result) -> float | None:
-    """Cycles until the preload had fallen to LIFE_SHARE; with `wear.lost_of` "any" that of the first joint."""
+    """Cycles until the preload had fallen as `life_ends` says; with `wear.lost_of` "any" that of the first joint."""
     if result.wear is None:
         return None
     if _wear_table(result).get("lost_of") != "any":
-        return cycles_to_preload(result.wear)
+        return cycles_to_preload(result.wear, life_ends(result)[0])
     return min(_lives(result).values(), default=None)
 
 
@@ -133,6 +133,12 @@ def _wear_table(result: Result) -> dict[str, Any]:
 def _life_share(result: Result) -> float:
     """Share of the first preload where the life of a joint ends: the scene's `wear.lost_below`, else LIFE_SHARE."""
     return float(_wear_table(result).get("lost_below") or LIFE_SHARE)
+
+
+def life_ends(result: Result) -> tuple[float, str]:
+    """Share of the first preload where the life of a whole contact ends, and which preload that is."""
+    at_rest = _wear_table(result).get("end_at") == "at_rest"
+    return (_life_share(result), "preload at rest") if at_rest else (LIFE_SHARE, "preload")
 
 
 def _wear(result: Result) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
@@ -30,18 +31,28 @@ from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.structure import NamedContact
 from tribodyn.workflows.scene.wear import Wear
 
+KEEPING = 0.05  # share of the time that goes into writing steps: a kill loses as many as take twenty times one writing
+
 
 def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advance: Advance) -> Result:
-    """Wear until contact is lost; every step is kept as soon as it is done."""
+    """Wear until contact is lost; steps are kept as they are done, as far as that takes little of the time."""
     scene = file.scene
     assert scene.wear is not None
     patch, wear = result.patch, scene.wear
     rows = rows_to_resume(result.wear)
     to_wear = float(patch.area @ patch.free_deflection)
 
-    def on_row(row: WearRow) -> None:
-        rows.append(row)
+    due = 0.0
+
+    def keep_rows() -> None:
         keep(replace(result, wear=history(rows, WearEnd.UNFINISHED.say()), stage=Stage.WEARING))
+
+    def on_row(row: WearRow) -> None:
+        nonlocal due
+        rows.append(row)
+        if (begun := process_time()) >= due:
+            keep_rows()
+            due = begun + (process_time() - begun) / KEEPING
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         deepest, hertz = 1e3 * float((row.depth + row.worn).max()), row.omega / (2 * np.pi)
         state = f"{row.cycles + row.cycles_in_step:.3g} cycles, peak {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"
@@ -54,7 +65,11 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
             problem, mission=tuple(_from_response(d, result.response, model.balance) for d in problem.mission)
         )
     limit = settings.step_limit(scene, patch.free_deflection, patch.area)
-    worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
+    try:
+        worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
+    finally:
+        if rows:
+            keep_rows()
     result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(problem.mission[0].load), model.part)
     if worn.ended.failed:
         keep(replace(result, stage=Stage.FAILED))
@@ -75,7 +90,7 @@ def worn_out(file: SceneFile, model: Model, left: float = LIFE_SHARE) -> WearHis
     """Wear by the scene's rule until a share `left` of the preload is left, of which nothing is kept."""
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
-    problem = wear_problem(file.scene, file.folder, balance, left)
+    problem = wear_problem(file.scene, file.folder, balance, left, wanted.end_at == "at_rest")
     limit = settings.step_limit(file.scene, references.free_deflection(balance), problem.area)
     return evolve(problem, wanted, limit, wanted.max_steps)
 
