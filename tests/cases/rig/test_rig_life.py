@@ -12,7 +12,7 @@ from tests.proof.cases.rig.published import PRELOAD
 COARSE = (
     "geometry.n_contact_length=3", "geometry.n_contact_width=5", "reduction.modes=6", "harmonics.kept=[0, 1]",
     "harmonics.samples=32", "harmonics.transitions=sampled", "damping.modal=6 %", "wear.rule=error_controlled",
-    "wear.tolerance=30 %", "wear.lost_below=60 %",
+    "wear.tolerance=30 %", "wear.lost_below=30 %",
 )  # fmt: skip
 HALF_AS_FAST = "wear.coefficient=2.75e3 um3/J"
 FEW = "wear.max_steps=2"
