@@ -57,6 +57,8 @@ html_copy_source = False
 
 def setup(app: Sphinx) -> None:
     """Make the generated pages before anything is read; docstrings are read in the form that this project has."""
+    for name in ("skfem", "traitlets"):  # they tell every step of what the pages run
+        logging.getLogger(name).setLevel(logging.WARNING)
     generated_pages.write(HERE / "generated")
     examples_pages.write(HERE / "examples" / "generated")
     app.connect("source-read", outputs.add)

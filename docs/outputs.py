@@ -1,7 +1,7 @@
 """What the commands of a tutorial print: they are run when the site is built, and their output stands below each.
 
 A page is followed as a reader does: named fences are files, Python is run, commands of tribodyn in this process.
-The first command of all pages is not run again where the check has left what it printed and wrote.
+The first command of all pages is not run again where the tests of the same check have left what it printed and wrote.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+
+from filelock import FileLock
 
 FOLLOWED = ("tutorials/first_run", "tutorials/own_matrices", "howto/deck", "howto/step", "howto/inspect")
 FENCE = re.compile(r"^```([a-z]+)(?: ([\w.]+))?\n(.*?)^```\n", re.M | re.S)
@@ -62,10 +64,12 @@ def _said(command: str) -> str:
         return ""
     if words[0] != "./tribodyn":
         raise RuntimeError(f"the build follows commands of tribodyn alone: {command}")
-    left = Path(os.environ.get("TRIBODYN_FIRST", "unknown"))
-    if command.strip() == FIRST and left.is_dir():
-        shutil.copytree(left / "results", "results", dirs_exist_ok=True)
-        return (left / "printed").read_text(encoding="utf-8")
+    if command.strip() == FIRST and "TRIBODYN_FIRST" in os.environ:
+        left = Path(os.environ["TRIBODYN_FIRST"])
+        with FileLock(f"{left}.lock"):  # which the tests hold while they run it
+            if left.is_dir():
+                shutil.copytree(left / "results", "results", dirs_exist_ok=True)
+                return (left / "printed").read_text(encoding="utf-8")
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         try:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 from PIL import Image
 
 import tribodyn as td
@@ -28,13 +29,11 @@ ELSEWHERE = {"docs/tutorials/own_part.md"}  # in test_own_part, which looks at i
 def after_the_first_command(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder where the first command of README and site has run; left to the build of the site where it asks."""
     folder = prepare(tmp_path_factory.mktemp("first"))
-    printed = shell(FIRST, folder)
-    if "TRIBODYN_FIRST" in os.environ:
-        whole = Path(os.environ["TRIBODYN_FIRST"])
-        part = whole.with_suffix(".part")
-        shutil.copytree(folder / "results", part / "results")
-        (part / "printed").write_text(printed, encoding="utf-8")
-        part.rename(whole)
+    left = Path(os.environ.get("TRIBODYN_FIRST", tmp_path_factory.mktemp("left") / "first"))
+    with FileLock(f"{left}.lock"):
+        printed = shell(FIRST, folder)
+        shutil.copytree(folder / "results", left / "results")
+        (left / "printed").write_text(printed, encoding="utf-8")
     return folder
 
 

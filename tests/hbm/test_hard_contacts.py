@@ -24,8 +24,8 @@ def stopped(hardness: float) -> HarmonicBalance:
     return HarmonicBalance.of(oscillator(1.0, 1.0, 0.02, "n"), joint, basis, load, 10.0)
 
 
-@pytest.mark.parametrize("hardness", [1e6, 1e7])
-def test_a_hard_stop_is_followed_past_grazing_from_both_ends(hardness):
+def test_a_hard_stop_is_followed_past_grazing_from_both_ends():
+    hardness = 1e7
     up, down = (arc_length.follow(stopped(hardness), *ends) for ends in ((0.5, 2.0), (2.0, 0.5)))
     for branch, end in ((up, 2.0), (down, 0.5)):
         assert branch.omega[-1] == end, branch.end

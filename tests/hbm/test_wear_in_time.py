@@ -90,7 +90,7 @@ def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit(
     problem = flipping()
     flips = problem.balance
     rows: list[WearRow] = []
-    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, rows.append, motion=motion)
+    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 4, rows.append, motion=motion)
     assert whole.in_time.all()
     assert "followed in time for 100% of the cycles" in str(whole.end)
     follower = Follower(MeanOptions(128))
@@ -99,8 +99,8 @@ def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit(
     assert whole.energy[0].sum() == pytest.approx(alone.energy.sum(), rel=0.01)
     along_balance = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 1).energy[0].sum()
     assert abs(whole.energy[0].sum() / along_balance - 1) > 0.04
-    begun = history(rows[:4], WearEnd.UNFINISHED.say())
-    resumed = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, resume=begun, motion=motion)
+    begun = history(rows[:3], WearEnd.UNFINISHED.say())
+    resumed = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 4, resume=begun, motion=motion)
     for name in ("cycles", "depth", "energy", "moving", "spread"):
         np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name))
 

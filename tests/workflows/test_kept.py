@@ -89,8 +89,9 @@ def test_residual_flexibility_and_waves_are_those_of_their_springs(made: list[st
 def test_a_result_is_that_without_anything_kept(
     made: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, scene: str
 ) -> None:
-    small = TINY if scene == "beam" else ("response.points=6", "wear=", "harmonics.kept=[0, 1]",
-                                          "verdict.enabled=false")  # fmt: skip
+    few = ("response.points=6", "wear=", "harmonics.kept=[0, 1]", "verdict.enabled=false")
+    leaf = ("geometry.n_column=7", "geometry.pin_column=2", *few)
+    small = {"beam": TINY, "blade": few, "leaf_seal": leaf}[scene]
     file = scene_file.read(scene, small)
     results = [pipeline.run(file, None, Progress()) for _ in range(2)]
     assert made == ALL
