@@ -142,11 +142,11 @@ try:
     cli.main(sys.argv[1:])
 except SystemExit as end:
     assert not end.code, end.code
-print(*(name for name in ("gmsh", "pyvista", "vtk", "matplotlib") if name in sys.modules), file=sys.stderr)
+print(*(name for name in ("pyvista", "vtk", "matplotlib") if name in sys.modules), file=sys.stderr)
 """
 
 
-def test_the_command_without_pictures_on_a_mesh_file_loads_neither_mesher_nor_plots(tmp_path: Path) -> None:
+def test_the_command_without_pictures_on_a_mesh_file_loads_no_plots(tmp_path: Path) -> None:
     scene = on_a_mesh_file(
         "beam", ("harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1"), tmp_path
     )
