@@ -69,6 +69,7 @@ def rescaled(part: ModuleType, parameters: Any, ratio: float) -> dict[str, int]:
     return changed
 
 
+@cache
 def _is_part(file: Path) -> bool:
     body = ast.parse(file.read_text(encoding="utf-8")).body
     classes = {node.name for node in body if isinstance(node, ast.ClassDef)}

@@ -45,6 +45,17 @@ def test_the_laws_of_scaling_hold(beam):
     np.testing.assert_allclose(stiffer, [softens[name] for name in names], atol=1e-5)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("modes", ["6", "30"])
+def test_the_law_of_scaling_holds_of_springs_that_the_reduction_follows(modes):
+    """All stiffness times c and the force that shakes: at the same displacements time goes by 1 / sqrt(c)."""
+    found = td.studies.derivatives("rig", overrides=(*COARSE["rig"], f"reduction.modes={modes}"))
+    rows = found.elasticities
+    total = sum(row for key, row in rows.items() if key.endswith((".stiffness", ".young", "shaker.value")))
+    wanted = {"frequency": 0.5, "energy": 1.0, "preload": 1.0, "wear rate": 1.0}
+    np.testing.assert_allclose(total, [wanted.get(name, 0.0) for name in found.found.names], atol=1e-5)
+
+
 def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
     assert beam.seconds > 0
     lines = beam.lines()

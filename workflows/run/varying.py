@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from tribodyn import declare
 from tribodyn.fem.part import Part
@@ -94,8 +95,9 @@ class Varying:
     def change(self, key: str, value: float) -> Change:
         """The problems a step above and below a value of a key."""
         anew = self._settles or self.anew(key)
-        step = (REBUILT if anew or self.follows(key) else STEP) * abs(value)
-        far: tuple[Posed, ...] | None = () if self.follows(key) else None
+        linear = self._scales(key) or self.follows(key)
+        step = (REBUILT if anew or linear else STEP) * abs(value)
+        far: tuple[Posed, ...] | None = () if linear else None
         if anew:
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far)
@@ -123,7 +125,9 @@ class Varying:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
         if self.follows(key) and np.array_equal(reduced.interface.B, self.own.model.interface.B):
             reduced = replace(reduced, interface=self.own.model.interface)  # the same coordinates
-        contact = Contact.of(reduced, joints.make_joints(scene, plain))
+        contact, seen = self.own.contact, key.startswith(("contact", "material"))
+        if self.anew(key) or (seen and not key.endswith(".density")):
+            contact = Contact.of(reduced, joints.make_joints(scene, plain))
         return Posed(reduced, contact, joints.excite(scene, base), self.own.memory)
 
     @property
@@ -156,46 +160,57 @@ class Varying:
             return None
         if part.system.gyroscopic is not None:
             return None
-        shapes = plain.basis
-        if self.file.mesh_scene.reduction.relative:
-            shapes = shapes.copy()
+        system, shapes = part.system, plain.basis
+        if self._relative is not None:
+            system, shapes = self._relative[0], shapes.copy()
             shapes[body_1_dofs(part.interface).ravel()] = part.interface.B @ plain.basis
-        return Sensitivity(self._coordinates(part), plain, shapes)
+        return Sensitivity(system, plain, shapes)
 
-    def _coordinates(self, part: Part) -> SecondOrderSystem:
-        """The full system in the coordinates that it is reduced in."""
-        moves = self.file.mesh_scene.reduction.relative
-        return relative(part.system, part.interface)[0] if moves else part.system
+    @cached_property
+    def _relative(self) -> tuple[SecondOrderSystem, csr_matrix] | None:
+        """The full system in relative coordinates, and the way back from them; None where it is reduced in its own."""
+        if self.part is None or not self.file.mesh_scene.reduction.relative:
+            return None
+        system, _, back = relative(self.part.system, self.part.interface)
+        return system, back
 
     def _followed(self, key: str, value: float) -> ReducedModel:
         """The reduced model with another value of a key that it follows."""
-        own, part, following = keys(self.scene)[key], self.part, self._sensitivity
-        assert part is not None
+        own, following = keys(self.scene)[key], self._sensitivity
         assert following is not None
         if key not in self._ways:
-            self._ways[key] = following.towards(self._coordinates(self._doubled(key, 2 * own, part)))
+            change = self._doubled(key, 2 * own)
+            self._ways[key] = following.towards(change.projected(self._relative[1]) if self._relative else change)
         return following.moved(self._ways[key], value / own - 1)
 
-    def _doubled(self, key: str, value: float, part: Part) -> Part:
-        """The part with another value of a key; nothing is assembled for a spring."""
-        twice, scene = self.file.changed(f"{key}={value!r}"), self.scene
-        if isinstance(scene, PartScene) and key.startswith("springs."):
-            spring = bodies.spring(scene.springs[key.split(".")[1]])
-            added = spring.matrix(part.mesh, part.node_sets)[part.free][:, part.free]
-            return replace(part, system=replace(part.system, stiffness=part.system.stiffness + added))
-        mesh, node_sets = part.mesh, dict(part.node_sets)
+    def _doubled(self, key: str, value: float) -> SecondOrderSystem:
+        """What the full system moves by where a key is doubled; springs and all that they are not need no assembly."""
+        scene, part, of_spring = self.scene, self.part, key.startswith("springs.")
+        assert part is not None
+        own = part.system
+        if isinstance(scene, PartScene) and (of_spring or (key == "material.young" and _loaded_alike(scene))):
+            seen = [scene.springs[key.split(".")[1]]] if of_spring else scene.springs.values()
+            added = part.restricted(sum(bodies.spring(one).matrix(part.mesh, part.node_sets) for one in seen))
+            change = added if of_spring else own.stiffness - added
+            still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
+            return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
+        twice, mesh, node_sets = self.file.changed(f"{key}={value!r}"), part.mesh, dict(part.node_sets)
         if not isinstance(scene, PartScene):  # its mesh has the materials
             with TemporaryDirectory() as folder:
                 mesh, node_sets = modelling.make_mesh(twice, Path(folder))
-        return modelling.make_part(twice.mesh_scene, mesh, node_sets, twice.folder)
+        new = modelling.make_part(twice.mesh_scene, mesh, node_sets, twice.folder).system
+        moves = {
+            kind: {name: getattr(new, kind)[name] - v for name, v in getattr(own, kind).items()}
+            for kind in ("loads", "outputs")
+        }
+        return SecondOrderSystem(new.mass - own.mass, new.stiffness - own.stiffness, None, **moves)
 
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""
         scene = self.scene
         if key not in ("material.young", "material.density") or not isinstance(scene, PartScene) or self._spins:
             return False
-        loads = {**scene.loads.static, **scene.loads.harmonic}.values()
-        return not scene.springs and all(load.value is not None or load.pressure is not None for load in loads)
+        return _loaded_alike(scene) and not (scene.springs and key == "material.young")
 
     def _damps(self, scene: Scene, plain: ReducedModel) -> bool:
         """Whether the damping of a scene is another one."""
@@ -203,6 +218,12 @@ class Varying:
             return True
         own, springs = (joints.contact_stiffness(one, plain) for one in (self.scene, scene))
         return scene.damping.given and scene.damping.state == "stuck" and not np.array_equal(own, springs)
+
+
+def _loaded_alike(scene: PartScene) -> bool:
+    """Whether no load depends on what the part is made of."""
+    loads = {**scene.loads.static, **scene.loads.harmonic}.values()
+    return all(load.value is not None or load.pressure is not None for load in loads)
 
 
 def _scaled(plain: ReducedModel, name: str, factor: float) -> ReducedModel:

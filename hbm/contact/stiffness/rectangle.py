@@ -17,6 +17,7 @@ No reference depth enters: displacements vanish far from the patch. An extruded 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from math import acos, cos, isfinite, pi, sin, sqrt
 
 import numpy as np
@@ -30,6 +31,7 @@ LONGEST = 1e9
 """Largest ratio of the sides; a finer mesh changes k_n and k_t by less than 3e-4 up to there."""
 
 
+@cache
 def rectangular_punch(
     a: float,
     b: float,
