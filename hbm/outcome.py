@@ -45,7 +45,7 @@ class SolveEnd(End):
     NO_DIRECTION = "no direction to correct along:"
     NO_REST = "no state of rest was found under the static loads alone"
     SLIDES_AWAY = "the contact slides away,"
-    SITE_NOT_FOUND = "the site of a duty was not found in"
+    SITE_NOT_FOUND = "the motion sought was not found in"
     AT_FOLD = "the curve turns back at a fold,"
     INTEGRATION_FAILED = "time integration failed:"
     NOT_PERIODIC = "not periodic after"

@@ -47,15 +47,17 @@ def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[com
     def departure(rate: complex) -> np.ndarray:
         turn = np.exp(-rate * 2 * np.pi / STEPS)
         driven = of_x @ p + turn * (of_x0 @ np.roll(p, 1, axis=0))
-        s, kept = np.zeros((n_pair, n_state, c * nc), complex), np.eye(n_state)
+        passed_on = turn * of_s
+        kept = np.zeros((STEPS + 1, n_pair, n_state, c * nc + n_state), complex)  # from no memory, and of one
+        kept[0, :, :, c * nc :] = np.eye(n_state)
         for j in range(STEPS):
-            s, kept = driven[j, :, c:] + turn * (of_s[j, :, c:] @ s), turn * (of_s[j, :, c:] @ kept)
-        s = np.linalg.pinv(np.eye(n_state) - kept, rcond=1e-9) @ s  # as a period before; a slider that rests does so
-        force = np.zeros((n_pair, c, nc, c * nc), complex)
-        for j in range(STEPS):
-            now = driven[j] + turn * (of_s[j] @ s)
-            s = now[:, c:]
-            force += waves[j].conj()[:, None] * now[:, :c, None]
+            np.matmul(passed_on[j, :, c:], kept[j], out=kept[j + 1])
+            kept[j + 1, :, :, : c * nc] += driven[j, :, c:]
+        s, of_one = kept[..., : c * nc], kept[..., c * nc :]
+        # as a period before; a slider that rests does so
+        first = np.linalg.pinv(np.eye(n_state) - of_one[-1], rcond=1e-9) @ s[-1]
+        now = driven[:, :, :c] + passed_on[:, :, :c] @ (s[:-1] + of_one[:-1] @ first)
+        force = np.tensordot(waves.conj(), now, (0, 0)).transpose(1, 2, 0, 3)
         return stuck - force.reshape(n_pair, c, nc, c, nc) / STEPS
 
     return departure

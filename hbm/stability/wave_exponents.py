@@ -109,8 +109,11 @@ def exponents(
     chosen = _once(*every, order, n, sum(2 * len(modes(d)[0]) for d in range(n)))
     values, waves = every[0][chosen], every[2][chosen]
     if answer is not None:
-        for d in np.unique(waves[values.real > GROWS]):
-            values[waves == d] = settled(values[waves == d], (modes, order, int(d), omega), slope, answer)
+        for d in np.unique(np.abs(waves[values.real > GROWS])):  # what is solved for d holds for -d, conjugated
+            here, back = np.abs(waves) == d, waves < 0
+            one, of = np.unique(np.where(back, values.conj(), values)[here], return_inverse=True)
+            found = settled(one, (modes, order, int(d), omega), slope, answer)[of]
+            values[here] = np.where(back[here], found.conj(), found)
     return values * omega, waves
 
 

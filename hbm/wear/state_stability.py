@@ -5,25 +5,15 @@ A machine leaves a periodic motion that a push grows on, so that the wear of tha
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import wave_in_time
 from tribodyn.hbm.wear.evolution import WearProblem, WearState
 
-
-@dataclass(frozen=True)
-class GrowthRules:
-    """Where the growth is looked for.
-
-    most_unknowns : of a balance, of all sectors of a wave, whose states are all looked at: up to it Hill's method takes
-        less than a fifth of the time of a wear step (beam: 73 ms of 0.5 s with 1029)
-    """
-
-    most_unknowns: int = 2000
-
-
-RULES = GrowthRules()
+# Unknowns of a balance, of all sectors of a wave, up to which all states are looked at: Hill's method takes less than a
+# fifth of the time of a wear step (beam: 73 ms of 0.5 s with 1029)
+MOST_UNKNOWNS = 2000
 
 
 def with_growth(problem: WearProblem, state: WearState, always: bool = False) -> WearState:
@@ -36,7 +26,7 @@ def with_growth(problem: WearProblem, state: WearState, always: bool = False) ->
     """
     balance = problem.balance
     sectors = wave_in_time.sectors_of(balance)
-    few = balance.contact.stiffness.size * balance.basis.n_coeff * sectors <= RULES.most_unknowns
+    few = balance.contact.stiffness.size * balance.basis.n_coeff * sectors <= MOST_UNKNOWNS
     if state.failure or not (few or (always and not wave_in_time.is_wave(balance))):
         return state
     growth = -float("inf")

@@ -140,6 +140,13 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
+def test_tests_that_pages_name_exist() -> None:
+    kept = {one.name for one in (ROOT / "tests").rglob("test_*.py")}
+    named = {(page.name, test) for page in pages() for test in re.findall(r"test_\w+\.py", page.read_text("utf-8"))}
+    assert named
+    assert not [one for one in named if one[1] not in kept]
+
+
 def test_names_of_python_in_pages_exist() -> None:
     called = re.compile(r"(?<![\w./\"-])(?:td|tribodyn)\.((?!NAME)[a-zA-Z_][\w.]*\w)")
     for page in [*pages(), *(ROOT / "docs").glob("examples/*.py"), ROOT / "docs/reference/examples.py"]:

@@ -20,7 +20,7 @@ from tribodyn.workflows.errors import refine, states
 from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.report import text as in_words
 from tribodyn.workflows.result import summary
-from tribodyn.workflows.run import modelling, pipeline
+from tribodyn.workflows.run import modelling, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
@@ -76,6 +76,14 @@ def test_what_cannot_be_is_one_sentence(tmp_path: Path, change: tuple[str, str],
     with pytest.raises(ValueError, match=said) as raised:
         built(BLOCKS.replace(*change), tmp_path)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(("keys", "pairs"), [((), 21), (("face_centres",), 12), (("face_centres", "vertices_only"), 3)])
+def test_a_plan_counts_the_pairs_that_a_run_has(keys: tuple[str, ...], pairs: int, tmp_path: Path) -> None:
+    """Three quadratic faces in a row: 21 nodes on them, and four faces between the nodes of each."""
+    changes = [f"contacts.lap.{key}=true" for key in keys]
+    planned = planning.plan(scene_file.parse(BLOCKS, "scene.toml", changes, tmp_path))
+    assert planned.contact_pairs == built(BLOCKS, tmp_path, *changes).reduced.interface.n_pair == pairs
 
 
 def test_a_body_without_its_material_is_refused(tmp_path: Path) -> None:
