@@ -30,12 +30,13 @@ NAMED_SUPPORTS = {
 }
 # read first, as the points that they name are known by these names then, and tables of materials need temperatures
 FIRST = {"COUPLING", "KINEMATIC", "DISTRIBUTING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "RIGID BODY",
-         "INITIAL CONDITIONS"}  # fmt: skip
+         "INITIAL CONDITIONS", "SURFACE INTERACTION", "CHANGE FRICTION", "FRICTION"}  # fmt: skip
 TABLE = CardTable(
     read="""NODE, ELEMENT, NSET, ELSET, SURFACE, SOLID SECTION, PART, END PART, INSTANCE, END INSTANCE, ASSEMBLY,
         END ASSEMBLY, INCLUDE, SYSTEM, ORIENTATION, DISTRIBUTION, MATERIAL, ELASTIC, DENSITY, EXPANSION, MASS, SPRING,
         TIE, EQUATION, COUPLING, KINEMATIC, DISTRIBUTING, KINEMATIC COUPLING, DISTRIBUTING COUPLING, RIGID BODY, CLOAD,
-        BOUNDARY, DSLOAD, DLOAD, INITIAL CONDITIONS, STEP, CONTACT PAIR""",
+        BOUNDARY, DSLOAD, DLOAD, INITIAL CONDITIONS, STEP, CONTACT PAIR, SURFACE INTERACTION, CHANGE FRICTION,
+        FRICTION""",
     silent="""HEADING, PREPRINT, RESTART, OUTPUT, NODE OUTPUT, ELEMENT OUTPUT, CONTACT OUTPUT, ENERGY OUTPUT,
         NODE PRINT, NODE FILE, EL PRINT, EL FILE, CONTACT PRINT, CONTACT FILE, END STEP, MONITOR, PRINT, ENERGY PRINT,
         SECTION PRINT, FILE FORMAT""",
@@ -47,10 +48,10 @@ TABLE = CardTable(
             HOURGLASS STIFFNESS, DISTRIBUTION TABLE, PHYSICAL CONSTANTS, USER OUTPUT, FILTER, NORMAL""",
         "damping is the scene's": "DAMPING, MODAL DAMPING, GLOBAL DAMPING, DAMPING CONTROLS",
         "bodies are elastic": "PLASTIC, CREEP, CYCLIC HARDENING, RATE DEPENDENT, CONDUCTIVITY, SPECIFIC HEAT",
-        "contact is the scene's": """SURFACE INTERACTION, SURFACE BEHAVIOR, FRICTION, CONTACT, CONTACT INCLUSIONS,
+        "contact is the scene's": """SURFACE BEHAVIOR, CONTACT, CONTACT INCLUSIONS,
             CONTACT EXCLUSIONS, CONTACT PROPERTY ASSIGNMENT, CONTACT CONTROLS, CONTACT CONTROLS ASSIGNMENT,
             CONTACT FORMULATION, CONTACT INITIALIZATION ASSIGNMENT, CONTACT INITIALIZATION DATA, CONTACT DAMPING,
-            CHANGE FRICTION, CLEARANCE, GAP CONDUCTANCE, SURFACE PROPERTY ASSIGNMENT""",
+            CLEARANCE, GAP CONDUCTANCE, SURFACE PROPERTY ASSIGNMENT""",
     },
 )
 
@@ -90,6 +91,8 @@ class _Cards:
     springs: list[deck.Spring] = field(default_factory=list)
     met: Met = field(default_factory=lambda: Met(TABLE, "*"))
     steps: int = 0
+    frictions: dict[str, float] = field(default_factory=dict)  # of surface interactions
+    interaction: str = ""
     material: str = ""
     coupling: Card | None = None
     solid: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool))
@@ -325,7 +328,19 @@ class _Cards:
             self.unused.append(f"contact pair {' on '.join(line)}, which the scene gives as [contacts.NAME]")
             with suppress(ValueError):  # of faces of what is no solid
                 slave, master = (self._place(name, card, face=True) for name in line)
-                self.contacts.append(deck.Tie(" on ".join(line), slave, master))
+                friction = self.frictions.get(card.option("INTERACTION").upper())
+                self.contacts.append(deck.Tie(" on ".join(line), slave, master, friction=friction))
+
+    def _surface_interaction(self, card: Card) -> None:
+        self.interaction = card.option("NAME").upper()
+
+    _change_friction = _surface_interaction  # has no name: what a step changes is not taken
+
+    def _friction(self, card: Card) -> None:
+        """The coefficient of an interaction where it is one for all; other kinds of friction are not taken."""
+        other = {"ANISOTROPIC", "EXPONENTIALDECAY", "DEPENDENCIES", "USER", "ROUGH"} & card.options.keys()
+        if self.interaction and len(card.data) == 1 and not other:
+            self.frictions[self.interaction] = card.number(card.data[0][0])
 
     def _initial_conditions(self, card: Card) -> None:
         if card.option("TYPE").upper() == "TEMPERATURE":

@@ -36,12 +36,16 @@ class DeckMaterial:
 
 @dataclass(frozen=True)
 class Tie:
-    """Two faces glued, or that may touch, as the deck calls them. tolerance [m], None where the deck leaves it."""
+    """Two faces glued, or that may touch, as the deck calls them.
+
+    tolerance : of glued ones [m]; friction : of ones that may touch; None where the deck leaves it
+    """
 
     name: str
     slave: str
     master: str
     tolerance: float | None = None
+    friction: float | None = None
 
 
 @dataclass(frozen=True)

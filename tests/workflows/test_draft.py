@@ -98,13 +98,21 @@ def test_a_scene_is_begun_from_a_file_and_is_one(
 def test_contact_pairs_of_a_deck_come_first_under_the_names_that_it_has(tmp_path: Path, capsys: Any) -> None:
     file, faces = deck(tmp_path / "lap.inp"), "*Surface, type=ELEMENT, name=Over\n 1, S2\n 2, S2\n"
     faces += "*Surface, type=ELEMENT, name=Under\n 1, S1\n 2, S1\n*End Part"
-    pair = "*Contact Pair, interaction=rough\nUpper.Under, Lower.Over\n*Boundary"
+    pair = "*Contact Pair, interaction=dry\nUpper.Under, Lower.Over\n"
+    for card in (
+        "Surface Interaction, name=Dry",
+        "Surface Interaction, name=oiled",
+        "Change Friction, interaction=Dry",
+    ):
+        pair += f"*{card}\n*Friction\n {0.23 if card.endswith('name=Dry') else 0.4},\n"
+    pair += "*Boundary"
     file.write_text(file.read_text().replace("*End Part", faces).replace("*Boundary", pair))
     code, said, _ = leave(["new", str(file), "--out", str(tmp_path / "begun")], capsys)
     assert code == 0
     assert "Lower.Over and Upper.Under: 0 mm apart" in said
     (joint,) = scene_file.read(str(tmp_path / "begun/lap.toml")).scene.joints.values()
-    assert (joint.group, joint.opposite) == ("Lower.Over", "Upper.Under")
+    assert (joint.group, joint.opposite, joint.friction) == ("Lower.Over", "Upper.Under", 0.23)
+    assert "friction = 0.23  # of the deck" in (tmp_path / "begun/lap.toml").read_text()
     assert len(td.build(str(tmp_path / "begun/lap.toml")).part.interface.area) > 4  # the deck is found from there
 
 

@@ -45,7 +45,7 @@ LIMITS = Limits()
 class Candidate:
     """Two faces that may touch: "body.face" of each, least distance [m], share of the smaller one that is near.
 
-    normal : of the first face, outward; declared : whether the deck has them as a contact pair
+    normal : of the first face, outward; declared : whether the deck has them as a contact pair; friction : of it
     """
 
     first: str
@@ -54,6 +54,7 @@ class Candidate:
     share: float
     normal: tuple[float, float, float]
     declared: bool = False
+    friction: float | None = None
 
 
 @dataclass(frozen=True)
@@ -141,12 +142,14 @@ def _candidates(source: Any) -> Iterator[Candidate]:
             of = np.isin(facets, own)
             if of.sum() < len(facets):  # a group of the whole skin says nothing
                 faces.append((body, name, {*facets[of].tolist()}, centre[of], normal[of], wide[of]))
-    declared = [{one.slave, one.master} for one in source.deck.contacts]
+    declared = {frozenset((one.slave, one.master)): one.friction for one in source.deck.contacts}
     found = []
     for one, two in combinations(faces, 2):
         if one[0] != two[0] and (met := _near(one[3:], two[3:], near)) is not None:
             names = [named_in(body, face, source.bodies[body].node_sets) for body, face, *_ in (one, two)]
-            found.append((Candidate(names[0], names[1], *met, {one[1], two[1]} in declared), one, two))
+            pair = frozenset((one[1], two[1]))
+            candidate = Candidate(names[0], names[1], *met, pair in declared, declared.get(pair))
+            found.append((candidate, one, two))
     taken: dict[tuple[str, str], set[int]] = defaultdict(set)  # bodies that touch -> facets of the first one
     for pair, one, two in sorted(found, key=lambda at: (not at[0].declared, -round(at[0].share, 2), at[0].distance)):
         ends = ((taken[one[0], two[0]], one[2]), (taken[two[0], one[0]], two[2]))
@@ -209,7 +212,7 @@ def _text(
         yield from ("", f"[contacts.joint_{number}]  # {_said(pair)}")
         yield from (f"first = {json.dumps(pair.first)}", f"second = {json.dumps(pair.second)}")
         yield from ('tangential_stiffness = "100 N/um"  # GUESS', 'normal_stiffness = "100 N/um"  # GUESS')
-        yield "friction = 0.5  # GUESS"
+        yield "friction = 0.5  # GUESS" if pair.friction is None else f"friction = {pair.friction}  # of the deck"
     held = {name for name, body in source.bodies.items() for s in source.deck.supports if s.group in body.node_sets}
     moved = [*held, *(name for name in source.bodies if name not in held)][-1]
     face = json.dumps(named_in(moved, first_face[moved], source.bodies[moved].node_sets))
@@ -217,8 +220,8 @@ def _text(
     if own and not (source.deck.forces or source.deck.pressures):
         pair, end = own[0]
         towards = [(1 if end == pair.first else -1) * one + 0.0 for one in pair.normal]
-        yield from ("", "# [loads.static.press]  # presses the faces together: its resultant has to lie between them")
-        yield from (f"# group = {json.dumps(end)}", f"# direction = {towards}", '# value = "1 kN"')
+        yield from ("", "[loads.static.press]  # GUESS: presses the faces together, more than the drive lifts or slides")
+        yield from (f"group = {json.dumps(end)}", f"direction = {towards}", 'value = "1 kN"')
     yield from ("", "[loads.harmonic.drive]  # GUESS", f"group = {face}", 'direction = "x"', 'value = "10 N"')
     yield from ("", "[response]", 'frequency = ["100 Hz", "1 kHz"]  # GUESS; a run says its modes, open and stuck')
     yield from ("", "[damping]", 'modal = "1 %"  # GUESS', "", "# [wear]  # take the marks off to let it wear")
