@@ -228,7 +228,7 @@ def of_summary(varying: Varying, response: Branch, numbers: Mapping[str, float],
     if len(places) > 1 or places[0].peak not in (None, 1.0) or not (own or of_gap.keys() & set(wanted)):
         return slopes
     try:
-        found = _found(varying, response, places[0].frequency, own, lambda done, text: None)
+        found = _found(varying, response, places[0].frequency, own, lambda *_: None)
     except NoDerivative:
         return slopes
     by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}

@@ -96,11 +96,11 @@ def test_every_contact_is_told_by_itself(worn: td.Result) -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ("bodies.blade.gap_top=30 mm", r"gap_top is 0.03: give less than gap_bottom"),
-        ("bodies.blade.bulb_width=10 mm", r"bulb_width is 0.01: give more than neck_width"),
+        ("bodies.blade.gap_top=30 mm", r"gap_top is 0.03: give less than geometry.gap_bottom"),
+        ("bodies.blade.bulb_width=10 mm", r"bulb_width is 0.01: give more than geometry.neck_width"),
         ("bodies.disk.neck_height=3 mm", r"neck_height is 0.003: give more than .*, or the posts of the disk end"),
         ("bodies.disk.disk_radius=180 mm", r"disk_radius is 0.18: give a radius below .* the bottom of the slot"),
-        ("bodies.damper.damper_length=60 mm", r"damper_length is 0.06: give at most platform_length"),
+        ("bodies.damper.damper_length=60 mm", r"damper_length is 0.06: give at most geometry.platform_length"),
         ("wheel.sectors=23", "wheel.sectors = 23, but the part is made for n_blades = 24"),
         ("wheel.seam=", r'wheel.seam is missing, .* \["disk.cyclic_right", "disk.cyclic_left"\]'),
         ("wheel=", "sector is for a"),
