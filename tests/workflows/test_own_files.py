@@ -125,6 +125,7 @@ CHANGES = {
     "kept = [0, 1, 2, 3]": "kept = [0, 1]",
     "points = 100": "points = 6",
     'rule = "error_controlled"': 'rule = "thesis"\nmax_steps = 1',
+    'at = "800 Hz"': 'at = "peak"',
 }
 DROPPED = ("length =", "width =", "height =", "patch_length =", "n_patch =", "grading =", "n_length =", "n_height =")
 
@@ -140,7 +141,7 @@ def scene(tmp_path: Path) -> Path:
     for name, body in files.items():
         (tmp_path / f"{name}.py").write_text(body)
     (tmp_path / "mine.study.toml").write_text(STUDY)
-    (tmp_path / "mine.toml").write_text(text.replace("[verdict]", "[verdict]\nenabled = false"))
+    (tmp_path / "mine.toml").write_text(text + "\n[verdict]\nenabled = false\n")
     return tmp_path / "mine.toml"
 
 
