@@ -75,7 +75,7 @@ def test_contact_springs_and_friction_are_found_again():
 def test_the_wear_coefficient_is_found_from_life_and_work():
     """Life and work both go with its inverse, as the volume that is to be worn is given."""
     looked = {"alpha": {"keys": ["wear.coefficient"], "low": "2e2 um3/J", "high": "2e4 um3/J"}}
-    measured = {"life": {"of": "life", "left": 0.5}, "work": {"of": "work", "left": 0.5}}
+    measured = {"life": {"of": "life", "left": 0.9}, "work": {"of": "work", "left": 0.9}}
     found, _ = found_again("beam", BEAM, ("wear.coefficient=5e3 um3/J",), looked, measured)
     assert found.values == pytest.approx([5e-15], rel=1e-3)
     assert found.sensitivity.ravel() == pytest.approx([-1.0, -1.0], abs=0.01)
