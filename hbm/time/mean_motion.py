@@ -17,7 +17,7 @@ from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration, wave_in_time
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.push import push
-from tribodyn.hbm.time.stepper import Options, TimeStepper
+from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.time.time_step import Moving
 
@@ -142,6 +142,16 @@ class Follower:
         self._passing = settled.settled and self.options.passing > 0
         self._regular = settled.settled and settled.spread <= self.options.accuracy and not self._passing
         return replace(settled, periods=settled.periods + spent)
+
+    def kept_beside(self, balance: HarmonicBalance, state: State) -> float | None:
+        """Friction work [J] of a periodic motion beside that of a balance, if a push does not drive it away."""
+        try:
+            self.start(balance, state)
+            found, spent = self._periodic(stepper := self._at(balance, state.omega))
+        except IntegrationFailed:
+            return None
+        one = None if found is None else time_integration.motion_of(stepper, found, spent, CONVERGED)
+        return None if one is None else float(one.energy.sum())
 
     def _periodic(self, stepper: TimeStepper) -> tuple[Period | None, int]:
         """A periodic motion that a push does not drive away, and the periods marched; else the motion has left it."""

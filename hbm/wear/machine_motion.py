@@ -27,7 +27,7 @@ from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
-from tribodyn.hbm.wear.history import WearRow
+from tribodyn.hbm.wear.history import WearHistory, WearRow
 
 GAMMA = 1 - 1 / np.sqrt(2)
 
@@ -89,8 +89,7 @@ class MachineMotion:
 
     def __init__(self, problem: WearProblem, always: bool = False):
         self._problem, self._always = problem, always
-        steps = max(RULES.steps, RULES.per_harmonic * problem.balance.basis.harmonics[-1])
-        self._options = MeanOptions(steps, accuracy=RULES.accuracy)
+        self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy)
         if always:
             self._options = replace(self._options, contact=RULES.contact, passing=RULES.passing)
         self._followers: list[Follower] = []
@@ -209,6 +208,31 @@ class MachineMotion:
             stiffness = stiffness - coupled @ np.linalg.lstsq(rest, coupled.T, rcond=None)[0]
         fall[np.ix_(touches, touches)] = (here.rate[touches] / force[touches])[:, None] * stiffness
         return fall
+
+
+def left_aside(problem: WearProblem, worn: WearHistory, looks: int) -> float:
+    """Relative change of the cycles of a run, had it worn along periodic motions of the first duty that it passed by.
+
+    An irregular motion may be a transient of some hundred periods, of which its scatter tells nothing, while a wear
+    step has 100 000. So a periodic motion that stays is looked for beside the balance's, at `looks` rows: each stands
+    for the same share of the cycles that the work of the balance would add or save.
+    """
+    rows = [row for row in worn.rows() if row.spread > 0 and row.cycles_in_step > 0]
+    balances = [problem.in_duty(problem.mission[0], row.depth) for row in rows]
+    states = [b.evaluate(row.omega, b.shaped(row.displacement)) for b, row in zip(balances, rows, strict=True)]
+    stride, own = np.array([(row.cycles_in_step, row.energy.sum()) for row in rows]).reshape(-1, 2).T
+    work = np.array([np.sum(b.energy(state)) for b, state in zip(balances, states, strict=True)])
+    by_balance = np.abs(stride * (work - own)) / np.maximum(work, own)
+    whole, change = float(by_balance.sum()), 0.0
+    for i in np.searchsorted(by_balance.cumsum(), whole * (np.arange(looks if whole else 0) + 0.5) / looks):
+        follower = Follower(MeanOptions(_steps(problem), contact=RULES.contact))
+        kept = follower.kept_beside(balances[i], states[i]) or own[i]
+        change -= whole / looks * stride[i] * (kept - own[i]) / max(kept, own[i]) / by_balance[i]
+    return change / float(worn.cycles_in_step.sum() or 1.0)
+
+
+def _steps(problem: WearProblem) -> int:
+    return max(RULES.steps, RULES.per_harmonic * problem.balance.basis.harmonics[-1])
 
 
 def _depth_rate(

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_problem
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
@@ -15,7 +16,7 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.stays import HILL, MULTIPLIERS, stays
-from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time import mean_motion, time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
@@ -24,7 +25,7 @@ from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.machine_motion import MotionExposure
+from tribodyn.hbm.wear.machine_motion import MotionExposure, left_aside
 from tribodyn.hbm.wear.step_control import Tolerance
 
 LEFT = 0.5  # share of the preload
@@ -170,6 +171,30 @@ def test_a_motion_that_passes_needs_no_more_periods_than_its_normal_force() -> N
     assert passed.energy.sum() == pytest.approx(settled.energy.sum(), rel=0.02)
     later = [one.mean(flips, FLIPS_AT, lambda motion: motion.energy) for one in (follower, again)]
     np.testing.assert_array_equal(later[1].energy, later[0].energy)
+
+
+def test_the_standard_error_of_a_mean_covers_its_deviation() -> None:
+    """Autoregression as correlated as the beam's work; the mean of n deviates by s / (1 - r) / n^0.5."""
+    r, n, rng = 0.3, 64, np.random.default_rng(1)
+    noise = rng.normal(0.0, 0.1, 400 * n)
+    series = 1.0 + lfilter([1.0], [1.0, -r], noise)
+    windows = series.reshape(-1, n)
+    errors = np.array([mean_motion._standard_error(window) for window in windows])
+    exact = 0.1 / (1 - r) / np.sqrt(n)
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(exact, rel=0.2)
+    assert np.mean(np.abs(windows.mean(axis=1) - 1) <= 2 * errors) > 0.93
+
+
+def test_a_periodic_motion_that_a_run_passed_by_is_told(problem: WearProblem, run: WearHistory) -> None:
+    """The work of a run halved, as if a transient had been followed; and one whose balance's motion does not stay."""
+    assert left_aside(problem, error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), 3, motion="time"), 3) == 0.0
+    half = replace(run, energy=0.5 * run.energy, spread=np.full(len(run.cycles), 0.3))
+    assert left_aside(problem, half, 3) == pytest.approx(-0.5, rel=0.02)
+    flips = flipping()
+    passed = error_controlled_rule.evolve(flips, Tolerance(0.05, 1e-6), 3, motion="machine")
+    assert passed.spread is not None
+    assert passed.spread.min() > 0.05
+    assert left_aside(flips, passed, 3) == 0.0
 
 
 def test_the_largest_multiplier_without_the_monodromy_matrix(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -90,6 +90,7 @@ def test_the_scatter_of_a_motion_in_time_and_of_its_steps_is_the_least_change_th
     assert verdict.error_of([own[0], row(Refinement.WEAR_STEPS, 0.005)], 0.7)[0] == DEFAULT.total(0.002, 0.7)
     assert verdict.error_of([*own, row(Refinement.MOTION, 0.005)], 0.7)[0] == DEFAULT.total(0.01, 0.7)
     assert verdict.error_of([*own, row(Refinement.MOTION, 0.03)], 0.7)[0] == DEFAULT.total(0.03, 0.7)
+    assert verdict.error_of([*own, row(Refinement.OTHER_MOTION, 0.06)], 0.7)[0] == pytest.approx(0.01 + 0.06)
 
 
 def test_the_error_holds_against_a_finer_reference(small: td.Result) -> None:

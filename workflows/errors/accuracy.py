@@ -157,6 +157,7 @@ def _finer(file: SceneFile, refinement: str, factor: float) -> tuple[str, ...]:
         Refinement.SAMPLES: lambda: file.changed(f"harmonics.samples={2 * file.scene.harmonics.samples}"),
         Refinement.WEAR_STEPS: wear,
         Refinement.MOTION: wear,
+        Refinement.OTHER_MOTION: lambda: None,
     }
     try:
         finer = refined[refinement]()

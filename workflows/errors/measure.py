@@ -14,6 +14,7 @@ from tribodyn.hbm.contact.sampling import sampling_error
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
+from tribodyn.hbm.wear.machine_motion import left_aside
 from tribodyn.hbm.wear.step_error import step_error
 from tribodyn.workflows.errors import refine, states
 from tribodyn.workflows.errors.options import DEFAULT, Options
@@ -72,7 +73,7 @@ def measure(
         _on_own_mesh(file, why, table, say)
     else:
         _step_by_step(file, finer, ratio, table, say)
-    _estimates(file, table, result)
+    _estimates(file, model, table, result, options)
     if result.wear_steps and file.scene.wear is not None:
         _worn(file, finer, why, table, result, options)
     return table
@@ -191,8 +192,8 @@ def _more_harmonics(state: State, table: Table, say: Callable[[str], None]) -> A
     return answers
 
 
-def _estimates(file: SceneFile, table: Table, result: Result) -> None:
-    """What the contact law and the wear rule estimate of themselves: samples and wear steps."""
+def _estimates(file: SceneFile, model: Model, table: Table, result: Result, options: Options) -> None:
+    """What the contact law, the wear rule and its motions estimate of themselves."""
     own = table.first
     assert own is not None
     state = own.here.state
@@ -207,6 +208,11 @@ def _estimates(file: SceneFile, table: Table, result: Result) -> None:
             if result.wear.in_time.any():
                 how = "standard error of means in time"
                 table.rows.append(Change(Refinement.MOTION, name, None, None, result.wear.scatter, how))
+        if result.wear.in_time.any():
+            problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
+            aside = abs(left_aside(problem, result.wear, options.looks))
+            how = "periodic motions that an irregular one passed by"
+            table.rows.append(Change(Refinement.OTHER_MOTION, "life", None, None, aside, how))
 
 
 def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, result: Result, options: Options) -> None:

@@ -19,6 +19,7 @@ class Options:
     coarser : elements along every edge of the scene over those of the coarser mesh
     wear_steps : on the refined mesh over those of the scene
     max_time_components : of a contact whose motions are integrated in time
+    looks : wear states at which a periodic motion is looked for that an irregular one passed by
     order : of convergence that is relied on: errors at contact kinks and corners fall with the element size
     safety : on the extrapolated error (Roache 1994: 1.25)
     floor : least change that a refinement counts with: two models agree by chance on small errors
@@ -34,6 +35,7 @@ class Options:
     coarser: float = 1.5
     wear_steps: float = 2.0
     max_time_components: int = 30
+    looks: int = 12
     order: float = 1.0
     safety: float = 1.25
     floor: float = 1e-3

@@ -92,11 +92,12 @@ def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEF
     by_chance = [row for row in rows if row.refinement in (Refinement.MOTION, Refinement.WEAR_STEPS)]
     least = max((row.relative or 0.0 for row in by_chance), default=0.0)
     chance = least if marched else 0.0
+    aside = sum(row.relative or 0.0 for row in rows if row.refinement == Refinement.OTHER_MOTION)
     for row in rows:
         if row.refinement == Refinement.COMBINED:
             if row.relative is None:
                 return None, row.how
-            return max(options.total(max(row.relative, chance), ratio), least), ""
+            return max(options.total(max(row.relative, chance), ratio), least) + aside, ""
     return None, "no refinement was measured"
 
 

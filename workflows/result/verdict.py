@@ -24,6 +24,7 @@ class Refinement(StrEnum):
     SAMPLES = "samples"
     WEAR_STEPS = "wear steps"
     MOTION = "statistics of the motion"
+    OTHER_MOTION = "another motion"
     COMBINED = "combined"
 
 
