@@ -155,6 +155,7 @@ class Change:
 
     twice : where p acts on the structure, whose changes have no corners: the same by two steps, for a difference of
         order four, which a system near its own resonance needs; none of these where the model moves linearly
+    touching : what p changes of the contact besides, whose forces have corners, by a smaller step
     """
 
     name: str
@@ -162,6 +163,7 @@ class Change:
     above: Posed
     below: Posed
     twice: tuple[Posed, ...] | None = None
+    touching: Change | None = None
 
 
 @dataclass(frozen=True)
@@ -399,7 +401,8 @@ class Gradient:
         if change.twice is not None:
             up = (8 * (up - down) - (far[0] - far[1])) / 12 if far else (up - down) / 2
             down = -up
-        return up / change.step, -down / change.step
+        by_touching = self.by(change.touching) if change.touching is not None else (0.0, 0.0)
+        return up / change.step + by_touching[0], -down / change.step + by_touching[1]
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
-STEP = 1e-5  # relative, of a number that acts on contact, loads or damping alone
+STEP = 1e-6  # relative, of a number that acts on contact, loads or damping alone
 REBUILT = 1e-3  # the same of a number of the structure, whose rounding is larger
 STRUCTURAL = ("material.", "materials.", "springs.")
 OF_CONTACT = ("tangential_stiffness", "normal_stiffness")
@@ -97,10 +97,20 @@ class Varying:
         anew = self._settles or self.anew(key)
         linear = self._scales(key) or self.follows(key)
         step = (REBUILT if anew or linear else STEP) * abs(value)
-        far: tuple[Posed, ...] | None = () if linear else None
-        if anew:
+        far: tuple[Posed, ...] | None = () if anew or linear else None
+        if self._settles or (anew and key.startswith((*STRUCTURAL, "wheel."))):
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
-        return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far)
+        touching = None
+        if (anew or linear) and not self._settles and _touches(key):
+            small = STEP * abs(value)
+            up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
+            touching = Change(key, small, up, down)
+        return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
+
+    def _contact(self, key: str, value: float) -> Contact:
+        """The contact with another value of a key."""
+        scene = self.file.changed(f"{key}={value!r}").scene
+        return Contact.of(self.own.model, joints.make_joints(scene, self.plain))
 
     def posed(self, key: str, value: float) -> Posed:
         """The problem with another value of a key; nothing is solved but what the preload comes to rest in."""
@@ -125,9 +135,8 @@ class Varying:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
         if self.follows(key) and np.array_equal(reduced.interface.B, self.own.model.interface.B):
             reduced = replace(reduced, interface=self.own.model.interface)  # the same coordinates
-        contact, seen = self.own.contact, key.startswith(("contact", "material"))
-        if self.anew(key) or (seen and not key.endswith(".density")):
-            contact = Contact.of(reduced, joints.make_joints(scene, plain))
+        structural = self.anew(key) or self._scales(key) or self.follows(key)
+        contact = self._contact(key, value) if _touches(key) and not structural else self.own.contact
         return Posed(reduced, contact, joints.excite(scene, base), self.own.memory)
 
     @property
@@ -218,6 +227,11 @@ class Varying:
             return True
         own, springs = (joints.contact_stiffness(one, plain) for one in (self.scene, scene))
         return scene.damping.given and scene.damping.state == "stuck" and not np.array_equal(own, springs)
+
+
+def _touches(key: str) -> bool:
+    """Whether the law of a contact may see a key."""
+    return key.startswith(("contact", "material")) and not key.endswith(".density")
 
 
 def _loaded_alike(scene: PartScene) -> bool:
