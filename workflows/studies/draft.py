@@ -220,7 +220,7 @@ def _text(
     if own and not (source.deck.forces or source.deck.pressures):
         pair, end = own[0]
         towards = [(1 if end == pair.first else -1) * one + 0.0 for one in pair.normal]
-        yield from ("", "[loads.static.press]  # GUESS: presses the faces together, more than the drive lifts or slides")
+        yield from ("", "[loads.static.press]  # GUESS: presses the faces together, the drive shall not lift them")
         yield from (f"group = {json.dumps(end)}", f"direction = {towards}", 'value = "1 kN"')
     yield from ("", "[loads.harmonic.drive]  # GUESS", f"group = {face}", 'direction = "x"', 'value = "10 N"')
     yield from ("", "[response]", 'frequency = ["100 Hz", "1 kHz"]  # GUESS; a run says its modes, open and stuck')
