@@ -19,7 +19,10 @@ from typing import Any
 
 from filelock import FileLock
 
-FOLLOWED = ("tutorials/first_run", "tutorials/own_matrices", "howto/deck", "howto/step", "howto/inspect")
+FOLLOWED = (
+    "tutorials/first_run", "tutorials/own_law", "tutorials/own_part", "tutorials/own_matrices", "howto/deck", "howto/step",
+    "howto/inspect",
+)  # fmt: skip
 FENCE = re.compile(r"^```([a-z]+)(?: ([\w.]+))?\n(.*?)^```\n", re.M | re.S)
 FIRST = "./tribodyn run beam"
 MOST = 30  # lines of an output
