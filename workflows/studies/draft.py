@@ -147,9 +147,8 @@ def _candidates(source: Any) -> Iterator[Candidate]:
     for one, two in combinations(faces, 2):
         if one[0] != two[0] and (met := _near(one[3:], two[3:], near)) is not None:
             names = [named_in(body, face, source.bodies[body].node_sets) for body, face, *_ in (one, two)]
-            pair = frozenset((one[1], two[1]))
-            candidate = Candidate(names[0], names[1], *met, pair in declared, declared.get(pair))
-            found.append((candidate, one, two))
+            faced = frozenset((one[1], two[1]))
+            found.append((Candidate(names[0], names[1], *met, faced in declared, declared.get(faced)), one, two))
     taken: dict[tuple[str, str], set[int]] = defaultdict(set)  # bodies that touch -> facets of the first one
     for pair, one, two in sorted(found, key=lambda at: (not at[0].declared, -round(at[0].share, 2), at[0].distance)):
         ends = ((taken[one[0], two[0]], one[2]), (taken[two[0], one[0]], two[2]))
