@@ -64,6 +64,11 @@ READ = {
         "INITIAL CONDITIONS": ("inp", "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nFOOT, 20.\n"),
         "STEP": ("inp", "*STEP\n*END STEP\n*STEP\n*END STEP\n"),
         "CONTACT PAIR": ("inp", FACES + "*CONTACT PAIR\nEND, START\n"),
+        **dict.fromkeys(
+            ("SURFACE INTERACTION", "FRICTION", "CHANGE FRICTION"),
+            ("inp", FACES + "*SURFACE INTERACTION, NAME=DRY\n*FRICTION\n.2,\n*CHANGE FRICTION, INTERACTION=DRY\n"
+                            "*FRICTION\n.4,\n*CONTACT PAIR, INTERACTION=DRY\nEND, START\n"),
+        ),
     },
     "bdf": {
         **dict.fromkeys(("GRID", "CHEXA", "PSOLID", "MAT1"), ("bdf", "")),
