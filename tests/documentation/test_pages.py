@@ -94,7 +94,7 @@ def test_the_readme_shows_what_the_first_command_prints(after_the_first_command:
         for lines in (shown, printed)
     ]
     assert firm[0] == firm[1], printed
-    of_wear = [re.search(r"life +(\d+) million cycles +(\d+) %", lines) for lines in (shown, printed)]
+    of_wear = [re.search(r"life +(\d+) million cycles +([\d.]+) %", lines) for lines in (shown, printed)]
     assert of_wear[0] is not None
     assert of_wear[1] is not None, printed
     (there, _), (here, error) = (map(float, found.groups()) for found in of_wear if found is not None)
