@@ -168,12 +168,15 @@ def exists(names: list[str]) -> bool:
 def test_the_paper_states_what_the_first_command_prints() -> None:
     """Its numbers are those of the README, which are those of the command."""
     paper = (ROOT / "paper/paper.md").read_text(encoding="utf-8")
-    told = re.search(r"`tribodyn run beam`.*?half a minute", paper, re.DOTALL)
+    told = re.search(r"`tribodyn run beam`.*?less than a minute", paper, re.DOTALL)
     assert told is not None
     (shown,) = [fence.text for fence in fences(README) if fence.language == "text"]
     numbers = re.findall(r"\d[\d.]*(?: million cycles| DOFs| %)?", told[0])
     assert len(numbers) >= 4
     assert [number for number in numbers if number not in shown] == []
+    life = re.search(r"life +(\d+ million cycles) +([\d.]+ %)", shown)
+    assert life is not None
+    assert "{} with an error of {}".format(*life.groups()) in " ".join(told[0].split())
 
 
 def test_readme_is_short() -> None:
