@@ -272,8 +272,8 @@ def export(result: Path, *, to: Targets, out: Path | None = None, mesh_ending: s
     result
         Folder or file of a result.
     to
-        Formats, one or several: vtk (series for ParaView), csv, parquet, mat, uff (tables and curves), mesh (worn part
-        with its fields), npz, mtx, abaqus (reduced matrices).
+        Formats, one or several: vtk (series for ParaView), csv, mat, uff (tables and curves), mesh (worn part
+        with its fields), npz, abaqus (reduced matrices).
     out
         Folder, in which each format gets a folder of its own; export/ beside the result by default.
     mesh_ending

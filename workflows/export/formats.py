@@ -11,7 +11,6 @@ from tribodyn.workflows.result.result import Result
 FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
     "vtk": ("series for ParaView over wear and over a cycle (.pvd, .vtu, .vtp)", vtk.write_vtk),
     "csv": ("every curve and history as a table", curves.write_csv),
-    "parquet": ("the same tables for pandas, polars, DuckDB", curves.write_parquet),
     "mat": ("the same tables as structs for MATLAB", curves.write_mat),
     "uff": ("universal file, dataset 58, for tools of measured data", curves.write_uff),
     "mesh": (
@@ -21,7 +20,6 @@ FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
     "npz": ("reduced matrices for NumPy, and for a scene's [model]", matrix_file.write_npz),
     "matlab": ("reduced matrices for MATLAB, and for a scene's [model]", matrix_file.write_matlab),
     "op4": ("reduced matrices, Nastran OUTPUT4", matrix_file.write_op4),
-    "mtx": ("reduced matrices, Matrix Market", matrix_file.write_mtx),
     "abaqus": ("reduced matrices, Abaqus *MATRIX INPUT", matrix_file.write_abaqus),
 }
 

@@ -155,10 +155,9 @@ class Reduction(Table):
     """Number of modes."""
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
     """Frequency up to which modes are kept, instead of their number."""
-    solver: Literal["direct", "mumps", "single_precision", "multigrid"] = "direct"
-    """How the part's equations are solved: by a factor, or by one of MUMPS in MPI processes; where none fits, by one in
-    single precision, half as large, and conjugate gradients; or by conjugate gradients with algebraic multigrid, which
-    takes far longer."""
+    solver: Literal["direct", "mumps", "multigrid"] = "direct"
+    """How the part's equations are solved: by a factor, or by one of MUMPS in MPI processes; where none fits, by
+    conjugate gradients with algebraic multigrid, which takes far longer."""
     interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
     """Replace the masters by this number of characteristic constraint modes."""
     interface_keep: tuple[str, ...] | None = None
