@@ -11,7 +11,7 @@ from pydantic import Field, StrictBool, StrictInt, ValidationInfo, field_validat
 
 from tribodyn import declare
 from tribodyn.hbm.contact import law as contact_law
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table
+from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
 from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
 
 
@@ -22,6 +22,48 @@ def rows_of(path: Path) -> list[list[float]]:
     except ValueError as error:
         raise ValueError(f"'{path.name}' is no table of comma-separated numbers ({error})") from None
     return rows
+
+
+Change = Annotated[float, quantity("K")]
+GIVEN = ("friction", "tangential_stiffness", "normal_stiffness")
+
+
+class ByTemperature(Table):
+    """Numbers of a contact at several changes of temperature, linear between them; none beyond their ends."""
+
+    temperature: Annotated[tuple[Change, ...], Field(min_length=1)]
+    """Changes of temperature, ascending, counted as those of the loads."""
+    friction: tuple[Annotated[Number, Field(ge=0)], ...] | None = None
+    """Coefficient of friction at each."""
+    tangential_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
+    """Tangential stiffness of the contact at each."""
+    normal_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
+    """Normal stiffness of the contact at each."""
+
+    @model_validator(mode="after")
+    def _columns(self) -> ByTemperature:
+        if any(np.diff(self.temperature) <= 0):
+            raise ValueError("temperature: give the changes of temperature in ascending order")
+        if not self.columns:
+            raise ValueError(f"give at least one of {', '.join(GIVEN)} at each temperature")
+        for name, values in self.columns.items():
+            if len(values) != len(self.temperature):
+                raise ValueError(f"{name}: give {len(self.temperature)} values, one for each temperature")
+        return self
+
+    @property
+    def columns(self) -> dict[str, tuple[float, ...]]:
+        """The numbers that are given, by name."""
+        return {name: values for name in GIVEN if (values := getattr(self, name)) is not None}
+
+    def at(self, temperature: float) -> dict[str, float]:
+        """The numbers at a change of temperature [K]; raises ValueError beyond the ends."""
+        low, high = self.temperature[0], self.temperature[-1]
+        if not low <= temperature <= high:
+            raise ValueError(
+                f"the contact is at {temperature:g} K, but by_temperature goes from {low:g} to {high:g} K: extend it"
+            )
+        return {name: float(np.interp(temperature, self.temperature, values)) for name, values in self.columns.items()}
 
 
 class ContactTable(LawTable):
@@ -121,6 +163,18 @@ class FaceContact(ContactTable):
     punch: tuple[Annotated[Length, Field(gt=0)], Annotated[Length, Field(gt=0)]] | None = None
     """Sides of a rectangular punch along t1 and t2, from which the contact stiffness is calculated instead of given
     numbers."""
+
+    temperature: Change | None = None
+    """Change of temperature of the contact, for `by_temperature`; by default the mean over its two bodies of what
+    static loads heat them by."""
+    by_temperature: ByTemperature | None = None
+    """Friction and stiffness at several temperatures, instead of numbers of this table."""
+
+    @model_validator(mode="after")
+    def _temperature_is_for_a_table(self) -> Self:
+        if self.temperature is not None and self.by_temperature is None:
+            raise ValueError(f"{self.TABLE}.temperature is for by_temperature, which is not there: leave it out")
+        return self
 
     @model_validator(mode="after")
     def _map_is_there(self, info: ValidationInfo) -> Self:

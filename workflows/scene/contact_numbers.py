@@ -1,4 +1,4 @@
-"""Numbers of a contact that follow from the measured faces that a scene names."""
+"""Numbers of a contact that follow from its temperature, or from the measured faces that a scene names."""
 
 from __future__ import annotations
 
@@ -7,13 +7,68 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import ValidationError
+
 from tribodyn import declare
 from tribodyn.hbm.contact import law as contact_law
-from tribodyn.workflows.scene.contact import Surfaces
+from tribodyn.workflows.scene.contact import ByTemperature, Change, Surfaces
+from tribodyn.workflows.scene.fields import Table
 from tribodyn.workflows.scene.own import is_file
 
 if TYPE_CHECKING:  # most scenes name no faces and start sooner without
     from tribodyn.geometry.surface import HeightMap
+
+
+class _OfContact(Table):
+    temperature: Change | None = None
+    by_temperature: ByTemperature
+
+
+class _Heat(Table):
+    temperature: Change
+
+
+def with_numbers_when_hot(key: str, contact: Mapping[str, Any], static: Any) -> dict[str, Any]:
+    """The table of a contact as it stands in the file, with the numbers of its temperature.
+
+    key : of the contact; static : the table of the static loads
+    Raises  ValueError where its temperature is not known or a number is given twice
+    """
+    own = {name: contact[name] for name in ("temperature", "by_temperature") if name in contact}
+    try:
+        read = _OfContact.model_validate(own)
+    except ValidationError as error:  # before the numbers that it should have given are missed
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in (key, *first["loc"]))
+        raise ValueError(f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
+    try:
+        found = read.by_temperature.at(_warmed(contact, static) if read.temperature is None else read.temperature)
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from None
+    # a scene that was written out has the numbers beside the table
+    twice = [name for name, value in found.items() if contact.get(name, value) not in (None, value)]
+    if twice:
+        raise ValueError(f"{key}.{twice[0]}: by_temperature gives it too: leave one of them out")
+    return {**contact, **found}
+
+
+def _warmed(contact: Mapping[str, Any], static: Any) -> float:
+    """Mean over its two bodies of what the static loads heat them by [K]."""
+    faces = [contact.get(one) for one in ("first", "second", "group", "opposite")]
+    bodies = {str(face).partition(".")[0] for face in faces if isinstance(face, str) and face != "ground"}
+    warmed = dict.fromkeys(bodies, 0.0)
+    for load in static.values() if isinstance(static, Mapping) else ():
+        if not isinstance(load, Mapping) or not {"temperature", "field"} & set(load):
+            continue
+        if "field" in load:
+            raise ValueError("a field of temperatures heats its bodies: give the contact's own temperature")
+        try:
+            change = _Heat.model_validate({"temperature": load["temperature"]}).temperature
+        except ValidationError:  # reported where the load is read
+            continue
+        for body in bodies & set(load.get("bodies", bodies)):
+            warmed[body] += change
+    return sum(warmed.values()) / len(warmed)
 
 
 def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:

@@ -20,7 +20,7 @@ from pydantic import (
 from tribodyn.workflows.scene.afterwards import Pictures, VerdictOptions
 from tribodyn.workflows.scene.body import Geometry, SolidMaterial
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
-from tribodyn.workflows.scene.contact_numbers import takes_asperities, with_asperities
+from tribodyn.workflows.scene.contact_numbers import takes_asperities, with_asperities, with_numbers_when_hot
 from tribodyn.workflows.scene.fields import (
     Table,
     unknown_key,
@@ -159,6 +159,26 @@ class MeshScene(Scene):
         if surfaces is None:
             return data
         found = {name: with_asperities(dict(contacts[name]), surfaces, folder) for name in lacking}
+        return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers_when_hot(cls, data: Any) -> Any:
+        """A contact with a table over temperature has the numbers of its own one."""
+        if not isinstance(data, dict):
+            return data
+        loads = data.get("loads")
+        static = loads.get("static") if isinstance(loads, dict) else None
+        several = data.get("contacts")
+        contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
+        prefix = "contacts." if several is contacts else ""
+        found = {
+            name: with_numbers_when_hot(prefix + name, contact, static)
+            for name, contact in contacts.items()
+            if isinstance(contact, dict) and contact.get("by_temperature") is not None
+        }
+        if not found:
+            return data
         return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}
 
     @model_validator(mode="before")
