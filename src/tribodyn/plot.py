@@ -8,6 +8,7 @@
 `axes`, `draw_field`, `draw_status` and `shades` draw one's own figures in the same style, see `tribodyn.style`.
 """
 
+from tribodyn.workflows.export.vtk import mesh_fields, patch_fields
 from tribodyn.workflows.pictures.figures import axes_of as axes
 from tribodyn.workflows.pictures.figures import length_unit
 from tribodyn.workflows.pictures.film import film
@@ -16,7 +17,6 @@ from tribodyn.workflows.pictures.maps import draw_field, draw_status
 from tribodyn.workflows.pictures.maps import motion_maps as motion
 from tribodyn.workflows.pictures.maps import patch_maps as patch
 from tribodyn.workflows.pictures.maps import status_maps as status
-from tribodyn.workflows.pictures.mesh_fields import mesh_fields, patch_fields
 from tribodyn.workflows.pictures.plots import draw as write
 from tribodyn.workflows.pictures.plots import hysteresis, response, wear
 from tribodyn.workflows.pictures.render import draw as render

@@ -4,61 +4,38 @@ A scene is a name, the path of a .toml file, its tables as a dict, or one that w
 and `study` are made from these functions.
 """
 
-from tribodyn.geometry.surface import HeightMap
-from tribodyn.workflows.studies.convergence import Converged, converge
-from tribodyn.workflows.studies.curves.backbones import SceneBackbone, backbone
-from tribodyn.workflows.studies.curves.decay import Decay, ring_down
-from tribodyn.workflows.studies.curves.folds import FoldsFound, folds
-from tribodyn.workflows.studies.curves.tracking import Track, track
-from tribodyn.workflows.studies.derivatives import ResponseDerivatives, derivatives
-from tribodyn.workflows.studies.fits.fit_file import Fit, identify, posterior
-from tribodyn.workflows.studies.fits.posterior import Posterior
-from tribodyn.workflows.studies.forces import Forces, forces
-from tribodyn.workflows.studies.inspection import Inspection
-from tribodyn.workflows.studies.many.lives import Lives, lives
-from tribodyn.workflows.studies.many.optimum import Optimum, optimise
-from tribodyn.workflows.studies.many.study import grid
-from tribodyn.workflows.studies.many.table import StudyTable
-from tribodyn.workflows.studies.measured.compare import Compared, compare
-from tribodyn.workflows.studies.supports import Supports, supports
-from tribodyn.workflows.studies.surfaces import FaceAsperities, asperities
-from tribodyn.workflows.studies.verification import Comparison
-from tribodyn.workflows.studies.worn_states import WornStates, verify_states
-
-__all__ = [
-    "Compared",
-    "Comparison",
-    "Converged",
-    "Decay",
-    "FaceAsperities",
-    "Fit",
-    "FoldsFound",
-    "Forces",
-    "HeightMap",
-    "Inspection",
-    "Lives",
-    "Optimum",
-    "Posterior",
-    "ResponseDerivatives",
-    "SceneBackbone",
-    "StudyTable",
-    "Supports",
-    "Track",
-    "WornStates",
-    "asperities",
-    "backbone",
-    "compare",
-    "converge",
-    "derivatives",
-    "folds",
-    "forces",
-    "grid",
-    "identify",
-    "lives",
-    "optimise",
-    "posterior",
-    "ring_down",
-    "supports",
-    "track",
-    "verify_states",
-]
+from tribodyn.geometry.surface import HeightMap as HeightMap
+from tribodyn.workflows.studies.convergence import Converged as Converged
+from tribodyn.workflows.studies.convergence import converge as converge
+from tribodyn.workflows.studies.curves.backbones import SceneBackbone as SceneBackbone
+from tribodyn.workflows.studies.curves.backbones import backbone as backbone
+from tribodyn.workflows.studies.curves.decay import Decay as Decay
+from tribodyn.workflows.studies.curves.decay import ring_down as ring_down
+from tribodyn.workflows.studies.curves.folds import FoldsFound as FoldsFound
+from tribodyn.workflows.studies.curves.folds import folds as folds
+from tribodyn.workflows.studies.curves.tracking import Track as Track
+from tribodyn.workflows.studies.curves.tracking import track as track
+from tribodyn.workflows.studies.derivatives import ResponseDerivatives as ResponseDerivatives
+from tribodyn.workflows.studies.derivatives import derivatives as derivatives
+from tribodyn.workflows.studies.fits.fit_file import Fit as Fit
+from tribodyn.workflows.studies.fits.fit_file import identify as identify
+from tribodyn.workflows.studies.fits.fit_file import posterior as posterior
+from tribodyn.workflows.studies.fits.posterior import Posterior as Posterior
+from tribodyn.workflows.studies.forces import Forces as Forces
+from tribodyn.workflows.studies.forces import forces as forces
+from tribodyn.workflows.studies.inspection import Inspection as Inspection
+from tribodyn.workflows.studies.many.lives import Lives as Lives
+from tribodyn.workflows.studies.many.lives import lives as lives
+from tribodyn.workflows.studies.many.optimum import Optimum as Optimum
+from tribodyn.workflows.studies.many.optimum import optimise as optimise
+from tribodyn.workflows.studies.many.study import grid as grid
+from tribodyn.workflows.studies.many.table import StudyTable as StudyTable
+from tribodyn.workflows.studies.measured.compare import Compared as Compared
+from tribodyn.workflows.studies.measured.compare import compare as compare
+from tribodyn.workflows.studies.supports import Supports as Supports
+from tribodyn.workflows.studies.supports import supports as supports
+from tribodyn.workflows.studies.surfaces import FaceAsperities as FaceAsperities
+from tribodyn.workflows.studies.surfaces import asperities as asperities
+from tribodyn.workflows.studies.verification import Comparison as Comparison
+from tribodyn.workflows.studies.worn_states import WornStates as WornStates
+from tribodyn.workflows.studies.worn_states import verify_states as verify_states

@@ -22,8 +22,7 @@ def functions() -> set[str]:
     found = set()
     for place in (td, td.plot, td.studies, td.wheel, td.matrices):
         short = place.__name__.replace("tribodyn", "td")
-        names = dir(place) if place is td else getattr(place, "__all__", dir(place))
-        ours = {name: getattr(place, name) for name in names if not name.startswith("_")}
+        ours = {name: getattr(place, name) for name in dir(place) if not name.startswith("_")}
         found |= {f"{short}.{name}" for name, thing in ours.items() if inspect.isfunction(thing)}
     return found
 

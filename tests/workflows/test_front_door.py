@@ -44,9 +44,6 @@ def test_every_name_is_there_and_is_told_once() -> None:
     assert len(td.__all__) == len(set(td.__all__)) <= 40
     for name in td.__all__:
         assert getattr(td, name) is not None
-    for room in (td.matrices, td.plot, td.studies, td.wheel):
-        for name in room.__all__:
-            assert getattr(room, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         _ = td.nonsense
 
@@ -119,11 +116,15 @@ def test_fields_on_the_mesh_are_those_of_the_result(worn: td.Result) -> None:
     assert worn.patch is not None
     assert worn.fields is not None
     assert grid.n_points == len(worn.part.points)
-    depth = np.asarray(grid["wear_depth"])
-    assert np.array_equal(np.flatnonzero(np.isfinite(depth)), np.sort(worn.patch.nodes))
     assert worn.wear is not None
-    assert np.array_equal(depth[worn.patch.nodes], worn.wear.depth[-1])  # of the state that the row solved
-    assert np.array_equal(np.asarray(patch["wear_depth"]), worn.wear.depth[-1])
+    depth = np.asarray(patch.point_data["depth"])
+    assert np.array_equal(depth, worn.wear.depth[-1])  # of the state that the row solved
+    split = worn.facts.share_of_body_1
+    assert np.allclose(np.asarray(grid["depth_on_this_face"])[worn.patch.nodes], split * depth, rtol=1e-12)
+    first = td.plot.patch_fields(worn, 0)
+    assert not np.asarray(first.point_data["depth"]).any()
+    with pytest.raises(ValueError, match="no wear row 77"):
+        td.plot.patch_fields(worn, 77)
     # a single harmonic on top of the static one swings by sqrt(a^2 + b^2 in the ellipse's long axis)
     a, b = worn.fields.displacement[-1][..., 1:3].transpose(2, 0, 1)
     long = np.linalg.svd(np.stack([a, b], axis=-1), compute_uv=False)[:, 0]

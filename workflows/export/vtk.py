@@ -8,17 +8,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.workflows.pictures.view import grid_of, polygons
+from tribodyn.workflows.pictures.view import cycle, grid_of, polygons, swing
 from tribodyn.workflows.result.faces import meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, instant_status, over_a_cycle, shown_states, state_of
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 INSTANTS = 32  # of a period
 
@@ -90,8 +93,46 @@ def _vectors(result: Result, components: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("pc,pcx->px", components, axes))
 
 
+def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
+    """The worn part as a pyvista grid, with `part_grid`'s fields and the motion of a state that keeps one.
+
+    row : of the wear history or the response, among `result.fields.row`; the last of them by default
+    Point data: vibration (n_node, 3), displacement from the mean position at the largest swing; amplitude (n_node,),
+    largest distance from there over the cycle [m]
+    Raises  ValueError where the result keeps no mesh or no field at the row
+    """
+    if result.part is None or result.fields is None:
+        raise ValueError("the result keeps no fields on a mesh: its scene needs a part, [wear] and pictures.renders")
+    rows = result.fields.row.tolist()
+    row = rows[-1] if row is None else row
+    if row not in rows:
+        raise ValueError(f"the result has no field at wear row {row}: it has those at {', '.join(map(str, rows))}")
+    grid, displacement = part_grid(result, state_of(result, row)), result.fields.displacement[rows.index(row)]
+    grid.point_data["vibration"] = swing(displacement, result.harmonics)
+    grid.point_data["amplitude"] = np.linalg.norm(cycle(displacement, result.harmonics), axis=1).max(axis=1)
+    return grid
+
+
+def patch_fields(result: Result, row: int | None = None) -> pv.PolyData:
+    """The faces of the contact as `contact_surface` has them in point_data and cell_data, at a wear row, else the last.
+
+    Raises  ValueError where the result has no worn patch with faces
+    """
+    wear = result.wear
+    if wear is None or not len(wear.cycles) or not len(result.patch.faces):
+        raise ValueError("the result holds no worn patch with faces")
+    rows = range(len(wear.cycles))
+    if row is not None and row not in rows:
+        raise ValueError(f"the result has no wear row {row}: it has 0 to {rows[-1]}")
+    return contact_surface(result, state_of(result, rows[-1] if row is None else row))
+
+
 def part_grid(result: Result, state: State) -> Any:
-    """The worn part as a pyvista grid with its fields at nodes, of one state."""
+    """The worn part as a pyvista grid of one state.
+
+    Point data: worn_off (n_node, 3) [m]; depth_on_this_face [m]; face, of the contact, 1, 2 or 0; Fourier coefficients
+    displacement_a0, ... (n_node, 3) where the state keeps them [m]
+    """
     part = result.part
     assert part is not None
     meetings = meetings_of(result)
@@ -116,7 +157,11 @@ def part_grid(result: Result, state: State) -> Any:
 
 
 def contact_surface(result: Result, state: State) -> Any:
-    """Body 1's face of the contact as a pyvista surface: fields at its pairs and their means on its faces."""
+    """Body 1's face of the contact as a pyvista surface: fields at its pairs and their means on its faces.
+
+    depth, gap with it [m]; area [m2]; pressure [Pa], mean over the cycle; energy_per_cycle [J]; normal; status, bits of
+    hbm.contact.law (1 sticks, 2 slips, 4 separates)
+    """
     pv = package("pyvista")
 
     patch = result.patch
