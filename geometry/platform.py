@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.geometry.airfoil import Section
+from tribodyn.geometry.blade import Section
 from tribodyn.geometry.blocks import Block
 
 Names = Mapping[tuple[int, int], Mapping[str, str]]
