@@ -14,7 +14,7 @@ from tribodyn.workflows.command.word import QUIET, show_found, word
 from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, quantity
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress

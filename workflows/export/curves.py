@@ -11,7 +11,7 @@ import numpy as np
 from tribodyn.extras import package
 from tribodyn.workflows.export.tables import tables, terms
 from tribodyn.workflows.result import verdict
-from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.result.result import Result
 
 

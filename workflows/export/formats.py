@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tribodyn.workflows.export import curves, matrix_file, mesh_file, vtk
+from tribodyn.workflows.export import curves, matrix_file, vtk
 from tribodyn.workflows.result.result import Result
 
 FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
@@ -15,7 +15,7 @@ FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
     "uff": ("universal file, dataset 58, for tools of measured data", curves.write_uff),
     "mesh": (
         "worn part with its fields (.xdmf; another format with --mesh-ending)",
-        lambda r, f: mesh_file.write_mesh(r, f / "part.xdmf"),
+        lambda r, f: vtk.write_mesh(r, f / "part.xdmf"),
     ),
     "npz": ("reduced matrices for NumPy, and for a scene's [model]", matrix_file.write_npz),
     "matlab": ("reduced matrices for MATLAB, and for a scene's [model]", matrix_file.write_matlab),
@@ -37,7 +37,7 @@ def write(result: Result, wanted: Sequence[str], folder: Path, mesh_ending: str 
         place = folder / name
         place.mkdir(parents=True, exist_ok=True)
         if name == "mesh":
-            written += mesh_file.write_mesh(result, place / f"part{mesh_ending}")
+            written += vtk.write_mesh(result, place / f"part{mesh_ending}")
         else:
             written += FORMATS[name][1](result, place)
     return written

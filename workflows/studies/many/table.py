@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
-from tribodyn.workflows.result.whole_file import replacing
+from tribodyn.workflows.result.store import replacing
 from tribodyn.workflows.studies.many import pictures
 from tribodyn.workflows.studies.many.distributions import si
 from tribodyn.workflows.studies.many.task import ENDS, SINGLE, Row
