@@ -1,4 +1,4 @@
-"""Files for ParaView: the worn part, and series of part and contact over wear and over a cycle with a .pvd that lists them.
+"""Files for ParaView: the worn part, and series of part and contact over wear and over a cycle, listed by a .pvd.
 
 Point coordinates are those of the worn part at rest, not exaggerated; displacements are fields, to warp by in ParaView.
 """

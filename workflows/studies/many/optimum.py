@@ -21,7 +21,8 @@ from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study import Runner
 from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
-from tribodyn.workflows.studies.many.table import RUN, SENTENCE, StudyTable
+from tribodyn.workflows.studies.many.table import SENTENCE, StudyTable
+from tribodyn.workflows.studies.many.task import RUN
 from tribodyn.workflows.studies.many.trades import Known, chebyshev, ends, propose
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth

@@ -11,13 +11,11 @@ from matplotlib.ticker import MaxNLocator
 
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, STYLE
-from tribodyn.workflows.studies.many.table import RUN
-
-if TYPE_CHECKING:
-    from tribodyn.workflows.studies.many.table import StudyTable
+from tribodyn.workflows.studies.many.task import RUN
 
 if TYPE_CHECKING:
     from tribodyn.workflows.studies.many.optimum import Optimum
+    from tribodyn.workflows.studies.many.table import StudyTable
 
 
 def picture(found: Optimum) -> Figure:

@@ -15,12 +15,12 @@ from scipy import stats
 from tribodyn.workflows.result.store import replacing
 from tribodyn.workflows.studies.many import pictures
 from tribodyn.workflows.studies.many.distributions import si
-from tribodyn.workflows.studies.many.task import ENDS, SINGLE, Row
+from tribodyn.workflows.studies.many.task import ENDS, RUN, SINGLE, Row
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RUN, STATUS, SENTENCE = "run", "status", "sentence"
+STATUS, SENTENCE = "status", "sentence"
 LIFE = "life_cycles"
 FEWEST = 5  # complete runs that a correlation needs
 
