@@ -1,10 +1,10 @@
-"""Make the gallery of the site: every scene that comes along, every kind of picture, films, screenshots of reports.
+"""Make the gallery of the site: every scene that comes along, every kind of picture, films.
 
     ./tribodyn gallery                       runs every scene as it is shipped, half an hour
     ./tribodyn gallery --results FOLDER      takes FOLDER/NAME/result.h5 where they are complete
 
 Leaves docs/gallery/pictures/*.png and *.gif, docs/gallery/pictures.md that shows them, and the figures that other pages
-take from the same runs. Screenshots need Chromium and chromedriver.
+take from the same runs.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ PICTURES = HERE / "gallery" / "pictures"
 PAGE = HERE / "gallery" / "pictures.md"
 DPI, FILM_DPI, FILM_IMAGES = 100, 55, 16
 COLOURS = 256  # of a picture on the site
-WIDTHS = {"phone": 390, "desk": 1280}
 ELSEWHERE = {
     ("beam", "patch"): "beam_patch", ("beam", "frf"): "beam_frf", ("blade", "wheel"): "blade_wheel",
     ("brb_flat", "patch"): "brb_patch", ("brb_flat", "part"): "brb_part", ("turbine", "frf"): "turbine_frf",
@@ -54,14 +53,11 @@ KINDS = {
     "wheel": "All blades at one instant.",
     "film_wear": "Depth, status and pressure over wear.",
     "film_cycle": "One cycle: the part in motion and the status of every pair.",
-    "report_phone": "The top of the report at the width of a phone.",
-    "report_desk": "The top of the report at the width of a desk.",
     "nodal_diameters": "Frequencies over nodal diameters, contact free and stuck.",
     "safe": "SAFE diagram: which modes an engine order meets in a range of speeds.",
     "campbell": "Campbell diagram of some engine orders.",
     "backbone": "Frequency and damping of a nonlinear mode against its amplitude.",
-    "life": "Lives of a study of drawn loads and frictions on Weibull paper.",
-    "study": "Peak, amplitude, depth and life of the same study against what was drawn.",
+    "study": "Peak, amplitude, depth and life of a study of drawn loads and frictions.",
 }
 
 CHANGED = {"rig": ("verdict.enabled=false",)}  # its verdict takes longer than all else here
@@ -126,7 +122,6 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
                 yield Path(shutil.copy(film, PICTURES / f"{name}_film_{over}.gif"))
         if name == "beam":
             story(result, HERE / "figures" / "beam_story.png", Path(place))
-        yield from screenshots(name, folder / "result.h5", Path(place))
 
 
 def story(result: td.Result, path: Path, place: Path) -> Path:
@@ -168,40 +163,6 @@ def result_at(result: td.Result, at: int) -> td.Result:
     )
 
 
-def screenshots(name: str, file: Path, place: Path) -> Iterator[Path]:
-    """The top of the report at two widths."""
-    from tribodyn.workflows.report import page
-
-    report = page.write([(name, td.load(file), file)], place / "report.html")
-    print(f"  report: {report.stat().st_size / 1e6:.1f} MB")
-    chromium = next((path for word in ("chromium", "google-chrome") if (path := shutil.which(word))), None)
-    if chromium is None:
-        print("  no Chromium here: no screenshots")
-        return
-    from selenium import webdriver
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader"):
-        options.add_argument(word)
-    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which("chromedriver")))
-    try:
-        browser.set_page_load_timeout(300)
-        for word, width in WIDTHS.items():
-            size = {"width": width, "height": 1500, "deviceScaleFactor": 1, "mobile": width < 600}
-            browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-            browser.get(report.resolve().as_uri())
-            end = time.monotonic() + 300
-            while not browser.execute_script("return window.reportReady === true") and time.monotonic() < end:
-                time.sleep(0.5)
-            time.sleep(3)
-            path = place / f"report_{word}.png"
-            browser.save_screenshot(str(path))
-            yield small(path, f"{name}_report_{word}")
-    finally:
-        browser.quit()
-
-
 def studies(folder: Path) -> Iterator[Path]:
     """What the studies draw: modes of the blade's wheel, a backbone of the beam, lives of a drawn beam."""
     wheel = td.wheel.build(td.read_scene("blade"))
@@ -217,7 +178,6 @@ def studies(folder: Path) -> Iterator[Path]:
         "blade_campbell": td.plot.campbell(speeds, waves, orders, critical, "blade"),
         "beam_backbone": bone.plot(),
         "beam_study": table.plot(),
-        "beam_life": table.plot_distribution(),
     }.items():
         path = folder / f"{name}.png"
         figure.savefig(path, dpi=DPI)

@@ -15,12 +15,11 @@ from scipy.sparse.linalg import splu
 
 from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.mumps import Mumps
-from tribodyn.fem.refined import Refined
 
 # Relative residual of the softest direction that still counts as regular. Measured: a plate 2000 times longer than
 # thick reaches 0.05, a body that can move rigidly 6 to 1000.
 SINGULAR = 0.5
-SOLVERS = ("pardiso", "superlu", "mumps", "single_precision", "multigrid")
+SOLVERS = ("pardiso", "superlu", "mumps", "multigrid")
 
 
 class SingularStiffness(ValueError):
@@ -46,8 +45,7 @@ def factorise(
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
     solver : "pardiso" or "superlu", the best available by default; "mumps" in MPI processes of another Python;
-        "single_precision" has a factor of half the size and refines, "multigrid" has none and iterates, both for a
-        definite K
+        "multigrid" has no factor and iterates, for a definite K
     shapes : (n, k) motions that K hardly resists, for multigrid; few : rows that `solve_few` is to be fast for
     Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
@@ -56,16 +54,10 @@ def factorise(
         solver = "pardiso" if pardiso_available() else "superlu"
     elif solver not in SOLVERS:
         raise ValueError(f"no solver '{solver}': there are {', '.join(SOLVERS)}")
-    elif solver == "single_precision" and not pardiso_available():
-        raise ValueError(
-            'the solver single_precision needs the package pypardiso: install it with pip install "tribodyn[mkl]"'
-        )
     try:
         factor: Factor
         if solver == "multigrid":
             factor = Multigrid(K, shapes)
-        elif solver == "single_precision":
-            factor = Refined(K, lambda scaled: Pardiso(scaled, single=True))
         elif solver == "mumps":
             factor = Mumps(K, definite)
         else:
@@ -132,7 +124,7 @@ def pardiso_available() -> bool:
 
 
 class Pardiso:
-    """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite), where `single` in float32.
+    """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite).
 
     few : rows that are eliminated last, so that a solution in them from forces on them visits no others
     """
@@ -141,31 +133,28 @@ class Pardiso:
     ANALYSE_AND_FACTORISE, SOLVE = 12, 33  # phases
     PARTIAL = 31  # place of the switch
 
-    def __init__(
-        self, K: csr_matrix, definite: bool = True, single: bool = False, few: np.ndarray | None = None
-    ) -> None:
+    def __init__(self, K: csr_matrix, definite: bool = True, few: np.ndarray | None = None) -> None:
         from pypardiso import PyPardisoSolver
 
         self.name = "MKL PARDISO, " + ("Cholesky" if definite else "LDL^T")
-        self._kind = np.float32 if single else np.float64
         upper = triu(K, format="csr")
         upper.sort_indices()
         if not np.diff(upper.indptr).all():
             raise ArithmeticError("a row is empty")  # PARDISO would crash
         # as Fortran counts; pypardiso's own call makes these arrays anew at each solution
         rows, columns = (1 + array.astype(np.int32) for array in (upper.indptr, upper.indices))
-        self._matrix = upper.data.astype(self._kind), rows, columns
+        self._matrix = upper.data.astype(float), rows, columns
         del upper
         self._solver = PyPardisoSolver(mtype=2 if definite else -2)
         # METIS, and no iterative refinement unless pivots were perturbed: MKL's defaults refine twice, 5 times slower
-        for place, value in {1: 1, 2: 2, 8: 0, 10: 8, 28: int(single)}.items():
+        for place, value in {1: 1, 2: 2, 8: 0, 10: 8}.items():
             self._solver.set_iparm(place, value)
         self._few = few is not None
         if few is not None:
             self._solver.perm = np.zeros(K.shape[0], np.int32)
             self._solver.perm[few] = 1
             self._solver.set_iparm(self.PARTIAL, 1)
-        self._call(self.ANALYSE_AND_FACTORISE, np.zeros(K.shape[0], self._kind))
+        self._call(self.ANALYSE_AND_FACTORISE, np.zeros(K.shape[0]))
 
     @property
     def negative(self) -> int:
@@ -175,7 +164,7 @@ class Pardiso:
     def solve(self, rhs: np.ndarray, few: bool = False) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k); of the few rows alone where asked for, see `solve_few`."""
         self._solver.set_iparm(self.PARTIAL, int(few and self._few))
-        return np.ascontiguousarray(self._call(self.SOLVE, np.asfortranarray(rhs, dtype=self._kind)))
+        return np.ascontiguousarray(self._call(self.SOLVE, np.asfortranarray(rhs, dtype=float)))
 
     def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
         """One call of PARDISO; rhs (n,) or (n, k) in Fortran's order. Raises MemoryError, ArithmeticError."""

@@ -12,13 +12,15 @@ a parameter makes, by a step so small that what they miss is rounding; where a p
 model, such as the shapes of a reduction, x and y are compared at the same g, which needs no common coordinates.
 
 At a peak of A(w, p), where the slope a_w of a = A^2 / 2 vanishes, dw/dp = - a_wp / a_ww, and dq/dp has q_w dw/dp
-besides. a_wp and a_ww are differences along the curve of the exact gradient, of all parameters together.
+besides. a_wp and a_ww are differences along the curve of the exact gradient, of all parameters together. A peak that is
+a corner of the curve, where a contact transition begins, stays where both sides meet: dw/dp = - [A_p] / [A_w], with
+the jumps of both.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -51,6 +53,8 @@ class Rules:
     most_steps: int = 12  # to a peak, and the first of them over the frequency
     first_step: float = 1e-5
     at_peak: float = 1e-7  # half widths between a peak and where it is foreseen
+    at_corner: float = 1e-8  # half widths between both sides of a corner, and the first of four points beside it
+    sides: tuple[float, float] = (-3e-4, 3e-4)
     # difference of one-sided derivatives over their size from which on they are two, and size over the largest of all
     # parameters by one step that counts
     corner: float = 1e-2
@@ -416,6 +420,7 @@ class Derivatives:
     by_frequency : (n_quantity,) dq / d omega at fixed parameters [1/(rad/s)], zero along a peak
     by_gap : (n_quantity, n_pair) dq / d gap of each pair [1/m]
     state : solved, along a peak beside it; solves : of the balance that were spent
+    follows_corner : whether the peak is a corner of the curve, at which a contact transition begins
     """
 
     names: tuple[str, ...]
@@ -429,49 +434,73 @@ class Derivatives:
     by_gap: np.ndarray
     state: State
     solves: int
-
-
-def _explicit(gradient: Gradient, changes: Sequence[Change]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """At a fixed frequency: dq / dp (n_quantity, n_change + n_pair) of the changes and of the gap of every pair;
-    one-sided derivatives of the changes.
-    """
-    both = np.reshape([gradient.by(change) for change in changes], (len(changes), 2, len(gradient.quantities)))
-    above, below = both[:, 0].T, both[:, 1].T
-    return np.concatenate([(above + below) / 2, gradient.by_gap()], axis=1), above, below
+    follows_corner: bool = False
 
 
 @dataclass(frozen=True)
-class _Peak:
-    """How a peak moves: from the state to where its slope vanishes [rad/s], and with every column of `_explicit`."""
+class _Fixed:
+    """At one solution: values and dq / d omega (n_quantity,) of its quantities, and derivatives at a fixed frequency.
 
-    left: float
-    moves: np.ndarray
+    above, below : (n_quantity, n_change) one-sided, by the changes; by_gap : (n_quantity, n_pair)
+    """
+
+    values: np.ndarray
+    by_frequency: np.ndarray
+    above: np.ndarray
+    below: np.ndarray
+    by_gap: np.ndarray
+
+    @property
+    def columns(self) -> np.ndarray:
+        """(n_quantity, n_change + n_pair) by the changes and by the gap of every pair."""
+        return np.concatenate([(self.above + self.below) / 2, self.by_gap], axis=1)
+
+    @classmethod
+    def limit(cls, points: Sequence[_Fixed]) -> _Fixed:
+        """What points at 1, 4, 9 and 16 times a distance tend to, by a cubic over its root: slip begins by a root."""
+        return cls(*(np.tensordot((4, -6, 4, -1), [getattr(p, f.name) for p in points], 1) for f in fields(cls)))
+
+
+def _fixed(gradients: Sequence[Gradient], changes: Iterable[Change]) -> tuple[list[str], np.ndarray, list[_Fixed]]:
+    """Names and steps of the changes, and what each gradient has; one change is there at a time."""
+    names, steps = list[str](), list[float]()
+    sides: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in gradients]
+    for change in changes:
+        names.append(change.name)
+        steps.append(change.step)
+        for found, gradient in zip(sides, gradients, strict=True):
+            found.append(gradient.by(change))
+    points = []
+    for found, gradient in zip(sides, gradients, strict=True):
+        values = np.array([q.value for q in gradient.quantities])
+        both = np.reshape(found, (len(found), 2, len(values)))
+        points.append(_Fixed(values, gradient.by_frequency(), both[:, 0].T, both[:, 1].T, gradient.by_gap()))
+    return names, np.array(steps), points
 
 
 def _gathered(
     gradient: Gradient,
-    changes: Sequence[Change],
+    names: list[str],
+    steps: np.ndarray,
+    own: _Fixed,
     solves: int,
-    peak_of: Callable[[float], _Peak] | None = None,
+    omega: float = 0.0,
+    moves: np.ndarray | None = None,
 ) -> Derivatives:
-    """At the frequency of a gradient's state, or along the peak: peak_of takes the slope of A^2 / 2 at the state."""
-    columns, above, below = _explicit(gradient, changes)
-    names, values = [q.name for q in gradient.quantities], np.array([q.value for q in gradient.quantities])
-    by_frequency = gradient.by_frequency()
-    if peak_of is not None:
-        peak = peak_of(values[0] * by_frequency[0])
-        omega = gradient.state.omega + peak.left
-        columns = np.concatenate([peak.moves[None] / (2 * np.pi), columns + by_frequency[:, None] * peak.moves])
-        values = np.concatenate([[omega / (2 * np.pi)], values + by_frequency * peak.left])
-        names, by_frequency = ["frequency", *names], np.zeros(len(values))
-        above, below = (np.concatenate([np.zeros((1, len(changes))), side]) for side in (above, below))
-    n = len(changes)
-    steps = np.array([change.step for change in changes])
+    """At a fixed frequency, or along a frequency [rad/s] that has a derivative `moves` by every column."""
+    values, columns, above, below = own.values, own.columns, own.above, own.below
+    quantities, by_frequency = [q.name for q in gradient.quantities], own.by_frequency
+    if moves is not None:
+        columns = np.concatenate([moves[None] / (2 * np.pi), columns + by_frequency[:, None] * moves])
+        values = np.concatenate([[omega / (2 * np.pi)], values])
+        quantities, by_frequency = ["frequency", *quantities], np.zeros(len(values))
+        above, below = (np.concatenate([np.zeros((1, len(names))), side]) for side in (above, below))
+    n = len(names)
     moved = np.abs(above + below) * steps
     seen = np.maximum(moved, RULES.seen * moved.max(axis=1, initial=0.0, keepdims=True))
     corner = (2 * np.abs(above - below) * steps > RULES.corner * seen).any(axis=0)
     return Derivatives(
-        tuple(names), values, tuple(change.name for change in changes), columns[:, :n], corner, above, below,
+        tuple(quantities), values, tuple(names), columns[:, :n], corner, above, below,
         by_frequency, columns[:, n:], gradient.state, solves,
     )  # fmt: skip
 
@@ -488,7 +517,7 @@ def at_frequency(
     balance: HarmonicBalance,
     state: State,
     output: str,
-    changes: Sequence[Change],
+    changes: Iterable[Change],
     worn: Mapping[str, float] | None = None,
     options: NewtonOptions | None = None,
 ) -> Derivatives:
@@ -499,7 +528,8 @@ def at_frequency(
     """
     state = _solved(balance, state.omega, state.x, options)
     gradient = Gradient(balance, state, tuple(quantities(balance, state, output, worn)))
-    return _gathered(gradient, changes, 1)
+    names, steps, (own,) = _fixed([gradient], changes)
+    return _gathered(gradient, names, steps, own, 1)
 
 
 @single
@@ -507,34 +537,57 @@ def at_peak(
     balance: HarmonicBalance,
     state: State,
     output: str,
-    changes: Sequence[Change],
+    changes: Iterable[Change],
     worn: Mapping[str, float] | None = None,
     options: NewtonOptions | None = None,
 ) -> Derivatives:
     """Derivatives along the resonance peak beside a state, its frequency [Hz] the first quantity; see `at_frequency`.
 
     Values are those of the peak itself: one Newton step on its condition from the state, which is `RULES.at_peak` away.
-    Raises  NoDerivative where no slope vanishes beside the state, as at a fold
+    A peak that is a corner of the curve stays where the curve has its corner
+    Raises  NoDerivative where no peak lies beside the state, as at a fold
     """
-    here, width, solves = _peak(balance, state, output, options)
-    state = here.solution.state
-    gradient = Gradient(balance, state, tuple(quantities(balance, state, output, worn)))
+    ends, width, solves = _peak(balance, state, output, options)
 
-    def peak_of(slope: float) -> _Peak:
-        curvature, mixed = 0.0, 0.0
-        step = RULES.along * width
-        for side in (-step, step):
-            omega = state.omega + side
-            near_state = _solved(balance, omega, here.predict(omega), options)
-            near = Gradient(balance, near_state, (quantities(balance, near_state, output)[0],))
-            size = near.quantities[0].value / (2 * side)
-            curvature += size * near.by_frequency()[0]
-            mixed += size * _explicit(near, changes)[0][0]
-        if not curvature < 0:
-            raise NoDerivative("the response has no maximum beside this point")
-        return _Peak(-slope / curvature, -np.asarray(mixed) / curvature)
+    def beside(end: Slope, widths: float) -> Gradient:
+        omega = end.omega + widths * width
+        near = _solved(balance, omega, end.predict(omega), options)
+        return Gradient(balance, near, tuple(quantities(balance, near, output, worn)))
 
-    return _gathered(gradient, changes, solves + 2, peak_of)
+    if len(ends) == 2:
+        low, high = (
+            [beside(end, side * n**2) for n in (1, 2, 3, 4)] for end, side in zip(ends, RULES.sides, strict=True)
+        )
+        return _at_corner(low, high, changes, solves + 8)
+    gradient, *near = (beside(ends[0], side) for side in (0.0, -RULES.along, RULES.along))
+    near = [replace(one, quantities=one.quantities[:1]) for one in near]
+    names, steps, (own, *points) = _fixed([gradient, *near], changes)
+    slopes = [p.values[0] * np.concatenate([p.by_frequency[:1], p.columns[0]]) for p in points]
+    curvature, *mixed = (slopes[1] - slopes[0]) / (2 * RULES.along * width)
+    if not curvature < 0:
+        raise NoDerivative("the response has no maximum beside this point")
+    left = -own.values[0] * own.by_frequency[0] / curvature
+    own = replace(own, values=own.values + left * own.by_frequency)
+    return _gathered(
+        gradient, names, steps, own, solves + 2, gradient.state.omega + left, -np.asarray(mixed) / curvature
+    )
+
+
+def _at_corner(
+    low: Sequence[Gradient], high: Sequence[Gradient], changes: Iterable[Change], solves: int
+) -> Derivatives:
+    """Along a corner of the curve, from what tends to it below and above it: both are one curve there."""
+    both = set.intersection(*({q.name for q in one.quantities} for one in (*low, *high)))
+    gradients = [replace(g, quantities=tuple(q for q in g.quantities if q.name in both)) for g in (*low, *high)]
+    names, steps, points = _fixed(gradients, changes)
+    below, above = _Fixed.limit(points[:4]), _Fixed.limit(points[4:])
+    moves = (above.columns[0] - below.columns[0]) / (below.by_frequency[0] - above.by_frequency[0])
+    along = [side.columns + side.by_frequency[:, None] * moves for side in (below, above)]
+    size = np.abs(along).max(axis=(0, 2), keepdims=True)[0]
+    if (np.abs(along[1] - along[0]) > RULES.corner * size).any():
+        raise NoDerivative("the peak is a corner of the curve where more than one contact transition begins")
+    omega = (low[0].state.omega + high[0].state.omega) / 2
+    return replace(_gathered(gradients[0], names, steps, below, solves, omega, moves), follows_corner=True)
 
 
 def _slope(balance: HarmonicBalance, state: State, output: str) -> Slope:
@@ -543,22 +596,48 @@ def _slope(balance: HarmonicBalance, state: State, output: str) -> Slope:
 
 def _peak(
     balance: HarmonicBalance, state: State, output: str, options: NewtonOptions | None
-) -> tuple[Slope, float, int]:
-    """The peak beside a state, by secants of the slope; half width of the resonance by its curvature, solves spent."""
-    before = _slope(balance, _solved(balance, state.omega, state.x, options), output)
-    step = RULES.first_step * before.omega
-    step = float(np.clip(before.distance, -step, step))
+) -> tuple[tuple[Slope, ...], float, int]:
+    """The peak beside a state, by secants of the slope; half width of the resonance, solves spent.
+
+    Two points where the slope does not vanish but jumps: those on both sides of the corner
+    """
+
+    def at(omega: float, beside: Slope) -> Slope:
+        return _slope(balance, _solved(balance, omega, beside.predict(omega), options), output)
+
+    first = before = _slope(balance, _solved(balance, state.omega, state.x, options), output)
+    longest = RULES.first_step * before.omega
+    step = float(np.clip(before.distance, -longest, longest))
     for solves in range(2, RULES.most_steps):
-        omega = before.omega + step
-        here = _slope(balance, _solved(balance, omega, before.predict(omega), options), output)
+        here = at(before.omega + step, before)
         curvature = (here.slope - before.slope) / step if step else 0.0
         if not curvature < 0:
             break
         width = float(np.sqrt(-2 / curvature) * amplitude(balance.outputs(here.solution.state))[_row(balance, output)])
         before, step = here, float(np.clip(-here.slope / curvature, -width / 2, width / 2))
         if abs(step) <= RULES.at_peak * width:
-            return here, width, solves
-    raise NoDerivative(f"no peak of {output} lies beside {state.omega / (2 * np.pi):.6g} Hz where its slope vanishes")
+            return (here,), width, solves
+    low = high = first
+    for _ in range(RULES.most_steps):
+        if low.slope > 0 > high.slope:
+            break
+        solves, longest = solves + 1, 2 * longest
+        low, high = (high, at(high.omega + longest, high)) if high.slope > 0 else (at(low.omega - longest, low), low)
+    hertz = f"{state.omega / (2 * np.pi):.6g} Hz"
+    if not low.slope > 0 > high.slope:
+        raise NoDerivative(f"no peak of {output} lies beside {hertz}")
+    width = min(low.width, high.width)
+    while high.omega - low.omega > RULES.at_corner * width:
+        solves, middle = solves + 1, at((low.omega + high.omega) / 2, low)
+        low, high = (middle, high) if middle.slope > 0 else (low, middle)
+    if max(low.miss, high.miss) <= RULES.at_peak:
+        return (low,), width, solves
+    if balance.basis.transitions != "located":
+        raise NoDerivative(
+            f"the peak of {output} at {hertz} is a corner of the curve, as forces at samples have many: "
+            'harmonics.transitions = "located" has none but where a contact transition begins'
+        )
+    return (low, high), width, solves
 
 
 def _row(balance: HarmonicBalance, output: str) -> int:

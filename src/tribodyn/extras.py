@@ -11,7 +11,6 @@ EXTRA = {
     "imageio_ffmpeg": "pictures",
     "plotly": "pictures",
     "pyvista": "pictures",
-    "pyarrow": "exports",
     "pyuff": "exports",
     "pyamg": "multigrid",
     "pypardiso": "mkl",

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from tests.helpers.contact_draws import LAWS, LOCATED, own
-from tests.helpers.verification_models import interface, random_structure
+from tests.helpers.verification_models import interface, modal_damping, random_structure
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import derivatives, newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import law as contact_law
@@ -18,6 +20,7 @@ from tribodyn.hbm.derivatives import Change, NoDerivative, Posed, at_frequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.reduction.model import ReducedModel
 
 OMEGA, PAIRS, K = 900.0, 3, 2e6
 EXACT = NewtonOptions(tolerance=1e-12)
@@ -91,6 +94,39 @@ def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again
         difference = (again(balance.with_gap(gap + d)) - again(balance.with_gap(gap - d))) / 2e-10
         size = np.maximum(np.abs(difference), 1e-2 * np.abs(found.by_gap).max(axis=1))
         assert (np.abs(found.by_gap[:, pair] - difference) <= 1e-4 * size).all()
+
+
+def slider_behind_a_mass(friction):
+    """A driven mass, and one behind it on a slider, whose first slip is a peak of the first."""
+    mass, stiffness = np.diag([1.0, 0.566]), np.array([[1.131, -0.131], [-0.131, 0.233]])
+    spring = 0.2
+    damping = modal_damping(mass, stiffness + np.diag([0, spring]), 0.01)
+    system = SecondOrderSystem(mass, stiffness, damping, {"force": np.eye(2)[0]}, {"tip": np.eye(2)[0]})
+    parameters = ContactParameters.of(("t1",), np.array([[spring]]), friction=friction, normal_load=np.array([1.0]))
+    model = ReducedModel(system, interface(np.eye(2)[1:], ("t1",)))
+    basis, excitation = HarmonicBasis((1, 3), 64, "located"), Excitation.of({}, {1: {"force": 1.0}})
+    return HarmonicBalance.of(model, Joint("j", "jenkins_constant", parameters), basis, excitation, 2.0)
+
+
+def test_a_peak_that_is_a_corner_follows_first_slip():
+    """Against the linear response with the slider stuck: there the second mass moves by the slip limit."""
+    balance, friction = slider_behind_a_mass(2.6), 2.6
+
+    def stuck(omega):
+        system = balance.model.system
+        dynamic = system.stiffness + np.diag([0, 0.2]) - omega**2 * system.mass + 1j * omega * system.damping
+        return np.abs(np.linalg.solve(dynamic, [1.0, 0.0]))
+
+    omega, step = brentq(lambda omega: stuck(omega)[1] - friction / 0.2, 0.8, 0.82), 1e-6
+    tip, slider = (stuck(omega + step) - stuck(omega - step)) / (2 * step)
+    state = newton.solve_from_rest(balance, omega * (1 + 1e-4), EXACT).state
+    posed, h = Posed.of(balance), 1e-6
+    sides = (replace(posed, contact=with_number(balance, "friction", 1 + s)) for s in (h, -h))
+    found = derivatives.at_peak(balance, state, "tip", [Change("friction", h * friction, *sides)])
+    assert found.follows_corner
+    assert found.names[:2] == ("frequency", "amplitude")
+    np.testing.assert_allclose(found.values[:2], [omega / (2 * np.pi), stuck(omega)[0]], rtol=1e-6)
+    np.testing.assert_allclose(found.slopes[:2, 0], np.array([1 / (2 * np.pi), tip]) / slider / 0.2, rtol=5e-6)
 
 
 def test_a_fold_has_no_derivative():

@@ -200,13 +200,13 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
 
 
 def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None:
-    """With eight harmonics no solution is found while the deepest pair is between 1e-5 and 6e-5 m, with four it is."""
-    tolerance = Tolerance(0.1, 2e-4)
-    whole = wear_problem(balance=balance_of(pressed_body(), tuple(range(8))))
+    """With six harmonics no solution is found while the deepest pair is between 1e-5 and 6e-5 m, with four it is."""
+    tolerance = Tolerance(0.2, 2e-4)
+    whole = wear_problem(balance=balance_of(pressed_body(), tuple(range(6))))
     gap = whole.balance.contact.gap
 
     def gone(balance: HarmonicBalance) -> bool:
-        return len(balance.basis.harmonics) == 8 and 1e-5 < (balance.contact.gap - gap).max() < 6e-5
+        return len(balance.basis.harmonics) == 6 and 1e-5 < (balance.contact.gap - gap).max() < 6e-5
 
     class Missing(AtFrequency):
         def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
@@ -227,9 +227,10 @@ def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None
     assert np.all(worn.plan[:-1, 0] > 0)  # implicit steps throughout
     assert "with harmonics up to 3" in str(worn.end)
     assert life(worn) == pytest.approx(life(error_controlled_rule.evolve(whole, tolerance)), rel=0.02)
-    begun = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 2)
-    again = error_controlled_rule.evolve(lacking, tolerance, resume=begun)
-    assert np.array_equal(again.depth, worn.depth)
+    begun = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 1)
+    again = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 2, resume=begun)
+    assert np.array_equal(again.depth, worn.depth[: len(again.depth)])
+    assert len(again.depth) > len(begun.depth)
 
 
 def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(problem: WearProblem) -> None:

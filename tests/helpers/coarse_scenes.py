@@ -23,6 +23,7 @@ BLADE = (
 RIG = (
     "geometry.n_contact_length=3", "geometry.n_contact_width=5", "reduction.modes=6", "harmonics.kept=[0, 1]",
     "harmonics.samples=32", "harmonics.transitions=sampled", "verdict.enabled=false",
+    "wear.rule=thesis", "wear.step=2 %", "wear.motion=balance", "wear.end_at=vibrating",
 )  # fmt: skip
 QUICK_RIG = (
     *RIG, "damping.modal=6 %", "wear.step=15 %", "wear.lost_below=30 %", "wear.max_steps=60",

@@ -40,12 +40,10 @@ SIZES = {  # of the beam, name -> elements along it and through its height; 13 x
 ASSEMBLIES = {"assembly": (52, 14, 9, 30)}
 PRODUCTS = {  # ways of the product -> how the scene asks for it
     "product": (),
-    "single precision": ("reduction.solver=single_precision",),
     "flexibility": ("reduction.method=residual_flexibility",),
-    "single flexibility": ("reduction.method=residual_flexibility", "reduction.solver=single_precision"),
 }
 WAYS = ("product", "by hand", "multigrid")
-OTHERS = {"1M": ("flexibility", "single flexibility")}  # constraint modes do not fit 24 GB
+OTHERS = {"1M": ("flexibility",)}  # constraint modes do not fit 24 GB
 STAGES = {  # function of a reduction -> what its seconds are told as
     "factorise": "factor", "fixed_interface_modes": "modes", "constraint_modes": "constraint modes",
     "_congruent": "projection", "_ritz": "static shapes",

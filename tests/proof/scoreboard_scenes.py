@@ -7,6 +7,7 @@ stuck, and the vibration force is that at which the stuck contact would carry a 
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sla
 
+from tests.proof import bracket
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.reduction.linear import stuck_stiffness
@@ -57,6 +59,7 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
     rng = np.random.default_rng([seed, number])
     family = tuple(FAMILIES)[number % len(FAMILIES)]
     tables = FAMILIES[family](rng)
+    shutil.copy(bracket.__file__, folder)
     table: Table = {"scene": {"title": f"{family} {number} of seed {seed}"}} | tables
     table |= _common(rng, HIGHEST.get(family, TOPS[-1]))
     table |= {"materials": {"steel": STEEL}} if "bodies" in table else {"material": STEEL}
@@ -161,7 +164,7 @@ def _bracket(rng: np.random.Generator) -> Table:
     )  # fmt: skip
     counts = {"n_length": int(rng.integers(6, 10)), "holes": int(rng.integers(0, 4))}
     return {
-        "geometry": {"part": "bracket", "fixed": ["back"], **sizes, **counts},
+        "geometry": {"part": "bracket.py", "fixed": ["back"], **sizes, **counts},
         "contact": {"group": "pad", **_contact(rng, 5e7, vertices_only=True)},
         **_pressed("top", str(rng.choice(["end", "side"])), "top", "y", rng),
     }

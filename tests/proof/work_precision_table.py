@@ -22,8 +22,8 @@ from tests.proof.work_precision import (
 from tribodyn.workflows.errors.limit import Limit
 from tribodyn.workflows.pictures.figures import axes_of, log_axis, named
 from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, ORANGE
+from tribodyn.workflows.result.store import replacing
 from tribodyn.workflows.result.summary import plain
-from tribodyn.workflows.result.whole_file import replacing
 
 FORMAT = "tribodyn work and precision 1"
 SETTLED = 0.01  # doubt about a limit above which this is said not to be known

@@ -14,7 +14,7 @@ import tribodyn as td
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.export import formats
 from tribodyn.workflows.export.curves import DataKind, Function, function
-from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.studies.measured import measurement, reading, resonance
 from tribodyn.workflows.studies.measured.measurement import Run
 

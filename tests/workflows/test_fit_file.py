@@ -17,7 +17,7 @@ from tests.helpers.pages import ROOT, fences
 from tests.helpers.structures import BLOCKS
 from tests.proof.problems import cycle_at
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress

@@ -54,30 +54,6 @@ def test_the_backbone_goes_from_the_stuck_to_the_free_mode(capsys: pytest.Captur
     assert "at rest" in out
 
 
-def test_changes_of_the_scene_say_what_they_do_to_its_backbone(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    changes = [
-        "harmonics.kept=[0, 1, 3]; harmonics.samples=256",
-        "material.young=231 GPa",
-        "loads.static.press.value=40 kN",
-    ]
-    given = [word for change in changes for word in ("--change", change)]
-    words = ["curve", "backbone", "beam", *SET, *given]
-    words += ["--from", "0.1um", "--to", "1um", "--points", "3", "--out", str(tmp_path)]
-    code, out, err = leave([*words, "--json"], capsys)
-    assert code == 0, err
-    harmonics, stiffer, pressed = json.loads(out)["changes"]
-    assert harmonics["change"] == changes[0]
-    assert 0 < max(abs(row["frequency"]) for row in harmonics["rows"]) < 0.01
-    young = read("beam").part_scene.material.young
-    for row in stiffer["rows"]:  # the contact does not get stiffer with the beam
-        assert 0.6 * (231e9 / young) ** 0.5 < (1 + row["frequency"]) < (231e9 / young) ** 0.5
-    assert max(row["damping"] for row in pressed["rows"]) < 0  # under twice the load less slips
-    assert harmonics["seconds"] + pressed["seconds"] < 2 * stiffer["seconds"]  # whose model is made again
-    code, out, err = leave([*words, "--change", "harmonics.keep=3"], capsys)
-    assert code == 2
-    assert "keep" in err
-
-
 def test_maps_along_the_backbone_hold_its_friction_work_and_its_motion() -> None:
     bone = backbones.backbone("beam", 1e-7, 2e-4, points=6, overrides=SMALL)
     found, balance, slides = bone.mode, bone.balance, []

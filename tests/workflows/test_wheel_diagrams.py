@@ -13,8 +13,6 @@ from tests.helpers.synthetic_result import result
 from tests.proof.cases.blade.few_sectors import FEW_SECTORS
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.pictures import maps, plots, wheel_diagrams
-from tribodyn.workflows.studies.many import life_picture
-from tribodyn.workflows.studies.many.table import StudyTable
 
 
 @pytest.mark.parametrize("n_sectors", [7, 8])
@@ -84,45 +82,6 @@ def test_a_part_without_a_wheel_has_no_diagrams(capsys: pytest.CaptureFixture[st
         cli.main(["wheel", "modes", "beam"])
     assert stop.value.code == 2
     assert "has no [wheel]" in capsys.readouterr().err
-
-
-def of_lives(lives: np.ndarray) -> StudyTable:
-    columns = {
-        "run": np.arange(1, len(lives) + 1),
-        "status": np.array(["complete"] * len(lives), dtype=object),
-        "sentence": np.array([""] * len(lives), dtype=object),
-        "load": np.ones(len(lives)),
-        "life_cycles": lives,
-    }
-    return StudyTable("made_up", columns, ("load",))
-
-
-def test_a_weibull_distribution_is_found_again() -> None:
-    shares = (np.arange(400) + 0.5) / 400
-    lives = 2e6 * (-np.log(1 - shares)) ** (1 / 1.8)
-    law = life_picture.fitted(lives)
-    assert law.args[0] == pytest.approx(1.8, rel=0.02)
-    assert law.kwds["scale"] == pytest.approx(2e6, rel=0.01)
-    assert law.ppf(0.1) == pytest.approx(np.quantile(lives, 0.1), rel=0.02)
-    values, below = life_picture.ranks(lives)
-    assert np.abs(below - shares).max() < 1e-3
-    assert (values == lives).all()
-
-
-def test_lives_are_drawn_on_weibull_paper_and_not_fitted_where_some_are_missing(tmp_path: Path) -> None:
-    lives = 1e6 * np.random.default_rng(1).weibull(2.0, 30)
-    figure = of_lives(lives).plot_distribution()
-    figure.savefig(tmp_path / "life.png", dpi=60)
-    assert_not_blank(tmp_path / "life.png")
-    assert len(figure.axes[0].lines) == 4
-    line = figure.axes[0].lines[1]  # the fit is straight on this paper
-    assert len(line.get_xdata()) == 2
-    lives[3] = np.nan
-    axes = of_lives(lives).plot_distribution().axes[0]
-    assert len(axes.lines) == 2
-    assert "1 runs without, not fitted" in axes.get_title(loc="left")
-    with pytest.raises(ValueError, match="3 runs have a life_cycles, a distribution needs 5"):
-        of_lives(lives[:4] * 0 + 1).plot_distribution()
 
 
 def test_status_over_wear_and_loops_of_chosen_pairs() -> None:

@@ -14,7 +14,7 @@ from tribodyn.workflows.command.word import QUIET, show_found, word
 from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, quantity
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress
@@ -272,8 +272,8 @@ def export(result: Path, *, to: Targets, out: Path | None = None, mesh_ending: s
     result
         Folder or file of a result.
     to
-        Formats, one or several: vtk (series for ParaView), csv, parquet, mat, uff (tables and curves), mesh (worn part
-        with its fields), npz, mtx, abaqus (reduced matrices).
+        Formats, one or several: vtk (series for ParaView), csv, mat, uff (tables and curves), mesh (worn part
+        with its fields), npz, abaqus (reduced matrices).
     out
         Folder, in which each format gets a folder of its own; export/ beside the result by default.
     mesh_ending

@@ -1,4 +1,4 @@
-"""Curves as files: CSV, Parquet, MATLAB and universal files (dataset 58)."""
+"""Curves as files: CSV, MATLAB and universal files (dataset 58)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from tribodyn.extras import package
 from tribodyn.workflows.export.tables import tables, terms
 from tribodyn.workflows.result import verdict
-from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.result.result import Result
 
 
@@ -33,17 +33,6 @@ def write_csv(result: Result, folder: Path) -> list[Path]:
     for name, table in tables(result).items():
         path = folder / f"{name}.csv"
         write_columns(table, path)
-        written.append(path)
-    return written
-
-
-def write_parquet(result: Result, folder: Path) -> list[Path]:
-    """One file for each table. Raises ValueError where pyarrow is missing."""
-    arrow, parquet = package("pyarrow"), package("pyarrow.parquet")
-    written = []
-    for name, table in tables(result).items():
-        path = folder / f"{name}.parquet"
-        parquet.write_table(arrow.table({key: arrow.array(column.tolist()) for key, column in table.items()}), path)
         written.append(path)
     return written
 

@@ -1,4 +1,4 @@
-"""The reduced model of a result for other solvers: npz, MATLAB, Nastran OUTPUT4, Matrix Market, Abaqus matrix input."""
+"""The reduced model of a result for other solvers: npz, MATLAB, Nastran OUTPUT4, Abaqus matrix input."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.io import mmwrite, savemat
+from scipy.io import savemat
 
 from tribodyn.reduction import nastran_matrix
 from tribodyn.reduction.model import ReducedModel
@@ -101,20 +101,6 @@ def write_op4(result: Result, folder: Path) -> list[Path]:
     return [folder / "reduced.op4", _about(model, folder, **columns)]
 
 
-def write_mtx(result: Result, folder: Path) -> list[Path]:
-    """reduced_M.mtx and so on in the Matrix Market format, and reduced.json that describes them."""
-    model = reduced_model(result)
-    written = []
-    for name, matrix in _symmetric(arrays(model)).items():
-        path = folder / f"reduced_{name}.mtx"
-        symmetric = name in ("M", "K", "C")
-        kind = "general" if not symmetric else "hermitian" if np.iscomplexobj(matrix) else "symmetric"
-        stored = sp.coo_matrix(matrix) if symmetric else matrix.reshape(len(matrix), -1) if matrix.ndim != 2 else matrix
-        mmwrite(path, stored, symmetry=kind, precision=17)
-        written.append(path)
-    return [*written, _about(model, folder)]
-
-
 def write_abaqus(result: Result, folder: Path) -> list[Path]:
     """reduced_M.inp, reduced_K.inp, reduced_C.inp as *MATRIX INPUT reads them, and reduced.inp that assembles them.
 
@@ -124,7 +110,7 @@ def write_abaqus(result: Result, folder: Path) -> list[Path]:
     model, written, called = reduced_model(result), [], []
     found = _symmetric(arrays(model))
     if np.iscomplexobj(found["K"]):
-        raise ValueError("abaqus: the matrices of a wheel are complex, which Abaqus does not take; export npz or mtx")
+        raise ValueError("abaqus: the matrices of a wheel are complex, which Abaqus does not take; export npz")
     words = {"K": "STIFFNESS", "M": "MASS", "C": "VISCOUS DAMPING"}
     for name in words:
         if name not in found:

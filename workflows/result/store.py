@@ -10,7 +10,8 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -33,7 +34,21 @@ from tribodyn.workflows.result.result import (
     ShearBounds,
     WornResponses,
 )
-from tribodyn.workflows.result.whole_file import replacing
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path beside `path` to write to; it takes the place of `path` at the end, and is removed where writing fails.
+
+    The operating system renames at once or not at all.
+    """
+    new = path.with_name(f"{path.name}.{os.getpid()}.new")
+    try:
+        yield new
+        os.replace(new, path)
+    finally:
+        new.unlink(missing_ok=True)
+
 
 FORMAT = "tribodyn result 3"
 USER_BLOCK = 512  # bytes before the HDF5 content, the least that HDF5 allows

@@ -37,10 +37,10 @@ def check(n_dof: int, solver: str = "direct") -> None:
         machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, OSError, ValueError):  # as on Windows
         return
-    needed = FACTOR_BYTES * n_dof * (0.5 if solver == "single_precision" else 1.0)
+    needed = FACTOR_BYTES * n_dof
     if needed > machine:
         raise ValueError(
             f"the mesh has {n_dof} DOFs, whose factorisation needs some {needed / 1e9:.0f} GB, and this machine has "
             f"{machine / 1e9:.0f} GB: make the mesh coarser, or set "
-            'reduction.solver = "single_precision", which takes half, or "multigrid", which takes less and far longer'
+            'reduction.solver = "multigrid", which takes less and far longer'
         )

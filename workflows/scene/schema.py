@@ -17,7 +17,6 @@ from pydantic import (
     model_validator,
 )
 
-from tribodyn.workflows.scene.afterwards import Pictures, VerdictOptions
 from tribodyn.workflows.scene.body import Geometry, SolidMaterial
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
 from tribodyn.workflows.scene.contact_numbers import takes_asperities, with_asperities, with_numbers_when_hot
@@ -33,10 +32,12 @@ from tribodyn.workflows.scene.solution import (
     Harmonics,
     NonlinearMode,
     PartResponse,
+    Pictures,
     Preload,
     Reduction,
     Response,
     Solver,
+    VerdictOptions,
 )
 from tribodyn.workflows.scene.wear import Wear
 

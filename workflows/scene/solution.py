@@ -31,6 +31,30 @@ from tribodyn.workflows.scene.fields import (
 from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
 from tribodyn.workflows.scene.units import to_si
 
+
+class Pictures(Table):
+    """What is drawn after a run."""
+
+    plots: StrictBool = True
+    """Draw curves and maps."""
+    renders: StrictBool = True
+    """Draw the part in 3-D."""
+    deformation_scale: Annotated[Number, Field(gt=0)] | None = None
+    """Factor on displacements in renders; chosen by size by default."""
+    wear_scale: Annotated[Number, Field(gt=0)] | None = None
+    """Factor on wear depth in renders; chosen by size by default."""
+
+
+class VerdictOptions(Table):
+    """What is measured to judge a finished result, see `tribodyn.workflows.errors.verdict`."""
+
+    enabled: StrictBool = True
+    """Judge the result when the run is done."""
+    in_time: StrictBool | None = None
+    """Integrate the unworn, the middle and the late state in time; by default where the contact has at most 30
+    components."""
+
+
 HIGHEST = 15  # harmonic that kept = "auto" may keep, where the scene does not name one
 
 
@@ -155,10 +179,9 @@ class Reduction(Table):
     """Number of modes."""
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
     """Frequency up to which modes are kept, instead of their number."""
-    solver: Literal["direct", "mumps", "single_precision", "multigrid"] = "direct"
-    """How the part's equations are solved: by a factor, or by one of MUMPS in MPI processes; where none fits, by one in
-    single precision, half as large, and conjugate gradients; or by conjugate gradients with algebraic multigrid, which
-    takes far longer."""
+    solver: Literal["direct", "mumps", "multigrid"] = "direct"
+    """How the part's equations are solved: by a factor, or by one of MUMPS in MPI processes; where none fits, by
+    conjugate gradients with algebraic multigrid, which takes far longer."""
     interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
     """Replace the masters by this number of characteristic constraint modes."""
     interface_keep: tuple[str, ...] | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from tribodyn.hbm import derivatives as exact
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.derivatives import Derivatives, NoDerivative
+from tribodyn.hbm.derivatives import Change, Derivatives, NoDerivative
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.style import CYCLE, GREY
@@ -102,6 +102,8 @@ class ResponseDerivatives:
         lines.append("".join(f"{name:>{w}}" for name, w in zip(names, width, strict=True)))
         for key, row in self.elasticities.items():
             lines.append("".join(f"{value:>+{w}.4f}" for value, w in zip(row, width, strict=True)) + f"  {key}")
+        if f.follows_corner:
+            lines.append("the peak is a corner of the curve, which moves with the contact transition that begins there")
         for key in self.corners:
             i = f.parameters.index(key)
             first = f.names.index("amplitude")
@@ -206,12 +208,15 @@ def _found(
     near = int(np.argmax(height)) if at is None else int(np.argmin(np.abs(branch.frequency - at)))
     x = balance.shaped(branch.contact[near])
     state = balance.evaluate(branch.omega[near] if at is None else 2 * np.pi * at, x)
-    changes = []
-    for i, (key, value) in enumerate(wanted.items()):
-        advance(i / (len(wanted) + 1), key)
-        changes.append(varying.change(key, value))
+
+    def changes() -> Iterator[Change]:
+        for i, (key, value) in enumerate(wanted.items()):
+            advance(i / len(wanted), key)
+            yield varying.change(key, value)
+
     take = exact.at_peak if at is None else exact.at_frequency
-    return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), settings.newton_options(scene))
+    rates, options = wear_run.coefficients(scene), settings.newton_options(scene)
+    return take(balance, state, settings.OUTPUT, changes(), rates, options)
 
 
 def of_summary(varying: Varying, response: Branch, numbers: Mapping[str, float], wanted: Sequence[str]) -> Slopes:

@@ -19,7 +19,7 @@ from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources.deck import Deck
 from tribodyn.workflows.pictures import groups as group_pictures
-from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.run import decks, modelling, part_reduction, sanity_checks
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file

@@ -161,7 +161,7 @@ def animate(
 def export(result: Held, to: Sequence[str], folder: AnyPath, mesh_ending: str = ".xdmf") -> list[Path]:
     """Write a result in the formats of other programs, each into a folder of its name; the files written.
 
-    to : of vtk, csv, parquet, mat, uff, mesh, npz, mtx, abaqus; mesh_ending : format of the mesh
+    to : of vtk, csv, mat, uff, mesh, npz, matlab, op4, abaqus; mesh_ending : format of the mesh
     """
     from tribodyn.workflows.export import formats
 

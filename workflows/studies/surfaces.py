@@ -14,7 +14,7 @@ from tribodyn.geometry import surface_io
 from tribodyn.geometry.asperities import Asperities, identify
 from tribodyn.geometry.surface import HeightMap
 from tribodyn.geometry.surface_pair import mirrored
-from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
 
 Face = HeightMap | str | PathLike[str]

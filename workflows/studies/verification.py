@@ -24,8 +24,8 @@ from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
-from tribodyn.workflows.result.columns import named_lines
 from tribodyn.workflows.result.provenance import rebuilt
+from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.run import modelling, settings

@@ -1,14 +1,10 @@
-"""The backbone of a scene: frequency and damping of one nonlinear mode of the unworn contact against its amplitude.
-
-Followed again with changes of the scene: what finer harmonics, samples and meshes change is its error.
-"""
+"""The backbone of a scene: frequency and damping of one nonlinear mode of the unworn contact against its amplitude."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from time import process_time
 from typing import Any
 
 import numpy as np
@@ -22,7 +18,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.maps import backbone_maps
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
-from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
@@ -31,8 +27,6 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.published import PublishedBackbone, published_backbone
-
-COMPARED = 9  # amplitudes at which two backbones are compared
 
 
 @dataclass(frozen=True)
@@ -68,39 +62,16 @@ class AmplitudeRange:
 
 
 @dataclass(frozen=True)
-class Changed:
-    """What a change of the scene does to its backbone.
-
-    change : overrides, joined by ";"; modal_amplitude : (n,) [m kg^0.5]
-    frequency, damping : (n,) differences there from the backbone of the scene, relative to it
-    seconds : of the processor, with its model
-    """
-
-    change: str
-    modal_amplitude: np.ndarray
-    frequency: np.ndarray
-    damping: np.ndarray
-    seconds: float
-
-    def record(self) -> dict[str, Any]:
-        """For machines."""
-        columns = {"modal_amplitude": self.modal_amplitude, "frequency": self.frequency, "damping": self.damping}
-        return {"change": self.change, "seconds": self.seconds, "rows": _rows(columns)}
-
-
-@dataclass(frozen=True)
 class SceneBackbone:
     """The backbone of a scene.
 
     balance : of the scene; mode : its points; published : of the same mode by others, None for none
-    changes : what changes of the scene do to it
     """
 
     name: str
     balance: HarmonicBalance
     mode: Backbone
     published: PublishedBackbone | None = None
-    changes: tuple[Changed, ...] = ()
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
@@ -117,7 +88,7 @@ class SceneBackbone:
         return {name: values[mode.converged] for name, values in columns.items()}
 
     def record(self) -> dict[str, Any]:
-        """For machines: the converged points, what is published, and what changes do."""
+        """For machines: the converged points, and what is published."""
         found = {
             "reference_hz": self.mode.reference_omega / (2 * np.pi),
             **{name: values.tolist() for name, values in self.columns.items()},
@@ -126,8 +97,6 @@ class SceneBackbone:
         }
         if self.published is not None:
             found["published"] = beside(self.mode, self.published)
-        if self.changes:
-            found["changes"] = [one.record() for one in self.changes]
         return found
 
     def lines(self) -> list[str]:
@@ -139,7 +108,6 @@ class SceneBackbone:
                 ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
                 ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
                 *self._published_lines(),
-                *self._change_lines(),
                 ("end", str(self.mode.end)),
             ]
         )
@@ -154,17 +122,6 @@ class SceneBackbone:
                 f"%), {100 * row['damping']:.3g} %; here {row['our_frequency_hz']:.5g} Hz "
                 f"({100 * row['our_shift']:+.2f} %), {100 * row['our_damping']:.3g} %",
             )
-
-    def _change_lines(self) -> Iterator[tuple[str, str]]:
-        """What changes do at the first, a middle and the last amplitude, and at most all together."""
-        for one in self.changes:
-            at = [0, len(one.modal_amplitude) // 2, -1]
-            frequency, damping = (", ".join(f"{100 * v[i]:+.3g}" for i in at) for v in (one.frequency, one.damping))
-            yield one.change, f"frequency {frequency} %, damping {damping} % in {one.seconds:.3g} s"
-        if self.changes:
-            every = ([np.abs(getattr(one, name)) for one in self.changes] for name in ("frequency", "damping"))
-            frequency, damping = (f"{100 * np.sum(each, axis=0).max():.3g} %" for each in every)
-            yield "all of them", f"frequency {frequency}, damping {damping} at most, summed without signs"
 
     def write(self, folder: Path) -> list[Path]:
         """Write backbone.csv, backbone.png and, where faces rub, backbone_maps.png."""
@@ -205,7 +162,6 @@ def backbone(
     *,
     mode: int | None = None,
     points: int | None = None,
-    changes: Sequence[str] = (),
     overrides: Overrides = (),
     progress: Report = None,
 ) -> SceneBackbone:
@@ -218,20 +174,17 @@ def backbone(
     stop : amplitude to end at, such as 1mm
     mode : number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default
     points : points where the backbone bends little; there are more elsewhere. 40 or those of [backbone] by default
-    changes : follow it again with this changed and report the difference, such as "harmonics.samples=256", or several
-        keys joined by ";"; can be repeated
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
     file, report = read_scene(scene, overrides), reporter(progress)
     asked = AmplitudeRange.of(file, start, stop, mode, points)
     published = published_backbone(file)
-    others = {text: file.changed(*(part.strip() for part in text.split(";") if part.strip())) for text in changes}
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, report).balance
         found = along(file, balance, asked, report)
     if not found.converged.any():
         raise SolveFailed(f"the backbone {found.end}")
-    return SceneBackbone(file.name, balance, found, published, _changed(asked, found, others, report))
+    return SceneBackbone(file.name, balance, found, published)
 
 
 def along(
@@ -241,33 +194,6 @@ def along(
     with progress.stage("backbone"):
         options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
         return nonlinear_modes.backbone(balance, asked.start, asked.stop, asked.mode, output, options, asked.modal)
-
-
-def _changed(
-    asked: AmplitudeRange, found: Backbone, others: Mapping[str, SceneFile], progress: Progress
-) -> tuple[Changed, ...]:
-    """The backbone of a scene again with changes of it.
-
-    Raises  SolveFailed where a changed backbone is not found
-    """
-    done = []
-    for text, other in others.items():
-        clock = process_time()
-        with limited(other.scene.solver.threads), progress.stage(text):
-            there = along(other, modelling.build(other, progress).balance, asked, progress)
-        if not there.converged.any():
-            raise SolveFailed(f"the backbone with {text} {there.end}")
-        ends = [f(b.modal_amplitude[b.converged]) for f in (min, max) for b in (found, there)]
-        low, high = max(ends[:2]), min(ends[2:])
-        if not low < high:
-            raise SolveFailed(
-                f"the backbone with {text} has no amplitude in common with that of the scene: {there.end}"
-            )
-        a = np.geomspace(low, high, COMPARED)
-        a[[0, -1]] = low, high
-        off = [t / o - 1 for t, o in zip(_at(there, a), _at(found, a), strict=True)]
-        done.append(Changed(text, a, off[0], off[1], process_time() - clock))
-    return tuple(done)
 
 
 def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:

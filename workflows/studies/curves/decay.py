@@ -20,7 +20,7 @@ from tribodyn.hbm.time.decrement import decrement
 from tribodyn.hbm.time.ring_down import RingDown
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
-from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter

@@ -15,13 +15,14 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.studies.many import pictures, study_file
 from tribodyn.workflows.studies.many import study as studies
-from tribodyn.workflows.studies.many import study_file, trade_picture
 from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study import Runner
 from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
-from tribodyn.workflows.studies.many.table import RUN, SENTENCE, StudyTable
+from tribodyn.workflows.studies.many.table import SENTENCE, StudyTable
+from tribodyn.workflows.studies.many.task import RUN
 from tribodyn.workflows.studies.many.trades import Known, chebyshev, ends, propose
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
@@ -93,7 +94,7 @@ class Optimum:
 
     def plot(self) -> Figure:
         """The trade of the first two aims, or how the one aim got better."""
-        return trade_picture.picture(self)
+        return pictures.picture(self)
 
 
 def optimise(

@@ -15,7 +15,7 @@ from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many import cluster, design, life_picture, pictures, pool, study_file
+from tribodyn.workflows.studies.many import cluster, design, pictures, pool, study_file
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.study_file import Study
 from tribodyn.workflows.studies.many.table import StudyTable, table, write
@@ -132,8 +132,6 @@ def draw(found: StudyTable, folder: Path) -> None:
     """Pictures of a study, as far as its runs make any."""
     if pictures.shown(found):
         found.plot().savefig(folder / "study.png")
-        if life_picture.possible(found):
-            found.plot_distribution().savefig(folder / "life.png")
 
 
 def _finished(tasks: Sequence[Task], workers: int, scheduler: str, inside: bool) -> Iterator[Row]:

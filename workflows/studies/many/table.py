@@ -12,15 +12,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
-from tribodyn.workflows.result.whole_file import replacing
-from tribodyn.workflows.studies.many import life_picture, pictures
+from tribodyn.workflows.result.store import replacing
+from tribodyn.workflows.studies.many import pictures
 from tribodyn.workflows.studies.many.distributions import si
-from tribodyn.workflows.studies.many.task import ENDS, SINGLE, Row
+from tribodyn.workflows.studies.many.task import ENDS, RUN, SINGLE, Row
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RUN, STATUS, SENTENCE = "run", "status", "sentence"
+STATUS, SENTENCE = "status", "sentence"
 LIFE = "life_cycles"
 FEWEST = 5  # complete runs that a correlation needs
 
@@ -126,10 +126,6 @@ class StudyTable:
         import pandas
 
         return pandas.DataFrame(dict(self.columns)).set_index(RUN)
-
-    def plot_distribution(self, number: str = "life_cycles") -> Figure:
-        """A number of the runs on Weibull paper, see `many.life_picture`; raises ValueError where they are few."""
-        return life_picture.picture(self, number)
 
     def plot(self) -> Figure:
         """Response against each of the keys that vary, see `many.pictures`."""

@@ -25,6 +25,7 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies import derivatives
 
 Status = Literal["complete", "failed", "refused", "lost"]
+RUN = "run"  # the column of their numbers
 ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
 UNDRAWN = ("pictures.plots=false", "pictures.renders=false")
 NO_PEAK = "; the response is highest at an end of its range: no peak"

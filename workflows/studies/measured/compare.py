@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
-from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneFile

@@ -33,7 +33,7 @@ from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.version import __version__
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED
-from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.failure import SolveFailed

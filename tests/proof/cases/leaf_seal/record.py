@@ -15,7 +15,7 @@ from tests.proof.cases.leaf_seal.cases import Case
 from tests.proof.cases.leaf_seal.response import LINER_NODE, LeafResponse
 from tribodyn.hbm.contact.law import SEPARATES, STICKS
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.workflows.result.whole_file import replacing as write_whole
+from tribodyn.workflows.result.store import replacing as write_whole
 from tribodyn.workflows.scene.schema import Scene
 
 COLUMNS = (

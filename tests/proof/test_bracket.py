@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.proof import bracket
 from tribodyn.fem.surface import surface
-from tribodyn.geometry import bracket, mesh
+from tribodyn.geometry import mesh
 
 
 @pytest.mark.parametrize("holes", [0, 3])
