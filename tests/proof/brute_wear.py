@@ -114,14 +114,13 @@ dofs = [9]
 frequency = [{0.8 * hertz}, {1.2 * hertz}]
 points = 10
 [harmonics]
-kept = [0, 1, 2, 3]
+kept = [0, 1, 2, 3, 4, 5]
 [wear]
 coefficient = {COEFFICIENT}
 at = {{ frequency = {hertz} }}
 rule = "error_controlled"
 motion = "machine"
 max_steps = 400
-tolerance = "3 %"
 tolerance = "3 %"
 lost_below = {LIFE_SHARE}
 """
