@@ -27,6 +27,7 @@ from tribodyn.hbm.wear.evolution import (
     assess,
     first_at_rest,
     first_preload,
+    kept_beside,
     reason_to_stop,
     row_of,
     state_of,
@@ -223,7 +224,8 @@ def _step_in_time(
     slopes, look = np.full(len(state.points), RULES.unknown_slope), _next_look(problem, state, rows)
     # where rates scatter a small error may be chance: two in turn are believed
     stride_after = stride * growth(max(error, rows[-1].step_error) if rows else error)
-    after = assess(problem, state.depth + worn, state.cycles + stride, state)
+    after_at = state.depth + worn, state.cycles + stride
+    after = kept_beside(problem, state, *after_at) if given and machine.always else assess(problem, *after_at, state)
     solves += after.solves
     if not after.failure and _share_left(problem, after, rows, state) <= look:
         found = _overtaken(problem, after)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 
 from tribodyn.workflows.scene.units import to_si
 
@@ -23,6 +23,24 @@ class Table(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, table: Any) -> Any:
+        """Runs after those of a table itself, which may take other keys."""
+        if isinstance(table, dict) and cls.model_config.get("extra") == "forbid":
+            for key in table:
+                if key not in cls.model_fields:
+                    raise UnknownKey(key, list(cls.model_fields))
+        return table
+
+
+class UnknownKey(ValueError):
+    """A key that a table does not have; known : those that it has."""
+
+    def __init__(self, key: str, known: list[str]):
+        super().__init__(unknown_key(key, known))
+        self.key, self.known = key, known
 
 
 @dataclass(frozen=True)

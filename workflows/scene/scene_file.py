@@ -7,11 +7,11 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from tribodyn.workflows.scene.fields import unknown_key
+from tribodyn.workflows.scene.fields import UnknownKey, unknown_key
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 from tribodyn.workflows.scene.structure import StructureScene
@@ -143,7 +143,7 @@ def checked(kind: type[Kind], data: dict[str, Any], label: str, folder: Path | N
     try:
         return kind.model_validate(data, context=None if folder is None else {"folder": folder})
     except ValidationError as error:
-        problems = [_sentence(problem, kind) for problem in _of_the_kind_meant(error.errors())]
+        problems = _problems(error, data)
         more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
         raise SceneError(f"{label}: {'; '.join(problems[:MOST_PROBLEMS])}{more}") from None
 
@@ -162,8 +162,8 @@ def from_json(text: str) -> Scene:
     try:
         return kind_of(data).model_validate(data)
     except ValidationError as trouble:
-        key = ".".join(map(str, trouble.errors()[0]["loc"]))
-        raise SceneError(f"the scene of this result is of another version of tribodyn ({key}): run it again") from None
+        why = _problems(trouble, data)[0].partition(",")[0]
+        raise SceneError(f"the scene of this result is of another version of tribodyn ({why}): run it again") from None
 
 
 def _override(data: dict[str, Any], text: str) -> None:
@@ -186,50 +186,41 @@ def _override(data: dict[str, Any], text: str) -> None:
         table[path[-1]] = value.strip()
 
 
-def _of_the_kind_meant(problems: Sequence[Any]) -> list[Any]:
-    """Problems without those of the kinds of value that were not meant, where a key takes a list or something else.
-
-    pydantic reports what is wrong with each kind; a list was meant to be one, all else was not. Names of kinds are
-    taken off the end of locations.
-    """
-    found = []
-    for problem in problems:
-        place = tuple(item for item in problem["loc"] if not _is_kind(item))
-        listed = any(str(item).startswith("tuple[") for item in problem["loc"])
-        found.append((place, len(place) < len(problem["loc"]), listed, {**problem, "loc": place}))
-
-    lists = {place: problem["type"] != "tuple_type" for place, _, listed, problem in found if listed}
-
-    def meant(place: tuple[str | int, ...], kinds: bool, listed: bool) -> bool:
-        """Where it belongs to a key of several kinds: whether it is of the kind that was given."""
-        within = [
-            given for key, given in lists.items() if place[: len(key)] == key and (kinds or len(place) > len(key))
-        ]
-        return not within or within[0] == listed
-
-    of_the_kind = [problem for place, kinds, listed, problem in found if meant(place, kinds, listed)]
-    return of_the_kind or [problem for *_, problem in found]
+def _problems(error: ValidationError, data: Any) -> list[str]:
+    """A clause for each problem; where a value may be of several kinds, for that which it comes closest to."""
+    closest_first = sorted(error.errors(), key=lambda problem: problem["type"].endswith("_type"))
+    places = [(_place(problem, data), problem) for problem in closest_first]
+    refused = [place for place, problem in places if problem["type"] != "missing"]
+    found: dict[tuple[Any, ...], str] = {}
+    for place, problem in places:
+        inside = any(len(other) > len(place) and other[: len(place)] == place for other in refused)
+        if not inside and not (problem["type"] == "missing" and place[:-1] in refused):
+            found.setdefault(place, _sentence(problem, place))
+    return list(found.values())
 
 
-def _is_kind(item: str | int) -> bool:
-    """Whether an item of a location names a kind of value, and no key."""
-    return isinstance(item, str) and (item.startswith("function-") or "[" in item)
+def _place(problem: Any, data: Any) -> tuple[str | int, ...]:
+    """Keys and list positions that lead to a problem, without the names of kinds that pydantic puts between them."""
+    kept: list[str | int] = []
+    *way, last = problem["loc"] or [""]
+    for item in (*way, last):
+        inside = data if isinstance(data, dict) else dict(enumerate(data)) if isinstance(data, (list, tuple)) else {}
+        if item in inside:
+            kept.append(item)
+            data = inside[item]
+    return (*kept, last) if problem["type"] == "missing" else tuple(kept)
 
 
-def _sentence(problem: Any, kind_of_file: type[BaseModel]) -> str:
+def _sentence(problem: Any, place: tuple[str | int, ...]) -> str:
     """One clause out of a problem that pydantic found: the key, what was expected, what was given."""
-    kind, given, context = problem["type"], problem["input"], problem.get("ctx", {})
-    whole = [item for item in problem["loc"] if isinstance(item, (str, int))]
-    location, table = _walked(whole, kind_of_file)
-    known = _table(table) is not table or location[-1:] == [] or location[-1] in table.model_fields
-    key = _key(location if known or kind == "extra_forbidden" else location[:-1])
-    if kind == "extra_forbidden":
-        return unknown_key(key, list(table.model_fields))
+    kind, given, context, key = problem["type"], problem["input"], problem.get("ctx", {}), _key(place)
     if kind == "missing":
         return f"{key} is missing"
     if kind == "value_error":
-        sentence = str(context["error"])
-        return sentence if key in sentence else f"{key}: {sentence}"
+        error = context["error"]
+        if isinstance(error, UnknownKey):
+            return unknown_key(_key((*place, error.key)), error.known)
+        return str(error) if key in str(error) else f"{key}: {error}"
     limits = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at least")}
     limits |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}
     if kind in limits:
@@ -256,35 +247,6 @@ def _key(location: Sequence[str | int]) -> str:
     for item in location:
         key += f"[{item}]" if isinstance(item, int) else f".{item}" if key else item
     return key or "the scene"
-
-
-def _walked(location: Sequence[str | int], kind: type[BaseModel]) -> tuple[list[str | int], Any]:
-    """A location without the names of types, which pydantic puts where a value may be of several, and its table."""
-    table: Any = kind
-    kept: list[str | int] = []
-    for item in location[:-1]:
-        if isinstance(item, int):  # of a list of tables, which `_table` has entered
-            kept.append(item)
-            continue
-        known = _table(table) is table
-        if known and item not in table.model_fields:
-            continue
-        kept.append(item)
-        table = table.model_fields[item].annotation if known else get_args(table)[1]
-        if not _is_mapping(table):  # else dict[str, Table], whose next key is a name
-            table = _table(table) or table
-    return [*kept, *location[-1:]], table
-
-
-def _table(annotation: Any) -> Any:
-    """The first table inside an annotation, itself where it is one."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((table for inner in get_args(annotation) if (table := _table(inner))), None)
-
-
-def _is_mapping(annotation: Any) -> bool:
-    return getattr(annotation, "__origin__", None) is dict
 
 
 def first_difference(first: Any, second: Any) -> str:
