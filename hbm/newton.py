@@ -27,6 +27,7 @@ class Rules:
     force_accuracy: float = 1e-4
     least_tolerance: float = 1e-12  # residual over displacement that rounding still lets through
     force_unknown: float = 1e-2  # error of the contact forces from which on a small residual is no solution
+    shortest: float = 4e-4  # share of a Newton step that is tried
     held: float = 1e-3  # contact force over that of the stuck contact from which on the structure leans on it
 
 
@@ -77,8 +78,6 @@ class NewtonOptions:
 
     tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction
     krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
-    shortest : share of a Newton step that is tried
-    slowest : residual over that of two steps before from which on the solve is given up; 1 continues while it falls
     least_motion : take the shortest of all directions that solve the linear problem, by its dense matrix: a body that
         slips on all its faces can be at rest in many places
     """
@@ -87,8 +86,6 @@ class NewtonOptions:
     max_steps: int = 40
     max_products: int = 300
     krylov: float = 0.1
-    shortest: float = 4e-4
-    slowest: float = 1.0
     least_motion: bool = False
 
 
@@ -213,7 +210,7 @@ def _solve(
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
                 why = SolveEnd.SINGULAR.say(f" {error:.1e}")
                 return Solved(state, why, step, products, tuple(history))
-        state, new_error = _search(balance, omega, state, direction, error, x_lin, options.shortest)
+        state, new_error = _search(balance, omega, state, direction, error, x_lin)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
             if new_error <= options.tolerance:
@@ -221,8 +218,6 @@ def _solve(
             return Solved(state, SolveEnd.NO_DESCENT.say(f" {error:.1e}"), step, products, tuple(history))
         forcing = 0.5 * (new_error / error) ** 1.5
         error = new_error
-        if step > 1 and error > max(options.slowest * history[-3], options.tolerance):
-            return Solved(state, SolveEnd.SLOW_DESCENT.say(f" {error:.1e}"), step, products, tuple(history))
     outcome = CONVERGED
     if error > options.tolerance:
         outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
@@ -275,7 +270,6 @@ def _search(
     direction: np.ndarray,
     error: float,
     x_lin: np.ndarray,
-    shortest: float,
 ) -> tuple[Evaluated, float]:
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
 
@@ -283,7 +277,7 @@ def _search(
     """
     best, best_error = state, error
     length = 1.0
-    while length > shortest:
+    while length > RULES.shortest:
         with np.errstate(over="ignore", invalid="ignore"):  # steep laws grow beyond all numbers
             trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
             trial_error = relative_residual(trial, x_lin)

@@ -39,7 +39,6 @@ class SolveEnd(End):
     CONVERGED = "converged"
     STEPS_SPENT = "not converged in"
     NO_DESCENT = "no descent from relative residual"
-    SLOW_DESCENT = "slow descent at relative residual"
     NOT_FINITE = "the residual is not a finite number"
     SINGULAR = "singular Jacobian at relative residual"
     NO_DIRECTION = "no direction to correct along:"

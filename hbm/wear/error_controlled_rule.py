@@ -69,10 +69,9 @@ class StepRules:
     # d (miss of the frequency) / d omega while it is not known: of a peak that is one mode's. Where a superharmonic
     # resonance stands on the flank of another the miss is tens of times too large
     unknown_slope: float = -1.0
-    # largest moves of the frequency, relative: with a slope that is known, with one that is not, over the move before
+    # largest moves of the frequency, relative: with a slope that is known, with one that is not
     most_moved: float = 0.03
     first_moved: float = 1e-3
-    further_moved: float = 4.0
     gain_accuracy: float = 1e-9  # of the depth, for laws whose depth per work is not constant
     # first depth in time, and the shortest: the scatter of the rates is no error that shorter steps lower; both over
     # the tolerance on depth
@@ -587,8 +586,6 @@ class _Search:
             slope = (miss - self._last[1]) / (omega - self._last[0])
             self._known, self.slope = (True, slope) if slope < -0.1 else (self._known, self.slope)
         reach = RULES.most_moved if self._known else RULES.first_moved
-        if self._last is not None:
-            reach = min(reach, max(RULES.first_moved, RULES.further_moved * abs(omega / self._last[0] - 1)))
         self._last = (omega, miss)
         if miss > 0:
             self._below = self._last
