@@ -57,7 +57,7 @@ def figures(
         found[name] = partial(contact_picture, result, contact, wear)
     if result.part is not None and int(bodies(result.part).max()) > 0:
         found["exploded"] = partial(exploded.exploded_picture, result)
-    wheel = render_wheel.wheel_of(result)
+    wheel = result.facts.around
     if wheel is not None and result.fields is not None:
         found["wheel"] = partial(render_wheel.wheel_picture, result, wheel, deformation)
     return found

@@ -15,116 +15,83 @@ from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
 from tribodyn.extras import package
-from tribodyn.geometry.placing import rotation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, named, scale_bar
 from tribodyn.workflows.pictures.offscreen import check
-from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, shoot, show, with_room
+from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, with_room
 from tribodyn.workflows.pictures.style import BLUE, INK, LAYOUT, MOTION_MAP, ORANGE, STYLE
+from tribodyn.workflows.result.facts import Around
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states
 
 
-@dataclass(frozen=True)
-class Wheel:
-    """n_sectors, engine_order, axis as in the scene; turn : (3, 3) by one pitch, to the neighbour on the left."""
+class Blades:
+    """All blades of a wheel as one surface, seen nearly along its axis.
 
-    n_sectors: int
-    engine_order: int
-    axis: np.ndarray
-
-    @property
-    def turn(self) -> np.ndarray:
-        """(3, 3) rotation by one pitch, from a blade to the one on its left."""
-        return rotation(tuple(self.axis), 2 * np.pi / self.n_sectors)
-
-    def blade(self, points: np.ndarray, n: int) -> np.ndarray:
-        """Points (..., 3) of blade 0 where blade n has them."""
-        return points @ np.linalg.matrix_power(self.turn, n).T
-
-    def radius(self, points: np.ndarray) -> float:
-        """Largest distance of points (n, 3) from the axis [m]."""
-        return float(np.linalg.norm(np.cross(points, self.axis), axis=1).max())
-
-    def camera(self, radius: float) -> Camera:
-        """The camera that sees the whole wheel, nearly along its axis."""
-        across = np.cross(self.axis, [0.0, 1.0, 0.0] if abs(self.axis[1]) < 0.9 else [0.0, 0.0, 1.0])
-        aside = np.cross(self.axis, across)
-        corners = 1.15 * radius * np.array([x * across + y * aside for x in (-1, 1) for y in (-1, 1)])
-        return frame(corners, self.axis + 0.25 * across, across, 1.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Shell:
-    """The surface of a part, which follows the nodes of the part.
-
-    nodes : (n_point,) nodes of the part on the surface; faces : as VTK wants them
+    nodes : (n_point,) of the part on its surface; size : largest distance of the part from the axis [m]
     """
 
-    nodes: np.ndarray
-    faces: np.ndarray
+    def __init__(self, wheel: Around, part: PartMesh):
+        shell = drawing.surface(drawing.grid_of(part))
+        self.nodes = cKDTree(part.points).query(shell.points)[1]
+        self._faces = _repeated(np.asarray(shell.faces), len(self.nodes), wheel.sectors)
+        self._wheel, axis = wheel, wheel.axis
+        self.size = float(np.linalg.norm(np.cross(part.points, axis), axis=1).max())
+        across = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [0.0, 0.0, 1.0])
+        aside = np.cross(axis, across)
+        corners = 1.15 * self.size * np.array([x * across + y * aside for x in (-1, 1) for y in (-1, 1)])
+        self.camera = frame(corners, axis + 0.25 * across, across, 1.0, 1.0)
 
-    @classmethod
-    def of(cls, part: PartMesh) -> Shell:
-        at_rest = drawing.surface(drawing.grid_of(part))
-        return cls(cKDTree(part.points).query(at_rest.points)[1], np.asarray(at_rest.faces))
-
-    def at(self, points: np.ndarray) -> Any:
-        """The surface where the nodes of the part are at points (n_node, 3) [m]."""
-        pv = package("pyvista")
-
-        return pv.PolyData(points[self.nodes], self.faces)
+    def shot(self, rest: np.ndarray, moved: np.ndarray, scale: float, largest: float) -> np.ndarray:
+        """The image of blades at rest and moved ([N,] n_point, 3), each in its own frame; colours : up to `largest`."""
+        points = rest + scale * moved
+        placed = np.concatenate([self._wheel.sector(blade, n) for n, blade in enumerate(points)])
+        surface = package("pyvista").PolyData(placed, self._faces)
+        values = np.linalg.norm(moved, axis=2).ravel()
+        layer = Layer(surface, values=values, map=MOTION_MAP, limits=(0.0, largest), edges=False)
+        return shoot(View([layer]), self.camera, LAYOUT.wheel)
 
 
-def wheel_of(result: Result) -> Wheel | None:
-    """The wheel of a result, None where its part stands alone."""
-    around = result.facts.around
-    return None if around is None else Wheel(around.sectors, around.engine_order, around.axis)
-
-
-def wheel_picture(result: Result, wheel: Wheel, deformation: float | None = None) -> Figure:
+def wheel_picture(result: Result, wheel: Around, deformation: float | None = None) -> Figure:
     """All blades at one instant in each shown state, coloured by how far they are from their mean position."""
     part, fields = result.part, result.fields
     assert part is not None
     assert fields is not None
 
     states = [state for state in shown_states(result) if state.field is not None]
-    radius = wheel.radius(part.points)
-    shell = Shell.of(part)
-    camera = wheel.camera(radius)
+    blades = Blades(wheel, part)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(3.4 * len(states) + 0.2, 4.4), layout="constrained")
         for axes, state in zip(np.atleast_1d(figure.subplots(1, len(states))), states, strict=True):
             wave = fields.displacement[state.field or 0]
-            moved = list(instants(wheel, result.harmonics, wave))
-            largest = max(float(np.linalg.norm(m, axis=-1).max()) for m in moved)
-            scale = deformation or drawing.deformation_scale(drawing.swing(wave, result.harmonics), 2 * radius)
-            rest = part.points + drawing.at_rest(wave, result.harmonics)
-            unit, factor = length_unit(largest)
-            layers = []
-            for n, vibration in enumerate(moved):
-                values = factor * np.linalg.norm(vibration, axis=-1)[shell.nodes]
-                blade = shell.at(wheel.blade(rest + scale * vibration, n))
-                layers.append(Layer(blade, values=values, map=MOTION_MAP, limits=(0.0, factor * largest), edges=False))
-            (image,), corner = with_room([shoot(View(layers), camera, LAYOUT.wheel)])
-            show(axes, image, camera, "xyz", corner)
+            moved = np.stack(list(instants(wheel, result.harmonics, wave)))
+            largest = float(np.linalg.norm(moved, axis=-1).max())
+            scale = deformation or drawing.deformation_scale(drawing.swing(wave, result.harmonics), 2 * blades.size)
+            rest = (part.points + drawing.at_rest(wave, result.harmonics))[blades.nodes]
+            (image,), corner = with_room([blades.shot(rest, moved[:, blades.nodes], scale, largest)])
+            show(axes, image, blades.camera, "xyz", corner)
             axes.set_title(f"{state.label}\nvibration × {scale:g}")
-            scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")
-        heading(figure, result, f"wheel of {wheel.n_sectors} sectors, engine order {wheel.engine_order}")
+            _bar(figure, axes, largest)
+        heading(figure, result, f"wheel of {wheel.sectors} sectors, engine order {wheel.engine_order}")
     return figure
 
 
-def instants(wheel: Wheel, harmonics: tuple[int, ...], displacement: np.ndarray) -> Iterator[np.ndarray]:
+def _bar(figure: Figure, axes: Any, largest: float) -> None:
+    unit, factor = length_unit(largest)
+    scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")
+
+
+def instants(wheel: Around, harmonics: tuple[int, ...], displacement: np.ndarray) -> Iterator[np.ndarray]:
     """Vibration (n_node, 3) [m] of every blade in its own frame, at the instant when blade 0 begins its period.
 
     displacement : (n_node, 3, n_coeff) of blade 0 [m]
     """
     basis = HarmonicBasis(harmonics, 2 * harmonics[-1] + 1)
     functions = basis.functions(np.zeros(1))[0] * (basis.order > 0)
-    for n in range(wheel.n_sectors):
-        yield at_sector(basis, displacement, wheel.engine_order, wheel.n_sectors, n) @ functions
+    for n in range(wheel.sectors):
+        yield at_sector(basis, displacement, wheel.engine_order, wheel.sectors, n) @ functions
 
 
 @dataclass(frozen=True)
@@ -151,25 +118,23 @@ class MistunedWheelFilm:
     name = "mistuned_wheel"
 
     def __init__(
-        self, scene: str, wheel: Wheel, part: PartMesh, harmonics: tuple[int, ...], states: Sequence[WheelState],
+        self, scene: str, wheel: Around, part: PartMesh, harmonics: tuple[int, ...], states: Sequence[WheelState],
         count: int = 1,
     ):  # fmt: skip
         check()
 
-        self.count, self._states, self._wheel = count, tuple(states), wheel
-        shell = Shell.of(part)
-        self._faces = _repeated(shell.faces, len(shell.nodes), wheel.n_sectors)
-        radius = wheel.radius(part.points)
-        self._camera = wheel.camera(radius)
+        self.count, self._states, self._sectors = count, tuple(states), wheel.sectors
+        self._blades = Blades(wheel, part)
+        nodes = self._blades.nodes
         self._rest, self._swings = [], []
         for state in states:
-            moved = state.displacement[:, shell.nodes]
-            self._rest.append(part.points[shell.nodes] + drawing.at_rest(moved, harmonics))
+            moved = state.displacement[:, nodes]
+            self._rest.append(part.points[nodes] + drawing.at_rest(moved, harmonics))
             self._swings.append(drawing.cycle(moved, harmonics))
         sizes = [np.linalg.norm(swing, axis=2) for swing in self._swings]
         self._largest = max(float(size.max()) for size in sizes)
         self._first = int(sizes[-1].max(axis=(0, 1)).argmax())
-        self._scale = drawing.nice(2 * radius / 12 / self._largest) if self._largest > 0 else 1.0
+        self._scale = drawing.nice(2 * self._blades.size / 12 / self._largest) if self._largest > 0 else 1.0
         with mpl.rc_context(STYLE):
             self.figure = Figure(figsize=(5.0 * len(states) + 0.4, 7.4), layout="constrained")
             self._draw(scene)
@@ -183,15 +148,14 @@ class MistunedWheelFilm:
         rows: Any = self.figure.subplots(
             3, len(self._states), squeeze=False, height_ratios=(4.2, 1.0, 1.0), sharey="row", sharex=False
         )
-        unit, factor = length_unit(self._largest)
         of_height, by_height = length_unit(max(float(state.heights.max()) for state in self._states))
         self._views = list(rows[0])
-        blades = np.arange(self._wheel.n_sectors)
+        blades = np.arange(self._sectors)
         for at, (state, (view, upper, lower)) in enumerate(zip(self._states, rows.T, strict=True)):
             view.imshow(self._shot(at, 0))
             view.axis("off")
             view.set_title(f"{state.label}\nvibration × {self._scale:g}")
-            scale_bar(self.figure, view, MOTION_MAP, 0.0, factor * self._largest, f"vibration at one instant / {unit}")
+            _bar(self.figure, view, self._largest)
             upper.bar(blades, by_height * state.heights, color=BLUE, width=0.8)
             upper.axhline(by_height * state.heights.mean(), color=INK, lw=0.8, ls="--")
             lower.bar(blades, 1e9 * state.volume, color=ORANGE, width=0.8)
@@ -199,19 +163,12 @@ class MistunedWheelFilm:
             if at == 0:
                 upper.set_ylabel(f"amplitude\n/ {of_height}")
                 lower.set_ylabel("worn volume\n/ mm³")
-        self.figure.suptitle(named(scene, f"wheel of {self._wheel.n_sectors} mistuned blades"), x=0.01, ha="left")
+        self.figure.suptitle(named(scene, f"wheel of {self._sectors} mistuned blades"), x=0.01, ha="left")
 
     def _shot(self, at: int, number: int) -> np.ndarray:
-        pv = package("pyvista")
-
         instants = self._swings[at].shape[-1]
         moved = self._swings[at][..., (self._first + number * instants // self.count) % instants]
-        points = self._rest[at] + self._scale * moved
-        placed = np.concatenate([self._wheel.blade(blade, n) for n, blade in enumerate(points)])
-        values = np.linalg.norm(moved, axis=2).ravel()
-        wheel, limits = pv.PolyData(placed, self._faces), (0.0, self._largest)
-        layer = Layer(wheel, values=values, map=MOTION_MAP, limits=limits, edges=False)
-        return shoot(View([layer]), self._camera, LAYOUT.wheel)
+        return self._blades.shot(self._rest[at], moved, self._scale, self._largest)
 
 
 def _repeated(faces: np.ndarray, n_point: int, count: int) -> np.ndarray:

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from tribodyn.geometry.placing import rotation
 from tribodyn.workflows.result.result import PartMesh, Patch, Result, connected
 
 
@@ -92,9 +91,7 @@ def _faces(result: Result, part: PartMesh, patch: Patch) -> tuple[Face, ...]:
     own = first or (patch.nodes, csr_matrix(np.eye(len(patch.nodes))))
     across: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]] = [(patch.points, -normal, None)]
     if (around := result.facts.around) is not None:
-        x, y, z = around.axis
-        turn = rotation((x, y, z), 2 * np.pi / around.sectors)
-        across.append((patch.points @ turn.T, -normal @ turn.T, turn))
+        across.append((around.sector(patch.points, 1), around.sector(-normal, 1), around.turn))
     for points, outward, turned in across:
         there = _nodes(part, patch, points, outward, own[0] if turned is None else none)
         if there is not None:

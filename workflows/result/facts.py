@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.geometry.placing import rotation
 from tribodyn.hbm.outcome import End
 
 
@@ -29,6 +30,16 @@ class Around:
     sectors: int
     engine_order: int
     axis: np.ndarray
+
+    @property
+    def turn(self) -> np.ndarray:
+        """(3, 3) rotation by one pitch, from a sector to the one on its left."""
+        x, y, z = self.axis
+        return rotation((x, y, z), 2 * np.pi / self.sectors)
+
+    def sector(self, points: np.ndarray, n: int) -> np.ndarray:
+        """Points (..., 3) of sector 0 where sector n has them."""
+        return points @ np.linalg.matrix_power(self.turn, n).T
 
 
 @dataclass(frozen=True)

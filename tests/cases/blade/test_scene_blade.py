@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import scipy.linalg as sla
@@ -22,7 +20,6 @@ from tribodyn.workflows.pictures import render, render_wheel
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.faces import meetings_of
-from tribodyn.workflows.result.facts import Facts
 from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning, sector
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -64,17 +61,16 @@ def test_wear_goes_on_until_the_blades_are_free(finished):
 
 def test_result_is_kept_and_told(finished, folder):
     loaded = store.load(folder / "result.h5")
-    assert render_wheel.wheel_of(loaded).n_sectors == 40
+    assert loaded.facts.around.sectors == 40
     assert "40 sectors, engine order 1" in text.brief(loaded)[1]
-    assert render_wheel.wheel_of(replace(loaded, facts=Facts())) is None
 
 
 def test_field_of_the_sector_meets_its_neighbour(finished):
     """From the displacement of all nodes: what the right face sees of the left face of the blade behind is x."""
     wear, patch, part, fields = finished.wear, finished.patch, finished.part, finished.fields
-    wheel = render_wheel.wheel_of(finished)
+    wheel = finished.facts.around
     left = node_of_pair(meetings_of(finished)[0].faces[1])
-    assert part.points[left] == pytest.approx(wheel.blade(patch.points, 1), abs=1e-12)
+    assert part.points[left] == pytest.approx(wheel.sector(patch.points, 1), abs=1e-12)
     basis = HarmonicBasis((0, 1))
     for row, field in zip(fields.row, fields.displacement, strict=True):
         behind = at_sector(basis, field, 1, 40, -1)[left]
@@ -102,7 +98,7 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
     Equal preload and shear on both faces; over the wheel the shrouds turn nothing, so the roots take no torque
     """
     model = built(folder)
-    wheel, patch, wear = render_wheel.wheel_of(finished), finished.patch, finished.wear
+    wheel, patch, wear = finished.facts.around, finished.patch, finished.wear
     _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
     left = node_of_pair(meetings_of(finished)[0].faces[1])
     clamp = named(model.part.node_sets, "clamp")
@@ -132,7 +128,7 @@ def model_scene():
 
 
 def test_every_blade_has_its_phase(finished):
-    wheel, field = render_wheel.wheel_of(finished), finished.fields.displacement[0]
+    wheel, field = finished.facts.around, finished.fields.displacement[0]
     moved = np.stack(list(render_wheel.instants(wheel, (0, 1), field)))
     assert moved.shape == (40, *field.shape[:2])
     assert moved[0] == pytest.approx(field[..., 1])  # cos at the start of the period
@@ -214,7 +210,7 @@ def test_plan_of_a_wheel():
 
 
 def test_rotation_leads_to_the_left(finished):
-    wheel = render_wheel.wheel_of(finished)
+    wheel = finished.facts.around
     assert wheel.turn == pytest.approx(rotation((1, 0, 0), 2 * np.pi / 40))
 
 

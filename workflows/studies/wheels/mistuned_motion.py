@@ -10,7 +10,8 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.pictures import film
-from tribodyn.workflows.pictures.render_wheel import MistunedWheelFilm, Wheel, WheelState
+from tribodyn.workflows.pictures.render_wheel import MistunedWheelFilm, WheelState
+from tribodyn.workflows.result.facts import Around
 from tribodyn.workflows.run.description import part_mesh
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.wheels.patterns import OUTPUT, Blades, amplitude
@@ -73,7 +74,7 @@ def write_wheel(blades: Blades, states: Sequence[WheelState], folder: Path, form
     assert info is not None
     if mesh is None:
         raise ValueError("this part has bodies of different elements: its wheel cannot be drawn")
-    wheel = Wheel(info.sectors, info.engine_order, np.array(info.axis, float))
+    wheel = Around(info.sectors, info.engine_order, np.array(info.axis, float))
     harmonics = blades.wheel.wave.basis.harmonics
     made = MistunedWheelFilm(blades.file.name, wheel, mesh, harmonics, states, IMAGES if formats else 1)
     folder.mkdir(parents=True, exist_ok=True)
