@@ -40,11 +40,10 @@ LARGE_ROTATION = 0.05  # of an element [rad]: its sine is off by 0.04 %, its geo
 class Prestress:
     """A static equilibrium and the stiffness about it.
 
-    q : (n_free,) displacement [m]; stiffness : (n_free, n_free) under the stress of q [N/m]
-    residual : relative change of q by its own stress once more; rotation : largest of any element [rad]
+    stiffness : (n_free, n_free) under the stress of its displacement [N/m]
+    residual : relative change of that displacement by its own stress once more; rotation : largest of any element [rad]
     """
 
-    q: np.ndarray
     stiffness: csr_matrix
     residual: float
     rotation: float
@@ -82,7 +81,7 @@ def prestressed(
             f"its static deflection of {1e3 * np.abs(q).max():.3g} mm turns elements by {np.degrees(rotation):.2g} "
             f"degrees, and small rotations are assumed, up to {np.degrees(LARGE_ROTATION):.2g}; {LOWER}"
         )
-    return Prestress(q, stiffness, residual, rotation)
+    return Prestress(stiffness, residual, rotation)
 
 
 def largest_rotation(mesh: Any, u: np.ndarray) -> float:

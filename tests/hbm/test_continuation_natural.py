@@ -29,6 +29,13 @@ def test_a_sweep_jumps_at_the_fold_and_says_so(n_points):
         assert abs(amplitude[at + 1] - amplitude[at]) > 0.5 * amplitude[at]
 
 
+def test_a_jump_that_newton_makes_by_itself_is_said():
+    """One step lands on the other branch without a failure: what tells is that it does not lead back."""
+    branch = natural.follow(Duffing().balance(), 5.0, 0.5, Options(n_points=27))
+    assert branch.ended is BranchEnd.JUMPED
+    assert not branch.folds
+
+
 def test_a_lifting_mass_jumps_both_ways_at_the_folds_of_the_arc_length():
     balance = Lifting().balance((0, 1, 2, 3), how="located")
     round_them = arc_length.follow(balance, 0.9, 4.0)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.geometry.surface import HeightMap, prepare
+from tribodyn.geometry.surface import prepare
 from tribodyn.geometry.surface_pair import centred, facing_gap, onto_nodes
 from tribodyn.workflows.scene.contact import Surfaces
 from tribodyn.workflows.scene.contact_numbers import faces
@@ -17,20 +16,10 @@ from tribodyn.workflows.scene.contact_numbers import faces
 FLAT = 1e-6  # part of its size by which a flat patch may bulge
 
 
-@dataclass(frozen=True)
-class SurfaceGap:
-    """gap : (n_pair,) before loading [m]; repairs : a sentence for each thing that was changed in a height map;
-    heights : waviness of the faces at the pairs (2, n_pair) [m]; maps : the prepared waviness of each face
-    """
+def surface_gap(surfaces: Surfaces, interface: ContactInterface, folder: Path) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Gap (n_pair,) [m] of a flat contact from the faces that a scene names, files relative to `folder`.
 
-    gap: np.ndarray
-    repairs: tuple[str, ...]
-    heights: np.ndarray
-    maps: tuple[HeightMap, ...]
-
-
-def surface_gap(surfaces: Surfaces, interface: ContactInterface, folder: Path) -> SurfaceGap:
-    """Gap of a flat contact from the faces that a scene names, files relative to `folder`.
+    Returns it with a sentence for each thing that was changed in a height map
 
     Raises  ValueError where the patch is not flat, or where a height map or the mating height cannot be what the scene
         gives
@@ -41,16 +30,13 @@ def surface_gap(surfaces: Surfaces, interface: ContactInterface, folder: Path) -
         raise ValueError(
             f'surfaces.mating_height is {surfaces.mating_height:g} m, more than the face is long: give its unit, "3 um"'
         )
-    waves: list[HeightMap] = []
     repairs: list[str] = []
-    for face in faces(surfaces, folder):
-        prepared = prepare(face, surfaces.cutoff, (float(size[0]), float(size[1])))
-        waves.append(centred(prepared.waviness))
-        repairs += prepared.repairs
     heights = np.zeros((2, len(nodes)))
-    for i, wave in enumerate(waves):
-        heights[i] = onto_nodes(wave, nodes)
-    return SurfaceGap(facing_gap(heights[0], heights[1], surfaces.mating_height), tuple(repairs), heights, tuple(waves))
+    for i, face in enumerate(faces(surfaces, folder)):
+        prepared = prepare(face, surfaces.cutoff, (float(size[0]), float(size[1])))
+        heights[i] = onto_nodes(centred(prepared.waviness), nodes)
+        repairs += prepared.repairs
+    return facing_gap(heights[0], heights[1], surfaces.mating_height), tuple(repairs)
 
 
 def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> np.ndarray:

@@ -184,8 +184,8 @@ def with_surfaces(scene: MeshScene, part: Part, folder: Path) -> tuple[Part, tup
             part = replace(part, interface=replace(part.interface, gap=gap))
     if scene.surfaces is None:
         return part, ()
-    measured = surface_gap(scene.surfaces, part.interface, folder)
-    return replace(part, interface=replace(part.interface, gap=part.interface.gap + measured.gap)), measured.repairs
+    gap, repairs = surface_gap(scene.surfaces, part.interface, folder)
+    return replace(part, interface=replace(part.interface, gap=part.interface.gap + gap)), repairs
 
 
 def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
