@@ -27,6 +27,7 @@ from tribodyn.hbm.wear.evolution import (
     assess,
     first_at_rest,
     first_preload,
+    kept_beside,
     reason_to_stop,
     row_of,
     state_of,
@@ -68,10 +69,9 @@ class StepRules:
     # d (miss of the frequency) / d omega while it is not known: of a peak that is one mode's. Where a superharmonic
     # resonance stands on the flank of another the miss is tens of times too large
     unknown_slope: float = -1.0
-    # largest moves of the frequency, relative: with a slope that is known, with one that is not, over the move before
+    # largest moves of the frequency, relative: with a slope that is known, with one that is not
     most_moved: float = 0.03
     first_moved: float = 1e-3
-    further_moved: float = 4.0
     gain_accuracy: float = 1e-9  # of the depth, for laws whose depth per work is not constant
     # first depth in time, and the shortest: the scatter of the rates is no error that shorter steps lower; both over
     # the tolerance on depth
@@ -224,7 +224,8 @@ def _step_in_time(
     slopes, look = np.full(len(state.points), RULES.unknown_slope), _next_look(problem, state, rows)
     # where rates scatter a small error may be chance: two in turn are believed
     stride_after = stride * growth(max(error, rows[-1].step_error) if rows else error)
-    after = assess(problem, state.depth + worn, state.cycles + stride, state)
+    after_at = state.depth + worn, state.cycles + stride
+    after = kept_beside(problem, state, *after_at) if given and machine.always else assess(problem, *after_at, state)
     solves += after.solves
     if not after.failure and _share_left(problem, after, rows, state) <= look:
         found = _overtaken(problem, after)
@@ -585,8 +586,6 @@ class _Search:
             slope = (miss - self._last[1]) / (omega - self._last[0])
             self._known, self.slope = (True, slope) if slope < -0.1 else (self._known, self.slope)
         reach = RULES.most_moved if self._known else RULES.first_moved
-        if self._last is not None:
-            reach = min(reach, max(RULES.first_moved, RULES.further_moved * abs(omega / self._last[0] - 1)))
         self._last = (omega, miss)
         if miss > 0:
             self._below = self._last

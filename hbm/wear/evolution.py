@@ -235,6 +235,24 @@ def _neighbour(
     return OperatingPoint(again.solution, again.amplitude, again.response, again.solves + solves)
 
 
+def kept_beside(problem: WearProblem, before: WearState, depth: np.ndarray, cycles: float) -> WearState:
+    """A state of duties at given frequencies that wears along motions in time, whatever their balances do.
+
+    The balance's solution next to that of `before` goes along, for what is asked of it later. Where Newton finds none,
+    the last one stays as it is: to look for another may take longer than all wear steps
+    """
+    points = []
+    for duty, known in zip(problem.mission, before.points, strict=True):
+        omega, x = known.state.omega, known.state.x
+        near, balance = problem.in_duty(duty, before.depth), problem.in_duty(duty, depth)
+        guess = x + near.gap_response(near.evaluate(omega, x), depth - before.depth)
+        found = newton.solve(balance, omega, guess, duty.site.newton)
+        if not found.converged:
+            found = replace(known.solution, state=balance.evaluate(omega, x))
+        points.append(OperatingPoint.of(balance, found, duty.site.output, 1))
+    return worn_state(problem, depth, cycles, points, len(points))
+
+
 def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.ndarray) -> tuple[np.ndarray, int]:
     """Follow x at fixed frequency while the gaps open, in steps that halve where Newton fails; x and solves spent."""
     gap, solves = before.contact.gap, 0

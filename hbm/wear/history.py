@@ -133,8 +133,9 @@ class WearHistory:
     growth : (n_row,) of the perturbation of the balance's motion that grows fastest, per radian, by Hill's method, less
         rounding; nan where it is not known, None where it is nowhere
     periods : (n_row,) marched in time, where a machine leaves the motion of the balance: energy, normal_force, preload
-        and amplitude then are means over its own, while omega, displacement, force and response stay the balance's;
-        zero elsewhere. None in a run that is nowhere marched, as the four below
+        and amplitude then are means over its own, while omega, displacement, force and response stay the balance's, or
+        of the last row with a balance where wear in time went on without one; zero elsewhere. None in a run that
+        is nowhere marched, as the four below
     spread : (n_row,) standard deviation of the work of a period, over its mean; mean_error : (n_row,) standard error of
         that mean, relative; settled : (n_row,) whether the means came to rest
     moving : (n_row, n) what moved before the row's periods, see hbm.time.mean_motion.Follower; zeros where they began

@@ -88,7 +88,7 @@ class MachineMotion:
     """
 
     def __init__(self, problem: WearProblem, always: bool = False):
-        self._problem, self._always = problem, always
+        self._problem, self.always = problem, always
         self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy)
         if always:
             self._options = replace(self._options, contact=RULES.contact, passing=RULES.passing)
@@ -116,7 +116,7 @@ class MachineMotion:
 
     def of(self, state: WearState) -> WearState:
         """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own."""
-        if not self._serves or state.failure or not (self._always or state.growth > 0):
+        if not self._serves or state.failure or not (self.always or state.growth > 0):
             self._followers, self._moving = [], np.zeros(0)
             return state
         self._moving = np.concatenate([f.kept() for f in self._followers]) if self._followers else np.zeros(0)
@@ -128,7 +128,7 @@ class MachineMotion:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
         assert found.means is not None
         apart = abs(float(found.work.sum() - state.work.sum()))
-        if not self._always and found.means.spread == 0 and apart <= RULES.accuracy * float(state.work.sum()):
+        if not self.always and found.means.spread == 0 and apart <= RULES.accuracy * float(state.work.sum()):
             self._followers, self._moving = [], np.zeros(0)
             return state  # the motion has come back to that of the balance
         return found

@@ -11,10 +11,12 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.sliding import solve_along_friction
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.reduction.model import ReducedModel
 
 LOAD, FRICTION, STIFFNESS, OMEGA = 1000.0, 0.3, 1e8, 100.0
@@ -54,3 +56,29 @@ def test_a_wedge_slides_to_where_friction_holds_it(degrees: float) -> None:
 
 def test_a_law_without_friction_has_no_such_way() -> None:
     assert solve_along_friction(wedge(0.5, rubs=False), OMEGA, NewtonOptions()) is None
+
+
+def shaken(force: float, stop: float = 0.0) -> HarmonicBalance:
+    """A wedge that a load [N] shakes along its edge, while half of it presses; stop : spring along the edge [N/m]."""
+    sine, cosine = np.sin(0.5), np.cos(0.5)
+    faces = [[cosine, -sine, 0], [0, 0, 1], [sine, cosine, 0], [cosine, sine, 0], [0, 0, 1], [sine, -cosine, 0]]
+    loads = {"press": np.array([1.0, 0.0, 0.0]), "shake": np.array([0.5, 0.0, 1.0])}
+    system = SecondOrderSystem(np.eye(3), np.diag([0, 0, stop]), None, loads, {"along": np.array([0.0, 0.0, 1.0])})
+    components = ("t1", "t2", "n")
+    model = ReducedModel(system, interface(np.array(faces), components))
+    parameters = ContactParameters.of(components, np.full((2, 3), STIFFNESS), friction=FRICTION)
+    load = Excitation.of({"press": LOAD}, {1: {"shake": force}})
+    return HarmonicBalance.of(model, Joint("faces", "jenkins", parameters), HarmonicBasis((0, 1), 64), load, OMEGA)
+
+
+def test_a_wedge_that_walks_along_its_edge_is_refused_by_name() -> None:
+    """In time it stays at 400 N and walks by 4 mm a period at 500 N."""
+    held = arc_length.solve_along_load(shaken(400.0), OMEGA)
+    assert held.converged
+    assert np.hypot(*held.state.x[0, 1, 1:]) == pytest.approx(400 / (2 * STIFFNESS), rel=1e-4)
+    assert np.abs(held.state.x[:, 1, 0]).max() < 1e-12
+    for force, share in ((500.0, "86%"), (1500.0, "29%")):  # both are 430 N
+        walks = arc_length.solve_along_load(shaken(force), OMEGA)
+        assert walks.outcome.kind is SolveEnd.NOT_HELD
+        assert f"from {share} of the vibration load on: every pair of faces slips along t2" in str(walks.outcome)
+        assert arc_length.solve_along_load(shaken(force, 1e5), OMEGA).converged

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Literal
 
 import numpy as np
@@ -13,14 +14,14 @@ from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_pr
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import AtFrequency
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.stays import HILL, MULTIPLIERS, stays
 from tribodyn.hbm.time import mean_motion, time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
-from tribodyn.hbm.wear import error_controlled_rule
+from tribodyn.hbm.wear import error_controlled_rule, evolution
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
@@ -57,6 +58,22 @@ def test_life_in_time_is_that_of_many_harmonics(problem: WearProblem, run: WearH
     assert cycles_to_preload(found, LEFT) == pytest.approx(cycles_to_preload(run, LEFT), rel=5e-3)
     assert found.energy[0].sum() == pytest.approx(run.energy[0].sum(), rel=5e-3)
     assert 0.95 < found.preload[-1] / (LEFT * found.preload[0]) < 1  # the last step ends where life does
+
+
+def test_wear_in_time_goes_on_where_the_balance_has_no_solution(
+    problem: WearProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), 4, motion="time")
+    lost = SolveEnd.NO_DESCENT.say(" here")
+    monkeypatch.setattr(
+        evolution,
+        "newton",
+        SimpleNamespace(Solution=newton.Solution, solve=lambda *of: replace(newton.solve(*of), outcome=lost)),
+    )
+    found = error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), 4, motion="time")
+    assert len(found.cycles) == 4
+    np.testing.assert_array_equal(found.depth, whole.depth)
+    np.testing.assert_array_equal(found.displacement[1:], found.displacement[:1].repeat(3, axis=0))  # that of the first
 
 
 def test_a_motion_that_is_the_balances_is_not_followed(

@@ -227,8 +227,8 @@ def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None
     assert np.all(worn.plan[:-1, 0] > 0)  # implicit steps throughout
     assert "with harmonics up to 3" in str(worn.end)
     assert life(worn) == pytest.approx(life(error_controlled_rule.evolve(whole, tolerance)), rel=0.02)
-    begun = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 1)
-    again = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 2, resume=begun)
+    begun = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 2)
+    again = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 3, resume=begun)
     assert np.array_equal(again.depth, worn.depth[: len(again.depth)])
     assert len(again.depth) > len(begun.depth)
 

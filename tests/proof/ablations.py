@@ -35,13 +35,13 @@ RULES: dict[str, dict[str, Any]] = {
         "least_error_share": 0.0, "jump_error": NEVER, "taken": 1.0, "crawled": 10**9, "rejected_error": 1.0,
     },
     "continuation.methods.natural.Rules": {
-        "least_spacing": 0.0, "max_fold_points": 10**9, "trial_shortest": 4e-4, "trial_slowest": 1.0, "abrupt": NEVER,
+        "least_spacing": 0.0, "max_fold_points": 10**9, "abrupt": NEVER,
     },
     "continuation.operating_point.AtPeak": {
         "scan_misses": 0.0, "overtakes": 1.0, "near": NEVER, "reach": 1e9, "tried": 1,
     },
     "wear.error_controlled_rule.StepRules": {
-        "error_trend_power": 0.0, "unexpected": NEVER, "retreats": 0, "further_moved": NEVER,
+        "error_trend_power": 0.0, "unexpected": NEVER, "retreats": 0,
     },
     "time.period_search.SearchRules": {"thrown_off": NEVER, "lost": NEVER, "progress": 1.0},
 }  # fmt: skip

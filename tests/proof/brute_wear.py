@@ -121,6 +121,7 @@ at = {{ frequency = {hertz} }}
 rule = "error_controlled"
 motion = "machine"
 max_steps = 400
+tolerance = "3 %"
 lost_below = {LIFE_SHARE}
 """
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.proof import bracket
 from tribodyn.workflows.errors import states
 from tribodyn.workflows.result.summary import numbers
 from tribodyn.workflows.run import modelling, pipeline
@@ -25,7 +26,7 @@ pad_start = 0.1
 pad_end = 0.12
 """
 BRACKET = """
-part = "bracket"
+part = "bracket.py"
 fixed = ["back"]
 length = 0.1
 height = 0.05
@@ -89,8 +90,8 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_head_verdict_and_arc_length_have_one_peak(name: str, tmp_path: Path) -> None:
-    file = parse(SCENES[name], "part.toml", ("verdict.enabled=false",), tmp_path)
+def test_head_verdict_and_arc_length_have_one_peak(name: str) -> None:
+    file = parse(SCENES[name], "part.toml", ("verdict.enabled=false",), Path(bracket.__file__).parent)
     result = pipeline.run(file, None, Progress())
     assert result.response is not None
     assert states.turns_back(result.response)

@@ -157,11 +157,14 @@ def amplitude_against_cycles(result: Result) -> Figure:
 
 
 def preload_against_cycles(result: Result) -> Figure:
-    """Static normal force of the contact against cycles."""
+    """Mean normal force of the contact against cycles, and that at rest where the run ends by it."""
     wear = _wear(result)
     with axes_of() as (figure, axes):
         scale_cycles = cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
+        if wear.preload_at_rest is not None:
+            axes.plot(scale_cycles * wear.cycles, scale * wear.preload_at_rest, "--", color=ORANGE, label="at rest")
+            axes.legend(loc="best")
         _course(axes, scale_cycles, wear, scale * wear.preload, BLUE)
         axes.set(ylabel=f"preload / {unit}", title=titled(result, "preload of the contact"))
         axes.set_ylim(bottom=0)

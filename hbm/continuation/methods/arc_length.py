@@ -27,7 +27,7 @@ from tribodyn.hbm.continuation.sliding import solve_along_friction
 from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.continuation.stiffening import solve_along_stiffness
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
 
@@ -145,7 +145,8 @@ def first_on(path: Parameter, value: float, options: NewtonOptions) -> Solution:
 def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
 
-    Newton from rest and its load ramp are tried first; else the curve of solutions over the load is followed, which
+    Newton from rest and its load ramp are tried first, a rest that Newton does not find by falling friction, too; where
+    a body then slides away, there is no other way; else the curve of solutions over the load is followed, which
     leads where a rising load would, or, where it turns back, through no load to the opposite one, whose solution is
     that of half a period later if all loads have odd harmonics; where that ends too, friction falls from where all
     closed pairs stick, and then the contact is stiffened from soft springs
@@ -153,7 +154,11 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
     """
     options = options or NewtonOptions()
     first = newton.solve_from_rest(balance, omega, options)
-    if first.converged:
+    if first.outcome.kind is SolveEnd.NO_REST and (
+        rest := solve_along_friction(balance.with_load(0.0), omega, options)
+    ):
+        first = newton.solve_from_rest(balance, omega, options, rest)
+    if first.converged or first.outcome.kind is SolveEnd.NOT_HELD:
         return first
     full, loads = balance.load_factor, balance.excitation
     odd = loads.base is None and all(h % 2 or h == 0 for h, _ in loads.loads)

@@ -32,8 +32,6 @@ class Rules:
 
     least_spacing : of the points extrapolated from, in steps: closer ones amplify what Newton leaves
     max_fold_points : by arc length on the way round folds, after which the sweep looks from rest
-    trial_shortest, trial_slowest : where Newton's method gives up early, as a shorter step is left to try: shortest
-        share of its step, and residual over that of two steps before
     abrupt : miss of the extrapolation, in steps of x, from which on a step is solved backwards: over a jump it does
         not lead back
     same : distance, in steps of x, within which it has led back
@@ -41,8 +39,6 @@ class Rules:
 
     least_spacing: float = 0.5
     max_fold_points: int = 200
-    trial_shortest: float = 0.03
-    trial_slowest: float = 0.8
     abrupt: float = 0.5
     same: float = 1e-2
 
@@ -129,9 +125,7 @@ class _Sweep:
 
 def _step(path: Parameter, builder: BranchBuilder, value: float, options: Options, halvings: int) -> Solution:
     """One step to `value`, through points in between where it fails."""
-    hasty = replace(options.newton, shortest=options.rules.trial_shortest, slowest=options.rules.trial_slowest)
-    patience = hasty if halvings > 0 else options.newton
-    solution = newton.solve(*path.place(value), predict(builder, value, options.rules.least_spacing), patience)
+    solution = newton.solve(*path.place(value), predict(builder, value, options.rules.least_spacing), options.newton)
     if not solution.converged and halvings > 0:
         middle = _step(path, builder, 0.5 * (builder.value[-1] + value), options, halvings - 1)
         if not middle.converged:

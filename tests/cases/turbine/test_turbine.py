@@ -12,6 +12,7 @@ import tribodyn as td
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tests.proof.problems import result_of, wear
 from tribodyn.geometry import bladed_sector
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.studies.forces import BodyForces
 
@@ -91,6 +92,20 @@ def test_every_contact_is_told_by_itself(worn: td.Result) -> None:
             assert np.interp(life, result.wear.cycles, preload) == pytest.approx(0.9995 * preload[0], rel=1e-5)
             lives.append(life)
     assert result.summary()["life_cycles"] == min(lives)  # the first joint that is lost ends the run
+
+
+STOP = 'springs.stop={group="damper.wedge_right", direction="x", stiffness="1 N/um"}'
+
+
+@pytest.mark.parametrize("stop", [(), (STOP,)])
+def test_dampers_without_shrouds_run_held_along_the_axis_or_are_refused(stop: tuple[str, ...]) -> None:
+    """Shaken hard, a damper slips along the axis at every pair, and only a stop holds it there."""
+    balance = td.build(td.read_scene("turbine", (*COARSE, "contacts.shroud=", "wear=", *stop))).balance
+    gentle, hard = (arc_length.solve_along_load(balance.with_load(load), 2 * np.pi * 780) for load in (1.0, 4.0))
+    assert gentle.converged
+    assert hard.converged == bool(stop)
+    if not stop:
+        assert "every pair of damper_right, damper_left slips along t1" in str(hard.outcome)
 
 
 @pytest.mark.parametrize(
