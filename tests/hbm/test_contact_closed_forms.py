@@ -3,19 +3,11 @@
 import numpy as np
 import pytest
 
+from tests.helpers.jenkins import describing_function
 from tribodyn.hbm.contact import aft
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
-
-
-def describing_function(amplitude, kt, limit):
-    """Cosine and sine coefficient of a Jenkins element under u = A cos t (Griffin 1980)."""
-    if amplitude <= limit / kt:
-        return kt * amplitude, 0.0
-    ratio = limit / (kt * amplitude)
-    theta = np.arccos(1 - 2 * ratio)
-    return kt * amplitude / np.pi * (theta - 0.5 * np.sin(2 * theta)), -4 * limit / np.pi * (1 - ratio)
 
 
 @pytest.mark.parametrize("amplitude", [0.1, 0.999, 1.001, 1.5, 3.0, 40.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from tests.hbm.test_contact_closed_forms import describing_function
+from tests.helpers.jenkins import describing_function
 from tests.helpers.verification_models import interface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
