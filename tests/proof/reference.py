@@ -54,7 +54,7 @@ def solved(file: SceneFile, seconds: float, elements: float = FINER.elements) ->
     try:
         with processor_seconds(seconds), threads.limited(1):
             model = modelling.build(fine, Progress())
-            values |= dict(states.unworn(fine, model).answers.by_quantity())
+            values |= states.unworn(fine, model).answers
         wear = fine.scene.wear
         if fine.scene.wears and wear is not None:
             what = "measured, the reference of its wear"

@@ -97,7 +97,9 @@ def test_head_verdict_and_arc_length_have_one_peak(name: str) -> None:
     assert states.turns_back(result.response)
     head = numbers(result)
     said = states.first_state(file, modelling.build(file, Progress()).balance, result).answers
-    assert (said.hertz, said.amplitude) == pytest.approx((head["peak_hz"][0], head["peak_m"][0]), rel=1e-9)
+    assert (said["peak_frequency"], said["amplitude"]) == pytest.approx(
+        (head["peak_hz"][0], head["peak_m"][0]), rel=1e-9
+    )
     down = pipeline.run(file.changed("response.method=arc_length", "response.sweep=down"), None, Progress())
     assert down.response is not None
     assert down.response.omega[0] > down.response.omega[-1]  # it comes to the peak from the other side

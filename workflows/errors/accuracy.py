@@ -10,7 +10,7 @@ from functools import partial
 from tribodyn.workflows.errors import refine
 from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import NAMES, QUANTITIES, Refinement, Verdict, loaded
+from tribodyn.workflows.result.verdict import NAMES, Refinement, Verdict, loaded
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.units import to_si
 
@@ -64,8 +64,8 @@ class Bound:
     @property
     def sentence(self) -> str:
         """Errors, the settings that gave them, and what is missed."""
-        good = [f"{_name(q)} {self.errors[q]:.2g}" for q, why in self.reasons.items() if not why]
-        bad = [f"{_name(q)} ({why})" for q, why in self.reasons.items() if why]
+        good = [f"{NAMES[q]} {self.errors[q]:.2g}" for q, why in self.reasons.items() if not why]
+        bad = [f"{NAMES[q]} ({why})" for q, why in self.reasons.items() if why]
         settings = f"with {', '.join(self.overrides)}" if self.overrides else "with the scene as it is"
         said = f"error bound {self.wanted.error:g} {settings}, after {self.rounds} runs"
         said += f"; met: {', '.join(good)}" if good else ""
@@ -85,7 +85,7 @@ def parsed(text: str) -> Wanted:
         raise ValueError(f'--accuracy "{text}": {wrong}') from None
     if not 0 < error < 1:
         raise ValueError(f'--accuracy "{text}": give an error above 0 and below 100 %, such as "1 %"')
-    known = {_name(q): q for q in QUANTITIES}
+    known = {name: q for q, name in NAMES.items()}
     asked = tuple(re.split(r", and |, | and ", names)) if names else ()
     for name in asked:
         if name not in known:
@@ -164,7 +164,3 @@ def _finer(file: SceneFile, refinement: str, factor: float) -> tuple[str, ...]:
     except refine.NoMesh:
         return ()
     return () if finer is None else finer.overrides[len(file.overrides) :]
-
-
-def _name(quantity: str) -> str:
-    return NAMES.get(quantity, quantity)

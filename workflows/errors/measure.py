@@ -50,8 +50,8 @@ class Table:
 
     def add(self, refinement: Refinement, before: Answers, after: Answers, how: str) -> None:
         """What a refinement changed in a state."""
-        for (name, a), (_, b) in zip(before.by_quantity(), after.by_quantity(), strict=True):
-            self.rows.append(Change(refinement, name, a, b, relative(a, b), how))
+        for name, value in before.items():
+            self.rows.append(Change(refinement, name, value, after[name], relative(value, after[name]), how))
 
     def refuse(self, refinement: Refinement, why: str, quantities: tuple[str, ...] = OF_STATE) -> None:
         """A refinement that was not measured."""
@@ -187,7 +187,7 @@ def _more_harmonics(state: State, table: Table, say: Callable[[str], None]) -> A
     except REFUSALS as refusal:
         table.refuse(Refinement.HARMONICS, f"{how}: {refusal}")
         return None
-    answers = Answers.of(wide, point)
+    answers = states.answers_of(wide, point)
     table.add(Refinement.HARMONICS, state.answers, answers, how)
     return answers
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.structure import BodyTable, DeckTable, StructureScene
+from tribodyn.workflows.scene.wear import WearStep
 
 HALVED = 2.0  # ratio of element sizes where every element of a given mesh is cut into eight
 
@@ -61,20 +61,17 @@ def harmonics(file: SceneFile, top: int) -> SceneFile:
 
 def wear(file: SceneFile, factor: float) -> SceneFile:
     """The scene with wear steps finer by a factor, as many more of them allowed."""
-    return file.changed(*_wear(file, factor))
-
-
-def _wear(file: SceneFile, factor: float) -> Iterator[str]:
     table = file.scene.wear
     if table is None:
-        return
-    yield f"wear.max_steps={round(2 * factor * table.max_steps)}"
-    if table.rule == "error_controlled" and table.tolerance is not None:
-        yield f"wear.tolerance={table.tolerance / factor!r}"
-    elif table.step is not None and table.step.share is not None:
-        yield f"wear.step={table.step.share / factor!r}"
-    elif table.step is not None and table.step.depth is not None:
-        yield f"wear.step={table.step.depth / factor!r} m"
+        return file
+    step = table.step or WearStep()
+    if table.rule == "error_controlled":
+        finer = f"wear.tolerance={table.tolerance / factor!r}"
+    elif step.share is not None:
+        finer = f"wear.step={step.share / factor!r}"
+    else:
+        finer = f"wear.step={(step.depth or 0.0) / factor!r} m"
+    return file.changed(f"wear.max_steps={round(2 * factor * table.max_steps)}", finer)
 
 
 def _meshed(file: SceneFile) -> dict[str, Mesh]:

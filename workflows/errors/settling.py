@@ -107,7 +107,7 @@ class Settlings:
         tables = [table for one in self.ladders if (table := _bounds(one, quantity))]
         flat = [(i, row, error) for i, table in enumerate(tables) for row, error in table]
         if not flat:
-            raise ValueError(f"no setting of {self.scene} changes {_name(quantity)}")
+            raise ValueError(f"no setting of {self.scene} changes {NAMES[quantity]}")
         one_each = np.array([[float(at == i) for at, _, _ in flat] for i in range(len(tables))])
         errors = np.array([error for _, _, error in flat])
         found = milp(
@@ -118,7 +118,7 @@ class Settlings:
         )
         if found.x is None:
             least = sum(min(error for _, error in table) for table in tables)
-            raise ValueError(f"{_name(quantity)} is known to {least:.2g} at best: it needs finer settings")
+            raise ValueError(f"{NAMES[quantity]} is known to {least:.2g} at best: it needs finer settings")
         taken = [k for k, used in enumerate(found.x) if used > 0.5]
         rows = tuple(flat[k][1] for k in taken)
         return rows, float(errors[taken].sum()), self.seconds * float(np.prod([row.share for row in rows]))
@@ -132,10 +132,6 @@ def _bounds(one: Settling, quantity: str) -> list[tuple[Row, float]]:
     return [(row, b) for row in one.rows if (b := one.bound(row, known)) is not None and np.isfinite(b)]
 
 
-def _name(quantity: str) -> str:
-    return NAMES.get(quantity, quantity)
-
-
 def measure(file: SceneFile, wears: bool = True) -> Measured:
     """Solve a scene's unworn state, and wear it where that is wanted; raises ValueError for what it cannot be."""
     values: dict[str, float | None] = dict.fromkeys(QUANTITIES)
@@ -147,7 +143,7 @@ def measure(file: SceneFile, wears: bool = True) -> Measured:
         work, solved = np.zeros(contact.n_pair), clock
         try:
             state = _state(file, model)
-            values |= dict(state.answers.by_quantity())
+            values |= state.answers
             work = state.balance.energy(state.here.state) / contact.area
             solved = process_time()
             if wears and file.scene.wears:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,29 +20,19 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 
+Answers = dict[str, float]
+"""What one solved cycle answers, by names of result.verdict.QUANTITIES and in their units."""
 
-@dataclass(frozen=True)
-class Answers:
-    """What one solved cycle answers: frequency [Hz], amplitude of the response [m], friction work [J], preload [N]."""
 
-    hertz: float
-    amplitude: float
-    energy: float
-    preload: float
-
-    @classmethod
-    def of(cls, balance: HarmonicBalance, point: OperatingPoint) -> Answers:
-        """The answers of a solved operating point."""
-        state = point.state
-        energy = float(balance.energy(state).sum())
-        return cls(state.omega / (2 * np.pi), point.amplitude, energy, balance.preload(state))
-
-    def by_quantity(self) -> Iterator[tuple[str, float]]:
-        """Names as in result.verdict.QUANTITIES, and values."""
-        yield from (
-            ("peak_frequency", self.hertz), ("amplitude", self.amplitude), ("energy", self.energy),
-            ("preload", self.preload),
-        )  # fmt: skip
+def answers_of(balance: HarmonicBalance, point: OperatingPoint) -> Answers:
+    """The answers of a solved operating point."""
+    state = point.state
+    return {
+        "peak_frequency": state.omega / (2 * np.pi),
+        "amplitude": point.amplitude,
+        "energy": float(balance.energy(state).sum()),
+        "preload": balance.preload(state),
+    }
 
 
 @dataclass(frozen=True)
@@ -61,7 +50,7 @@ class State:
     @property
     def answers(self) -> Answers:
         """What it answers."""
-        return Answers.of(self.balance, self.here)
+        return answers_of(self.balance, self.here)
 
 
 @dataclass(frozen=True)

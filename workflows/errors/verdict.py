@@ -43,7 +43,7 @@ def values_of(table: Table, result: Result) -> dict[str, float | None]:
     """The quantities of a result: of its unworn state, and of its whole wear."""
     values: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     if table.first is not None:
-        values |= dict(table.first.answers.by_quantity())
+        values |= table.first.answers
     if result.wear is not None and result.wear_steps:
         values["depth"] = float(result.depth_after(-1).max())
         values["life"] = summary.life(result)

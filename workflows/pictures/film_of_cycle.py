@@ -120,7 +120,7 @@ class CycleFilm:
             found.append(self._moving.marked(shoot(view, self._moving.camera, LAYOUT.film_part), points))
         if self._contact is not None:
             own = self._contact.own(self.state)
-            paint = book.Status(self._status[self._contact.pairs, sample])
+            paint = book.Status(self._status[self._contact.contact.pairs, sample])
             view = self._contact.view(own.depth, self._wear, paint)
             found.append(shoot(view, self._contact.camera, LAYOUT.film_part))
         return found

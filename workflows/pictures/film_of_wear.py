@@ -48,7 +48,7 @@ class WearFilm:
         depth = np.stack([state.depth for state in self.states])
         self._pressure_top = max(float(_pressure(state).max()) for state in self.states)
         self._depth_top = float(depth.max())
-        self.scale = wear or wear_scale(self.contact.patch, depth)
+        self.scale = wear or wear_scale(self.contact.contact.patch, depth)
         with mpl.rc_context(STYLE):
             self.figure = Figure(figsize=LAYOUT.film, layout="constrained")
             halves: Any = self.figure.subfigures(2, 1, height_ratios=[1.8, 1])

@@ -13,6 +13,7 @@ from tribodyn.fem.assembly import Body
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.shots import SHADE
 from tribodyn.workflows.pictures.style import BODY, INK, LAYOUT, PAPER
+from tribodyn.workflows.pictures.view import polygons
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d", "#8c564b", "#17becf")
 
@@ -58,6 +59,4 @@ def draw(solids: Sequence[Body], path: Path, most: int = 20) -> Path:
 
 def surface_of(pv: Any, mesh: Any, facets: np.ndarray) -> Any:
     """Some facets of a mesh as pyvista has them."""
-    corners = mesh.facets[:, facets].T
-    faces = np.hstack([np.full((len(corners), 1), corners.shape[1]), corners])
-    return pv.PolyData(mesh.p.T, faces.ravel())
+    return pv.PolyData(mesh.p.T, polygons(mesh.facets[:, facets].T))

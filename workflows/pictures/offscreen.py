@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import faulthandler
 import os
-import signal
 import subprocess
 import sys
-import time
 from functools import cache
 from importlib import import_module
+from multiprocessing import get_context
 
 from tribodyn.extras import package
 
@@ -56,33 +55,23 @@ def _works(probe: str) -> bool:
 def _works_in_child(probe: str, patience: float = 30.0) -> bool:
     """Whether it ends well in a child within so many seconds.
 
-    That can fail for another reason too: this process has drawn before.
+    That can fail for another reason too: this process has drawn before, or may have no children.
     """
+    child = get_context("fork").Process(target=_run_in_silence, args=(probe,), daemon=True)
     try:
-        import pyvista  # noqa: F401
-
-        pid = os.fork()
-    except (ImportError, OSError):
+        child.start()
+    except (OSError, AssertionError):
         return False
-    if pid == 0:
-        code = 1
-        try:
-            resource = import_module("resource")
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            faulthandler.disable()  # whether it dies is the question
-            nowhere = os.open(os.devnull, os.O_RDWR)
-            os.dup2(nowhere, 1)
-            os.dup2(nowhere, 2)
-            exec(probe, {})
-            code = 0
-        finally:
-            os._exit(code)  # nothing that this process would write or remove at its end is written or removed twice
-    ends = time.monotonic() + patience
-    while time.monotonic() < ends:
-        ended, status = os.waitpid(pid, os.WNOHANG)
-        if ended:
-            return status == 0
-        time.sleep(0.01)
-    os.kill(pid, signal.SIGKILL)
-    os.waitpid(pid, 0)
-    return False
+    child.join(patience)
+    child.kill()
+    return child.exitcode == 0
+
+
+def _run_in_silence(probe: str) -> None:
+    resource = import_module("resource")
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    faulthandler.disable()  # whether it dies is the question
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+    exec(probe, {})

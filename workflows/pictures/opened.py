@@ -27,20 +27,17 @@ THICK = 0.5  # of its size, how deep the bodies are cut off
 class Opened:
     """What does not change over a series: where the faces lie and how they are looked at.
 
-    name : of the contact among several, else empty; pairs : of the result that are its own; patch : of these alone
-    flat : (n_pair, 2) along t1, t2 [m]; size : of the patch [m]; split : share of the depth on body 1
+    contact : with its pairs and faces; part : of the result; split : share of the depth on body 1
+    flat : (n_pair, 2) along t1, t2 [m]; size : of the patch [m]
     along : which of t1, t2 the book opens along, hinge : the place of its hinge there [m]
     around : lowest and highest t1, t2 of what is shown [m]
     """
 
-    name: str
-    pairs: slice
-    patch: Patch
+    contact: Meeting
     part: PartMesh | None
-    faces: tuple[Face, ...]
+    split: float
     flat: np.ndarray
     size: float
-    split: float
     along: int
     hinge: float
     around: tuple[np.ndarray, np.ndarray]
@@ -49,18 +46,18 @@ class Opened:
     @property
     def sides(self) -> str:
         """What stands where, for a title."""
-        of = f" {self.name.replace('_', ' ')}" if self.name else ""
-        return f"contact{of}: body 1 in front, {'body 2' if len(self.faces) > 1 else 'ground'} behind"
+        across = "body 2" if len(self.contact.faces) > 1 else "ground"
+        return f"{f'contact {self.contact.name}'.strip().replace('_', ' ')}: body 1 in front, {across} behind"
 
     def own(self, state: State) -> State:
         """A state, of this contact's pairs."""
-        return state.of(self.pairs)
+        return state.of(self.contact.pairs)
 
     def view(self, depth: np.ndarray, scale: float, paint: Paint) -> View:
         """Both faces worn by a depth (n_pair,) that is drawn `scale` times as large, and painted."""
-        patch, layers = self.patch, []
+        contact, layers = self.contact, []
         for number, share in enumerate((self.split, 1 - self.split)):
-            face = self.faces[number] if number < len(self.faces) else None
+            face = contact.faces[number] if number < len(contact.faces) else None
             block = self._block(face, number == 0, scale * depth)
             points = np.column_stack(
                 [self.flat, (0.0 if face is None else -scale * share) * depth + LAYOUT.lift * self.size]
@@ -69,7 +66,7 @@ class Opened:
                 block.points = self._turned(np.asarray(block.points), -1)
                 points = self._turned(points, 1)
             layers.append(Layer(block.extract_surface(algorithm="dataset_surface"), color=(BODY, BODY_2)[number]))
-            layers += paint(patch, points)
+            layers += paint(contact.patch, points)
         return View(layers)
 
     def _turned(self, points: np.ndarray, sign: int) -> np.ndarray:
@@ -83,7 +80,7 @@ class Opened:
         """The elements near a face in the axes of the patch, worn, or a plate where no body is meshed."""
         pv = package("pyvista")
 
-        patch, part = self.patch, self.part
+        patch, part = self.contact.patch, self.part
         sign = -1.0 if below else 1.0
         (x0, y0), (x1, y1) = self.around
         if face is None or part is None:
@@ -163,8 +160,7 @@ def contacts(result: Result) -> tuple[Meeting, ...]:
 
 def opened(result: Result, contact: Meeting, aspect: float = 1.3) -> Opened:
     """An opened contact of a result; aspect : of the view, width over height."""
-    patch, faces = contact.patch, contact.faces
-    flat = patch.flat
+    flat = contact.patch.flat
     low, high = flat.min(axis=0), flat.max(axis=0)
     size = float(np.sqrt(np.prod(high - low)))
     along = int(np.argmin(high - low))  # open along the shorter side
@@ -176,7 +172,4 @@ def opened(result: Result, contact: Meeting, aspect: float = 1.3) -> Opened:
     other[:, along] = 2 * hinge - other[:, along]
     look = np.array([-0.3, -0.8, 1.0]) if along == 1 else np.array([-0.8, -0.3, 1.0])
     camera = frame(np.concatenate([corners, other]), look, np.array([0.0, 0, 1]), aspect, 1.05)
-    split = result.facts.share_of_body_1
-    return Opened(
-        contact.name, contact.pairs, patch, result.part, faces, flat, size, split, along, hinge, around, camera
-    )
+    return Opened(contact, result.part, result.facts.share_of_body_1, flat, size, along, hinge, around, camera)

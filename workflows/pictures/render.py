@@ -97,7 +97,7 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
     opened = book.opened(result, contact)
     states = [opened.own(state) for state in shown_states(result)]
     depth = np.stack([state.depth for state in states])
-    wear = wear or drawing.wear_scale(opened.patch, depth)
+    wear = wear or drawing.wear_scale(contact.patch, depth)
     worn, known = bool(depth.max() > 0), [s for s in states if s.status is not None]
     rows = [name for name, there in (("depth", worn), ("status", bool(known)), ("pressure", True)) if there]
     with mpl.rc_context({**STYLE, "axes.grid": False}):
@@ -117,7 +117,7 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
             axes.set_title(state.label)
         if "status" in rows:
             present = {int(bits) for s in known if s.status is not None for bits in s.status}
-            status_legend(figure, present, opened.patch.components)
+            status_legend(figure, present, contact.patch.components)
         told_scale = f", depth in relief × {wear:g}" if worn else ""
         heading(figure, result, f"opened {opened.sides}{told_scale}")
     return figure

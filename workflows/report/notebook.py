@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import io
+from functools import partial
 from html import escape
 
-import matplotlib as mpl
-
 from tribodyn.workflows.pictures import plots
-from tribodyn.workflows.pictures.style import STYLE
 from tribodyn.workflows.report import page, text
 from tribodyn.workflows.result.result import Result
 
@@ -19,10 +15,7 @@ def shown(result: Result) -> str:
     parts = [f"<pre>{escape(chr(10).join(text.brief(result)))}</pre>"]
     figures = plots.figures(result)
     if "frf" in figures:
-        with mpl.rc_context(STYLE):
-            buffer = io.BytesIO()
-            figures["frf"](result).savefig(buffer, format="png", dpi=90)
-        parts.append(f'<img alt="response" src="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}">')
+        parts.append(page.embedded("response", partial(figures["frf"], result), dpi=90))
     viewer = page.part_alone(result)
     if viewer:
         parts.append(f'<iframe width="100%" height="680" style="border:0" srcdoc="{escape(viewer)}"></iframe>')

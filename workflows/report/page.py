@@ -118,7 +118,7 @@ def _head(named: Sequence[tuple[str, Result]]) -> str:
         given, seconds = result.provenance, result.summary()["seconds"]
         started = given.get("started", "")[:16].replace("T", " ")
         rows.append((name, given.get("versions", "").split(",")[0], started, f"{result.state}, {seconds:.0f} s"))
-        pictures += [_embedded(kind, make) for kind, make in _renders(result).items() if kind == HEADING]
+        pictures += [embedded(kind, make) for kind, make in _renders(result).items() if kind == HEADING]
     title = _title(named[0][1]) if len(named) == 1 else ", ".join(name for name, _ in named)
     table = _table(rows, ("scene", "program", "started", "state"))
     return f"<header><h1>{escape(title)}</h1>{table}{''.join(pictures)}</header>"
@@ -232,15 +232,16 @@ def _changes(result: Result) -> str:
 
 def _figures(result: Result) -> str:
     """Every figure as an embedded picture; renders only where this machine can draw them."""
-    made = [_embedded(name, partial(make, result)) for name, make in plots.figures(result).items()]
-    made += [_embedded(name, make) for name, make in _renders(result).items() if name != HEADING]
+    made = [embedded(name, partial(make, result)) for name, make in plots.figures(result).items()]
+    made += [embedded(name, make) for name, make in _renders(result).items() if name != HEADING]
     return '<div class="grid">' + "".join(made) + "</div>"
 
 
-def _embedded(name: str, make: Callable[[], Figure]) -> str:
+def embedded(name: str, make: Callable[[], Figure], dpi: int = DPI) -> str:
+    """A figure as an element of a page."""
     with mpl.rc_context(STYLE):
         buffer = io.BytesIO()
-        make().savefig(buffer, format="png", dpi=DPI)
+        make().savefig(buffer, format="png", dpi=dpi)
     code = base64.b64encode(buffer.getvalue()).decode()
     return f'<figure><img alt="{escape(name)}" src="data:image/png;base64,{code}"></figure>'
 

@@ -105,13 +105,10 @@ def _surface(result: Result) -> tuple[np.ndarray, np.ndarray]:
     part = result.part
     assert part is not None
     grid = grid_of(part)
-    grid.point_data["node"], grid.point_data["body"] = np.arange(len(part.points)), bodies(part)
+    grid.point_data["body"] = bodies(part)
     shell = grid.extract_surface(nonlinear_subdivision=1, algorithm="dataset_surface").triangulate()
     shell = shell.compute_normals(consistent_normals=True, auto_orient_normals=True, split_vertices=False)
-    near = np.round(np.asarray(shell.point_data["node"], float)).astype(int)
-    exact = np.linalg.norm(part.points[np.clip(near, 0, len(part.points) - 1)] - shell.points, axis=1)
-    if exact.max() > 1e-6 * np.ptp(part.points, axis=0).max():  # interpolated: look the nodes up by place
-        near = _nearest(part.points, bodies(part), np.asarray(shell.points), np.asarray(shell.point_data["body"]))
+    near = _nearest(part.points, bodies(part), np.asarray(shell.points), np.asarray(shell.point_data["body"]))
     nodes, where = np.unique(near, return_inverse=True)
     return nodes, where[shell.faces.reshape(-1, 4)[:, 1:]]
 

@@ -119,7 +119,7 @@ def _errors_in_brief(judged: dict[str, Statement]) -> list[str]:
     """A table of values, errors and what dominates these; the reasons of what is not known once, below it."""
     shown, reasons = [], dict[str, list[str]]()
     for name, one in judged.items():
-        label = NAMES.get(name, name)
+        label = NAMES[name]
         if one.value is None or (name == "peak_frequency" and one.error == 0.0):  # given by the scene
             continue
         if one.stated:

@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import Any
 
 QUANTITIES = ("peak_frequency", "amplitude", "energy", "preload", "depth", "life")
-NAMES = {"peak_frequency": "peak frequency"}
+NAMES = {name: name.replace("_", " ") for name in QUANTITIES}
 UNITS = {"peak_frequency": "Hz", "amplitude": "m", "energy": "J", "preload": "N", "depth": "m", "life": "cycles"}
 
 
@@ -100,14 +100,8 @@ class Verdict:
 def loaded(text: str) -> Verdict:
     """A verdict from its JSON text."""
     data: dict[str, Any] = json.loads(text)
-    statements = {name: Statement(**item) for name, item in data["statements"].items()}
-    return Verdict(
-        statements,
-        tuple(Change(**item) for item in data["changes"]),
-        data["ratio"],
-        data["seconds"],
-        data["worn_ratio"],
-    )
+    data["statements"] = {name: Statement(**item) for name, item in data["statements"].items()}
+    return Verdict(**data | {"changes": tuple(Change(**item) for item in data["changes"])})
 
 
 def record(text: str) -> dict[str, dict[str, Any]] | None:

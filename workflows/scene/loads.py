@@ -114,13 +114,17 @@ class StaticLoad(Table):
         return next((size for kind in KINDS if (size := getattr(self, kind)) is not None), 0.0)
 
 
-class HarmonicLoad(StaticLoad):
+class Vibrates(Table):
     """A load that goes as cos(harmonic * w t + phase)."""
 
     phase: Angle = 0.0
     """Phase of the load."""
     harmonic: Annotated[StrictInt, Field(ge=1)] = 1
     """Multiple of the excitation frequency."""
+
+
+class HarmonicLoad(Vibrates, StaticLoad):
+    """A load that goes as cos(harmonic * w t + phase)."""
 
 
 class Motion(Table):

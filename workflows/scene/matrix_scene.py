@@ -11,8 +11,8 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from tribodyn.workflows.scene.contact import ContactTable
-from tribodyn.workflows.scene.fields import Angle, Direction, Force, Number, Quantity, Table
-from tribodyn.workflows.scene.loads import Loads
+from tribodyn.workflows.scene.fields import Direction, Force, Number, Quantity, Table
+from tribodyn.workflows.scene.loads import Loads, Vibrates
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.solution import Reduction, Response
 from tribodyn.workflows.scene.units import to_si
@@ -137,13 +137,8 @@ class DofLoad(DofOutput):
         return self.value
 
 
-class HarmonicDofLoad(DofLoad):
+class HarmonicDofLoad(Vibrates, DofLoad):
     """A load that goes as cos(harmonic * w t + phase)."""
-
-    phase: Angle = 0.0
-    """Phase of the load."""
-    harmonic: Annotated[StrictInt, Field(ge=1)] = 1
-    """Multiple of the excitation frequency."""
 
 
 class DofResponse(Response, DofOutput):
