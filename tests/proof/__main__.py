@@ -355,7 +355,7 @@ def wear_steps(scene: str, *, overrides: Overrides = (), out: Path | None = None
     print(json.dumps(shown.as_records(table), indent=2) if as_json else shown.as_text(table))
 
 
-def wear(*, scenes: int = 12, as_json: Json = False) -> None:
+def wear(*, scenes: int = 12, seconds: float = 60.0, as_json: Json = False) -> None:
     """Compare lives of random scenes that slip and lift with brute force, every block of cycles integrated in time.
 
     Exit code 3 where a true error is above the stated one.
@@ -364,12 +364,14 @@ def wear(*, scenes: int = 12, as_json: Json = False) -> None:
     ----------
     scenes
         How many are drawn.
+    seconds
+        Processor seconds that the run of a scene may take, with its errors.
     as_json
         Print JSON for machines.
     """
     from tests.proof import brute_wear
 
-    rows = brute_wear.run(scenes, aside)
+    rows = brute_wear.run(scenes, aside, seconds=seconds)
     records = [{**asdict(row), "outcome": row.outcome} for row in rows]
     print(json.dumps(records, indent=2) if as_json else brute_wear.as_text(rows))
     if broken := sum(row.outcome == "violated" for row in rows):

@@ -15,6 +15,7 @@ import numpy as np
 
 from tests.helpers.verification_models import random_structure
 from tests.proof import scoreboard
+from tests.proof.time_limit import TimeUp, processor_seconds
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.errors import verdict
 from tribodyn.workflows.run.progress import Progress
@@ -228,8 +229,8 @@ def life(one: Drawn, finer: int = 1) -> Brute:
     return Brute(None, f"{before / first:.2g} of the preload is left after {finer * BLOCKS} blocks", first, most, block)
 
 
-def run(scenes: int, say: Callable[[str], None], first: int = 0) -> list[Row]:
-    """Rows of so many scenes."""
+def run(scenes: int, say: Callable[[str], None], first: int = 0, seconds: float = 60.0) -> list[Row]:
+    """Rows of so many scenes; seconds : of the processor, that `run` may take for one, with its errors."""
     rows = []
     for number in range(first, first + scenes):
         one = draw(number)
@@ -238,14 +239,17 @@ def run(scenes: int, say: Callable[[str], None], first: int = 0) -> list[Row]:
         row = Row(number, None, None, False, "", brute, abs(coarse.cycles / brute.cycles - 1) if known else None, None)
         with TemporaryDirectory() as place:
             np.savez(Path(place) / "part.npz", M=one.mass, K=one.stiffness, C=one.damping)
+            file = parse(one.text(), "brute.toml", (), Path(place))
             try:
-                file = parse(one.text(), "brute.toml", (), Path(place))
-                result, model = scoreboard.solved(file)
-                said = verdict.judge(file, model, result, Progress()).statements["life"]
+                with processor_seconds(seconds):
+                    result, model = scoreboard.solved(file)
+                    said = verdict.judge(file, model, result, Progress()).statements["life"]
                 row = replace(row, value=said.value, error=said.error, stated=said.stated, reason=said.reason)
                 if (worn := result.wear) is not None:
                     followed = float(worn.cycles_in_step[worn.in_time].sum() / worn.cycles_in_step.sum())
                     row = replace(row, preload=float(worn.preload[0]) / brute.first, followed=followed)
+            except TimeUp:
+                row = replace(row, reason=f"its run takes above {seconds:g} s")
             except (ValueError, RuntimeError) as refusal:
                 row = replace(row, reason=str(refusal))
         rows.append(row)

@@ -61,6 +61,8 @@ def test_curves_show_the_numbers_of_the_result() -> None:
     for height in (wear.depth.max(axis=1), wear.depth.min(axis=1), mean):
         assert has(plots.wear(given, "depth"), 1e3 * height)
     assert has(plots.wear(given, "preload"), 1e-3 * wear.preload)
+    assert wear.preload_at_rest is not None
+    assert has(plots.wear(given, "preload"), 1e-3 * wear.preload_at_rest)
     assert has(plots.wear(given, "peak"), wear.omega / (2 * np.pi))
     assert has(plots.wear(given, "cycles_per_step"), 1e-6 * wear.cycles_in_step[:-1])
     pair = 3
