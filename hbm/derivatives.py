@@ -30,7 +30,12 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.joint import Contact
+from tribodyn.hbm.continuation import bordered, parameter
+from tribodyn.hbm.continuation.bordered import Direction, Metric
 from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.continuation.folds import FoldOptions
+from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
+from tribodyn.hbm.continuation.nonlinear_modes import newton_on
 from tribodyn.hbm.continuation.operating_point import Slope
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.krylov import gmres
@@ -48,8 +53,10 @@ class Rules:
     newton: float = 1e-12  # relative residual of the states that derivatives are taken at
     adjoint: float = 1e-12  # relative residual of an adjoint, and of one that is no solution
     failed: float = 1e-7
+    of_mode: float = 1e-10
     most_products: int = 400
     along: float = 2e-4  # half widths of the resonance from a peak to the two points of the gradient along the curve
+    at_fold: float = 1e-5  # arc length to the fold; tangents are known to a tenth of it
     most_steps: int = 12  # to a peak, and the first of them over the frequency
     first_step: float = 1e-5
     at_peak: float = 1e-7  # half widths between a peak and where it is foreseen
@@ -140,12 +147,16 @@ def quantities(
 
 @dataclass(frozen=True)
 class Posed:
-    """What a parameter changes of a balance: its model, contact, loads and the start of the load path."""
+    """What a parameter changes of a balance: its model, contact, loads and the start of the load path.
+
+    balance : all of it, where it was made already
+    """
 
     model: ReducedModel
     contact: Contact
     excitation: Excitation
     memory: np.ndarray
+    balance: HarmonicBalance | None = None
 
     @classmethod
     def of(cls, balance: HarmonicBalance) -> Posed:
@@ -214,7 +225,7 @@ def _difference(new: SecondOrderSystem, old: SecondOrderSystem, s: complex, u: n
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """The derivatives of some quantities at one solution.
+    """The derivatives of some quantities at one solution; at a fold what the balance itself changes by, projected.
 
     quantities : at the solution; fields : harmonic -> coordinates u (n,) complex; weights : (n_quantity, n_contact,
     n_coeff), dq / df of the contact forces at fixed x
@@ -223,6 +234,7 @@ class Gradient:
     balance: HarmonicBalance
     state: State
     quantities: tuple[Quantity, ...]
+    at_fold: bool = False
 
     @cached_property
     def _sides(self) -> list[_Side]:
@@ -239,7 +251,7 @@ class Gradient:
         basis, state = self.balance.basis, self.state
         jac = state.cycle.jacobian
         assert jac is not None
-        shape = state.flat.shape
+        shape, none = state.flat.shape, np.zeros_like(state.flat)
 
         def transposed(blocks: np.ndarray, v: np.ndarray) -> np.ndarray:
             """df/dx^T v."""
@@ -260,13 +272,20 @@ class Gradient:
             found = basis.to_real(np.stack(moved, axis=-1))
             return found if residual is None else found + residual.apply(v)
 
+        # at a fold one row and column make the transpose regular, and its solution that of no right-hand side
+        border = np.random.default_rng(0).normal(size=shape) if self.at_fold else none
+        border /= max(float(np.linalg.norm(border)), 1.0)
+
+        def product(v: np.ndarray) -> np.ndarray:
+            return v - departed(compliant(v)) + np.vdot(border, v) * border
+
         found, fields = [], []
         for q in self.quantities:
             seen = basis.to_complex(q.of_output)
             own = [side.adjoint(side.C.conj().T @ seen[:, i]) for i, side in enumerate(self._sides)]
             through = basis.to_real(np.stack([side.B @ v for side, v in zip(self._sides, own, strict=True)], axis=-1))
             right = q.of_x + transposed(jac, q.of_force) + departed(through)
-            solved = self._transposed_solve(lambda v: v - departed(compliant(v)), right)
+            solved = self._transposed_solve(product, right + border)
             amplitudes = basis.to_complex(solved)
             fields.append(
                 [
@@ -588,6 +607,96 @@ def _at_corner(
         raise NoDerivative("the peak is a corner of the curve where more than one contact transition begins")
     omega = (low[0].state.omega + high[0].state.omega) / 2
     return replace(_gathered(gradients[0], names, steps, below, solves, omega, moves), follows_corner=True)
+
+
+@single
+def at_fold(
+    balance: HarmonicBalance, state: State, changes: Iterable[Change], options: NewtonOptions | None = None
+) -> Derivatives:
+    """Derivatives of the frequency [Hz] of the fold beside a state; see `at_frequency`.
+
+    The transpose of the balance R(x, w, p) = 0 has a solution l without a right-hand side there, so that along the fold
+    l . (R_w dw + R_p dp) = 0
+    Raises  NoDerivative where no fold lies beside the state
+    """
+    state, solves = _fold(balance, state, options)
+    none = np.zeros_like(state.flat)
+    nothing = Quantity("", 0.0, none, none, np.zeros_like(balance.outputs(state)))
+    gradient = Gradient(balance, state, (nothing,), at_fold=True)
+    names, steps, (own,) = _fixed([gradient], changes)
+    moves = -own.columns[0] / own.by_frequency[0]
+    alone = _Fixed(*(getattr(own, field.name)[:0] for field in fields(own)))
+    return _gathered(replace(gradient, quantities=()), names, steps, alone, solves, state.omega, moves)
+
+
+def _fold(balance: HarmonicBalance, state: State, options: NewtonOptions | None) -> tuple[State, int]:
+    """The fold beside a state, by secants of the share of the frequency in the tangent; solves spent."""
+    how, path = replace(options or NewtonOptions(), tolerance=RULES.newton), parameter.of(balance)
+    vibration = np.where(balance.basis.order > 0, state.flat, 0.0)
+    metric = Metric(float(np.linalg.norm(vibration)), FoldOptions.frequency_scale * state.omega)
+
+    def at(guess: Direction, along: Direction) -> tuple[State, Direction]:
+        found = bordered.correct(path, guess, along, metric, how)[0].state
+        return found, bordered.tangent(path, found.omega, found, along, metric, how, RULES.adjoint)
+
+    try:
+        here, along = at(Direction(state.flat, state.omega), metric.unit(Direction(vibration, 0.0)))
+        step = RULES.along
+        there, tangent = at(Direction(here.flat, here.omega) + along * step, along)
+        bend = (tangent.p - along.p) / step
+        solves = 2
+        while solves < RULES.most_steps:
+            here, along, step = there, tangent, -tangent.p / bend if bend else np.inf
+            if not abs(step) <= 1.0 or abs(step) <= RULES.at_fold:
+                break
+            there, tangent = at(Direction(here.flat, here.omega) + along * step, along)
+            solves += 1
+        if abs(step) <= RULES.at_fold:
+            return here, solves
+    except bordered.BorderFailed:
+        pass
+    raise NoDerivative(f"no fold lies beside {state.omega / (2 * np.pi):.6g} Hz")
+
+
+@single
+def at_mode(
+    problem: FreeVibration, point: Point, changes: Iterable[Change], options: NewtonOptions | None = None
+) -> Derivatives:
+    """Derivatives of frequency [Hz] and damping ratio of a nonlinear mode at a modal amplitude that stays.
+
+    One solution of the linearised problem for each parameter, whose residual is differenced at the same motion.
+    Raises  NoDerivative where the mode is not solved
+    """
+    balance, how = problem.balance, replace(options or NewtonOptions(), tolerance=RULES.of_mode)
+    normal = np.zeros(len(point.coordinates))
+    normal[-1] = 1.0
+    point, outcome, _ = newton_on(problem, point, normal, how)
+    if outcome != CONVERGED:
+        raise NoDerivative(f"the mode is not solved: {outcome}")
+
+    def residual(posed: Posed) -> np.ndarray:
+        made = posed.balance or HarmonicBalance.of(
+            posed.model, posed.contact.joints, balance.basis, posed.excitation, balance.omega_max, posed.memory
+        )
+        return FreeVibration(made, problem.mode, problem.output).at(point.x, point.omega, point.zeta, point.a).residual
+
+    def by(change: Change) -> np.ndarray:
+        up, down, *far = (residual(one) for one in (change.above, change.below, *(change.twice or ())))
+        moved = ((8 * (up - down) - (far[0] - far[1])) / 12 if far else (up - down) / 2) / change.step
+        return moved if change.touching is None else moved + by(change.touching)
+
+    names, columns = list[str](), []
+    for change in changes:
+        moved = problem.correction(replace(point, residual=by(change)), normal, RULES.adjoint, how.max_products)
+        names.append(change.name)
+        columns.append(np.array([point.omega / (2 * np.pi) * moved[-3], moved[-2]]))
+    slopes = np.reshape(columns, (-1, 2)).T
+    values, none = np.array([point.omega / (2 * np.pi), point.zeta]), np.zeros(2)
+    state = balance.evaluate(point.omega, point.x)
+    return Derivatives(
+        ("frequency", "damping"), values, tuple(names), slopes, np.zeros(len(names), bool), slopes, slopes, none,
+        np.zeros((2, balance.contact.n_pair)), state, 1,
+    )  # fmt: skip
 
 
 def _slope(balance: HarmonicBalance, state: State, output: str) -> Slope:

@@ -139,7 +139,7 @@ class FreeVibration:
     """
 
     def __init__(self, balance: HarmonicBalance, mode: int | None, output: str | None):
-        model, self.balance, self.basis = balance.model, balance, balance.basis
+        model, self.balance, self.basis, self.mode = balance.model, balance, balance.basis, mode
         model.require_masters("nonlinear modes")
         if model.per_harmonic is not None and model.per_index is None:
             raise ValueError(

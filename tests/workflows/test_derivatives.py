@@ -93,6 +93,69 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name):
             assert (np.abs(elasticity - difference) <= error * size).all(), (key, elasticity, difference)
 
 
+LEAF = ("geometry.n_column=7", "geometry.pin_column=2", "response.frequency=['120 Hz', '190 Hz']")
+
+
+def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
+    """All stiffness times c: time goes by 1 / sqrt(c) at c times the loads; so does all mass at the same motion."""
+    file = scene_file.read("leaf_seal", LEAF)
+    found = td.studies.derivatives(file, of="fold")
+    rows = {key: row[0] for key, row in found.elasticities.items()}
+    assert found.found.names == ("frequency",)
+    stiffness, loads = (
+        sum(row for key, row in rows.items() if key.endswith(end)) for end in (("stiffness", "young"), "pressure")
+    )
+    np.testing.assert_allclose([stiffness, loads, rows["material.density"]], [0.5, 0.0, -0.5], atol=5e-6)
+    value, h = keys(file.scene), 2e-5
+
+    def again(factor):
+        changed = file.changed(f"damping.modal={value['damping.modal'] * factor!r}")
+        with limited(1):
+            balance = Varying(changed, Progress()).model.balance
+            return exact.at_fold(balance, found.found.state, ()).values[0]
+
+    difference = (again(1 + h) - again(1 - h)) / (2 * h) / found.found.values[0]
+    assert rows["damping.modal"] == pytest.approx(difference, rel=1e-5)
+
+
+MODE = {"of": "mode", "amplitude": 5e-4, "overrides": COARSE["beam"]}
+
+
+def test_a_mode_follows_the_law_of_scaling():
+    """All stiffness and the static load times c: at the same motion time goes by 1 / sqrt(c)."""
+    found = td.studies.derivatives("beam", **MODE)
+    assert found.found.names == ("frequency", "damping")
+    stiffer = sum(
+        row for key, row in found.elasticities.items() if key.endswith(("_stiffness", "young", "press.value"))
+    )
+    np.testing.assert_allclose(stiffer, [0.5, 0.0], atol=1e-5)
+
+
+@pytest.mark.slow
+def test_derivatives_of_a_mode_are_those_of_modes_found_anew():
+    found = td.studies.derivatives("beam", **MODE, only=("contact.friction",))
+    values, h = [], 1e-4
+    for friction in (0.5 * (1 + h), 0.5 * (1 - h)):
+        changed = MODE | {"overrides": (*COARSE["beam"], f"contact.friction={friction!r}")}
+        values.append(td.studies.derivatives("beam", **changed, only=("damping.modal",)).found.values)
+    difference = (values[0] - values[1]) / (2 * h) / found.found.values
+    np.testing.assert_allclose(found.elasticities["contact.friction"], difference, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--of", "mode"), "give --amplitude of the mode, or backbone.modal_amplitude in the scene"),
+        (("--amplitude", "1 mm"), "--amplitude is that of --of mode"),
+    ],
+)
+def test_what_is_missing_is_one_sentence(capsys, words, sentence):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["study", "derivatives", "beam", *words])
+    assert end.value.code == 2
+    assert sentence in capsys.readouterr().err
+
+
 def test_an_unknown_key_is_one_sentence(capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(["study", "derivatives", "beam", "--only", "contact.color"])

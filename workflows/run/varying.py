@@ -73,8 +73,8 @@ def keys(scene: Scene) -> dict[str, float]:
 class Varying:
     """A scene with its model, and what a step of each of its numbers makes of it."""
 
-    def __init__(self, file: SceneFile, progress: Progress):
-        self.file, self.scene = file, file.scene
+    def __init__(self, file: SceneFile, progress: Progress, step: float = STEP):
+        self.file, self.scene, self.step = file, file.scene, step
         part = plain = None
         if isinstance(self.scene, MeshScene):
             with progress.stage("mesh, mass and stiffness, reduction"):
@@ -98,13 +98,13 @@ class Varying:
         """The problems a step above and below a value of a key."""
         anew = self._settles or self.anew(key)
         linear = self._scales(key) or self.follows(key)
-        step = (REBUILT if anew or linear else STEP) * abs(value)
+        step = (REBUILT if anew or linear else self.step) * abs(value)
         far: tuple[Posed, ...] | None = () if anew or linear else None
         if self._settles or (anew and key.startswith((*STRUCTURAL, "wheel."))):
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
         touching = None
         if (anew or linear) and not self._settles and _touches(key):
-            small = STEP * abs(value)
+            small = self.step * abs(value)
             up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
             touching = Change(key, small, up, down)
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
@@ -131,7 +131,8 @@ class Varying:
                 reduced = part_reduction.with_prescribed(scene, part, reduced)
         if self._settles:
             problem = modelling.Problem.of(scene, part, reduced)
-            return Posed.of(problem.balance(self.model.balance.basis.harmonics))
+            balance = problem.balance(self.model.balance.basis.harmonics)
+            return replace(Posed.of(balance), balance=balance)
         base = None
         if isinstance(scene, MeshScene) and part is not None:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)

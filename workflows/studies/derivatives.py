@@ -6,31 +6,48 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm import derivatives as exact
 from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.free_vibration import FreeVibration
+from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.derivatives import Change, Derivatives, NoDerivative
+from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.style import CYCLE, GREY
 from tribodyn.workflows.run import curve, pipeline, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.run.varying import Varying, keys
-from tribodyn.workflows.scene.fields import Frequency
+from tribodyn.workflows.run.varying import STEP, Varying, keys
+from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.scene.wear import Place
+from tribodyn.workflows.studies.curves import backbones
+from tribodyn.workflows.studies.curves.backbones import AmplitudeRange
 from tribodyn.workflows.studies.files import write_files
 
 SHOWN = 12  # parameters in the picture
 OF_ROWS = {"peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
+PLOTTED = ("frequency", "amplitude", "damping", "energy", "preload")
+# step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
+OF_MODE = 1e-4
+DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
 Slopes = dict[tuple[str, str], float]
-UNITS = {"frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3"}
+UNITS = {
+    "frequency": "Hz",
+    "amplitude": "m",
+    "phase": "rad",
+    "energy": "J",
+    "preload": "N",
+    "wear": "m3",
+    "damping": "",
+}
 MICROMETRE = 1e-6
 
 
@@ -62,7 +79,7 @@ class ResponseDerivatives:
         for joint, pairs in self.joints.items():
             if f.by_gap[:, pairs].any():
                 rows[f"gap of {joint}, by um"] = f.by_gap[:, pairs].sum(axis=1) * 100 * MICROMETRE / size
-        first = f.names.index("amplitude")
+        first = f.names.index("amplitude") if "amplitude" in f.names else 0
         return dict(sorted(rows.items(), key=lambda row: -abs(row[1][first])))
 
     @property
@@ -126,9 +143,9 @@ class ResponseDerivatives:
         return write_files(folder, {"derivatives": {**table, **columns}}, {"derivatives": self.plot()})
 
     def plot(self) -> Figure:
-        """Bars of the elasticities of frequency, amplitude, energy and preload."""
+        """Bars of the elasticities of frequency, amplitude, damping, energy and preload."""
         rows = dict(list(self.elasticities.items())[:SHOWN])
-        shown = [name for name in self.found.names if name in ("frequency", "amplitude", "energy", "preload")]
+        shown = [name for name in self.found.names if name in PLOTTED]
         columns = len(shown)
         with axes_of(2.6 + 2.2 * columns, 1.4 + 0.28 * len(rows), columns=columns) as (figure, panes):
             for i, (axes, name) in enumerate(zip(np.atleast_1d(panes), shown, strict=True)):
@@ -145,7 +162,9 @@ class ResponseDerivatives:
 def derivatives(
     scene: Source,
     *,
+    of: Literal["response", "fold", "mode"] = "response",
     at: Frequency | None = None,
+    amplitude: Length | None = None,
     only: tuple[str, ...] = (),
     overrides: Overrides = (),
     progress: Report = None,
@@ -156,32 +175,49 @@ def derivatives(
     is reduced anew, such as the stiffness of one body of several, take four reductions each.
 
     scene : name of a scene or a .toml file
-    at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too
+    of : the response; the frequency of its fold; frequency and damping of the nonlinear mode of [backbone]
+    at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too. The fold
+        next to it; that of the largest amplitude by default
+    amplitude : of the observed displacement in the mode; the last of [backbone] by default
     only : keys of the scene to look at, such as contact.friction; all by default
     Raises  SceneError for a key that is no such number; SolveFailed where there is no derivative, as at a fold
     """
     file = read_scene(scene, overrides)
-    with limited(file.scene.solver.threads):
-        return of_scene(file, at, only, reporter(progress))
-
-
-def of_scene(file: SceneFile, at: float | None, only: tuple[str, ...], report: Any) -> ResponseDerivatives:
-    """The derivatives of a scene that was read."""
     known = keys(file.scene)
     unknown = [key for key in only if key not in known]
     if unknown:
         raise SceneError(f"{unknown[0]} is no number that a response depends on: these are {', '.join(known)}")
+    if (amplitude is not None and of != "mode") or (at is not None and of == "mode"):
+        raise SceneError("--amplitude is that of --of mode, and --at a frequency of --of response or fold")
+    if of == "mode" and amplitude is None and file.scene.backbone is None:
+        raise SceneError("give --amplitude of the mode, or backbone.modal_amplitude in the scene")
     wanted = {key: value for key, value in known.items() if not only or key in only}
-    varying = Varying(file, report)
-    balance = varying.model.balance
-    clock = process_time()
-    with report.track("frequency response") as advance:
-        branch = curve.follow_response(file.scene, balance, advance)
-    pipeline.check_branch(branch)
+    with limited(file.scene.solver.threads):
+        return _of_scene(file, of, amplitude if of == "mode" else at, wanted, reporter(progress))
+
+
+def _of_scene(
+    file: SceneFile, of: str, at: float | None, wanted: Mapping[str, float], report: Any
+) -> ResponseDerivatives:
+    """Of a scene that was read; at : frequency [Hz], or the amplitude of a mode [m]; wanted : key -> value."""
+    varying = Varying(file, report, OF_MODE if of == "mode" else STEP)
+    balance, clock = varying.model.balance, process_time()
+    mode = branch = None
+    if of == "mode":
+        asked = AmplitudeRange.of(file, None if at is None else at / DECADES, at, None, None)
+        mode = backbones.along(file, balance, asked, report)
+    else:
+        with report.track("frequency response") as advance:
+            branch = curve.follow_response(file.scene, balance, advance)
+        pipeline.check_branch(branch)
     solved = process_time()
     with report.track("derivatives") as advance:
         try:
-            found = _found(varying, branch, at, wanted, advance)
+            if mode is not None:
+                found = _of_mode(varying, mode, wanted, advance)
+            else:
+                assert branch is not None
+                found = _found(varying, branch, at, wanted, advance, of == "fold")
         except NoDerivative as reason:
             raise SolveFailed(f"{file.name} has no derivatives here: {reason}") from None
     return ResponseDerivatives(
@@ -195,28 +231,47 @@ def of_scene(file: SceneFile, at: float | None, only: tuple[str, ...], report: A
     )
 
 
+Advance = Callable[[float, str], None]
+
+
+def _changes(varying: Varying, wanted: Mapping[str, float], advance: Advance) -> Iterator[Change]:
+    for i, (key, value) in enumerate(wanted.items()):
+        advance(i / len(wanted), key)
+        yield varying.change(key, value)
+
+
+def _of_mode(varying: Varying, mode: Backbone, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
+    """At the last point of a backbone."""
+    if mode.end.kind is not BranchEnd.REACHED:
+        raise NoDerivative(f"the backbone {mode.end}")
+    problem = FreeVibration(varying.model.balance, mode.number, mode.output)
+    x = varying.model.balance.shaped(mode.contact[-1])
+    point = problem.at(x, mode.omega[-1], mode.damping[-1], mode.modal_amplitude[-1])
+    return exact.at_mode(problem, point, _changes(varying, wanted, advance), settings.newton_options(varying.scene))
+
+
 def _found(
     varying: Varying,
     branch: Branch,
     at: float | None,
     wanted: Mapping[str, float],
-    advance: Callable[[float, str], None],
+    advance: Advance,
+    fold: bool = False,
 ) -> Derivatives:
-    """At a frequency [Hz], or along the highest peak of a response; wanted : key -> value."""
+    """At a frequency [Hz], or along the highest peak of a response, or fold of it; wanted : key -> value."""
     balance, scene = varying.model.balance, varying.scene
-    height = np.where(branch.converged, branch.amplitude(settings.OUTPUT), -1.0)
-    near = int(np.argmax(height)) if at is None else int(np.argmin(np.abs(branch.frequency - at)))
+    options, changes = settings.newton_options(scene), _changes(varying, wanted, advance)
+    points = np.isin(np.arange(len(branch.omega)), branch.folds) if fold else branch.converged
+    if not points.any():
+        raise NoDerivative("the response has no fold")
+    fits = branch.amplitude(settings.OUTPUT) if at is None else -np.abs(branch.frequency - at)
+    near = int(np.argmax(np.where(points, fits, -np.inf)))
     x = balance.shaped(branch.contact[near])
-    state = balance.evaluate(branch.omega[near] if at is None else 2 * np.pi * at, x)
-
-    def changes() -> Iterator[Change]:
-        for i, (key, value) in enumerate(wanted.items()):
-            advance(i / len(wanted), key)
-            yield varying.change(key, value)
-
+    state = balance.evaluate(branch.omega[near] if at is None or fold else 2 * np.pi * at, x)
+    if fold:
+        return exact.at_fold(balance, state, changes, options)
     take = exact.at_peak if at is None else exact.at_frequency
-    rates, options = wear_run.coefficients(scene), settings.newton_options(scene)
-    return take(balance, state, settings.OUTPUT, changes(), rates, options)
+    return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), options)
 
 
 def of_summary(varying: Varying, response: Branch, numbers: Mapping[str, float], wanted: Sequence[str]) -> Slopes:
