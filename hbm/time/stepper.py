@@ -111,14 +111,14 @@ class TimeStepper:
         self.hold = Hold.of(balance, force[:, :static].sum(axis=1), self._base[:, :static].sum(axis=1))
         at = np.zeros((len(phi), 0)) if self.hold is None else self.hold.at
         rows = np.concatenate([rows, at.T])
-        outputs = np.concatenate([rows @ moving, np.zeros((len(rows), m)), -(rows @ rest) @ follows.T], axis=1)
+        self._seen = rows @ moving, -(rows @ rest) @ follows.T  # outputs of eta and of the contact force
         self.rest = follows @ (rest.T @ force) - self._base  # (n_contact, n_coeff)
-        output_rest = (rows @ rest) @ (rest.T @ force)
+        self._output_rest = samples @ ((rows @ rest) @ (rest.T @ force)).T  # (n_step, n_output)
         modal = moving.T @ at
         self._of_hold = modal, Q @ modal, follows @ (rest.T @ at), (rows @ rest) @ (rest.T @ at)
         self.linear = time_step.Linear(
-            E, Q, U, np.ascontiguousarray(outputs), np.ascontiguousarray(np.roll(samples, 1, axis=0) @ impulse.T),
-            np.ascontiguousarray(samples @ self.rest.T), np.ascontiguousarray(samples @ output_rest.T),
+            E, Q, U, np.ascontiguousarray(np.roll(samples, 1, axis=0) @ impulse.T),
+            np.ascontiguousarray(samples @ self.rest.T),
         )  # fmt: skip
         compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
         symmetric = system.gyroscopic is None and system.circulatory is None
@@ -200,10 +200,9 @@ class TimeStepper:
         x_free += self._of_hold[2] @ hold
         contact = self.contact._replace(A=self.static)
         closed = np.zeros(self.n_pair, bool)
-        scale, inverse = float(np.abs(x).max()), np.zeros_like(self.static)
-        rounds, _ = time_step.solve_contact(
-            self.law, contact, x_free, x.copy(), closed, s, x, f, scale, inverse, self._space(s)
-        )
+        scale, inverse, space = float(np.abs(x).max()), np.zeros_like(self.static), self._space(s)
+        time_step.displace(contact.A, f, space.y)
+        rounds, _ = time_step.solve_contact(self.law, contact, x_free, x.copy(), closed, s, x, f, scale, inverse, space)
         if rounds < 0:
             raise IntegrationFailed("the contact has no equilibrium to start from")
         s, bits = time_step.memory_after(self.law, x[None], self.contact, s)
@@ -221,23 +220,23 @@ class TimeStepper:
         n, n_pair, c, n_state = self.options.steps, self.n_pair, self.c, start.memory.shape[1]
         end = Moving(*(np.array(part) for part in start))
         record = Record(
-            np.empty((n, n_pair, c)), np.empty((n, n_pair, c)), np.empty((n, len(self.linear.outputs))),
+            np.empty((n, n_pair, c)), np.empty((n, n_pair, c)), np.empty((n, len(start.z))), np.empty((0, 0)),
             np.zeros(n_pair, np.int64), np.zeros((n if with_slopes else 0, n_pair, c + n_state, 2 * c + n_state)),
         )  # fmt: skip
-        linear = self.linear
+        linear, y = self.linear, self._output_rest
         if self.hold is not None:
             _, impulse, rest, output_rest = self._of_hold
-            linear = linear._replace(
-                impulse=linear.impulse + impulse @ start.hold,
-                rest=linear.rest + rest @ start.hold,
-                output_rest=linear.output_rest + output_rest @ start.hold,
-            )
+            impulse, rest = linear.impulse + impulse @ start.hold, linear.rest + rest @ start.hold
+            linear = linear._replace(impulse=impulse, rest=rest)
+            y = y + output_rest @ start.hold
         failed, spent, speed = time_step.march(self.law, self.contact, linear, end, record, self._space(end.memory))
         if failed >= 0:
             raise IntegrationFailed(
                 f"the contact iteration did not converge in step {failed} of {n}: take more steps per period"
             )
-        return end, record, spent, speed / self.h
+        of_eta, of_force = self._seen
+        y = y + record.z[:, : self.n_dynamic] @ of_eta.T + record.f.reshape(n, -1) @ of_force.T
+        return end, record._replace(y=y), spent, speed / self.h
 
 
 def _free_modes(system: SecondOrderSystem) -> tuple[np.ndarray, np.ndarray]:

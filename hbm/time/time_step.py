@@ -58,17 +58,15 @@ class Contact(NamedTuple):
 class Linear(NamedTuple):
     """The linear part of every step of a period.
 
-    E : (2 m, 2 m), Q : (2 m, m); U : (n_contact, m), outputs : (n_output, 2 m + n_contact) of (z, f)
-    impulse : (n_step, 2 m), rest : (n_step, n_contact), output_rest : (n_step, n_output) under the loads
+    E : (2 m, 2 m), Q : (2 m, m), U : (n_contact, m)
+    impulse : (n_step, 2 m), rest : (n_step, n_contact) under the loads
     """
 
     E: np.ndarray
     Q: np.ndarray
     U: np.ndarray
-    outputs: np.ndarray
     impulse: np.ndarray
     rest: np.ndarray
-    output_rest: np.ndarray
 
 
 class Moving(NamedTuple):
@@ -86,38 +84,44 @@ class Moving(NamedTuple):
 
 
 class Space(NamedTuple):
-    """Work space of a step: `room` of one pair, three for its equations, y = A f, then of all pairs status bits, slopes
-    df/dx, and the x and f tried.
+    """Work space of a step: `room` of one pair, two for its equations, y = A f, then of all pairs status bits, slopes
+    J = df/dx with the factors of 1 + A J of each pair and their pivots, memory, and the x and f tried.
     """
 
     work: tuple[np.ndarray, ...]
-    M: np.ndarray
     r: np.ndarray
     b: np.ndarray
     y: np.ndarray
     bits: np.ndarray
     J: np.ndarray
+    M: np.ndarray
+    pivots: np.ndarray
+    memory: np.ndarray
     x: np.ndarray
     f: np.ndarray
 
     @classmethod
     def of(cls, n_pair: int, c: int, n_state: int) -> Space:
         """For so many pairs, components and states of the memory."""
-        small = np.zeros((c, c)), np.zeros(c), np.zeros(c), np.zeros(n_pair * c)
-        status, slopes = np.zeros(n_pair, np.int64), np.zeros((n_pair, c, c))
-        return cls(room(c, n_state), *small, status, slopes, *np.zeros((2, n_pair, c)))
+        small = np.zeros(c), np.zeros(c), np.zeros(n_pair * c)
+        status, pivots = np.zeros(n_pair, np.int64), np.zeros((n_pair, c), np.int64)
+        J, M = np.full((2, n_pair, c, c), np.nan)
+        x, f = np.zeros((2, n_pair, c))
+        return cls(room(c, n_state), *small, status, J, M, pivots, np.zeros((n_pair, n_state)), x, f)
 
 
 class Record(NamedTuple):
     """One period, at the ends of its steps.
 
-    x, f : (n_step, n_pair, c); y : (n_step, n_output); bits : (n_pair,) all that happened
+    x, f : (n_step, n_pair, c); z : (n_step, 2 m); bits : (n_pair,) all that happened
+    y : (n_step, n_output) outputs, which the stepper adds
     slopes : derivatives of (f, memory) after a step with respect to (x_1, memory before, x_0), as (n_step, n_pair,
         c + n_state, c + n_state + c), or of length 0 where they are not wanted
     """
 
     x: np.ndarray
     f: np.ndarray
+    z: np.ndarray
     y: np.ndarray
     bits: np.ndarray
     slopes: np.ndarray
@@ -148,7 +152,7 @@ def room(c, n_state):
     )  # fmt: skip
 
 
-@numba.njit(**PLAIN)
+@numba.njit(inline="always", **PLAIN)
 def advance(step, x0, was_open, x1, s, p, gap, normal, work, chained):
     """The law of one pair along the straight line from x0 to x1 with memory s before, into `work`.
 
@@ -183,7 +187,9 @@ def advance(step, x0, was_open, x1, s, p, gap, normal, work, chained):
     if chained or closes:
         clear(J, dfs, dsx, dss)
     else:
-        J[:] = 0.0
+        for a in range(c):
+            for b in range(c):
+                J[a, b] = 0.0
     bits = step(x1, memory, p, f, J, dfs, dsx, dss)
     if closes:
         for a in range(c):
@@ -237,25 +243,43 @@ def add_product(A, B, D, row, column):
 
 
 @numba.njit(**PLAIN)
-def solve_small(M, r):
-    """M^-1 r in place of r for a matrix of up to three rows, which is overwritten; without pivots: I + A J."""
-    n = r.size
+def differ(A, B):
+    """Whether two matrices differ."""
+    for a in range(A.shape[0]):
+        for b in range(A.shape[1]):
+            if A[a, b] != B[a, b]:
+                return True
+    return False
+
+
+@numba.njit(**PLAIN)
+def factorise(M, pivots):
+    """Factors of a small matrix in its place, with the rows that are exchanged."""
+    n = pivots.size
     for i in range(n):
         best = i
         for j in range(i + 1, n):
             if abs(M[j, i]) > abs(M[best, i]):
                 best = j
-        if best != i:
-            for q in range(i, n):
-                M[i, q], M[best, q] = M[best, q], M[i, q]
-            r[i], r[best] = r[best], r[i]
-        if M[i, i] == 0.0:
-            continue
+        pivots[i] = best
+        for q in range(n):
+            M[i, q], M[best, q] = M[best, q], M[i, q]
         for j in range(i + 1, n):
-            factor = M[j, i] / M[i, i]
+            if M[i, i] != 0.0:
+                M[j, i] /= M[i, i]
             for q in range(i + 1, n):
-                M[j, q] -= factor * M[i, q]
-            r[j] -= factor * r[i]
+                M[j, q] -= M[j, i] * M[i, q]
+
+
+@numba.njit(**PLAIN)
+def solve_small(M, pivots, r):
+    """M^-1 r in place of r by what `factorise` has made of M; rows of zeros leave r as it is."""
+    n = r.size
+    for i in range(n):
+        r[i], r[pivots[i]] = r[pivots[i]], r[i]
+    for i in range(n):
+        for q in range(i):
+            r[i] -= M[i, q] * r[q]
     for i in range(n - 1, -1, -1):
         for q in range(i + 1, n):
             r[i] -= M[i, q] * r[q]
@@ -263,17 +287,27 @@ def solve_small(M, r):
             r[i] /= M[i, i]
 
 
-@numba.njit(**PLAIN)
-def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, work, M, r):
+@numba.njit(inline="always", **PLAIN)
+def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, work, r, J, M, pivots):
     """Newton on x + own f(x) = b for one pair from the guess x, which is overwritten; returns bits, 0: failed.
 
-    bits : of the guess, whose force and slope are in `work` then; 0 where they are not known
+    bits : of the guess, whose force is in `work` then; 0 where it is not known
+    M, pivots : factors of 1 + own J, kept from solution to solution as long as the slope J stays what it was
     """
-    f, J = work[0], work[2]
+    f, slope = work[0], work[2]
     c = x.size
-    if bits == 0:
-        bits = advance(step, x0, was_open, x, s, p, gap, normal, work, False)
+    known = bits != 0
     for it in range(LOCAL):
+        if not known:
+            bits = advance(step, x0, was_open, x, s, p, gap, normal, work, False)
+            if differ(slope, J):
+                for a in range(c):
+                    for q in range(c):
+                        J[a, q], M[a, q] = slope[a, q], 1.0 if a == q else 0.0
+                        for k in range(c):
+                            M[a, q] += own[a, k] * slope[k, q]
+                factorise(M, pivots)
+        known = False
         size = 0.0
         for a in range(c):
             r[a] = x[a] - b[a]
@@ -281,22 +315,18 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, wor
                 r[a] += own[a, q] * f[q]
             size = max(size, abs(r[a]))
         if size <= near:
-            return abs(bits)
-        for a in range(c):
-            for q in range(c):
-                M[a, q] = 1.0 if a == q else 0.0
-                for k in range(c):
-                    M[a, q] += own[a, k] * J[k, q]
-        solve_small(M, r)
+            break
+        solve_small(M, pivots, r)
         for a in range(c):
             x[a] -= r[a] if it < DAMPED else 0.5 * r[a]
-        bits = advance(step, x0, was_open, x, s, p, gap, normal, work, False)
-    return 0
+    else:
+        bits = 0
+    return abs(bits)
 
 
 @numba.njit(**PLAIN)
-def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, near, backward, work, M, r, b):
-    """One round of Gauss-Seidel over all pairs; y = A f and everything else moves on in place but x of open pairs.
+def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, pivots, memory, near, backward, work, r, b):
+    """One round of Gauss-Seidel over all pairs; y = A f and all else moves on in place but x and memory of open pairs.
 
     Returns the largest displacement of a pair, negative where one failed
     """
@@ -322,52 +352,80 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, near, backwa
         elif off <= 0.1 * near and known != 0:
             continue
         if known != 0:
-            for a in range(c):
-                work[0][a] = f[i, a]
-                for q in range(c):
-                    work[2][a, q] = J[i, a, q]
-        at = contact.p[i], contact.gap[i], normal
-        bits[i] = solve_pair(step, x0[i], was_open[i], x[i], s[i], *at, own, b, 0.1 * near, known, work, M, r)
+            put_vector(f[i], work[0])
+        bits[i] = solve_pair(
+            step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], normal, own, b, 0.1 * near, known, work,
+            r, J[i], M[i], pivots[i],
+        )  # fmt: skip
         if bits[i] == 0:
             return -1.0
-        for a in range(c):
-            for q in range(c):
-                J[i, a, q] = work[2][a, q]
         moved = max(moved, off)
         for a in range(c):
-            change = work[0][a] - f[i, a]
-            if change != 0.0:
-                f[i, a] = work[0][a]
-                row = A[o + a]
-                for q in range(y.size):
-                    y[q] += change * row[q]
+            b[a] = work[0][a] - f[i, a]
+            f[i, a] = work[0][a]
+        put_vector(work[1], memory[i])
+        add_rows(A, o, b, y)
     return moved
+
+
+@numba.njit(**PLAIN)
+def add_rows(A, o, f, y):
+    """Add f A[o : o + c] to y, in one pass over y where there are three rows."""
+    if f.size == 3:
+        f0, f1, f2 = f[0], f[1], f[2]
+        r0, r1, r2 = A[o], A[o + 1], A[o + 2]
+        for q in range(y.size):
+            y[q] = y[q] + f0 * r0[q] + f1 * r1[q] + f2 * r2[q]
+        return
+    for a in range(f.size):
+        row = A[o + a]
+        for q in range(y.size):
+            y[q] += f[a] * row[q]
+
+
+@numba.njit(**PLAIN)
+def largest(x):
+    """Largest absolute value of x (n_pair, c)."""
+    found = 0.0
+    for i in range(x.shape[0]):
+        for a in range(x.shape[1]):
+            found = max(found, abs(x[i, a]))
+    return found
 
 
 @numba.njit(cache=True)
 def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse, space):
     """Solve x + A f(x) = x_free for all pairs from the guesses x, f, which are overwritten; s is the memory before.
 
+    space : with y = A f of the guess; the memory at x is left there, but of open pairs
     inverse : (n_contact, n_contact) of the derivative in the last step that needed Newton's method, zeros before the
         first; such steps come in a row, and one inverse serves many of them
     Returns rounds spent (negative: failed) and the scale of x
     """
+    if inverse[0, 0] == 0.0:
+        rounds, scale = sweeps(step, contact, x_free, x0, was_open, s, x, f, scale, space)
+    else:
+        rounds, scale = chord(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse)
+    if rounds > 0:
+        return rounds, scale
+    return newton(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse)
+
+
+@numba.njit(**PLAIN)
+def sweeps(step, contact, x_free, x0, was_open, s, x, f, scale, space):
+    """As `solve_contact`, pair after pair."""
     n_pair, c = x.shape
-    work, M, r, b, y, bits, J, _, _ = space
+    work, r, b, y, bits, J, M, pivots, memory, _, _ = space
     for i in range(n_pair):
         bits[i] = SEPARATES if contact.normal >= 0 and was_open[i] and f[i, contact.normal] == 0.0 else 0
-    if inverse[0, 0] != 0.0:
-        rounds, scale = chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
-        if rounds > 0:
-            return rounds, scale
-        return newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
-    put(times(contact.A, f), y)
     before = np.inf
     slow = 0
     for it in range(SWEEPS):
         near = contact.accuracy * scale
-        moved = sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, near, it % 2 == 1, work, M, r, b)
-        scale = max(scale, np.abs(x).max())
+        moved = sweep(
+            step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, pivots, memory, near, it % 2 == 1, work, r, b
+        )
+        scale = max(scale, largest(x))
         if 0.0 <= moved <= contact.accuracy * scale:
             for i in range(n_pair):
                 if bits[i] == SEPARATES:
@@ -378,44 +436,46 @@ def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse, 
         if moved < 0.0 or slow > 5:
             break
         before = moved
-    return newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
+    return -1, scale
 
 
-@numba.njit(cache=True)
-def times(A, f):
-    """Displacement (n,) under forces f (n_pair, c), of which many vanish; A as in `Contact`."""
-    y = np.zeros(A.shape[0])
+@numba.njit(**PLAIN)
+def displace(A, f, y):
+    """Displacement y (n,) under forces f (n_pair, c), of which many vanish; A as in `Contact`."""
     c = f.shape[1]
+    for q in range(y.size):
+        y[q] = 0.0
     for i in range(f.shape[0]):
+        pushed = False
         for a in range(c):
-            if f[i, a] != 0.0:
-                row = A[i * c + a]
-                for q in range(y.size):
-                    y[q] += f[i, a] * row[q]
-    return y
+            pushed |= f[i, a] != 0.0
+        if pushed:
+            add_rows(A, i * c, f[i], y)
 
 
 @numba.njit(cache=True)
-def residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J):
-    """x + A f(x) - x_free (n_contact,); forces, status and slopes of all pairs into f, bits and J."""
+def residual(step, contact, x_free, x0, was_open, s, x, f, J, space):
+    """x + A f(x) - x_free (n_contact,); forces and slopes of all pairs into f and J, status and memory into `space`."""
+    work, y = space.work, space.y
     for i in range(x.shape[0]):
-        bits[i] = abs(
+        space.bits[i] = abs(
             advance(step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], contact.normal, work, False)
         )
         put_vector(work[0], f[i])
         put(work[2], J[i])
-    return x.ravel() - x_free + times(contact.A, f)
+        put_vector(work[1], space.memory[i])
+    displace(contact.A, f, y)
+    return x.ravel() - x_free + y
 
 
 @numba.njit(cache=True)
-def chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse):
+def chord(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
     """As `newton` with the inverse of an earlier step; x stays where it was if that does not get there."""
-    n_pair, c = x.shape
-    J, start = np.empty((n_pair, c, c)), x.copy()
+    J, start = np.empty(space.J.shape), x.copy()
     before, slow = np.inf, 0
     move, r_before = np.zeros(x.size), np.zeros(x.size)
     for it in range(SWEEPS):
-        r = residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J)
+        r = residual(step, contact, x_free, x0, was_open, s, x, f, J, space)
         scale = max(scale, np.abs(x).max())
         error = np.abs(r).max()
         if error <= contact.accuracy * scale:
@@ -441,7 +501,7 @@ def chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inver
 
 
 @numba.njit(cache=True)
-def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse):
+def newton(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
     """As `solve_contact`, all pairs at once, where they are too stiffly coupled to be solved in turn."""
     n_pair, c = x.shape
     A = contact.A
@@ -450,7 +510,7 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inve
     best, length = np.inf, 1.0
     x_best, direction = x.copy(), np.zeros(x.size)
     for it in range(NEWTON):
-        r = residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J)
+        r = residual(step, contact, x_free, x0, was_open, s, x, f, J, space)
         scale = max(scale, np.abs(x).max())
         error = np.abs(r).max()
         if error <= contact.accuracy * scale:
@@ -472,15 +532,47 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inve
 
 @numba.njit(**PLAIN)
 def pass_on(step, contact, x, was_open, x_new, memory, bits, work, slopes):
-    """Memory and bits of all pairs over a step that is solved; slopes : (n, ...) the first is filled, if any."""
+    """Memory and bits of all pairs over a step that is known; slopes : (n, ...) the first is filled, if any."""
     chained = slopes.shape[0] > 0
     for i in range(x.shape[0]):
-        at = contact.p[i], contact.gap[i], contact.normal
-        now = advance(step, x[i], was_open[i], x_new[i], memory[i], *at, work, chained)
+        now = advance(
+            step, x[i], was_open[i], x_new[i], memory[i], contact.p[i], contact.gap[i], contact.normal, work, chained
+        )
         put_vector(work[1], memory[i])
         if chained:
             slopes_of(now < 0, work, slopes[0, i])
         bits[i] = abs(now)
+
+
+@numba.njit(**PLAIN)
+def foresee(x_free, f, f_before, bits, A, y, x_new, f_new, was_open):
+    """Guess of a step: forces go on as before, but of pairs without; with y = A f_new and x_new under them."""
+    n_pair, c = f.shape
+    for i in range(n_pair):
+        was_open[i] = bits[i] == SEPARATES
+        for a in range(c):
+            f_new[i, a] = 0.0 if f[i, a] == 0.0 else 2.0 * f[i, a] - f_before[i, a]
+    displace(A, f_new, y)
+    for i in range(n_pair):
+        for a in range(c):
+            x_new[i, a] = x_free[i * c + a] - y[i * c + a]
+
+
+@numba.njit(**PLAIN)
+def take_up(step, contact, x, was_open, x_new, memory, bits, space):
+    """As `pass_on` after `solve_contact`, which has left the memory of all but open pairs."""
+    work = space.work
+    for i in range(x.shape[0]):
+        bits[i] = space.bits[i]
+        if bits[i] != SEPARATES:
+            put_vector(space.memory[i], memory[i])
+            continue
+        bits[i] = abs(
+            advance(
+                step, x[i], was_open[i], x_new[i], memory[i], contact.p[i], contact.gap[i], contact.normal, work, False
+            )
+        )
+        put_vector(work[1], memory[i])
 
 
 @numba.njit(cache=True)
@@ -490,40 +582,52 @@ def march(step, contact, linear, moving, record, space):
     Returns the step that failed or -1, the rounds of the contact solver spent, and the largest |h v|
     """
     z, x, f, memory, bits, _ = moving
-    work = space.work
     x_new, f_new = space.x, space.f
     m = linear.Q.shape[1]
-    spent, scale = 0, np.abs(x).max()
+    spent, scale, speed = 0, largest(x), 0.0
     chained = record.slopes.shape[0] > 0
     inverse = np.zeros((x.size, x.size))
     record.bits[:] = 0
-    f_before = f.copy()
-    of_z = np.ascontiguousarray(linear.outputs[:, : 2 * m])
-    of_f = np.ascontiguousarray(linear.outputs[:, 2 * m :])
-    speed = 0.0
+    f_before, flat, was_open = f.copy(), f.ravel(), np.empty(x.shape[0], np.bool_)
+    kick = np.dot(linear.Q, 0.5 * np.dot(flat, linear.U))
     for j in range(linear.impulse.shape[0]):
-        half_pull = 0.5 * np.dot(f.ravel(), linear.U)
-        z_free = np.dot(linear.E, z) + linear.impulse[j] - np.dot(linear.Q, half_pull)
+        z_free = np.dot(linear.E, z) + linear.impulse[j] - kick
         x_free = np.dot(linear.U, z_free[:m]) + linear.rest[j]
-        put(np.where(f == 0.0, 0.0, 2.0 * f - f_before), f_new)
-        put(x_free - times(contact.A, f_new), x_new)
-        was_open = bits == SEPARATES
+        foresee(x_free, f, f_before, bits, contact.A, space.y, x_new, f_new, was_open)
         rounds, scale = solve_contact(step, contact, x_free, x, was_open, memory, x_new, f_new, scale, inverse, space)
         spent += abs(rounds)
         if rounds < 0:
             return j, spent, speed
-        pass_on(step, contact, x, was_open, x_new, memory, bits, work, record.slopes[j if chained else 0 :])
-        for i in range(x.shape[0]):
-            record.bits[i] |= bits[i]
-        put(f, f_before)
-        put(x_new, x)
-        put(f_new, f)
-        put(z_free - np.dot(linear.Q, 0.5 * np.dot(f.ravel(), linear.U)), z)
-        put(x, record.x[j])
-        put(f, record.f[j])
-        put(linear.output_rest[j] + np.dot(of_z, z) + np.dot(of_f, f.ravel()), record.y[j])
-        speed = max(speed, np.sqrt(np.sum(z[m:] ** 2)))
+        if chained:
+            pass_on(step, contact, x, was_open, x_new, memory, bits, space.work, record.slopes[j:])
+        else:
+            take_up(step, contact, x, was_open, x_new, memory, bits, space)
+        keep(x_new, f_new, bits, x, f, f_before, record.x[j], record.f[j], record.bits)
+        kick = np.dot(linear.Q, 0.5 * np.dot(flat, linear.U))
+        speed = max(speed, move(z_free, kick, z, record.z[j]))
     return -1, spent, speed
+
+
+@numba.njit(**PLAIN)
+def keep(x_new, f_new, bits, x, f, f_before, x_kept, f_kept, bits_kept):
+    """Displacements and forces of all pairs after a step: moved on, and recorded."""
+    for i in range(x.shape[0]):
+        bits_kept[i] |= bits[i]
+        for a in range(x.shape[1]):
+            f_before[i, a] = f[i, a]
+            x[i, a] = x_kept[i, a] = x_new[i, a]
+            f[i, a] = f_kept[i, a] = f_new[i, a]
+
+
+@numba.njit(**PLAIN)
+def move(z_free, kick, z, z_kept):
+    """z after a step, moved on and recorded; returns |h v|."""
+    speed = 0.0
+    for i in range(z.size):
+        z[i] = z_kept[i] = z_free[i] - kick[i]
+        if 2 * i >= z.size:
+            speed += z[i] ** 2
+    return np.sqrt(speed)
 
 
 @numba.njit(cache=True)
