@@ -195,7 +195,7 @@ def write_page() -> None:
         "# Every picture of every scene", "",
         "The scenes that come with tribodyn, as they are shipped, in every kind of picture that it draws.",
         "One command made them all, and this page:", "", "```text", "./tribodyn gallery", "```", "",
-        "Each is drawn by `tribodyn run`, `report`, `wheel`, `curve` or `study`.", "",
+        "Each is drawn by `tribodyn run`, `draw`, `wheel` or `study`.", "",
     ]  # fmt: skip
     for name in td.scene_names():
         lines += [f"## {name.replace('_', ' ')}", ""]
