@@ -11,7 +11,7 @@ from tests.proof import brute_wear
 
 @pytest.mark.slow
 def test_lives_of_two_scenes_hold_in_time() -> None:
-    rows = brute_wear.run(2, lambda line: None, first=1)
+    rows = [row for first in (1, 4) for row in brute_wear.run(1, lambda line: None, first)]
     assert all(row.brute.opened > 0.5 for row in rows)
     assert [row.preload for row in rows] == pytest.approx([1.0, 1.0], abs=0.02)
     assert [row.doubt for row in rows] == pytest.approx([0.0, 0.0], abs=0.01)
