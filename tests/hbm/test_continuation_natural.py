@@ -31,9 +31,11 @@ def test_a_sweep_jumps_at_the_fold_and_says_so(n_points):
 
 def test_a_jump_that_newton_makes_by_itself_is_said():
     """One step lands on the other branch without a failure: what tells is that it does not lead back."""
-    branch = natural.follow(Duffing().balance(), 5.0, 0.5, Options(n_points=27))
+    branch = natural.follow(Duffing().balance(), 5.0, 0.5, Options(n_points=27, refinements=0))
     assert branch.ended is BranchEnd.JUMPED
     assert not branch.folds
+    halved = natural.follow(Duffing().balance(), 5.0, 0.5, Options(n_points=27))
+    np.testing.assert_allclose(halved.omega[list(halved.folds)], [Duffing().folds()[0]], rtol=1e-8)
 
 
 def test_a_lifting_mass_jumps_both_ways_at_the_folds_of_the_arc_length():

@@ -43,8 +43,8 @@ def bench(
         Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
         same library and beside multigrid, or of an "assembly" of 200 000 DOFs with three joints; can be repeated.
     way
-        One way of --fe alone: "product", "by hand", "multigrid", "single precision" (a factor of half the size),
-        "flexibility" (no contact DOFs in the model) or "single flexibility" (both); can be repeated.
+        One way of --fe alone: "product", "by hand", "multigrid" or "flexibility" (no contact DOFs in the model); can be
+        repeated.
     contact
         Set-up, memory and seconds of one response at 0+3 on "500", "1500", "3k", "12k" or "48k" contact DOFs instead,
         with residual flexibility and, up to 3k, beside the dense compliance; can be repeated.

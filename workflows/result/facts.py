@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.geometry.placing import rotation
 from tribodyn.hbm.outcome import End
 
 
@@ -34,8 +33,9 @@ class Around:
     @property
     def turn(self) -> np.ndarray:
         """(3, 3) rotation by one pitch, from a sector to the one on its left."""
-        x, y, z = self.axis
-        return rotation((x, y, z), 2 * np.pi / self.sectors)
+        from tribodyn.geometry.placing import rotation
+
+        return rotation(self.axis, 2 * np.pi / self.sectors)
 
     def sector(self, points: np.ndarray, n: int) -> np.ndarray:
         """Points (..., 3) of sector 0 where sector n has them."""

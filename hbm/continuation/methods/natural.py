@@ -50,7 +50,7 @@ class Options:
     n_points: int = number(default=200, low=2)
     """Equidistant values, ends included; `response.points` of a scene by default."""
     refinements: int = number(default=6, low=0)
-    """Times that a step which fails may be halved."""
+    """Times that a step which fails, or does not lead back, may be halved."""
     rules: Rules = field(default_factory=Rules, kw_only=True)
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
@@ -106,13 +106,10 @@ class _Sweep:
         path, builder, options = self._path, self.builder, self._options
         solution = self._solution
         if solution.converged:
-            value, known = self._wanted[self.done], len(builder.value)
-            solution = _step(path, builder, value, options, options.refinements)
+            value = self._wanted[self.done]
+            solution = self._step(value, options.refinements)
             if not solution.converged:
                 solution = _by_arc_length(path, builder, solution, value, self._stop, options)
-            else:
-                steps = range(known, len(builder.value))
-                self._jumps += [builder.value[i] for i in steps if not _leads_back(path, builder, i, options)]
             self._solution = solution
             self.done += 1
         if not solution.converged:
@@ -122,31 +119,33 @@ class _Sweep:
             return end.say(f" {path.say(self._stop)}{self.notes}")
         return None
 
+    def _step(self, value: float, halvings: int) -> Solution:
+        """One step to `value`, through points in between where it fails or does not lead back."""
+        builder, options = self.builder, self._options
+        guess = predict(builder, value, options.rules.least_spacing)
+        solution = newton.solve(*self._path.place(value), guess, options.newton)
+        led_back = solution.converged and self._leads_back(value, solution.state.x)
+        if not led_back and halvings > 0:
+            middle = self._step(0.5 * (builder.value[-1] + value), halvings - 1)
+            return self._step(value, halvings - 1) if middle.converged else middle
+        builder.add(value, solution)
+        if solution.converged and not led_back:
+            self._jumps.append(value)
+        return solution
 
-def _step(path: Parameter, builder: BranchBuilder, value: float, options: Options, halvings: int) -> Solution:
-    """One step to `value`, through points in between where it fails."""
-    solution = newton.solve(*path.place(value), predict(builder, value, options.rules.least_spacing), options.newton)
-    if not solution.converged and halvings > 0:
-        middle = _step(path, builder, 0.5 * (builder.value[-1] + value), options, halvings - 1)
-        if not middle.converged:
-            return middle
-        return _step(path, builder, value, options, halvings - 1)
-    builder.add(value, solution)
-    return solution
-
-
-def _leads_back(path: Parameter, builder: BranchBuilder, i: int, options: Options) -> bool:
-    """Whether a step to point i, where it is far from the extrapolation, comes back to the point before."""
-    before, here = builder.x[i - 1], builder.x[i]
-    first = max(builder.folds[-1] + 1 if builder.folds else 0, i - EXTRAPOLATION_DEGREE - 1)
-    step = np.linalg.norm(here - before)
-    if i - first < 2:
-        return True
-    miss = here - extrapolate(np.array(builder.value[first:i]), builder.x[first:i], builder.value[i])
-    if np.linalg.norm(miss) <= options.rules.abrupt * step:
-        return True
-    back = newton.solve(*path.place(builder.value[i - 1]), here, options.newton)
-    return back.converged and bool(np.linalg.norm(back.state.x - before) <= options.rules.same * step)
+    def _leads_back(self, value: float, x: np.ndarray) -> bool:
+        """Whether a step to x at a value, where it is far from the extrapolation, comes back to the point before."""
+        builder, options = self.builder, self._options
+        before, last = builder.x[-1], len(builder.value) - 1
+        first = max(builder.folds[-1] + 1 if builder.folds else 0, last - EXTRAPOLATION_DEGREE)
+        step = np.linalg.norm(x - before)
+        if last - first < 1:
+            return True
+        miss = x - extrapolate(np.array(builder.value[first:]), builder.x[first:], value)
+        if np.linalg.norm(miss) <= options.rules.abrupt * step:
+            return True
+        back = newton.solve(*self._path.place(builder.value[-1]), x, options.newton)
+        return back.converged and bool(np.linalg.norm(back.state.x - before) <= options.rules.same * step)
 
 
 def _by_arc_length(
