@@ -721,6 +721,7 @@ def _peak(
     def at(omega: float, beside: Slope) -> Slope:
         return _slope(balance, _solved(balance, omega, beside.predict(omega), options), output)
 
+    row = balance.compliance.output_names.index(output)
     first = before = _slope(balance, _solved(balance, state.omega, state.x, options), output)
     longest = RULES.first_step * before.omega
     step = float(np.clip(before.distance, -longest, longest))
@@ -729,7 +730,7 @@ def _peak(
         curvature = (here.slope - before.slope) / step if step else 0.0
         if not curvature < 0:
             break
-        width = float(np.sqrt(-2 / curvature) * amplitude(balance.outputs(here.solution.state))[_row(balance, output)])
+        width = float(np.sqrt(-2 / curvature) * amplitude(balance.outputs(here.solution.state))[row])
         before, step = here, float(np.clip(-here.slope / curvature, -width / 2, width / 2))
         if abs(step) <= RULES.at_peak * width:
             return (here,), width, solves
@@ -754,7 +755,3 @@ def _peak(
             'harmonics.transitions = "located" has none but where a contact transition begins'
         )
     return (low, high), width, solves
-
-
-def _row(balance: HarmonicBalance, output: str) -> int:
-    return balance.compliance.output_names.index(output)

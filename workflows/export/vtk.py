@@ -23,12 +23,7 @@ from tribodyn.workflows.result.states import State, instant_status, over_a_cycle
 if TYPE_CHECKING:
     import pyvista as pv
 
-KIND = {
-    "triquadratic_hexahedron": "hexahedron27",
-    "quadratic_tetra": "tetra10",
-    "hexahedron": "hexahedron",
-    "tetra": "tetra",
-}
+KIND = {"triquadratic_hexahedron": "hexahedron27", "quadratic_tetra": "tetra10"}  # where meshio has another name
 WITH_FIELDS = (".xdmf", ".vtu", ".vtk", ".msh", ".exo", ".e", ".med")
 MESH_ONLY = (".bdf", ".nas", ".inp", ".unv", ".mesh", ".cgns")
 INSTANTS = 32  # of a period

@@ -40,14 +40,8 @@ OF_MODE = 1e-4
 DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
 Slopes = dict[tuple[str, str], float]
 UNITS = {
-    "frequency": "Hz",
-    "amplitude": "m",
-    "phase": "rad",
-    "energy": "J",
-    "preload": "N",
-    "wear": "m3",
-    "damping": "",
-}
+    "frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3", "damping": "",
+}  # fmt: skip
 MICROMETRE = 1e-6
 
 
@@ -115,7 +109,7 @@ class ResponseDerivatives:
         names = ["phase [rad]" if name == "phase" else name for name in f.names]
         width = [max(12, len(name) + 2) for name in names]
         values = (f"{name} {value:.6g} {UNITS[name.split()[0]]}" for name, value in zip(f.names, f.values, strict=True))
-        lines = [", ".join(values), "per cent of each for one per cent of:"]
+        lines = [", ".join(values).rstrip(), "per cent of each for one per cent of:"]
         lines.append("".join(f"{name:>{w}}" for name, w in zip(names, width, strict=True)))
         for key, row in self.elasticities.items():
             lines.append("".join(f"{value:>+{w}.4f}" for value, w in zip(row, width, strict=True)) + f"  {key}")
