@@ -621,12 +621,12 @@ def at_fold(
     """
     state, solves = _fold(balance, state, options)
     none = np.zeros_like(state.flat)
-    nothing = Quantity("", 0.0, none, none, np.zeros_like(balance.outputs(state)))
-    gradient = Gradient(balance, state, (nothing,), at_fold=True)
+    hertz = Quantity("frequency", state.omega / (2 * np.pi), none, none, np.zeros_like(balance.outputs(state)))
+    gradient = Gradient(balance, state, (hertz,), at_fold=True)
     names, steps, (own,) = _fixed([gradient], changes)
-    moves = -own.columns[0] / own.by_frequency[0]
-    alone = _Fixed(*(getattr(own, field.name)[:0] for field in fields(own)))
-    return _gathered(replace(gradient, quantities=()), names, steps, alone, solves, state.omega, moves)
+    to_hertz = -1 / (2 * np.pi * own.by_frequency[0])
+    sides = (to_hertz * side for side in (own.above, own.below, own.by_gap))
+    return _gathered(gradient, names, steps, _Fixed(own.values, np.zeros(1), *sides), solves)
 
 
 def _fold(balance: HarmonicBalance, state: State, options: NewtonOptions | None) -> tuple[State, int]:
@@ -660,10 +660,15 @@ def _fold(balance: HarmonicBalance, state: State, options: NewtonOptions | None)
 
 @single
 def at_mode(
-    problem: FreeVibration, point: Point, changes: Iterable[Change], options: NewtonOptions | None = None
+    problem: FreeVibration,
+    point: Point,
+    changes: Iterable[Change],
+    options: NewtonOptions | None = None,
+    modal: bool = True,
 ) -> Derivatives:
-    """Derivatives of frequency [Hz] and damping ratio of a nonlinear mode at a modal amplitude that stays.
+    """Derivatives of frequency [Hz] and damping ratio of a nonlinear mode at an amplitude that stays.
 
+    modal : the amplitude is that of the mass-normalised mode, else the motion of the output in it
     One solution of the linearised problem for each parameter, whose residual is differenced at the same motion.
     Raises  NoDerivative where the mode is not solved
     """
@@ -678,7 +683,9 @@ def at_mode(
         made = posed.balance or HarmonicBalance.of(
             posed.model, posed.contact.joints, balance.basis, posed.excitation, balance.omega_max, posed.memory
         )
-        return FreeVibration(made, problem.mode, problem.output).at(point.x, point.omega, point.zeta, point.a).residual
+        there = FreeVibration(made, problem.mode, problem.output)
+        a = point.a if modal else point.a * problem.per_amplitude / there.per_amplitude
+        return there.at(point.x, point.omega, point.zeta, a).residual
 
     def by(change: Change) -> np.ndarray:
         up, down, *far = (residual(one) for one in (change.above, change.below, *(change.twice or ())))
@@ -714,6 +721,7 @@ def _peak(
     def at(omega: float, beside: Slope) -> Slope:
         return _slope(balance, _solved(balance, omega, beside.predict(omega), options), output)
 
+    row = balance.compliance.output_names.index(output)
     first = before = _slope(balance, _solved(balance, state.omega, state.x, options), output)
     longest = RULES.first_step * before.omega
     step = float(np.clip(before.distance, -longest, longest))
@@ -722,7 +730,7 @@ def _peak(
         curvature = (here.slope - before.slope) / step if step else 0.0
         if not curvature < 0:
             break
-        width = float(np.sqrt(-2 / curvature) * amplitude(balance.outputs(here.solution.state))[_row(balance, output)])
+        width = float(np.sqrt(-2 / curvature) * amplitude(balance.outputs(here.solution.state))[row])
         before, step = here, float(np.clip(-here.slope / curvature, -width / 2, width / 2))
         if abs(step) <= RULES.at_peak * width:
             return (here,), width, solves
@@ -747,7 +755,3 @@ def _peak(
             'harmonics.transitions = "located" has none but where a contact transition begins'
         )
     return (low, high), width, solves
-
-
-def _row(balance: HarmonicBalance, output: str) -> int:
-    return balance.compliance.output_names.index(output)

@@ -222,8 +222,8 @@ def _solve(
     if error > options.tolerance:
         outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
     off = error / _stretched(balance, state, x_lin)
-    unknown = off > RULES.force_unknown or (off > RULES.force_accuracy and _unheld(balance, state))
-    if error <= options.tolerance and unknown and _leans(balance, state, x_lin):
+    doubtful = error <= options.tolerance and off > RULES.force_accuracy and _leans(balance, state, x_lin)
+    if doubtful and (off > RULES.force_unknown or _unheld(balance, state)):
         far = float(np.abs(state.x).max())
         outcome = SolveEnd.SLIDES_AWAY.say(
             f" {far:.1e} m, and its forces are known to {off:.1%} only: nothing holds it"
@@ -311,8 +311,8 @@ def _unheld(balance: Balance[Frequency, Evaluated], state: Evaluated) -> str:
     share = {joint.name: float(moved[joint.rows, along].sum()) for joint in contact.joints}
     names = ", ".join(name for name, own in share.items() if own >= sum(share.values()) / len(share))
     return (
-        f"every pair of {names or 'the contact'} slips along {contact.components[along]}, and nothing else holds the "
-        "body there: hold it by a spring, press it harder, or give more friction or a smaller load"
+        f"every pair of {names or 'the contact'} slips along {contact.components[along]}: hold it by a spring, "
+        "press it harder, or give more friction or a smaller load"
     )
 
 

@@ -44,7 +44,7 @@ class SolveEnd(End):
     NO_DIRECTION = "no direction to correct along:"
     NO_REST = "no state of rest was found under the static loads alone"
     SLIDES_AWAY = "the contact slides away,"
-    NOT_HELD = "a body slides away from"
+    NOT_HELD = "nothing holds a body from"
     SITE_NOT_FOUND = "the motion sought was not found in"
     AT_FOLD = "the curve turns back at a fold,"
     INTEGRATION_FAILED = "time integration failed:"

@@ -188,6 +188,12 @@ class WearHistory:
         return np.flatnonzero(np.abs(self.omega[1:] / self.omega[:-1] - 1) > LARGEST_SHIFT)
 
     @property
+    def without_balance(self) -> np.ndarray:
+        """Rows in time whose balance has no solution: the motion of the row before stays, but not its forces."""
+        stays, same = ((a[1:] == a[:-1]).all(axis=(1, 2)) for a in (self.displacement, self.force))
+        return 1 + np.flatnonzero(self.in_time[1:] & stays & ~same)
+
+    @property
     def scatter(self) -> float:
         """Standard error of the cycles passed by the scatter of the motions in time, relative."""
         if self.mean_error is None:

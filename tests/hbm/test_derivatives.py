@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.helpers.contact_draws import LAWS, LOCATED, own
+from tests.helpers.continuation_models import Lifting
 from tests.helpers.verification_models import interface, modal_damping, random_structure
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import derivatives, newton
@@ -16,6 +17,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.derivatives import Change, NoDerivative, Posed, at_frequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -127,6 +129,26 @@ def test_a_peak_that_is_a_corner_follows_first_slip():
     assert found.names[:2] == ("frequency", "amplitude")
     np.testing.assert_allclose(found.values[:2], [omega / (2 * np.pi), stuck(omega)[0]], rtol=1e-6)
     np.testing.assert_allclose(found.slopes[:2, 0], np.array([1 / (2 * np.pi), tip]) / slider / 0.2, rtol=5e-6)
+
+
+def test_a_fold_moves_as_folds_found_anew_and_tells_both_sides_of_a_corner():
+    balance, h = Lifting().balance((0, 1, 2, 3), how="located"), 1e-6
+    branch = arc_length.follow(balance, 0.9, 4.0)
+    at, posed = branch.folds[0], Posed.of(balance)
+    state = balance.evaluate(branch.omega[at], balance.shaped(branch.contact[at]))
+
+    def sides(above, below):
+        return tuple(replace(posed, contact=balance.contact.with_gap(balance.contact.gap + s)) for s in (above, below))
+
+    changes = [Change("gap", h, *sides(h, -h)), Change("twice above zero", h, *sides(2 * h, -h))]
+    found = derivatives.at_fold(balance, state, changes)
+    there, here = (
+        derivatives.at_fold(balance.with_gap(balance.contact.gap + s), state, ()).values[0] for s in (1e-4, -1e-4)
+    )
+    slope = (there - here) / 2e-4
+    np.testing.assert_allclose([found.slopes[0, 0], found.by_gap[0, 0]], slope, rtol=1e-6)
+    assert found.corner.tolist() == [False, True]
+    np.testing.assert_allclose([found.above[0, 1], found.below[0, 1]], [2 * slope, slope], rtol=2e-4)
 
 
 def test_a_fold_has_no_derivative():

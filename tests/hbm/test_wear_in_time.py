@@ -74,6 +74,8 @@ def test_wear_in_time_goes_on_where_the_balance_has_no_solution(
     assert len(found.cycles) == 4
     np.testing.assert_array_equal(found.depth, whole.depth)
     np.testing.assert_array_equal(found.displacement[1:], found.displacement[:1].repeat(3, axis=0))  # that of the first
+    assert found.without_balance.tolist() == [1, 2, 3]
+    assert not len(whole.without_balance)
 
 
 def test_a_motion_that_is_the_balances_is_not_followed(

@@ -241,3 +241,14 @@ def test_where_entries_lie(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> N
     assert kept.folder() == tmp_path / "tribodyn"
     monkeypatch.setenv("TRIBODYN_CACHE", "off")
     assert kept.folder() is None
+
+
+def test_another_temperature_of_a_contact_reduces_nothing() -> None:
+    table = {"temperature": ["0 K", "400 K"], "friction": [0.5, 0.4]}
+    text = ", ".join(f"{name}={value}" for name, value in table.items()).replace("'", '"')
+    cold, hot = (
+        scene_file.read("beam", (*TINY, "contact.friction=", f"contact.by_temperature={{{text}}}", *more)).mesh_scene
+        for more in ((), ("contact.temperature=300 K",))
+    )
+    assert cold.joints["contact"].numbers != hot.joints["contact"].numbers
+    assert kept.early_of(cold) == kept.early_of(hot)

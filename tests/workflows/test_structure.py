@@ -50,7 +50,7 @@ def test_a_body_that_slides_away_is_no_solution(tmp_path: Path) -> None:
             assert balance.preload(solved.state) == pytest.approx(0.5e6 * 0.04 * 0.014, rel=1e-2)
     assert outcomes[0] == "converged"
     assert any(
-        end in outcome for outcome in outcomes for end in ("slides away", "no descent")
+        end in outcome for outcome in outcomes for end in ("slides away", "nothing holds", "no descent")
     )  # rounding decides which
 
 

@@ -1,4 +1,4 @@
-"""Files for ParaView: the worn part, and series of part and contact over wear and over a cycle, listed by a .pvd.
+"""Part and contact with their fields: for pyvista, as a mesh file, as series for ParaView over wear and over a cycle.
 
 Point coordinates are those of the worn part at rest, not exaggerated; displacements are fields, to warp by in ParaView.
 """
@@ -23,14 +23,10 @@ from tribodyn.workflows.result.states import State, instant_status, over_a_cycle
 if TYPE_CHECKING:
     import pyvista as pv
 
-KIND = {
-    "triquadratic_hexahedron": "hexahedron27",
-    "quadratic_tetra": "tetra10",
-    "hexahedron": "hexahedron",
-    "tetra": "tetra",
-}
+KIND = {"triquadratic_hexahedron": "hexahedron27", "quadratic_tetra": "tetra10"}  # where meshio has another name
 WITH_FIELDS = (".xdmf", ".vtu", ".vtk", ".msh", ".exo", ".e", ".med")
 MESH_ONLY = (".bdf", ".nas", ".inp", ".unv", ".mesh", ".cgns")
+INSTANTS = 32  # of a period
 
 
 def write_mesh(result: Result, path: Path) -> list[Path]:
@@ -60,9 +56,6 @@ def write_mesh(result: Result, path: Path) -> list[Path]:
 
 def _plain(values: np.ndarray) -> np.ndarray:
     return values.astype(float) if values.dtype.kind in "iu" else values
-
-
-INSTANTS = 32  # of a period
 
 
 def write_vtk(result: Result, folder: Path) -> list[Path]:

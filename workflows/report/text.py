@@ -158,6 +158,8 @@ def warnings(result: Result) -> Iterator[str]:
             yield f'the motion is unstable for {share} of the cycles; wear.motion = "machine" follows a machine there'
         elif found["unstable_cycles"] is None and result.facts.around is not None and found["wear_steps"]:
             yield "whether the wheel stays at the motion that it wears along is not known"
+        for row in wear.without_balance[:1]:
+            yield f"from {measured(wear.cycles[row], 'cycles')} on maps, loops and films are of the last balance solved"
         for row in wear.jumps:
             before, after = (measured(hertz, "Hz", 4) for hertz in wear.frequency[row : row + 2])
             when = measured(wear.cycles[row + 1], "cycles")

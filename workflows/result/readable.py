@@ -1,4 +1,4 @@
-"""Numbers as a reader has them: in a unit with a prefix, with as many digits as their error allows."""
+"""Numbers for readers, with a prefix and as many digits as their error allows; columns with all digits, as a file."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
+COUNTED = {9: " billion", 6: " million", 0: ""}
+BLOCKS = "▁▂▃▄▅▆▇█"
+UNKNOWN, USUAL, MOST = 2, 3, 6  # digits of a value whose error was looked for in vain, of one without, at the most
 
 
 def write_columns(columns: Mapping[str, Any], path: Path) -> None:
@@ -21,12 +26,6 @@ def write_columns(columns: Mapping[str, Any], path: Path) -> None:
 def named_lines(values: Iterable[tuple[str, str]], width: int = 14) -> list[str]:
     """Names and values in two columns."""
     return [f"{name:{width}} {value}" for name, value in values]
-
-
-PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
-COUNTED = {9: " billion", 6: " million", 0: ""}
-BLOCKS = "▁▂▃▄▅▆▇█"
-UNKNOWN, USUAL, MOST = 2, 3, 6  # digits of a value whose error was looked for in vain, of one without, at the most
 
 
 def digits(error: float | None, default: int = USUAL) -> int:

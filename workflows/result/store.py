@@ -35,6 +35,19 @@ from tribodyn.workflows.result.result import (
     WornResponses,
 )
 
+FORMAT = "tribodyn result 3"
+USER_BLOCK = 512  # bytes before the HDF5 content, the least that HDF5 allows
+MARK = b"tribodyn result, sha256 of what follows this block: "
+FIELD = {"frf": "response"}  # groups of the file that have another name than the field of a Result
+
+Ended = TypeVar("Ended", bound=End)
+KIND = "end_kind"  # attribute with the name of the member whose sentence stands in "end"
+ENDS: dict[type, type[End]] = {Branch: BranchEnd, WearHistory: WearEnd}
+KINDS = "outcome_kind"  # attribute with the names of the members whose sentences stand in "outcome"
+
+Arrays = Mapping[str, tuple[tuple[str, ...], str]]
+"""array -> dimensions and unit"""
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
@@ -48,20 +61,6 @@ def replacing(path: Path) -> Iterator[Path]:
         os.replace(new, path)
     finally:
         new.unlink(missing_ok=True)
-
-
-FORMAT = "tribodyn result 3"
-USER_BLOCK = 512  # bytes before the HDF5 content, the least that HDF5 allows
-MARK = b"tribodyn result, sha256 of what follows this block: "
-FIELD = {"frf": "response"}  # groups of the file that have another name than the field of a Result
-
-Ended = TypeVar("Ended", bound=End)
-KIND = "end_kind"  # attribute with the name of the member whose sentence stands in "end"
-ENDS: dict[type, type[End]] = {Branch: BranchEnd, WearHistory: WearEnd}
-KINDS = "outcome_kind"  # attribute with the names of the members whose sentences stand in "outcome"
-
-Arrays = Mapping[str, tuple[tuple[str, ...], str]]
-"""array -> dimensions and unit"""
 
 
 def _arrays(of: Mapping[str, str]) -> Arrays:

@@ -47,7 +47,7 @@ LATE: Any = {
 }  # fmt: skip
 """What a scene may change without another part or reduction."""
 OF_JOINT = {
-    "law", "tangential_stiffness", "normal_stiffness", "punch", "table", "gap_map",
+    "law", "tangential_stiffness", "normal_stiffness", "punch", "table", "temperature", "by_temperature", "gap_map",
     "wear",
 }  # fmt: skip
 """... and a contact of it, besides the numbers of its law."""

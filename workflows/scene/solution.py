@@ -1,4 +1,4 @@
-"""Tables of a scene about how it is solved: outputs, response, reduction, harmonics, damping, tolerances."""
+"""Tables of a scene about how it is solved, judged and drawn: outputs, response, reduction, harmonics, damping."""
 
 from __future__ import annotations
 
@@ -31,6 +31,8 @@ from tribodyn.workflows.scene.fields import (
 from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
 from tribodyn.workflows.scene.units import to_si
 
+HIGHEST = 15  # harmonic that kept = "auto" may keep, where the scene does not name one
+
 
 class Pictures(Table):
     """What is drawn after a run."""
@@ -53,9 +55,6 @@ class VerdictOptions(Table):
     in_time: StrictBool | None = None
     """Integrate the unworn, the middle and the late state in time; by default where the contact has at most 30
     components."""
-
-
-HIGHEST = 15  # harmonic that kept = "auto" may keep, where the scene does not name one
 
 
 class Output(Table):

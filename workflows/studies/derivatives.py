@@ -40,14 +40,8 @@ OF_MODE = 1e-4
 DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
 Slopes = dict[tuple[str, str], float]
 UNITS = {
-    "frequency": "Hz",
-    "amplitude": "m",
-    "phase": "rad",
-    "energy": "J",
-    "preload": "N",
-    "wear": "m3",
-    "damping": "",
-}
+    "frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3", "damping": "",
+}  # fmt: skip
 MICROMETRE = 1e-6
 
 
@@ -115,7 +109,7 @@ class ResponseDerivatives:
         names = ["phase [rad]" if name == "phase" else name for name in f.names]
         width = [max(12, len(name) + 2) for name in names]
         values = (f"{name} {value:.6g} {UNITS[name.split()[0]]}" for name, value in zip(f.names, f.values, strict=True))
-        lines = [", ".join(values), "per cent of each for one per cent of:"]
+        lines = [", ".join(values).rstrip(), "per cent of each for one per cent of:"]
         lines.append("".join(f"{name:>{w}}" for name, w in zip(names, width, strict=True)))
         for key, row in self.elasticities.items():
             lines.append("".join(f"{value:>+{w}.4f}" for value, w in zip(row, width, strict=True)) + f"  {key}")
@@ -123,11 +117,13 @@ class ResponseDerivatives:
             lines.append("the peak is a corner of the curve, which moves with the contact transition that begins there")
         for key in self.corners:
             i = f.parameters.index(key)
-            first = f.names.index("amplitude")
-            above, below = (side[first, i] * self.at[key] / f.values[first] for side in (f.above, f.below))
+            first = "amplitude" if "amplitude" in f.names else "frequency"
+            at = f.names.index(first)
+            above, below = (side[at, i] * self.at[key] / f.values[at] for side in (f.above, f.below))
+            where = "" if first == "frequency" else " at a fixed frequency"
             lines.append(
-                f"warning: {key} is at a corner of the contact forces, such as grazing or first slip: the amplitude "
-                f"has {above:+.4g} above it and {below:+.4g} below at a fixed frequency, and the table their mean"
+                f"warning: {key} is at a corner of the contact forces, such as grazing or first slip: the {first} has "
+                f"{above:+.4g} above it and {below:+.4g} below{where}, and the table their mean"
             )
         share = 100 * self.seconds / self.response_seconds
         lines.append(f"{self.seconds:.3g} s, {share:.2g} % of the {self.response_seconds:.3g} s of the response")
@@ -178,7 +174,7 @@ def derivatives(
     of : the response; the frequency of its fold; frequency and damping of the nonlinear mode of [backbone]
     at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too. The fold
         next to it; that of the largest amplitude by default
-    amplitude : of the observed displacement in the mode; the last of [backbone] by default
+    amplitude : of the observed displacement in the mode, which stays; the last modal one of [backbone] by default
     only : keys of the scene to look at, such as contact.friction; all by default
     Raises  SceneError for a key that is no such number; SolveFailed where there is no derivative, as at a fold
     """
@@ -214,7 +210,7 @@ def _of_scene(
     with report.track("derivatives") as advance:
         try:
             if mode is not None:
-                found = _of_mode(varying, mode, wanted, advance)
+                found = _of_mode(varying, mode, wanted, advance, modal=at is None)
             else:
                 assert branch is not None
                 found = _found(varying, branch, at, wanted, advance, of == "fold")
@@ -240,14 +236,17 @@ def _changes(varying: Varying, wanted: Mapping[str, float], advance: Advance) ->
         yield varying.change(key, value)
 
 
-def _of_mode(varying: Varying, mode: Backbone, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
+def _of_mode(
+    varying: Varying, mode: Backbone, wanted: Mapping[str, float], advance: Advance, modal: bool
+) -> Derivatives:
     """At the last point of a backbone."""
     if mode.end.kind is not BranchEnd.REACHED:
         raise NoDerivative(f"the backbone {mode.end}")
     problem = FreeVibration(varying.model.balance, mode.number, mode.output)
     x = varying.model.balance.shaped(mode.contact[-1])
     point = problem.at(x, mode.omega[-1], mode.damping[-1], mode.modal_amplitude[-1])
-    return exact.at_mode(problem, point, _changes(varying, wanted, advance), settings.newton_options(varying.scene))
+    changes, options = _changes(varying, wanted, advance), settings.newton_options(varying.scene)
+    return exact.at_mode(problem, point, changes, options, modal)
 
 
 def _found(

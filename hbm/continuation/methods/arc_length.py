@@ -145,11 +145,11 @@ def first_on(path: Parameter, value: float, options: NewtonOptions) -> Solution:
 def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
 
-    Newton from rest and its load ramp are tried first, a rest that Newton does not find by falling friction, too; where
-    a body then slides away, there is no other way; else the curve of solutions over the load is followed, which
-    leads where a rising load would, or, where it turns back, through no load to the opposite one, whose solution is
-    that of half a period later if all loads have odd harmonics; where that ends too, friction falls from where all
-    closed pairs stick, and then the contact is stiffened from soft springs
+    Newton from rest and its load ramp are tried first, and where it finds no rest, from that by falling friction; a
+    body that then slides away has no other way. Else the curve of solutions over the load is followed, which leads
+    where a rising load would, or, where it turns back, through no load to the opposite one, whose solution is that of
+    half a period later if all loads have odd harmonics; where that ends too, friction falls from where all closed
+    pairs stick, and then the contact is stiffened from soft springs
     Returns a Solution; its outcome is the one from rest where no way leads to the load
     """
     options = options or NewtonOptions()

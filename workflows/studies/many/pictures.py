@@ -17,6 +17,14 @@ if TYPE_CHECKING:
     from tribodyn.workflows.studies.many.optimum import Optimum
     from tribodyn.workflows.studies.many.table import StudyTable
 
+WIDE_SCALE = 30.0  # largest over least value, from which on a scale is logarithmic
+SHOWN = {
+    "peak_hz_first": "peak / Hz",
+    "peak_m_first": "amplitude / m",
+    "depth_max_m": "depth / m",
+    "life_cycles": "life / cycles",
+}
+
 
 def picture(found: Optimum) -> Figure:
     """The runs over the first two aims, or the one aim over the runs."""
@@ -59,15 +67,6 @@ def _progress(found: Optimum, axes: Any) -> None:
 def _label(found: Optimum, at: int) -> str:
     aim = found.aims[at]
     return f"{SHOWN.get(aim.number, aim.number)}, wanted {aim.want}"
-
-
-WIDE_SCALE = 30.0  # largest over least value, from which on a scale is logarithmic
-SHOWN = {
-    "peak_hz_first": "peak / Hz",
-    "peak_m_first": "amplitude / m",
-    "depth_max_m": "depth / m",
-    "life_cycles": "life / cycles",
-}
 
 
 def shown(found: StudyTable) -> dict[str, str]:
