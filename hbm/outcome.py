@@ -37,6 +37,7 @@ class SolveEnd(End):
     """How a solve ended."""
 
     CONVERGED = "converged"
+    BESIDE_PEAK = "converged beside a peak that was not found"
     STEPS_SPENT = "not converged in"
     NO_DESCENT = "no descent from relative residual"
     NOT_FINITE = "the residual is not a finite number"
@@ -55,6 +56,8 @@ class SolveEnd(End):
 
 CONVERGED: Final = SolveEnd.CONVERGED.say()
 """The outcome of a solve that reached its tolerance."""
+BESIDE_PEAK: Final = SolveEnd.BESIDE_PEAK.say()
+"""The same at a point of a curve beside which no peak was found that is foreseen to be its highest."""
 
 
 class BranchEnd(End):

@@ -374,13 +374,14 @@ class AtPeak:
         uphill = other = None  # the latest points on either side of the zero, once it is bracketed
         climbed: bool | None = None  # whether the last point inside the bracket replaced `uphill`
         before: Slope | None = None
+        share = 1.0  # of the way to the zero in the bracket, halved where a solve fails
         best = here
         while solves < 60 and abs(best.distance) > resolution:
             side = float(np.sign(here.slope))
             if uphill is not None and other is not None:
                 if abs(uphill.omega - other.omega) <= resolution:  # as about a kink, where no slope vanishes
                     break
-                target = _zero(uphill, other)
+                target = here.omega + share * (_zero(uphill, other) - here.omega)
             elif before is None:
                 target = here.omega + (here.distance if abs(here.distance) < 20 * stride else side * stride)
             else:  # extrapolate the slope, never further than a few strides and always uphill
@@ -394,11 +395,15 @@ class AtPeak:
             solves += 1
             if not there.solution.converged:
                 if uphill is not None and other is not None:
-                    break
+                    if min(best.miss, abs(uphill.omega - other.omega) / best.width) <= self.near:
+                        break
+                    share *= 0.5
+                    continue
                 stride, before = 0.25 * min(stride, abs(target - here.omega)), None
                 if stride < resolution:
                     break
                 continue
+            share = 1.0
             if there.slope * here.slope <= 0 and uphill is None:
                 uphill, other = here, there
             elif uphill is not None and other is not None:

@@ -6,7 +6,7 @@ curve turns back beside it, along its arc length.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.highest_peak import Sample, vertex
 from tribodyn.hbm.continuation.operating_point import AtPeak, NoPeak, OperatingPoint, Slope
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import BESIDE_PEAK, CONVERGED
 from tribodyn.hbm.threads import single
 
 
@@ -57,10 +57,13 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
     """The curve with its highest peaks among its points, in their order.
 
     branch : over the frequency; site : of which output, and how exactly
-    A maximum that no solve makes higher stays the point that it is
+    A maximum that no solve makes higher stays the point that it is, marked where the search for its peak has failed and
+    that is foreseen higher than all that is solved
     """
     found: list[tuple[int, BranchPoint]] = []
+    failed: list[_Candidate] = []
     heights = branch.amplitude(site.output)
+    highest = float(branch.height(site.output).max())
     for candidate in _candidates(balance, branch, site)[: RULES.tried]:
         i = candidate.point
         if candidate.turns:
@@ -70,8 +73,11 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
             try:
                 point = site.within(balance, omega, x, candidate.low, candidate.high)
             except NoPeak:  # it still rises at the highest frequency that is modelled
-                continue
-        if point is None or not point.solution.converged or not point.amplitude > heights[i]:
+                point = None
+        if point is None or not point.solution.converged:
+            failed += [candidate]
+            continue
+        if not point.amplitude > heights[i]:
             continue
         state = point.state
         if not candidate.turns and not candidate.low < state.omega < candidate.high:
@@ -80,6 +86,10 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
         energy = float(balance.energy(state).sum())
         solved = BranchPoint(state.omega, state.x, state.omega, point.response, energy, CONVERGED, point.solves)
         found.append((at, solved))
+        highest = max(highest, point.amplitude)
+    beside = {candidate.point for candidate in failed if max(candidate.height, heights[candidate.point]) >= highest}
+    marked = (BESIDE_PEAK if i in beside else outcome for i, outcome in enumerate(branch.outcome))
+    branch = replace(branch, outcome=tuple(marked))
     for at, solved in sorted(found, key=lambda item: -item[0]):
         branch = branch.inserted(at, solved)
     return branch
