@@ -56,8 +56,6 @@ class SolveEnd(End):
 
 CONVERGED: Final = SolveEnd.CONVERGED.say()
 """The outcome of a solve that reached its tolerance."""
-BESIDE_PEAK: Final = SolveEnd.BESIDE_PEAK.say()
-"""The same at a point of a curve beside which no peak was found that is foreseen to be its highest."""
 
 
 class BranchEnd(End):

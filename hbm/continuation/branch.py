@@ -10,7 +10,7 @@ import numpy as np
 
 from tribodyn.hbm.continuation.parameter import LOAD, Parameter
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import BESIDE_PEAK, CONVERGED, BranchEnd, Outcome, SolveEnd
+from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Branch:
     response : (n_point, n_output, n_coeff) Fourier coefficients of the outputs [m]
     contact : (n_point, n_pair * n_component, n_coeff) relative displacement [m]
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
-    outcome : for each point CONVERGED, BESIDE_PEAK, or what went wrong
+    outcome : for each point CONVERGED, BESIDE_PEAK (a solution), or what went wrong
     newton_steps : (n_point,) Newton steps spent
     end : why and where the branch ends; its text is a sentence
     folds : indices of the points that are folds, where the branch turns back
@@ -56,7 +56,7 @@ class Branch:
     @property
     def converged(self) -> np.ndarray:
         """(n_point,) whether the point is a solution."""
-        return np.array([outcome in (CONVERGED, BESIDE_PEAK) for outcome in self.outcome])
+        return np.array([outcome.kind in (SolveEnd.CONVERGED, SolveEnd.BESIDE_PEAK) for outcome in self.outcome])
 
     @property
     def frequency(self) -> np.ndarray:
@@ -93,10 +93,10 @@ class Branch:
         best = int(np.argmax(self.height(output)))
         if best in (0, len(self.omega) - 1):
             return "the response is highest at an end of response.frequency, widen it"
-        if BESIDE_PEAK not in self.outcome:
-            return ""
-        hertz = self.frequency[self.outcome.index(BESIDE_PEAK)]
-        return f"none was found beside the point at {hertz:.5g} Hz, from which the response rises; more response.points"
+        beside = [
+            hertz for hertz, end in zip(self.frequency, self.outcome, strict=True) if end.kind is SolveEnd.BESIDE_PEAK
+        ]
+        return f"none was found beside the point at {beside[0]:.5g} Hz; more response.points" if beside else ""
 
     def inserted(self, at: int, point: BranchPoint) -> Branch:
         """The branch with one more point before point `at`."""

@@ -255,9 +255,6 @@ class AtPeak:
         """The solution at one frequency beside x; solves : spent before."""
         return OperatingPoint.of(balance, newton.solve(balance, omega, x, self.newton), self.output, solves + 1)
 
-    def _contains(self, omega: float) -> bool:
-        return min(self.start, self.stop) <= omega <= max(self.start, self.stop)
-
     def within(self, balance: HarmonicBalance, omega: float, x: np.ndarray, low: float, high: float) -> OperatingPoint:
         """Refine a maximum of a curve between two frequencies [rad/s] beside it."""
         return self._refine(balance, omega, x, 0.25 * (high - low), (low, high))
@@ -321,9 +318,8 @@ class AtPeak:
         return Overtaking(found, solves, found.amplitude / wanted)
 
     def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
-        omega = found.state.omega
-        higher = found.amplitude > self.overtakes * point.amplitude
-        return self._contains(omega) and found.solution.converged and higher
+        inside = min(self.start, self.stop) <= found.state.omega <= max(self.start, self.stop)
+        return inside and found.solution.converged and found.amplitude > self.overtakes * point.amplitude
 
     @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:

@@ -16,7 +16,7 @@ import pytest
 
 from tests.helpers.command import leave
 from tests.helpers.synthetic_result import result
-from tribodyn.hbm.outcome import BESIDE_PEAK, WearEnd
+from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.workflows.command import exits
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import readable, store, summary
@@ -278,7 +278,7 @@ def test_the_end_of_the_range_is_no_peak() -> None:
 def test_a_point_beside_a_peak_that_was_not_found_is_no_peak() -> None:
     made = curve(30)
     assert made.response is not None
-    outcome = tuple(BESIDE_PEAK if i == 30 else one for i, one in enumerate(made.response.outcome))
+    outcome = tuple(SolveEnd.BESIDE_PEAK.say() if i == 30 else one for i, one in enumerate(made.response.outcome))
     lost = replace(made, response=replace(made.response, outcome=outcome))
     assert summary.summary(lost)["peak_at_end"] is True
     assert "peak_m_first" not in numbers_of(lost)
