@@ -37,6 +37,7 @@ class SolveEnd(End):
     """How a solve ended."""
 
     CONVERGED = "converged"
+    BESIDE_PEAK = "converged beside a peak that was not found"
     STEPS_SPENT = "not converged in"
     NO_DESCENT = "no descent from relative residual"
     NOT_FINITE = "the residual is not a finite number"

@@ -22,7 +22,7 @@ class Branch:
     response : (n_point, n_output, n_coeff) Fourier coefficients of the outputs [m]
     contact : (n_point, n_pair * n_component, n_coeff) relative displacement [m]
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
-    outcome : for each point CONVERGED, or what went wrong
+    outcome : for each point CONVERGED, BESIDE_PEAK (a solution), or what went wrong
     newton_steps : (n_point,) Newton steps spent
     end : why and where the branch ends; its text is a sentence
     folds : indices of the points that are folds, where the branch turns back
@@ -56,7 +56,7 @@ class Branch:
     @property
     def converged(self) -> np.ndarray:
         """(n_point,) whether the point is a solution."""
-        return np.array([outcome.kind is SolveEnd.CONVERGED for outcome in self.outcome])
+        return np.array([outcome.kind in (SolveEnd.CONVERGED, SolveEnd.BESIDE_PEAK) for outcome in self.outcome])
 
     @property
     def frequency(self) -> np.ndarray:
@@ -85,10 +85,18 @@ class Branch:
         return np.where(self.converged, size, -1.0)
 
     def peak(self, output: str) -> int | None:
-        """The highest point of an output, None where that is an end of the branch: an end is no resonance."""
-        height = self.height(output)
-        best = int(np.argmax(height))
-        return None if best in (0, len(height) - 1) else best
+        """The highest point of an output, None where `no_peak` says why that is none."""
+        return None if self.no_peak(output) else int(np.argmax(self.height(output)))
+
+    def no_peak(self, output: str) -> str:
+        """Why the highest point of an output is no peak: an end of the curve, or a higher one not solved; else ""."""
+        best = int(np.argmax(self.height(output)))
+        if best in (0, len(self.omega) - 1):
+            return "the response is highest at an end of response.frequency, widen it"
+        beside = [
+            hertz for hertz, end in zip(self.frequency, self.outcome, strict=True) if end.kind is SolveEnd.BESIDE_PEAK
+        ]
+        return f"none was found beside the point at {beside[0]:.5g} Hz; more response.points" if beside else ""
 
     def inserted(self, at: int, point: BranchPoint) -> Branch:
         """The branch with one more point before point `at`."""

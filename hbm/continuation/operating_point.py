@@ -255,9 +255,6 @@ class AtPeak:
         """The solution at one frequency beside x; solves : spent before."""
         return OperatingPoint.of(balance, newton.solve(balance, omega, x, self.newton), self.output, solves + 1)
 
-    def _contains(self, omega: float) -> bool:
-        return min(self.start, self.stop) <= omega <= max(self.start, self.stop)
-
     def within(self, balance: HarmonicBalance, omega: float, x: np.ndarray, low: float, high: float) -> OperatingPoint:
         """Refine a maximum of a curve between two frequencies [rad/s] beside it."""
         return self._refine(balance, omega, x, 0.25 * (high - low), (low, high))
@@ -321,9 +318,8 @@ class AtPeak:
         return Overtaking(found, solves, found.amplitude / wanted)
 
     def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
-        omega = found.state.omega
-        higher = found.amplitude > self.overtakes * point.amplitude
-        return self._contains(omega) and found.solution.converged and higher
+        inside = min(self.start, self.stop) <= found.state.omega <= max(self.start, self.stop)
+        return inside and found.solution.converged and found.amplitude > self.overtakes * point.amplitude
 
     @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
@@ -374,13 +370,14 @@ class AtPeak:
         uphill = other = None  # the latest points on either side of the zero, once it is bracketed
         climbed: bool | None = None  # whether the last point inside the bracket replaced `uphill`
         before: Slope | None = None
+        share = 1.0  # of the way to the zero in the bracket, halved where a solve fails
         best = here
         while solves < 60 and abs(best.distance) > resolution:
             side = float(np.sign(here.slope))
             if uphill is not None and other is not None:
                 if abs(uphill.omega - other.omega) <= resolution:  # as about a kink, where no slope vanishes
                     break
-                target = _zero(uphill, other)
+                target = here.omega + share * (_zero(uphill, other) - here.omega)
             elif before is None:
                 target = here.omega + (here.distance if abs(here.distance) < 20 * stride else side * stride)
             else:  # extrapolate the slope, never further than a few strides and always uphill
@@ -394,11 +391,15 @@ class AtPeak:
             solves += 1
             if not there.solution.converged:
                 if uphill is not None and other is not None:
-                    break
+                    if min(best.miss, abs(uphill.omega - other.omega) / best.width) <= self.near:
+                        break
+                    share *= 0.5
+                    continue
                 stride, before = 0.25 * min(stride, abs(target - here.omega)), None
                 if stride < resolution:
                     break
                 continue
+            share = 1.0
             if there.slope * here.slope <= 0 and uphill is None:
                 uphill, other = here, there
             elif uphill is not None and other is not None:

@@ -6,7 +6,8 @@ curve turns back beside it, along its arc length.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.highest_peak import Sample, vertex
 from tribodyn.hbm.continuation.operating_point import AtPeak, NoPeak, OperatingPoint, Slope
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 from tribodyn.hbm.threads import single
 
 
@@ -57,29 +58,36 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
     """The curve with its highest peaks among its points, in their order.
 
     branch : over the frequency; site : of which output, and how exactly
-    A maximum that no solve makes higher stays the point that it is
+    A maximum that no solve makes higher stays the point that it is, marked where the search for its peak has failed and
+    that is foreseen higher than all that is solved
     """
     found: list[tuple[int, BranchPoint]] = []
+    failed: list[_Candidate] = []
     heights = branch.amplitude(site.output)
+    highest = float(branch.height(site.output).max())
     for candidate in _candidates(balance, branch, site)[: RULES.tried]:
         i = candidate.point
         if candidate.turns:
             point = along_arc(balance, branch, i, site)
         else:
             x, omega = balance.shaped(branch.contact[i]), float(branch.omega[i])
-            try:
+            point = None
+            with suppress(NoPeak):  # it still rises at the highest frequency that is modelled
                 point = site.within(balance, omega, x, candidate.low, candidate.high)
-            except NoPeak:  # it still rises at the highest frequency that is modelled
-                continue
-        if point is None or not point.solution.converged or not point.amplitude > heights[i]:
+        if point is None or not point.solution.converged:
+            failed += [candidate]
             continue
-        state = point.state
-        if not candidate.turns and not candidate.low < state.omega < candidate.high:
+        state, inside = point.state, candidate.turns or candidate.low < point.state.omega < candidate.high
+        if not inside or not point.amplitude > heights[i]:
             continue
         at = i + 1 if _lies_behind(branch, i, state.omega, state.flat) else i
         energy = float(balance.energy(state).sum())
         solved = BranchPoint(state.omega, state.x, state.omega, point.response, energy, CONVERGED, point.solves)
         found.append((at, solved))
+        highest = max(highest, point.amplitude)
+    beside = {candidate.point for candidate in failed if max(candidate.height, heights[candidate.point]) >= highest}
+    marked = (SolveEnd.BESIDE_PEAK.say() if i in beside else outcome for i, outcome in enumerate(branch.outcome))
+    branch = replace(branch, outcome=tuple(marked))
     for at, solved in sorted(found, key=lambda item: -item[0]):
         branch = branch.inserted(at, solved)
     return branch

@@ -32,7 +32,6 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import crossing, wave_exponents
 from tribodyn.hbm.stability.perturbed_contact import answer_of
 from tribodyn.hbm.stability.wave_exponents import WaveModes
@@ -168,9 +167,9 @@ def mark(
     if path.name != branch.parameter_name:
         raise ValueError(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
     found: list[Stability | None] = []
-    for value, flat, outcome in zip(branch.parameter, branch.contact, branch.outcome, strict=True):
+    for value, flat, converged in zip(branch.parameter, branch.contact, branch.converged, strict=True):
         here = None
-        if outcome == CONVERGED:
+        if converged:
             balance, omega = path.place(float(value))
             state = balance.evaluate(omega, balance.shaped(flat))
             here = stability(balance, state)

@@ -34,16 +34,37 @@ def peak(limit: float, harmonics: tuple[int, ...] = (1,)) -> float:
     return float(found.amplitude)
 
 
-def closed_form(limit: float) -> float:
+def chain_peak(limit: float, waves: int, blades: int = 6) -> tuple[float, float]:
+    """Peak amplitude of a chain without symmetry of blades, a shroud between neighbours; and how far blades differ.
+
+    Every blade is a mode as above; the force is a wave of so many nodal diameters, shrouds slip at a limit [N]
+    """
+    one, angle = np.eye(blades), 2 * np.pi * waves / blades * np.arange(blades)
+    seen = {f"tip {k}": one[k] for k in range(blades)}
+    system = SecondOrderSystem(one, one, DAMPING * one, {"cos": np.cos(angle), "sin": np.sin(angle)}, seen)
+    model = ReducedModel(system, interface(np.roll(one, 1, axis=1) - one, ("t1",)))
+    numbers = ContactParameters.of(("t1",), [[DAMPER]] * blades, friction=1.0, normal_load=limit)
+    basis = HarmonicBasis((1,), 64, "located")
+    load = Excitation.of({}, {1: {"cos": FORCE, "sin": -1j * FORCE}})
+    balance = HarmonicBalance.of(model, Joint("shroud", "jenkins_constant", numbers), basis, load, 3.0)
+    found = AtPeak("tip 0", 0.9, 1.9).first(balance)
+    assert found.solution.converged
+    heights = np.linalg.norm(found.response, axis=1)
+    return float(found.amplitude), float(np.ptp(heights) / heights.max())
+
+
+def closed_form(limit: float, damper: float = DAMPER) -> float:
     """The largest amplitude that the force sustains at any frequency, friction by its describing function."""
 
     def missing(amplitude: float) -> float:
-        stiff, lost = describing_function(amplitude, DAMPER, limit)
+        stiff, lost = describing_function(amplitude, damper, limit)
 
         def needed(omega: float) -> float:
             return float(np.hypot((1 - omega**2) * amplitude + stiff, DAMPING * omega * amplitude - lost))
 
-        best = minimize_scalar(needed, bounds=(0.9, 1.4), method="bounded", options={"xatol": 1e-10})
+        best = minimize_scalar(
+            needed, bounds=(0.9, 0.2 + np.sqrt(1 + damper)), method="bounded", options={"xatol": 1e-10}
+        )
         return float(best.fun) - FORCE
 
     return float(brentq(missing, 1e-2, 300.0))
@@ -61,3 +82,22 @@ def test_optimum_without_other_damping_is_half_pi_of_the_force() -> None:
         for limit in (1.2, np.pi / 2, 2.5):
             assert peak(limit) == pytest.approx(limit**2 / (DAMPER * (limit - np.pi / 4)), rel=1e-6)
         assert peak(np.pi / 2) == pytest.approx(np.pi / DAMPER, rel=1e-6)
+
+
+@pytest.mark.parametrize("waves", [1, 2, 3])
+@pytest.mark.parametrize("share", [0.8, 1.0, 1.6])
+def test_peak_over_shroud_load_is_that_of_a_damper_between_neighbours(waves: int, share: float) -> None:
+    """Neighbours move by s = 2 sin(pi n / N) of the amplitude: a damper of s^2 k slips at s p, best at pi F / 2."""
+    s = 2 * np.sin(np.pi * waves / 6)
+    height, differ = chain_peak(share * np.pi * FORCE / (2 * s), waves)
+    assert height == pytest.approx(closed_form(share * np.pi * FORCE / 2, s**2 * DAMPER), rel=1e-7)
+    assert differ < 1e-8
+
+
+def test_optimum_of_a_shroud_without_other_damping(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The optimum pi F / (2 s) has the amplitude pi F / (s^2 k), and is lower than either side."""
+    monkeypatch.setattr("tests.hbm.test_damper_curve.DAMPING", 1e-9)
+    s = 2 * np.sin(np.pi * 2 / 6)
+    below, best, above = (chain_peak(share * np.pi * FORCE / (2 * s), 2)[0] for share in (0.9, 1.0, 1.1))
+    assert best == pytest.approx(np.pi * FORCE / (s**2 * DAMPER), rel=1e-6)
+    assert best < min(below, above)

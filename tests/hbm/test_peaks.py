@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import count
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 from tests.helpers.continuation_models import Duffing, Lifting
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
@@ -20,7 +23,7 @@ from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.continuation.peaks import with_peaks
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.outcome import BranchEnd, SolveEnd
 from tribodyn.reduction.model import ReducedModel
 
 RANGE = 1.0, 4.0
@@ -91,6 +94,27 @@ def test_the_peak_of_a_sweep_does_not_depend_on_its_points(ratio: float, points:
     assert np.all(np.diff(solved.omega) > 0)
     assert solved.amplitude("mass").max() == pytest.approx(problem.peak[0], rel=1e-5)
     assert solved.peak("mass") == int(solved.amplitude("mass").argmax())
+
+
+@pytest.mark.parametrize("failing", [(3,), (4,), (3, 4), range(2, 100)])
+def test_a_peak_beside_solves_that_fail_is_found_or_told(failing, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where sliders come to rest. Without any solve beside it, the highest point is no peak."""
+    problem, solve, solves = StuckOscillator(1e-2), newton.solve, count(1)
+    branch = natural.follow(problem.balance, *RANGE, natural.Options(n_points=10))
+
+    def some(*given: Any) -> newton.Solution:
+        found = solve(*given)
+        return replace(found, outcome=SolveEnd.NO_DESCENT.say()) if next(solves) in failing else found
+
+    monkeypatch.setattr(newton, "solve", some)
+    solved = with_peaks(problem.balance, branch, AtPeak("mass", *RANGE))
+    assert solved.converged.all()
+    if 2 in failing:
+        assert solved.peak("mass") is None
+        assert "none was found beside the point at" in solved.no_peak("mass")
+    else:
+        assert solved.amplitude("mass")[solved.peak("mass")] == pytest.approx(problem.peak[0], rel=1e-5)
+        assert solved.no_peak("mass") == ""
 
 
 @pytest.mark.parametrize("way", [(0.3, 4.5), (4.5, 0.3)])

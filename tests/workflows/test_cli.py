@@ -16,11 +16,12 @@ import pytest
 
 from tests.helpers.command import leave
 from tests.helpers.synthetic_result import result
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.workflows.command import exits
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import readable, store, summary
 from tribodyn.workflows.result.facts import Stage
+from tribodyn.workflows.studies.many.task import numbers_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -272,6 +273,16 @@ def test_the_end_of_the_range_is_no_peak() -> None:
         made = curve(point)
         assert summary.summary(made)["peak_at_end"] is at_end
         assert any("no peak: " in line for line in text.warnings(made)) is at_end
+
+
+def test_a_point_beside_a_peak_that_was_not_found_is_no_peak() -> None:
+    made = curve(30)
+    assert made.response is not None
+    outcome = tuple(SolveEnd.BESIDE_PEAK.say() if i == 30 else one for i, one in enumerate(made.response.outcome))
+    lost = replace(made, response=replace(made.response, outcome=outcome))
+    assert summary.summary(lost)["peak_at_end"] is True
+    assert "peak_m_first" not in numbers_of(lost)
+    assert any("none was found beside the point at" in line for line in text.warnings(lost))
 
 
 def test_separation_is_reported_only_where_contact_was_lost() -> None:

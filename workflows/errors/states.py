@@ -85,7 +85,7 @@ def highest_of(branch: Branch, balance: HarmonicBalance) -> OperatingPoint:
 def _highest(branch: Branch) -> int:
     best = branch.peak(branch.output_names[0])
     if best is None:
-        raise NoPeak("the response is highest at an end of response.frequency, which is no peak: widen the range")
+        raise NoPeak(f"no peak: {branch.no_peak(branch.output_names[0])}")
     return best
 
 

@@ -142,8 +142,8 @@ def warnings(result: Result) -> Iterator[str]:
     found = result.summary()
     if result.stage not in (Stage.COMPLETE, Stage.RESPONSE):
         yield f"this run is not complete: {result.state}"
-    if found["peak_at_end"]:
-        yield "no peak: the response is highest at an end of response.frequency, widen it"
+    if found["peak_at_end"] and (frf := result.response) is not None:
+        yield f"no peak: {frf.no_peak(frf.output_names[0])}"
     if found["jumped"]:
         yield 'the sweep jumped: behind the fold its peak may be higher; see response.method "arc_length"'
     if found["peak_is_stable"] is False and not found["wear_steps"]:

@@ -35,7 +35,7 @@ def summary(result: Result) -> dict[str, Any]:
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one; the peak
         is that of the balance, also where a machine leaves it
     unstable_cycles : share of the cycles worn along an unstable motion of the balance, None where it is not known
-    peak_at_end : whether that peak is no peak, but an end of the response curve
+    peak_at_end : whether that peak is no peak, but an end of the response curve or a point whose peak was not found
     load_factor : [least, largest] factor on the vibrating loads, where it was found under control, else None; the peak
         is then where it takes least per amplitude
     jumped : whether the response is a sweep that jumped at a fold, so that the curve may have a higher peak

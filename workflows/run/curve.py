@@ -154,10 +154,7 @@ def worn_responses(
     return WornResponses(
         rows,
         np.stack([padded(curve.omega) for curve in branches]),
-        np.stack([padded(_amplitude(curve)) for curve in branches]),
+        np.stack(
+            [padded(np.where(curve.converged, curve.amplitude(curve.output_names[0]), np.nan)) for curve in branches]
+        ),
     )
-
-
-def _amplitude(curve: Branch) -> np.ndarray:
-    good = curve.converged
-    return np.where(good, curve.amplitude(curve.output_names[0]), np.nan)

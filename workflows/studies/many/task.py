@@ -28,7 +28,6 @@ Status = Literal["complete", "failed", "refused", "lost"]
 RUN = "run"  # the column of their numbers
 ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
 UNDRAWN = ("pictures.plots=false", "pictures.renders=false")
-NO_PEAK = "; the response is highest at an end of its range: no peak"
 SINGLE = ("energy_J", "depth_max_m", "volume_m3", "cycles", "life_cycles")
 
 
@@ -110,8 +109,9 @@ def solve(task: Task) -> Row:
             return ended("failed", error)
         except Exception as error:  # one run that nobody foresaw does not stop the others
             return ended("failed", f"{type(error).__name__}: {error}")
-        state = result.state + (NO_PEAK if numbers.get("peak_at_end") else "")
-        return ended("complete", state, numbers)
+        frf = result.response
+        why = frf.no_peak(frf.output_names[0]) if frf is not None and numbers.get("peak_at_end") else ""
+        return ended("complete", f"{result.state}; no peak: {why}" if why else result.state, numbers)
 
 
 def slope_column(number: str, key: str) -> str:
@@ -122,7 +122,7 @@ def slope_column(number: str, key: str) -> str:
 def numbers_of(result: Result) -> dict[str, float]:
     """The numbers of a result by column: those of its summary, and of its verdict where it has one.
 
-    A response that is highest at an end of its range has no peak.
+    A response that is highest at an end of its range, or whose peak was not found, has no peak.
     """
     summary = result.summary()
     numbers: dict[str, float | None] = {}
