@@ -65,8 +65,9 @@ def _statement(
     if unstable > options.largest:
         return Statement(value, error, dominated, Status.UNSTABLE, f"for {unstable:.0%} of the cycles")
     concerned = _beside(findings, result) if name in OF_WEAR else findings[:1]
+    worn = in_time.missed(concerned, result) if name in OF_WEAR and concerned else None
     for finding in () if name == "peak_frequency" else concerned:
-        status, reason = finding.judged(name, error)
+        status, reason = finding.judged(name, error, worn)
         if status is not None:
             return Statement(value, error, dominated, status, reason)
     if error is None:
