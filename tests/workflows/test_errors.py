@@ -211,7 +211,7 @@ def test_a_life_is_off_by_the_mean_of_its_states(steepness: float) -> None:
     cycles, left = np.cumsum(taken) - taken, np.linspace(1.0, 0.9, 400)
     wear = SimpleNamespace(cycles=cycles, cycles_in_step=taken, preload=left, in_time=np.zeros(400, bool))
     result = cast(td.Result, SimpleNamespace(wear=wear))
-    found = [finding(cycles=cycles[i], energy=off[i]) for i in (0, *states.later_rows(result))]
+    found = [finding(cycles=cycles[i], energy=off[i] + 3e-4, own_error=1e-4) for i in (0, *states.later_rows(result))]
     life_in_time = np.sum(np.diff(done) * (1 + off) / rate)
     assert in_time.missed(found, result) == pytest.approx(life_in_time / taken.sum() - 1, rel=0.06)
     assert found[-1].judged("life", 0.055)[0] == Status.CONTRADICTED  # by that state alone
