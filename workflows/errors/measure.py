@@ -18,7 +18,7 @@ from tribodyn.hbm.wear.machine_motion import left_aside
 from tribodyn.hbm.wear.step_error import step_error
 from tribodyn.workflows.errors import refine, states
 from tribodyn.workflows.errors.options import DEFAULT, Options
-from tribodyn.workflows.errors.states import Answers, OnCurve, State, relative
+from tribodyn.workflows.errors.states import Answers, State, relative
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import Change, Refinement
