@@ -15,7 +15,7 @@ import tribodyn as td
 from tests.proof import reference
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.stability.stays import MULTIPLIERS
-from tribodyn.workflows.errors import accuracy, in_time, measure, refine, verdict
+from tribodyn.workflows.errors import accuracy, in_time, measure, refine, states, verdict
 from tribodyn.workflows.errors.accuracy import Bound
 from tribodyn.workflows.errors.in_time import Finding
 from tribodyn.workflows.errors.options import DEFAULT
@@ -200,6 +200,26 @@ def test_what_time_integration_finds_decides_what_is_reported(
     changes: dict[str, object], status: Status | None
 ) -> None:
     assert finding(**changes).judged("energy", 0.01)[0] == status
+
+
+@pytest.mark.parametrize("steepness", [0.0, 3.0])
+def test_a_life_is_off_by_the_mean_of_its_states(steepness: float) -> None:
+    """Three states stand for all, beside the cycles that the wear takes by its work in time, 3 to 7 % less."""
+    done = np.linspace(0.0, 1.0, 401)
+    off, rate = 0.03 + 0.04 * done[:-1], np.exp(-steepness * done[:-1])
+    taken = np.diff(done) / rate
+    cycles, left = np.cumsum(taken) - taken, np.linspace(1.0, 0.9, 400)
+    wear = SimpleNamespace(cycles=cycles, cycles_in_step=taken, preload=left, in_time=np.zeros(400, bool))
+    result = cast(td.Result, SimpleNamespace(wear=wear))
+    found = [finding(cycles=cycles[i], energy=off[i] + 3e-4, own_error=1e-4) for i in (0, *states.later_rows(result))]
+    life_in_time = np.sum(np.diff(done) * (1 + off) / rate)
+    assert in_time.missed(found, result) == pytest.approx(life_in_time / taken.sum() - 1, rel=0.06)
+    assert found[-1].judged("life", 0.055)[0] == Status.CONTRADICTED  # by that state alone
+    assert found[-1].judged("life", 0.055, in_time.missed(found[-1:], result)) == (
+        Status.CONTRADICTED, "over the wear, by 7.0%",
+    )  # fmt: skip
+    wear.in_time = cycles > 0  # what was worn in time needs no balance
+    assert in_time.missed(found, result) < 0.001
 
 
 def test_small_contacts_are_integrated_in_time(monkeypatch: pytest.MonkeyPatch) -> None:

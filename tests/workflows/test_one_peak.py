@@ -89,7 +89,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [pytest.param("thin plate", marks=pytest.mark.slow), "bracket"])
 def test_head_verdict_and_arc_length_have_one_peak(name: str) -> None:
     file = parse(SCENES[name], "part.toml", ("verdict.enabled=false",), Path(bracket.__file__).parent)
     result = pipeline.run(file, None, Progress())

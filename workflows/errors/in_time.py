@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,19 +43,41 @@ class Finding:
     how: str
     outcome: Outcome[SolveEnd]
 
-    def judged(self, quantity: str, error: float | None) -> tuple[Status | None, str]:
-        """Why a quantity is not reported, if it is not; error : of the balance, relative, None where not known."""
+    @property
+    def doubt(self) -> float:
+        """Difference that the integration itself may make, relative."""
+        return 3 * float(np.fmax(self.own_error, INTEGRATION.tolerance))
+
+    def judged(self, quantity: str, error: float | None, worn: float | None = None) -> tuple[Status | None, str]:
+        """Why a quantity is not reported, if it is not; error : of the balance, if known; worn : see `missed`."""
         where = f"after {self.cycles:.3g} cycles" if self.cycles else "of the unworn contact"
         miss = abs({"amplitude": self.amplitude, "preload": self.preload}.get(quantity, self.energy))
-        own_error = float(np.fmax(self.own_error, INTEGRATION.tolerance))
-        allowed = (error or 0.0) + 3 * own_error
+        allowed = (error or 0.0) + self.doubt
         if self.outcome.kind is not SolveEnd.CONVERGED and not miss <= allowed:
             return Status.NOT_PERIODIC, f"{where}: {self.outcome}"
-        if not self.stable and (miss > 3 * own_error or self.how == MULTIPLIERS):
+        if not self.stable and (miss > self.doubt or self.how == MULTIPLIERS):
             return Status.UNSTABLE, f"{where}, by {self.how}"
+        if worn is not None:
+            miss, allowed, where = worn, error or 0.0, "over the wear"
         if miss > allowed:
             return Status.CONTRADICTED, f"{where}, by {miss:.1%}"
         return None, ""
+
+
+def missed(findings: Sequence[Finding], result: Result) -> float:
+    """How far the work of its states in time puts a wear of the balance off, relative to it.
+
+    A depth takes (1 + energy) times the cycles where the balance does that much more work than the motion in time: a
+    life is off by the mean over its cycles. A finding stands for the cycles nearest to it, wear in time needs none.
+    So few do not show that they cancel, their amounts are taken, less their own doubt.
+    """
+    wear = result.wear
+    assert wear is not None
+    rows = slice(0, max(states.later_rows(result), default=0) + 1)
+    taken = wear.cycles_in_step[rows]
+    apart = np.subtract.outer(wear.cycles[rows] + taken / 2, [finding.cycles for finding in findings])
+    sure = np.array([max(abs(finding.energy) - finding.doubt, 0.0) for finding in findings])
+    return float(np.sum(sure[np.abs(apart).argmin(axis=1)] * taken * ~wear.in_time[rows]) / (taken.sum() or 1.0))
 
 
 def check(

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 
 from tribodyn.hbm.contact.sampling import sampling_error
 from tribodyn.hbm.continuation import harmonic_choice
-from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
+from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
 from tribodyn.hbm.wear.machine_motion import left_aside
 from tribodyn.hbm.wear.step_error import step_error
 from tribodyn.workflows.errors import refine, states
 from tribodyn.workflows.errors.options import DEFAULT, Options
-from tribodyn.workflows.errors.states import Answers, OnCurve, State, relative
+from tribodyn.workflows.errors.states import Answers, State, relative
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import Change, Refinement
@@ -277,8 +277,3 @@ def life_of(worn: WearHistory, model: Model, wear: Wear) -> float | None:
     forces = (worn.normal_force[:, pairs].sum(axis=1) for pairs in model.reduced.info.joints.values())
     lives = [cycles_to_share(worn.cycles, force, share) for force in forces]
     return min((life for life in lives if life is not None), default=None)
-
-
-def at_given_frequency(state: State) -> bool:
-    """Whether the frequency of a state is given by the scene."""
-    return isinstance(state.site, AtFrequency) and not isinstance(state.site, OnCurve)

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from time import process_time
 
+from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.workflows.errors import in_time
 from tribodyn.workflows.errors.in_time import Finding
-from tribodyn.workflows.errors.measure import OF_WEAR, Table, at_given_frequency, measure
+from tribodyn.workflows.errors.measure import OF_WEAR, Table, measure
 from tribodyn.workflows.errors.options import DEFAULT, Options
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
@@ -55,7 +56,7 @@ def _statement(
 ) -> Statement:
     if value is None:
         return Statement(None, None, None, Status.ABSENT, _absent(name, table, result))
-    if name == "peak_frequency" and table.first is not None and at_given_frequency(table.first):
+    if name == "peak_frequency" and table.first is not None and isinstance(table.first.site, AtFrequency):
         return Statement(value, 0.0, None, Status.REPORTED, "given by the scene")
     own = [row for row in table.rows if row.quantity == name]
     error, why = error_of(own, table.worn_ratio if name in OF_WEAR else table.ratio, options)
@@ -64,9 +65,11 @@ def _statement(
     error = None if error is None else error + unstable  # what a machine wears there instead is not known
     if unstable > options.largest:
         return Statement(value, error, dominated, Status.UNSTABLE, f"for {unstable:.0%} of the cycles")
-    concerned = _beside(findings, result) if name in OF_WEAR else findings[:1]
+    followed = () if result.wear is None else result.wear.cycles[result.wear.in_time]  # in time, which needs no check
+    concerned = [one for one in findings if one.cycles not in followed] if name in OF_WEAR else findings[:1]
+    worn = in_time.missed(concerned, result) if name in OF_WEAR and concerned else None
     for finding in () if name == "peak_frequency" else concerned:
-        status, reason = finding.judged(name, error)
+        status, reason = finding.judged(name, error, worn)
         if status is not None:
             return Statement(value, error, dominated, status, reason)
     if error is None:
@@ -74,13 +77,6 @@ def _statement(
     if error > options.largest:
         return Statement(value, error, dominated, Status.TOO_LARGE, "")
     return Statement(value, error, dominated, Status.REPORTED, "measured on this scene")
-
-
-def _beside(findings: Sequence[Finding], result: Result) -> list[Finding]:
-    """Findings at states that a run wore along the balance; what it followed in time needs none."""
-    assert result.wear is not None
-    followed = result.wear.cycles[result.wear.in_time]
-    return [finding for finding in findings if finding.cycles not in followed]
 
 
 def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEFAULT) -> tuple[float | None, str]:
