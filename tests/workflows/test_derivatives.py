@@ -125,6 +125,7 @@ def test_a_mode_follows_the_law_of_scaling():
     """All stiffness and the static load times c: at the same motion time goes by 1 / sqrt(c)."""
     found = td.studies.derivatives("beam", **MODE)
     assert found.found.names == ("frequency", "damping")
+    assert found.lines()[0].endswith(f"damping {found.found.values[1]:.6g}")
     stiffer = sum(
         row for key, row in found.elasticities.items() if key.endswith(("_stiffness", "young", "press.value"))
     )

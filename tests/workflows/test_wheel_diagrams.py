@@ -56,6 +56,14 @@ def test_a_campbell_diagram_has_no_entry_without_a_curve() -> None:
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["free", "stuck, wave -2"]
 
 
+@pytest.mark.parametrize("orders", [(-2,), (-2, 2)])
+def test_a_campbell_diagram_has_each_wave_once(orders: tuple[int, ...]) -> None:
+    stuck = np.full((3, len(orders), 1), 150.0)
+    waves = {"free": np.full_like(stuck, np.nan), "stuck": stuck, "stuck, against": stuck + 5}
+    figure = wheel_diagrams.campbell(np.array([0.0, 50.0, 100.0]), waves, orders, {})
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["stuck, wave -2", "stuck, wave 2"]
+
+
 def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     changes = [word for text in (*FEW_SECTORS, "geometry.n_span=3") for word in ("--set", text)]
     speeds = ["--from", "3000rpm", "--to", "9000rpm", "--speeds", "2", "--families", "2", "--order", "1", "2"]

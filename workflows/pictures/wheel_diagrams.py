@@ -135,7 +135,7 @@ def campbell(
         for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
             own = found["stuck"][:, i]
             axes.plot(rpm, own, color=color, label=_first(f"stuck, wave {order}", own))
-            if (other := found.get("stuck" + AGAINST)) is not None:
+            if (other := found.get("stuck" + AGAINST)) is not None and -order not in orders:
                 axes.plot(rpm, other[:, i], "--", color=color, label=_first(f"stuck, wave {-order}", own))
             axes.plot(rpm, abs(order) * speeds, ":", color=color)
             end = min(1.0, top / (abs(order) * speeds[-1]))
