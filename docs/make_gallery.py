@@ -56,23 +56,9 @@ KINDS = {
     "nodal_diameters": "Frequencies over nodal diameters, contact free and stuck.",
     "safe": "SAFE diagram: which modes an engine order meets in a range of speeds.",
     "campbell": "Campbell diagram of some engine orders.",
-    "study": "Peak, amplitude, depth and life of a study of drawn loads and frictions.",
 }
 
 CHANGED = {"rig": ("verdict.enabled=false",)}  # its verdict takes longer than all else here
-STUDY = {
-    "study": {
-        "scene": "beam", "design": "latin_hypercube", "runs": 16, "seed": 1,
-        "set": [
-            "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=3", "verdict=",
-            "wear.tolerance=20 %",
-        ],
-    },
-    "vary": {
-        "contact.friction": {"distribution": "normal", "mean": 0.5, "cov": "10 %"},
-        "loads.static.press.value": {"distribution": "lognormal", "median": "20 kN", "cov": 0.1},
-    },
-}  # fmt: skip
 
 
 def main() -> None:
@@ -162,18 +148,16 @@ def result_at(result: td.Result, at: int) -> td.Result:
 
 
 def studies(folder: Path) -> Iterator[Path]:
-    """What the studies draw: modes of the blade's wheel, lives of a drawn beam."""
+    """What the studies draw: modes of the blade's wheel."""
     wheel = td.wheel.build(td.read_scene("blade"))
     families = {state: wheel.diagram(range(21), 4, state == "stuck") for state in ("free", "stuck")}
     orders = (1, 2, 3, 5, 8, 12, 20)
     speeds, waves = td.wheel.campbell(wheel, 150.0, 5, orders, 1)
     critical = {o: td.wheel.critical_speeds(speeds, waves["stuck"][:, i, 0], o) for i, o in enumerate(orders)}
-    table = td.studies.grid(STUDY, folder / "study", workers=1)
     for name, figure in {
         "blade_nodal_diameters": td.plot.nodal_diameters(families, "blade"),
         "blade_safe": td.plot.safe(families, wheel.n_sectors, 110.0, 120.0, "blade"),
         "blade_campbell": td.plot.campbell(speeds, waves, orders, critical, "blade"),
-        "beam_study": table.plot(),
     }.items():
         path = folder / f"{name}.png"
         figure.savefig(path, dpi=DPI)
@@ -195,7 +179,7 @@ def write_page() -> None:
         "# Every picture of every scene", "",
         "The scenes that come with tribodyn, as they are shipped, in every kind of picture that it draws.",
         "One command made them all, and this page:", "", "```text", "./tribodyn gallery", "```", "",
-        "Each is drawn by `tribodyn run`, `draw`, `wheel` or `study`.", "",
+        "Each is drawn by `tribodyn run`, `draw` or `wheel`.", "",
     ]  # fmt: skip
     for name in td.scene_names():
         lines += [f"## {name.replace('_', ' ')}", ""]

@@ -127,6 +127,7 @@ def test_a_mode_follows_the_laws_of_scaling():
     """
     found = td.studies.derivatives("beam", **MODE)
     assert found.found.names == ("frequency", "damping")
+    assert found.lines()[0].endswith(f"damping {found.found.values[1]:.6g}")
     stiffer = sum(
         row for key, row in found.elasticities.items() if key.endswith(("_stiffness", "young", "press.value"))
     )

@@ -45,15 +45,26 @@ def test_orders_in_space_excite_waves_against_the_rotation_up_to_half_the_sector
     assert met == {1: 126.0, 2: 150.0, 3: 120.0, 4: 100.0}  # none above the number of sectors
 
 
-def test_a_campbell_diagram_has_no_entry_without_a_curve() -> None:
+@pytest.mark.parametrize("known", [0, 1])
+def test_a_campbell_diagram_has_no_entry_without_a_curve(known: int) -> None:
+    """Not of the contact free where its frequencies are known at no speed, or at rest alone."""
     speeds = np.array([0.0, 50.0, 100.0])
     stuck = np.full((3, 1, 2), [150.0, 300.0])
-    waves = {"free": np.full_like(stuck, np.nan), "stuck": stuck}
+    free = np.where(np.arange(3)[:, None, None] < known, 0.0, np.full_like(stuck, np.nan))
+    waves = {"free": free, "stuck": stuck}
     figure = wheel_diagrams.campbell(speeds, waves, (-2,), {-2: [75.0]})
     shown = [text.get_text() for text in figure.legends[0].get_texts()]
     assert shown == ["stuck, wave -2", "critical speed"]
     figure = wheel_diagrams.campbell(speeds, {**waves, "free": stuck / 2}, (-2,), {})
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["free", "stuck, wave -2"]
+
+
+@pytest.mark.parametrize("orders", [(-2,), (-2, 2)])
+def test_a_campbell_diagram_has_each_wave_once(orders: tuple[int, ...]) -> None:
+    stuck = np.full((3, len(orders), 1), 150.0)
+    waves = {"free": np.full_like(stuck, np.nan), "stuck": stuck, "stuck, against": stuck + 5}
+    figure = wheel_diagrams.campbell(np.array([0.0, 50.0, 100.0]), waves, orders, {})
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["stuck, wave -2", "stuck, wave 2"]
 
 
 def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

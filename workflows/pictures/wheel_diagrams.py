@@ -129,13 +129,14 @@ def campbell(
     """
     with axes_of(7.2, 4.8) as (figure, axes):
         rpm = 60 * speeds
-        if not np.isnan(found["free"]).all():
-            axes.plot(rpm, found["free"][:, 0], "--", color=GREY, label=_first("free", found["free"][:, 0]))
+        free = found["free"][:, 0]
+        if np.isfinite(np.diff(free, axis=0)).any():  # of what only the contact holds they are known at rest alone
+            axes.plot(rpm, free, "--", color=GREY, label=_first("free", free))
         top = 1.08 * max(float(np.nanmax(found["stuck"])), *(s * abs(o) for o, at in critical.items() for s in at), 0.0)
         for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
             own = found["stuck"][:, i]
             axes.plot(rpm, own, color=color, label=_first(f"stuck, wave {order}", own))
-            if (other := found.get("stuck" + AGAINST)) is not None:
+            if (other := found.get("stuck" + AGAINST)) is not None and -order not in orders:
                 axes.plot(rpm, other[:, i], "--", color=color, label=_first(f"stuck, wave {-order}", own))
             axes.plot(rpm, abs(order) * speeds, ":", color=color)
             end = min(1.0, top / (abs(order) * speeds[-1]))

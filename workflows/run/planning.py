@@ -13,16 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem.assembly import pieces
 from tribodyn.fem.constraints import free_dofs, named
 from tribodyn.fem.couplings import Tie
-from tribodyn.fem.surface import surface
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.limits import LIMITS
+from tribodyn.reduction.relative import body_1_dofs
 from tribodyn.workflows.run import bodies, matrix_model
 from tribodyn.workflows.run import memory as memory_use
 from tribodyn.workflows.run.modelling import make_mesh
-from tribodyn.workflows.run.part_reduction import components, without_masters
+from tribodyn.workflows.run.part_reduction import components, contacts, without_masters
 from tribodyn.workflows.run.sanity_checks import check_opening
 from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
@@ -203,22 +202,14 @@ def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free
         if load.direction is not None and group
     ]
     points += [(output.group, output.direction) for output in (scene.response, *scene.response.others.values())]
-    corners = np.concatenate([piece.node + np.arange(piece.mesh.nvertices) for piece in pieces(mesh)])
     pairs, masters = 0, []
-    for contact in scene.joints.values():
-        faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]
-        nodes = [named(node_sets, name, "face") for name in faces]
-        if contact.vertices_only:
-            nodes = [np.intersect1d(side, corners) for side in nodes]
-        axes = np.arange(3)
-        if contact.plane is not None and contact.components == ("n",):
-            axes = np.flatnonzero(contact.plane)
-        masters += [(side[:, None] * 3 + axes).ravel() for side in (nodes[:1] if scene.reduction.relative else nodes)]
-        sides = nodes[: len(contact.groups)]
-        if contact.face_centres:
-            facets = (named(mesh.boundaries, name) for name in contact.groups)
-            sides = [surface(mesh, of, contact.vertices_only).faces for of in facets]
-        pairs += sum(len(side) for side in sides)
+    for contact in contacts(scene):
+        interface, *second = [contact.build(mesh)] if contact.turn is None else contact.halves(mesh)
+        pairs += interface.n_pair
+        if scene.reduction.relative:
+            masters.append(body_1_dofs(interface).ravel())
+        else:
+            masters += [np.unique(half.indices) for half in (interface.B, *second)]
     masters += [named(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
     touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= LIMITS.point_load]

@@ -108,8 +108,8 @@ class ResponseDerivatives:
         f = self.found
         names = ["phase [rad]" if name == "phase" else name for name in f.names]
         width = [max(12, len(name) + 2) for name in names]
-        values = (f"{name} {value:.6g} {UNITS[name.split()[0]]}" for name, value in zip(f.names, f.values, strict=True))
-        lines = [", ".join(values).rstrip(), "per cent of each for one per cent of:"]
+        values = (f"{n} {v:.6g} {UNITS[n.split()[0]]}".rstrip() for n, v in zip(f.names, f.values, strict=True))
+        lines = [", ".join(values), "per cent of each for one per cent of:"]
         lines.append("".join(f"{name:>{w}}" for name, w in zip(names, width, strict=True)))
         for key, row in self.elasticities.items():
             lines.append("".join(f"{value:>+{w}.4f}" for value, w in zip(row, width, strict=True)) + f"  {key}")
