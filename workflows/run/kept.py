@@ -79,6 +79,11 @@ def at_hand() -> Iterator[None]:
         _last.reset(before)
 
 
+def stay_at_hand() -> None:
+    """The same from here on, for a process that runs scenes of one study."""
+    _last.set({})
+
+
 def part(file: SceneFile, make: Callable[[], Part]) -> Part:
     """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
     early = json.loads(early_of(file.mesh_scene))
@@ -130,13 +135,14 @@ def _reads_others(path: Path, changed: int) -> bool:
 def _kept(file: SceneFile, what: str, own: tuple[Any, ...], make: Callable[[], T]) -> T:
     """own : what it is made of, its tables first."""
     room, last = folder(), _last.get()
-    if last is not None and what in last and last[what][0] == own:
+    now = None if last is None else (own, digests(own[0], file.folder))
+    if last is not None and what in last and last[what][0] == now:
         found: T = last[what][1]
         return found
     with limited(file.scene.solver.threads):  # who makes it: another count rounds differently
         found = make() if room is None else _kept_in(room, _key(file, *own), make)
     if last is not None:
-        last[what] = own, found
+        last[what] = now, found
     return found
 
 

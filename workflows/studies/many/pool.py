@@ -14,6 +14,7 @@ from typing import Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from tribodyn.workflows.run import kept
 from tribodyn.workflows.studies.many.task import Row
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
@@ -82,6 +83,7 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
 def _begin() -> None:
     """In every process of the pool: processes and threads do not multiply, and none outlives the study."""
     threadpool_limits(1)
+    kept.stay_at_hand()
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
