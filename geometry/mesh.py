@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from skfem.quadrature import get_quadrature
 
-from tribodyn.geometry.sources import read as sources
-from tribodyn.geometry.sources import solid
+from tribodyn.geometry.sources import read as sources, solid
 from tribodyn.geometry.sources.cad import Sizes
 from tribodyn.geometry.sources.deck import Deck
 

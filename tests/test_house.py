@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 import tribodyn
-from tests.conftest import PROCESSES
-from tests.conftest import ROOMS as ROOMS_OF_TESTS
+from tests.conftest import PROCESSES, ROOMS as ROOMS_OF_TESTS
 
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "tests"

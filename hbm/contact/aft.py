@@ -8,8 +8,7 @@ from types import ModuleType
 import numba
 import numpy as np
 
-from tribodyn.hbm.contact import events
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import events, law as contact_law
 from tribodyn.hbm.contact.compiled_law import pointer
 from tribodyn.hbm.contact.events import CycleNotPeriodic
 from tribodyn.hbm.contact.law import ContactCycle, ContactParameters

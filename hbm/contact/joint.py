@@ -14,8 +14,7 @@ from types import ModuleType
 
 import numpy as np
 
-from tribodyn.hbm.contact import aft
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import aft, law as contact_law
 from tribodyn.hbm.contact.law import ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel

@@ -9,16 +9,17 @@
 """
 
 from tribodyn.workflows.export.vtk import mesh_fields, patch_fields
-from tribodyn.workflows.pictures.figures import axes_of as axes
-from tribodyn.workflows.pictures.figures import length_unit
+from tribodyn.workflows.pictures.figures import axes_of as axes, length_unit
 from tribodyn.workflows.pictures.film import film
 from tribodyn.workflows.pictures.live import Live
-from tribodyn.workflows.pictures.maps import draw_field, draw_status
-from tribodyn.workflows.pictures.maps import motion_maps as motion
-from tribodyn.workflows.pictures.maps import patch_maps as patch
-from tribodyn.workflows.pictures.maps import status_maps as status
-from tribodyn.workflows.pictures.plots import draw as write
-from tribodyn.workflows.pictures.plots import hysteresis, response, wear
+from tribodyn.workflows.pictures.maps import (
+    draw_field,
+    draw_status,
+    motion_maps as motion,
+    patch_maps as patch,
+    status_maps as status,
+)
+from tribodyn.workflows.pictures.plots import draw as write, hysteresis, response, wear
 from tribodyn.workflows.pictures.render import draw as render
 from tribodyn.workflows.pictures.wheel_diagrams import campbell, nodal_diameters, safe, shades
 

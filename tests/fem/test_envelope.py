@@ -10,8 +10,7 @@ from tribodyn.fem.constraints import Clamp, NoMeanRotation
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.material import Material
 from tribodyn.fem.springs import Spring
-from tribodyn.geometry import leaf_seal
-from tribodyn.geometry import mesh as mesh_file
+from tribodyn.geometry import leaf_seal, mesh as mesh_file
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import linear_modes, system_modes

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tribodyn.fem.surface import surface
-from tribodyn.geometry import blade
-from tribodyn.geometry import mesh as mesh_file
+from tribodyn.geometry import blade, mesh as mesh_file
 
 
 def turned(points, angle):

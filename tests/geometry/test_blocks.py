@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import skfem
 
-from tribodyn.geometry import blocks, grid
-from tribodyn.geometry import mesh as mesh_file
+from tribodyn.geometry import blocks, grid, mesh as mesh_file
 
 LINE = np.linspace(0.0, 1.0, 4)
 

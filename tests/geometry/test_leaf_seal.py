@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tribodyn.fem.contact import ContactFaces
-from tribodyn.geometry import leaf_seal
-from tribodyn.geometry import mesh as mesh_file
+from tribodyn.geometry import leaf_seal, mesh as mesh_file
 
 
 def read(tmp_path, **changes):

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import skfem
 
-from tribodyn.geometry import bolt, nut
-from tribodyn.geometry import mesh as mesh_file
+from tribodyn.geometry import bolt, mesh as mesh_file, nut
 from tribodyn.geometry.gmsh_session import save, session
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 from tribodyn.geometry.overlap import overlap

@@ -7,8 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from tribodyn.geometry import gmsh_session, parts
-from tribodyn.geometry import mesh as mesh_file
+from tribodyn.geometry import gmsh_session, mesh as mesh_file, parts
 
 
 @pytest.fixture(scope="module", params=parts.names())

@@ -9,8 +9,7 @@ from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.surface import surface
-from tribodyn.geometry import mesh as mesh_file
-from tribodyn.geometry import rig
+from tribodyn.geometry import mesh as mesh_file, rig
 from tribodyn.reduction.linear import system_modes
 
 

@@ -13,8 +13,7 @@ from tests.proof.extremes_models import lattice, rigid
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import aft
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import aft, law as contact_law
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.contact.laws import jenkins, unilateral

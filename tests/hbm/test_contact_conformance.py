@@ -9,8 +9,7 @@ from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import aft
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import aft, law as contact_law
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.excitation import Excitation

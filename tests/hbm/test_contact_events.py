@@ -14,8 +14,7 @@ from tests.helpers.verification_models import oscillator, slab
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import events
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import events, law as contact_law
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.contact.law import STICKS, ContactParameters
 from tribodyn.hbm.continuation.methods import arc_length

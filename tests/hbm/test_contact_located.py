@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.helpers.contact_draws import HARMONICS, LOCATED, draw, own
 from tests.helpers.random_problems import cases
-from tribodyn.hbm.contact import aft, located
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import aft, law as contact_law, located
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 

@@ -15,8 +15,7 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.linear import recovery
-from tribodyn.hbm.linear import travelling_wave as waves
+from tribodyn.hbm.linear import recovery, travelling_wave as waves
 from tribodyn.hbm.mistuning import MistunedWheel, spread
 from tribodyn.reduction import mistuning
 from tribodyn.reduction.cyclic import travelling_wave, wheel_model

@@ -9,8 +9,7 @@ import pytest
 
 from tests.helpers.pressed_body import N_PAIR, life, wear_problem
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear import law as wear_law
+from tribodyn.hbm.wear import error_controlled_rule, law as wear_law, thesis_rule
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.step_control import Tolerance

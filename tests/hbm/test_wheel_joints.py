@@ -18,8 +18,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.linear import expansion
-from tribodyn.hbm.linear import travelling_wave as waves
+from tribodyn.hbm.linear import expansion, travelling_wave as waves
 from tribodyn.reduction import linear
 from tribodyn.reduction.cyclic import reduce_sector, travelling_wave
 from tribodyn.reduction.damping import modal_damping

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sla
-from hypothesis import HealthCheck, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, settings, strategies as st
 
 from tests.helpers.contact_draws import LAWS, LOCATED, own
 from tests.helpers.verification_models import interface, modal_damping

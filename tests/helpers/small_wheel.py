@@ -8,8 +8,7 @@ from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import NodalForce, Sum
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import build
-from tribodyn.geometry import blade
-from tribodyn.geometry import mesh as mesh_file
+from tribodyn.geometry import blade, mesh as mesh_file
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters

@@ -109,8 +109,7 @@ def scoreboard(
     as_json
         Print JSON for machines.
     """
-    from tests.proof import scoreboard as board
-    from tests.proof import scoreboard_table as table
+    from tests.proof import scoreboard as board, scoreboard_table as table
 
     make_room(out)
     rows = board.run(scenes, seed, out, seconds, aside)
@@ -187,8 +186,7 @@ def fuzz(
     as_json
         Print JSON for machines.
     """
-    from tests.proof import fuzz as measured
-    from tests.proof import fuzz_mixed
+    from tests.proof import fuzz as measured, fuzz_mixed
     from tribodyn.workflows.command import main as command
 
     make_room(out)
@@ -242,8 +240,7 @@ def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: 
     as_json
         Print JSON for machines.
     """
-    from tests.proof import extremes as table
-    from tests.proof import extremes_picture
+    from tests.proof import extremes as table, extremes_picture
 
     make_room(out, PICTURE)
     rows = table.run(quick, aside)
@@ -318,8 +315,7 @@ def motion(
     as_json
         Print JSON for machines.
     """
-    from tests.proof import work_precision
-    from tests.proof import work_precision_table as shown
+    from tests.proof import work_precision, work_precision_table as shown
 
     make_room(out, (".json",))
     path = out or Path("results") / Path(scene).stem / "motion.json"

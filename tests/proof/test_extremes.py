@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.proof import __main__ as cli
-from tests.proof import extremes, extremes_march, extremes_wear
+from tests.proof import __main__ as cli, extremes, extremes_march, extremes_wear
 from tests.proof.extremes_judge import judged, sampled_honestly, tried
 from tests.proof.extremes_march import held
 from tests.proof.extremes_models import lattice, rigid

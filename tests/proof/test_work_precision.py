@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.coarse_scenes import BEAM, RIG
-from tests.proof import __main__ as cli
-from tests.proof import work_precision as measured
-from tests.proof import work_precision_table as table
+from tests.proof import __main__ as cli, work_precision as measured, work_precision_table as table
 from tribodyn.hbm import newton
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress

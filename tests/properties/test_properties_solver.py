@@ -13,8 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from tests.helpers.contact_draws import LAWS
 from tests.helpers.random_problems import (

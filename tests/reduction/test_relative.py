@@ -11,8 +11,7 @@ from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.loads import NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.springs import Spring
-from tribodyn.geometry import blocks
-from tribodyn.geometry import mesh as mesh_file
+from tribodyn.geometry import blocks, mesh as mesh_file
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.linear import linear_modes, system_modes
 from tribodyn.reduction.relative import relative

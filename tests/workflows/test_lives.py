@@ -16,8 +16,7 @@ from scipy import stats
 
 import tribodyn as td
 from tests.helpers.command import leave
-from tribodyn.workflows.studies.many import design, pool, quantiles, study_file
-from tribodyn.workflows.studies.many import study as studies
+from tribodyn.workflows.studies.many import design, pool, quantiles, study as studies, study_file
 from tribodyn.workflows.studies.many.quantiles import Sample
 from tribodyn.workflows.studies.many.sensitivity import influences
 from tribodyn.workflows.studies.many.space import Space

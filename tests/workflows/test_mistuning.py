@@ -13,8 +13,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.wheels import mistuning
-from tribodyn.workflows.studies.wheels import wheel as wheels
+from tribodyn.workflows.studies.wheels import mistuning, wheel as wheels
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,7 @@ import tribodyn as td
 from tribodyn import declare
 from tribodyn.geometry import parts
 from tribodyn.hbm import continuation
-from tribodyn.hbm.contact import aft
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import aft, law as contact_law
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis

@@ -10,8 +10,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.stability.stays import MULTIPLIERS, stays
-from tribodyn.hbm.time.stepper import IntegrationFailed
-from tribodyn.hbm.time.stepper import Options as TimeOptions
+from tribodyn.hbm.time.stepper import IntegrationFailed, Options as TimeOptions
 from tribodyn.hbm.time.verify import verify
 from tribodyn.workflows.errors import states
 from tribodyn.workflows.errors.options import Options

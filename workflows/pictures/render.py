@@ -12,9 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
-from tribodyn.workflows.pictures import exploded, offscreen, render_wheel
-from tribodyn.workflows.pictures import opened as book
-from tribodyn.workflows.pictures import view as drawing
+from tribodyn.workflows.pictures import exploded, offscreen, opened as book, render_wheel, view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.style import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP

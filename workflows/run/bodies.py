@@ -18,8 +18,7 @@ from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
 from tribodyn.fem.part import Stiff
 from tribodyn.fem.springs import Mass, Spring
 from tribodyn.fem.surface import surface
-from tribodyn.geometry import mesh as mesh_reader
-from tribodyn.geometry import parts, placing, refine
+from tribodyn.geometry import mesh as mesh_reader, parts, placing, refine
 from tribodyn.geometry.overlap import overlap
 from tribodyn.geometry.placing import rotation
 from tribodyn.geometry.sources import cad, picking

@@ -24,8 +24,7 @@ from tribodyn.fem.springs import ElongationSpring, Mass
 from tribodyn.geometry import refine
 from tribodyn.geometry.sources import between, deck, picking, read
 from tribodyn.geometry.sources.directions import Directions
-from tribodyn.workflows.scene.structure import EVERYTHING
-from tribodyn.workflows.scene.structure import DeckTable as Table
+from tribodyn.workflows.scene.structure import EVERYTHING, DeckTable as Table
 
 UNITS = {metres: name for name, (metres, _) in read.UNITS.items()}
 ALL_AXES = (0, 1, 2, 3, 4, 5)

@@ -18,8 +18,7 @@ from tribodyn.fem.couplings import Tie
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.relative import body_1_dofs
-from tribodyn.workflows.run import bodies, matrix_model
-from tribodyn.workflows.run import memory as memory_use
+from tribodyn.workflows.run import bodies, matrix_model, memory as memory_use
 from tribodyn.workflows.run.modelling import make_mesh
 from tribodyn.workflows.run.part_reduction import components, contacts, without_masters
 from tribodyn.workflows.run.sanity_checks import check_opening

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn
-from rich.progress import Progress as Bar
+from rich.progress import BarColumn, Progress as Bar, TaskProgressColumn, TextColumn
 
 Advance = Callable[..., None]  # called with the share of long work that is done, a note, and the point it has come to
 NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a bar on

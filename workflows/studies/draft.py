@@ -15,8 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tribodyn.fem.assembly import named_in
-from tribodyn.geometry.sources import cad
-from tribodyn.geometry.sources import read as sources
+from tribodyn.geometry.sources import cad, read as sources
 from tribodyn.geometry.sources.picking import outline
 from tribodyn.workflows.scene.json_schema import json_schema
 from tribodyn.workflows.scene.source import AnyPath

@@ -18,8 +18,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import nonlinear_modes as modes
-from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.continuation.branch import amplitude as vibration
+from tribodyn.hbm.continuation.branch import Branch, amplitude as vibration
 from tribodyn.hbm.continuation.control import constant_response, driven, phase_resonance
 from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
@@ -28,8 +27,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.stability import exponents as floquet
-from tribodyn.hbm.time import time_integration as time
-from tribodyn.hbm.time import verify
+from tribodyn.hbm.time import time_integration as time, verify
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from tests.helpers.reduced import reduce_part
-from tests.proof.cases.leaf_seal import figures as leaf_figures
-from tests.proof.cases.leaf_seal import fit as leaf_fit
-from tests.proof.cases.leaf_seal import record as leaf_record
-from tests.proof.cases.leaf_seal import study as leaf_study
+from tests.proof.cases.leaf_seal import (
+    figures as leaf_figures,
+    fit as leaf_fit,
+    record as leaf_record,
+    study as leaf_study,
+)
 from tests.proof.cases.leaf_seal.cases import Case, cases, liner
 from tests.proof.cases.leaf_seal.response import LINER_NODE, respond
 from tests.proof.cases.leaf_seal.study import KEPT

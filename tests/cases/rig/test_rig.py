@@ -10,13 +10,9 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from tests.helpers.coarse_scenes import QUICK_RIG as QUICK
-from tests.helpers.coarse_scenes import RIG as COARSE
+from tests.helpers.coarse_scenes import QUICK_RIG as QUICK, RIG as COARSE
 from tests.proof import __main__ as cli
-from tests.proof.cases.rig import fit as rig_fit
-from tests.proof.cases.rig import published
-from tests.proof.cases.rig import table as rig_table
-from tests.proof.cases.rig import time as rig_time
+from tests.proof.cases.rig import fit as rig_fit, published, table as rig_table, time as rig_time
 from tests.proof.cases.rig.cases import apart
 from tests.proof.cases.rig.joints import Modes, joints_of
 from tests.proof.cases.rig.model import Rig

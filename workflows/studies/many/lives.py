@@ -20,8 +20,7 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many import lives_picture, quantiles, study_file
-from tribodyn.workflows.studies.many import study as studies
+from tribodyn.workflows.studies.many import lives_picture, quantiles, study as studies, study_file
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.quantiles import RARE, Sample
 from tribodyn.workflows.studies.many.sensitivity import Influence, influences

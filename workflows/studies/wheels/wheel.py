@@ -16,8 +16,7 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.linear.travelling_wave import on_wheel
 from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
-from tribodyn.workflows.run import joints, modelling
-from tribodyn.workflows.run import sector as sectors
+from tribodyn.workflows.run import joints, modelling, sector as sectors
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile

@@ -16,8 +16,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tests.proof.cases.blade import figures as blade_figures
-from tests.proof.problems import delta_max, follow_adaptive, linear_references, result_of, worn
-from tests.proof.problems import wear as wear_down
+from tests.proof.problems import delta_max, follow_adaptive, linear_references, result_of, wear as wear_down, worn
 from tests.proof.wear_steps import published_wear_steps
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
@@ -27,8 +26,7 @@ from tribodyn.workflows.result.result import References
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.wheels.wheel import Wheel, campbell, critical_speeds
-from tribodyn.workflows.studies.wheels.wheel import build as build_wheel
+from tribodyn.workflows.studies.wheels.wheel import Wheel, build as build_wheel, campbell, critical_speeds
 
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4

@@ -14,8 +14,7 @@ from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES, STICKS
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.stability.exponents import BranchStability
-from tribodyn.hbm.stability.exponents import mark as mark_stability
+from tribodyn.hbm.stability.exponents import BranchStability, mark as mark_stability
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.modelling import build
 from tribodyn.workflows.run.progress import Progress

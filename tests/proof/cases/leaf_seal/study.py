@@ -17,8 +17,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from tests.proof.cases.leaf_seal import figures as leaf_figures
-from tests.proof.cases.leaf_seal import record as leaf_record
+from tests.proof.cases.leaf_seal import figures as leaf_figures, record as leaf_record
 from tests.proof.cases.leaf_seal.cases import Case, cases
 from tests.proof.cases.leaf_seal.record import COLUMNS, STRUCK_POINT, Record
 from tests.proof.cases.leaf_seal.response import LeafResponse, respond

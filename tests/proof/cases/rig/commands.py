@@ -43,10 +43,7 @@ def rig(
     as_json
         Print JSON for machines.
     """
-    from tests.proof.cases.rig import fit as rig_fit
-    from tests.proof.cases.rig import life as rig_life
-    from tests.proof.cases.rig import study as rig_study
-    from tests.proof.cases.rig import table as rig_table
+    from tests.proof.cases.rig import fit as rig_fit, life as rig_life, study as rig_study, table as rig_table
 
     if change and work != "life":
         raise ValueError(f"--change is for rig life; for rig {work} use --set")

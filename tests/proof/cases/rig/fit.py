@@ -25,8 +25,7 @@ from tests.proof.cases.rig.published import LIFE_MEASURED, OPEN, PRELOAD, STUCK,
 from tests.proof.cases.rig.wear import RigWear, wear_down
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter
-from tribodyn.workflows.studies.fits.identification import fit as identify
+from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit as identify
 
 RIGID = 1e11  # stiffness beyond which no published frequency changes by one in a thousand [N/m]
 MICROMETRE = 1e-6

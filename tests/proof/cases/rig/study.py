@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tests.proof.cases.rig import cases as rig_cases
-from tests.proof.cases.rig import figures as rig_figures
-from tests.proof.cases.rig import model as rig_model
-from tests.proof.cases.rig import table as rig_table
+from tests.proof.cases.rig import cases as rig_cases, figures as rig_figures, model as rig_model, table as rig_table
 from tribodyn.workflows.scene.source import read_scene
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from tests.proof.cases.rig.model import Cycle, Rig
 from tests.proof.problems import verify_in_time
-from tribodyn.hbm.time.stepper import IntegrationFailed
-from tribodyn.hbm.time.stepper import Options as TimeOptions
+from tribodyn.hbm.time.stepper import IntegrationFailed, Options as TimeOptions
 from tribodyn.workflows.run.settings import OUTPUT
 
 STEPS, PERIODS, DRIFT = 1024, 200, 1e-5  # per period; periods to settle in; of the state over one period
