@@ -205,7 +205,7 @@ def show_found(found: Any, files: Sequence[Path] = (), as_json: bool = False) ->
 def meanings(doc: str, names: Sequence[str]) -> dict[str, str]:
     """Meaning of each name in the lines "name, name : meaning; name : meaning" of a docstring."""
     found: dict[str, str] = {}
-    for line in _whole_lines(doc):
+    for line in re.sub(r"\n {4,}", " ", inspect.cleandoc(doc)).splitlines():  # each with those that continue it
         for piece in re.split(r"; (?=\w+(?:, \w+)* : )", line):
             said, colon, meaning = piece.partition(" : ")
             listed = [name.strip() for name in said.split(",")]
@@ -224,11 +224,6 @@ def summary(doc: str, names: Sequence[str]) -> str:
             break
         lines.append(line)
     return "\n".join(lines).strip()
-
-
-def _whole_lines(doc: str) -> Iterator[str]:
-    """The lines of a docstring, each joined with those that continue it further in."""
-    return iter(re.sub(r"\n {4,}", " ", inspect.cleandoc(doc)).splitlines())
 
 
 def _folder(first: Any, into: str) -> Path | None:

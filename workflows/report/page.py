@@ -81,9 +81,10 @@ def part_alone(result: Result) -> str:
 
 def _html(title: str, body: str, data: dict[str, Any]) -> str:
     script = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    plotly = str(package("plotly.offline").get_plotlyjs()).replace("</script", "<\\/script")
     return (HERE / "page.html").read_text(encoding="utf-8").format(
         title=escape(title), style=(HERE / "page.css").read_text(encoding="utf-8"), body=body,
-        plotly=_plotly(), data=script, script=(HERE / "page.js").read_text(encoding="utf-8"),
+        plotly=plotly, data=script, script=(HERE / "page.js").read_text(encoding="utf-8"),
     )  # fmt: skip
 
 
@@ -95,10 +96,6 @@ def write(results: Sequence[tuple[str, Result, Path | None]], path: Path) -> Pat
         raise ValueError(f"the report would have {size / 1e6:.0f} MB: report fewer results at once")
     path.write_text(html, encoding="utf-8")
     return path
-
-
-def _plotly() -> str:
-    return str(package("plotly.offline").get_plotlyjs()).replace("</script", "<\\/script")
 
 
 def _chart_holder(title: str) -> str:

@@ -348,7 +348,8 @@ class Patterns:
 def tasks_of(file: SceneFile, count: int) -> list[PatternTask]:
     """The patterns 1 to `count` of a scene."""
     values = [tomllib.loads(file.text), *(one.partition("=")[2].strip(" \"'") for one in file.overrides)]
-    content = repr((__version__, file.text, _but_count(file.overrides), digests(values, file.folder)))
+    others = [one for one in file.overrides if one.partition("=")[0].strip() != "mistuning.patterns"]
+    content = repr((__version__, file.text, others, digests(values, file.folder)))
     return [
         PatternTask(n, file.name, file.text, file.overrides, file.folder, _key(content, n)) for n in range(1, count + 1)
     ]
@@ -412,8 +413,3 @@ def _finished(tasks: Sequence[PatternTask], workers: int) -> Iterator[Row]:
 
 def _key(content: str, number: int) -> str:
     return hashlib.sha256(f"{content} {number}".encode()).hexdigest()
-
-
-def _but_count(overrides: tuple[str, ...]) -> list[str]:
-    """Overrides but the number of patterns, on which no pattern depends."""
-    return [one for one in overrides if one.partition("=")[0].strip() != "mistuning.patterns"]
