@@ -16,6 +16,7 @@ from tests.helpers.structures import BLOCKS, STACK
 from tribodyn.workflows.run import kept, modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.many import pool
 
 TINY = ("geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=4", "response.points=6",
         "harmonics.kept=[0, 1]", "wear.max_steps=1", "verdict.enabled=false")  # fmt: skip
@@ -109,9 +110,10 @@ def test_a_result_is_that_without_anything_kept(
 
 def test_a_process_of_a_study_makes_a_part_once(made: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TRIBODYN_CACHE", "off")
+    monkeypatch.setattr(pool, "threadpool_limits", lambda limit: None)
 
     def process() -> None:
-        kept.stay_at_hand()
+        pool._begin()
         for change in ("contact.friction=0.4", "loads.static.press.value=10 kN"):
             built(change)
 

@@ -53,7 +53,7 @@ OF_JOINT = {
 """... and a contact of it, besides the numbers of its law."""
 
 T = TypeVar("T")
-_last: ContextVar[dict[str, tuple[Any, Any]] | None] = ContextVar("tribodyn_last", default=None)
+LAST: ContextVar[dict[str, tuple[Any, Any]] | None] = ContextVar("tribodyn_last", default=None)
 
 
 def early_of(scene: MeshScene) -> str:
@@ -72,16 +72,11 @@ def early_of(scene: MeshScene) -> str:
 @contextmanager
 def at_hand() -> Iterator[None]:
     """Within it the last part and the last reduction stay in memory too, for scenes that differ little."""
-    before = _last.set({})
+    before = LAST.set({})
     try:
         yield
     finally:
-        _last.reset(before)
-
-
-def stay_at_hand() -> None:
-    """The same from here on, for a process that runs scenes of one study."""
-    _last.set({})
+        LAST.reset(before)
 
 
 def part(file: SceneFile, make: Callable[[], Part]) -> Part:
@@ -134,7 +129,7 @@ def _reads_others(path: Path, changed: int) -> bool:
 
 def _kept(file: SceneFile, what: str, own: tuple[Any, ...], make: Callable[[], T]) -> T:
     """own : what it is made of, its tables first."""
-    room, last = folder(), _last.get()
+    room, last = folder(), LAST.get()
     now = None if last is None else (own, digests(own[0], file.folder))
     if last is not None and what in last and last[what][0] == now:
         found: T = last[what][1]

@@ -83,7 +83,7 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
 def _begin() -> None:
     """In every process of the pool: processes and threads do not multiply, and none outlives the study."""
     threadpool_limits(1)
-    kept.stay_at_hand()
+    kept.LAST.set({})  # as within kept.at_hand, to the end of the process
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
