@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from contextlib import nullcontext
-from contextvars import copy_context
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +14,6 @@ from tests.helpers.structures import BLOCKS, STACK
 from tribodyn.workflows.run import kept, modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many import pool
 
 TINY = ("geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=4", "response.points=6",
         "harmonics.kept=[0, 1]", "wear.max_steps=1", "verdict.enabled=false")  # fmt: skip
@@ -108,30 +105,7 @@ def test_a_result_is_that_without_anything_kept(
         np.testing.assert_array_equal(one.patch.area, results[0].patch.area)
 
 
-def test_a_process_of_a_study_makes_a_part_once(made: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TRIBODYN_CACHE", "off")
-    monkeypatch.setattr(pool, "threadpool_limits", lambda limit: None)
-
-    def process() -> None:
-        pool._begin()
-        for change in ("contact.friction=0.4", "loads.static.press.value=10 kN"):
-            built(change)
-
-    copy_context().run(process)
-    assert made == ALL
-
-
-@pytest.mark.parametrize("at_hand", [False, True])
-def test_a_file_that_is_named_counts_by_its_bytes(
-    made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_hand: bool
-) -> None:
-    if at_hand:
-        monkeypatch.setenv("TRIBODYN_CACHE", "off")
-    with kept.at_hand() if at_hand else nullcontext():
-        _counts_by_its_bytes(made, tmp_path)
-
-
-def _counts_by_its_bytes(made: list[str], tmp_path: Path) -> None:
+def test_a_file_that_is_named_counts_by_its_bytes(made: list[str], tmp_path: Path) -> None:
     (tmp_path / "scene").mkdir()
     file = scene_file.parse(*own_mesh(tmp_path / "scene"))
     modelling.build(file, Progress())

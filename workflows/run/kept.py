@@ -53,7 +53,7 @@ OF_JOINT = {
 """... and a contact of it, besides the numbers of its law."""
 
 T = TypeVar("T")
-LAST: ContextVar[dict[str, tuple[Any, Any]] | None] = ContextVar("tribodyn_last", default=None)
+_last: ContextVar[dict[str, tuple[Any, Any]] | None] = ContextVar("tribodyn_last", default=None)
 
 
 def early_of(scene: MeshScene) -> str:
@@ -72,11 +72,11 @@ def early_of(scene: MeshScene) -> str:
 @contextmanager
 def at_hand() -> Iterator[None]:
     """Within it the last part and the last reduction stay in memory too, for scenes that differ little."""
-    before = LAST.set({})
+    before = _last.set({})
     try:
         yield
     finally:
-        LAST.reset(before)
+        _last.reset(before)
 
 
 def part(file: SceneFile, make: Callable[[], Part]) -> Part:
@@ -129,15 +129,14 @@ def _reads_others(path: Path, changed: int) -> bool:
 
 def _kept(file: SceneFile, what: str, own: tuple[Any, ...], make: Callable[[], T]) -> T:
     """own : what it is made of, its tables first."""
-    room, last = folder(), LAST.get()
-    now = None if last is None else (own, digests(own[0], file.folder))
-    if last is not None and what in last and last[what][0] == now:
+    room, last = folder(), _last.get()
+    if last is not None and what in last and last[what][0] == own:
         found: T = last[what][1]
         return found
     with limited(file.scene.solver.threads):  # who makes it: another count rounds differently
         found = make() if room is None else _kept_in(room, _key(file, *own), make)
     if last is not None:
-        last[what] = now, found
+        last[what] = own, found
     return found
 
 

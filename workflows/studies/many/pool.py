@@ -14,7 +14,6 @@ from typing import Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from tribodyn.workflows.run import kept
 from tribodyn.workflows.studies.many.task import Row
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
@@ -83,7 +82,6 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
 def _begin() -> None:
     """In every process of the pool: processes and threads do not multiply, and none outlives the study."""
     threadpool_limits(1)
-    kept.LAST.set({})  # as within kept.at_hand, to the end of the process
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
