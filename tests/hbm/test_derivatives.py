@@ -18,8 +18,9 @@ from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.derivatives import Change, NoDerivative, Posed, at_frequency
+from tribodyn.hbm.derivatives import at_frequency
 from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.reduction.model import ReducedModel

@@ -16,7 +16,7 @@ from tribodyn import declare
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.contact.joint import Contact
-from tribodyn.hbm.derivatives import Change, Posed
+from tribodyn.hbm.gradient import Change, Posed
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity

@@ -15,7 +15,8 @@ from tribodyn.hbm import derivatives as exact
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
-from tribodyn.hbm.derivatives import Change, Derivatives, NoDerivative
+from tribodyn.hbm.derivatives import Derivatives
+from tribodyn.hbm.gradient import Change, NoDerivative
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.figures import axes_of, named

@@ -20,7 +20,8 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm import derivatives, newton
 from tribodyn.hbm.balance import State
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
-from tribodyn.hbm.derivatives import Change, Derivatives, NoDerivative, Posed
+from tribodyn.hbm.derivatives import Derivatives
+from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.run import joints, kept, modelling, settings, wear_run
