@@ -6,7 +6,7 @@ homotopy                              a number led to its goal in steps that New
 rest                                  the preloaded state that friction begins from
 mistuning                             wheels whose blades differ
 outcome                               how a solve or a run ended
-derivatives                           what a solution changes by with every number of it
+gradient, derivatives                 what a solution, a peak, a fold or a mode changes by with every number of it
 threads                               how many threads may work
 contact/                              joints and their laws
 linear/                               compliance of the structure where it touches
