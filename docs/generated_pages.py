@@ -30,8 +30,7 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.scene import json_schema
 from tribodyn.workflows.scene.fields import Direction, Quantity
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
-from tribodyn.workflows.scene.schema import PartScene
-from tribodyn.workflows.scene.structure import StructureScene
+from tribodyn.workflows.scene.schema import MeshScene
 
 ROOT = Path(__file__).parents[1]
 AXES = get_args(Direction)[1]
@@ -47,9 +46,8 @@ def write(folder: Path) -> None:
     """Write all of them; a page that has not changed is left alone, so that Sphinx does not read it again."""
     folder.mkdir(exist_ok=True)
     pages = {
-        "scene_of_a_part": scene_keys(PartScene),
-        "scene_of_bodies": scene_keys(StructureScene, without=PartScene),
-        "scene_of_matrices": scene_keys(MatrixScene, without=PartScene),
+        "scene_with_a_mesh": scene_keys(MeshScene),
+        "scene_of_matrices": scene_keys(MatrixScene, without=MeshScene),
         "parts": parameters_of(f"tribodyn.geometry.{name}" for name in parts.names()),
         "continuations": numbers_of(continuation.KIND),
         "contact_laws": numbers_of(contact_law.KIND),

@@ -115,16 +115,23 @@ class Bifurcation:
 
 @dataclass(frozen=True)
 class BranchStability:
-    """A branch with its stability.
+    """Stability of a branch, point by point, and its bifurcations in the order of the branch.
 
     stable : (n_point,) bool, False also where the point did not converge
-    leading : (n_point,) complex, exponent with the largest real part [1/s], nan where the point did not converge
-    bifurcations : in the order of the branch
+    growth : (n_point,) largest growth rate of a perturbation [1/s], nan where the point did not converge
+    omega, position, kinds : value, position and kind of every bifurcation, see Bifurcation
     """
 
     stable: np.ndarray
-    leading: np.ndarray
-    bifurcations: tuple[Bifurcation, ...]
+    growth: np.ndarray
+    omega: np.ndarray
+    position: np.ndarray
+    kinds: tuple[str, ...]
+
+    @property
+    def bifurcations(self) -> tuple[Bifurcation, ...]:
+        """The bifurcations one by one."""
+        return tuple(map(Bifurcation, self.position.tolist(), self.omega.tolist(), self.kinds))
 
 
 @single
@@ -184,8 +191,10 @@ def mark(
     ]
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
-        leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),
-        bifurcations=tuple(changes),
+        growth=np.array([np.nan if s is None else s.exponents[0].real for s in found]),
+        omega=np.array([b.value for b in changes]),
+        position=np.array([b.position for b in changes]),
+        kinds=tuple(b.kind for b in changes),
     )
 
 

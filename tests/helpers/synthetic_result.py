@@ -6,10 +6,10 @@ import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, WearEnd
+from tribodyn.hbm.stability.exponents import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.result import (
-    CurveStability,
     Fields,
     Loops,
     PartMesh,
@@ -118,7 +118,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         part=part,
         references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),
         response=frf,
-        stability=CurveStability(
+        stability=BranchStability(
             np.abs(np.arange(61) - 25) > 5, np.full(61, -1.0), omega[[20, 30]], np.array([20.5, 30.5]), ("fold", "fold")
         ),
         bounds=ShearBounds(*np.outer([0.9, 1.1, 0.8, 1.2], np.abs(slipping)), np.full(61, 0.5), np.zeros(61, int)),

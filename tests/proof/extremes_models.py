@@ -69,7 +69,7 @@ def beam(n_patch: int) -> Body:
     """The beam scene with n_patch x n_patch contact nodes and its published loads, between free and stuck peak."""
     file = scene_file.read("beam_thesis", (f"geometry.n_patch={n_patch}", "damping="))
     model = modelling.build(file, Progress())
-    contact, loads = file.part_scene.contact, model.balance.excitation.loads
+    contact, loads = file.mesh_scene.contact, model.balance.excitation.loads
     tangential, normal = contact.tangential_stiffness or 0.0, contact.normal_stiffness or 0.0
     ordinary = Setting(
         tangential, normal, contact.numbers["friction"], abs(loads[0, "press"]), abs(loads[1, "shake"]), 2 * np.pi * 860

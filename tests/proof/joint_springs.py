@@ -65,7 +65,7 @@ def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None 
         those of the scene by default
     Raises  ValueError for a scene without springs
     """
-    scene = file.part_scene
+    scene = file.mesh_scene
     if not scene.springs:
         raise ValueError(f"{file.name} has no springs whose stiffness could change: add a table such as [springs.seat]")
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

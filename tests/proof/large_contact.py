@@ -91,7 +91,7 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
     changes = [f"geometry.n_patch={n_patch}", f"harmonics.kept={HARMONICS}", f"harmonics.samples={SAMPLES}"]
     changes += [f'reduction.method="{way}"', f"reduction.modes={modes}"]
     file = scene_file.read("beam_thesis", changes)
-    scene = file.part_scene
+    scene = file.mesh_scene
     with threadpool_limits(1), TemporaryDirectory() as folder:
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
         clock = [time.process_time()]

@@ -66,7 +66,7 @@ def measure(n_patch: int, points: int = POINTS) -> SizeCost:
     """One response curve of the beam scene with n_patch x n_patch contact nodes, on one thread."""
     changes = [f"geometry.n_patch={n_patch}", f"harmonics.kept={HARMONICS}", f"harmonics.samples={SAMPLES}"]
     file = scene_file.read("beam_thesis", changes)
-    scene = file.part_scene
+    scene = file.mesh_scene
     with threadpool_limits(1), TemporaryDirectory() as folder:
         clock = [time.process_time()]
         mesh, node_sets = modelling.make_mesh(file, Path(folder))

@@ -37,8 +37,8 @@ def test_the_reference_is_finer_in_every_setting(tmp_path: Path) -> None:
     assert drawn.text == scoreboard_scenes.draw(SCENES[0], SEED, tmp_path).text
     assert drawn.text != scoreboard_scenes.draw(SCENES[0], SEED + 1, tmp_path).text
     ours = drawn.file(tmp_path)
-    fine = reference.finer(ours).part_scene
-    scene = ours.part_scene
+    fine = reference.finer(ours).mesh_scene
+    scene = ours.mesh_scene
     for name in ("n_patch", "n_length", "n_height"):
         assert fine.geometry.parameters[name] > scene.geometry.parameters[name]
     assert fine.reduction.modes is not None

@@ -40,7 +40,7 @@ def beam(tmp_path_factory: pytest.TempPathFactory) -> tuple[scene_file.SceneFile
     """The beam scene, its small part, and its contact springs."""
     file = scene_file.read("beam_thesis", SMALL)
     mesh, node_sets = modelling.make_mesh(file, tmp_path_factory.mktemp("mesh"))
-    part = modelling.make_part(file.part_scene, mesh, node_sets)
+    part = modelling.make_part(file.mesh_scene, mesh, node_sets)
     return file, part, joints.contact_stiffness(file.scene, joints.unreduced(part))
 
 
@@ -191,12 +191,12 @@ def test_a_copy_in_another_process_makes_its_own_factor(beam) -> None:
 
 def test_a_scene_with_thousands_of_pairs_does_without_masters(beam) -> None:
     file, _, _ = beam
-    scene = scene_file.read("beam_thesis", ['reduction.method="auto"']).part_scene
+    scene = scene_file.read("beam_thesis", ['reduction.method="auto"']).mesh_scene
     assert not part_reduction.without_masters(scene, part_reduction.MOST_MASTERS, False)
     assert part_reduction.without_masters(scene, part_reduction.MOST_MASTERS + 1, False)
     assert not part_reduction.without_masters(scene, part_reduction.MOST_MASTERS + 1, True)
-    assert not part_reduction.without_masters(file.part_scene, 10**5, False)  # it says craig_bampton
-    asked = scene_file.read("beam_thesis", ['reduction.method="residual_flexibility"']).part_scene
+    assert not part_reduction.without_masters(file.mesh_scene, 10**5, False)  # it says craig_bampton
+    asked = scene_file.read("beam_thesis", ['reduction.method="residual_flexibility"']).mesh_scene
     assert part_reduction.without_masters(asked, 75, False)
     with pytest.raises(ValueError, match='cannot do no_turning: take "craig_bampton"'):
         part_reduction.without_masters(asked, 75, True)

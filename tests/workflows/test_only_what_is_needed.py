@@ -69,7 +69,7 @@ def on_a_mesh_file(name: str, overrides: tuple[str, ...], folder: Path) -> list[
     geometry = [text for text in overrides if text.startswith("geometry.")]
     file = scene_file.read(name, geometry)
     modelling.make_mesh(file, folder)
-    given = file.part_scene.geometry
+    given = file.mesh_scene.geometry
     axes = ", ".join(f"{group} = {json.dumps(letters)}" for group, letters in given.fixed_axes.items())
     turning = "" if given.no_turning is None else f", no_turning = {json.dumps(given.no_turning)}"
     mesh = f"mesh = {json.dumps(str(folder / 'mesh.msh'))}, fixed = {json.dumps(list(given.fixed))}"

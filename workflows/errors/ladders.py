@@ -13,7 +13,7 @@ from tribodyn.hbm.contact import law
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import PartScene, Scene
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 TOPS = (1, 3, 5, 7, 9, 13)  # highest harmonic kept
 WORN_TOP = 5  # more harmonics take minutes to wear
@@ -115,7 +115,7 @@ def ladders_of(scene: Scene, study: Study, names: Sequence[str] = ()) -> tuple[L
 
 def _of_any(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
     """Names and settings of what scenes have without a study."""
-    if isinstance(scene, PartScene):
+    if isinstance(scene, MeshScene):
         modes = scene.reduction.modes
         if modes:
             yield "modes", _numbers("reduction.modes", sorted({0, modes // 3, modes, 3 * modes}))

@@ -10,8 +10,8 @@ from tribodyn.geometry import parts
 from tribodyn.geometry.sources import cad
 from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import PartScene
-from tribodyn.workflows.scene.structure import BodyTable, DeckTable, StructureScene
+from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.structure import BodyTable, DeckTable
 from tribodyn.workflows.scene.wear import WearStep
 
 HALVED = 2.0  # ratio of element sizes where every element of a given mesh is cut into eight
@@ -77,10 +77,10 @@ def wear(file: SceneFile, factor: float) -> SceneFile:
 def _meshed(file: SceneFile) -> dict[str, Mesh]:
     """The tables of a scene that give a mesh, by their keys; raises NoMesh without one."""
     scene = file.scene
-    if isinstance(scene, PartScene | StructureScene) and scene.geometry is not None:
-        return {"geometry": scene.geometry}
-    if not isinstance(scene, StructureScene):
+    if not isinstance(scene, MeshScene):
         raise NoMesh("matrices come without a mesh")
+    if scene.geometry is not None:
+        return {"geometry": scene.geometry}
     tables: dict[str, Mesh] = {f"bodies.{name}": body for name, body in scene.bodies.items()}
     return tables | {f"decks.{name}": deck for name, deck in scene.decks.items()}
 

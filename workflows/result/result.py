@@ -12,6 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.stability.exponents import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.summary import summary
@@ -135,23 +136,6 @@ class References:
 
 
 @dataclass(frozen=True)
-class CurveStability:
-    """Stability of the response curve, point by point.
-
-    stable : (n_point,) False also where the point did not converge
-    growth : (n_point,) largest growth rate of a perturbation [1/s], nan where the point did not converge
-    omega, position : (n_bifurcation,) [rad/s], and between which points, see hbm.stability.exponents.Bifurcation
-    kinds : "fold", "flip" or "Neimark-Sacker" of each bifurcation
-    """
-
-    stable: np.ndarray
-    growth: np.ndarray
-    omega: np.ndarray
-    position: np.ndarray
-    kinds: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class ShearBounds:
     """How far the curve depends on the load path of stuck pairs, see hbm.continuation.residual_shear.
 
@@ -230,7 +214,7 @@ class Result:
     part: PartMesh | None = None
     references: References | None = None
     response: Branch | None = None
-    stability: CurveStability | None = None
+    stability: BranchStability | None = None
     bounds: ShearBounds | None = None
     wear: WearHistory | None = None
     worn: WornResponses | None = None

@@ -21,10 +21,10 @@ import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd, End, Outcome, SolveEnd, WearEnd
+from tribodyn.hbm.stability.exponents import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.result import (
-    CurveStability,
     Fields,
     Loops,
     PartMesh,
@@ -83,7 +83,7 @@ SCHEMA: dict[str, tuple[type, Arrays]] = {
             "point": "omega:rad/s energy:J newton_steps parameter load_factor", "fold": "folds",
             "point output coefficient": "response:m", "point contact coefficient": "contact:m",
         }),
-        ("stability", CurveStability, {"point": "stable growth:1/s", "bifurcation": "omega:rad/s position"}),
+        ("stability", BranchStability, {"point": "stable growth:1/s", "bifurcation": "omega:rad/s position"}),
         ("bounds", ShearBounds, {
             "point": "amplitude_low:m amplitude_high:m energy_low:J energy_high:J stuck failed",
         }),

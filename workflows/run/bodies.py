@@ -26,8 +26,8 @@ from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
 from tribodyn.workflows.scene.body import Geometry, Meshed, SolidMaterial
 from tribodyn.workflows.scene.loads import SpringTable
-from tribodyn.workflows.scene.schema import MeshScene, PartScene
-from tribodyn.workflows.scene.structure import AXES, StructureScene
+from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.structure import AXES
 
 
 def part_mesh(part: str, parameters: Mapping[str, int | float], path: Path) -> tuple[Any, dict[str, np.ndarray]]:
@@ -51,7 +51,7 @@ def geometry_mesh(geometry: Geometry, folder: Path, scratch: Path) -> Noted:
     return *refine.halved(mesh, node_sets, geometry.halved), ()
 
 
-def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
+def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
     """All bodies of a scene in place, with the points of its couplings; files are read in `folder`, kept in `scratch`.
 
     Raises  ValueError, naming the body, for a mesh that cannot be read or a volume it lacks
@@ -93,7 +93,7 @@ def _apart(bodies: Sequence[Body]) -> None:
             )
 
 
-def of_decks(scene: StructureScene, folder: Path) -> dict[str, decks.CarriedDeck]:
+def of_decks(scene: MeshScene, folder: Path) -> dict[str, decks.CarriedDeck]:
     """What the decks of a scene bring, by their names; raises ValueError as `decks.structure` does."""
     materials = {name: solid(table) for name, table in scene.materials.items()} if scene.decks else {}
     return {name: decks.structure(name, table, materials, folder) for name, table in scene.decks.items()}
@@ -176,18 +176,16 @@ class Joined:
 
 def joined(scene: MeshScene, folder: Path) -> Joined:
     """What holds and joins the bodies of a scene, whose files are in `folder`; raises ValueError as `of_decks` does."""
-    assert isinstance(scene, PartScene | StructureScene)
     found = Joined(springs=[spring(table) for table in scene.springs.values()])
     held: dict[str, Meshed] = {} if scene.geometry is None else {"": scene.geometry}
-    if isinstance(scene, StructureScene):
-        held |= {f"{name}.": body for name, body in scene.bodies.items()}
-        _of_structure(scene, found)
-        for name, deck in of_decks(scene, folder).items():
-            found.clamps += deck.clamps
-            found.constraints += deck.constraints
-            found.springs += deck.springs
-            found.masses += deck.masses
-            found.loads[decks.load_name(name)] = deck.load
+    held |= {f"{name}.": body for name, body in scene.bodies.items()}
+    _of_structure(scene, found)
+    for name, deck in of_decks(scene, folder).items():
+        found.clamps += deck.clamps
+        found.constraints += deck.constraints
+        found.springs += deck.springs
+        found.masses += deck.masses
+        found.loads[decks.load_name(name)] = deck.load
     for before, table in held.items():
         found.clamps += [Clamp(f"{before}{group}") for group in table.fixed]
         found.clamps += [Clamp(f"{before}{group}", axes) for group, axes in table.fixed_axes.items()]
@@ -199,7 +197,7 @@ def spring(table: SpringTable) -> Spring:
     return Spring(table.group, table.direction, table.stiffness, table.opposite)
 
 
-def _of_structure(scene: StructureScene, found: Joined) -> None:
+def _of_structure(scene: MeshScene, found: Joined) -> None:
     """Ties, couplings with what of their points is held, links and lumped masses."""
     found.constraints += [Tie(f"ties.{name}", t.first, t.second, t.reach) for name, t in scene.ties.items()]
     coupled: dict[str, RigidCoupling | DistributedCoupling] = {}

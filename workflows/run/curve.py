@@ -17,9 +17,8 @@ from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.hbm.stability import exponents
 from tribodyn.workflows.result.readable import measured, sparkline
-from tribodyn.workflows.result.result import CurveStability, Result, ShearBounds, WornResponses
+from tribodyn.workflows.result.result import Result, ShearBounds, WornResponses
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.schema import Scene
@@ -89,18 +88,6 @@ def choose_harmonics(
         choice = harmonic_choice.choose(balance, [omega], options)
         balance, before = choice.balance, omega
     return choice
-
-
-def stability_of(balance: HarmonicBalance, branch: Branch, advance: Callable[[float, str], None]) -> CurveStability:
-    """Stability of every point of a curve by Hill's method, and its bifurcations."""
-    found = exponents.mark(balance, branch, on_point=lambda done, of: advance(done / of, ""))
-    return CurveStability(
-        found.stable,
-        found.leading.real,
-        np.array([b.value for b in found.bifurcations]),
-        np.array([b.position for b in found.bifurcations]),
-        tuple(b.kind for b in found.bifurcations),
-    )
 
 
 def shear_bounds(

@@ -24,7 +24,6 @@ from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
-from tribodyn.workflows.scene.structure import StructureScene
 
 # nodes of an element -> points in whose order VTK has them, of which it has the first; VTK's name
 VTK_KIND = {
@@ -69,7 +68,7 @@ def described(
             first_omitted_hz=reduced.info.first_omitted_frequency,
             factorisation=reduced.info.factorisation,
         )
-    if isinstance(file.scene, StructureScene) and file.scene.contacts:
+    if isinstance(file.scene, MeshScene) and file.scene.contacts:
         pairs = {name: slice(0, i.n_pair) for name in file.scene.contacts}  # a single joint has them all
         pairs |= {joint.name: joint.pairs for joint in balance.contact.joints if isinstance(joint.pairs, slice)}
         pairs |= {name: own for name, own in reduced.info.joints.items() if name in pairs}

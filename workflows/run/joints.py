@@ -16,8 +16,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.workflows.run import bodies, decks
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact
-from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene, Scene
-from tribodyn.workflows.scene.structure import StructureScene
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
 
 
 def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
@@ -66,9 +65,9 @@ def elastic(scene: Scene, face: str) -> tuple[float, float]:
 
     Raises  ValueError where it is orthotropic or of several materials
     """
-    assert isinstance(scene, PartScene | StructureScene)
+    assert isinstance(scene, MeshScene)
     solid = None if scene.material is None else bodies.solid(scene.material)
-    if isinstance(scene, StructureScene) and scene.material is None:
+    if scene.material is None:
         body = scene.bodies.get(face.partition(".")[0])
         if body is None:
             raise ValueError(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
@@ -114,8 +113,7 @@ def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     if isinstance(scene, MeshScene):
         loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
-        if isinstance(scene, StructureScene):
-            loads |= {(0, decks.load_name(name)): 1.0 for name in scene.decks}
+        loads |= {(0, decks.load_name(name)): 1.0 for name in scene.decks}
         if scene.wheel is not None and scene.wheel.speed:
             loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2
     for name, load in scene.loads.harmonic.items():

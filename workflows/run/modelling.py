@@ -49,9 +49,8 @@ from tribodyn.workflows.run.sanity_checks import check_size
 from tribodyn.workflows.scene.loads import StaticLoad
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene, Scene
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
 from tribodyn.workflows.scene.solution import HIGHEST
-from tribodyn.workflows.scene.structure import StructureScene
 
 
 @dataclass(frozen=True)
@@ -125,12 +124,8 @@ def plain_of(file: SceneFile, part: Part) -> ReducedModel:
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
-    scene = file.mesh_scene
-    if isinstance(scene, StructureScene):
-        whole = bodies.assembly(scene, file.folder, folder)
-        return whole, whole.node_sets
-    mesh, node_sets, _ = bodies.geometry_mesh(file.part_scene.geometry, file.folder, folder)
-    return mesh, node_sets
+    whole = bodies.assembly(file.mesh_scene, file.folder, folder)
+    return whole, whole.node_sets
 
 
 def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path | None = None) -> Part:
@@ -145,10 +140,9 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
         loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
     joined = bodies.joined(scene, folder or Path())
     loads |= joined.loads
-    rods = tightening.rods(scene, mesh, node_sets) if isinstance(scene, StructureScene) else {}
+    rods = tightening.rods(scene, mesh, node_sets)
     loads |= rods
-    geometry = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
-    turning = None if geometry is None else geometry.no_turning
+    turning = None if scene.geometry is None else scene.geometry.no_turning
     if joined.masses and scene.wheel is not None and scene.wheel.speed:
         raise ValueError(
             f"wheel.speed: there is a lumped mass at {joined.masses[0].at}, whose spin softening and Coriolis forces "
@@ -261,7 +255,7 @@ class Problem:
     def of(cls, scene: Scene, part: Part | None, reduced: ReducedModel) -> Problem:
         """The problem of a scene, its bolts tightened."""
         made, bolts = joints.make_joints(scene, reduced), {}
-        if isinstance(scene, StructureScene) and scene.bolts and part is not None:
+        if isinstance(scene, MeshScene) and scene.bolts and part is not None:
             alone = tightening.BoltsAlone(reduced, made, scene.harmonics.samples, settings.highest_frequency(scene))
             bolts = tightening.tightened(scene, tightening.rods(scene, part.mesh, part.node_sets), alone)
         return cls(scene, part, reduced, made, bolts)

@@ -22,7 +22,7 @@ from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.residual_flexibility import residual_flexibility
 from tribodyn.workflows.run import bodies, joints
-from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 BOLTS = "bolts."  # begins the names of outputs that are elongations of bolts
 MOST_MASTERS = 3000  # contact DOFs up to which all of them remain coordinates by default
@@ -30,7 +30,7 @@ MOST_MASTERS = 3000  # contact DOFs up to which all of them remain coordinates b
 
 def material(scene: MeshScene, mesh: Any = None) -> Any:
     """What the part is made of, or what every body of an assembly is made of."""
-    return bodies.solid(scene.material) if isinstance(scene, PartScene) else mesh.material
+    return mesh.material if scene.material is None else bodies.solid(scene.material)
 
 
 def components(scene: Scene) -> tuple[str, ...]:

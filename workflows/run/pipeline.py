@@ -11,6 +11,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
@@ -99,7 +100,8 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Pro
     assert frf is not None
     if scene.response.stability and result.stability is None:
         with progress.track("stability") as advance:
-            result = replace(result, stability=curve.stability_of(balance, frf, advance))
+            marks = exponents.mark(balance, frf, on_point=lambda done, of: advance(done / of, ""))
+            result = replace(result, stability=marks)
     if scene.response.bounds and result.bounds is None:
         with progress.track("bounds of residual shear") as advance:
             bounds = curve.shear_bounds(balance, frf, settings.OUTPUT, settings.newton_options(scene), advance)

@@ -26,8 +26,7 @@ from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
-from tribodyn.workflows.scene.structure import StructureScene
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,7 @@ def plan(file: SceneFile) -> Plan:
         modes: int | None = 0
     else:
         built = file.mesh_scene
-        tables = [built.geometry] if isinstance(built, PartScene) else getattr(built, "bodies", {}).values()
+        tables = built.bodies.values() if built.geometry is None else [built.geometry]
         for part in (table.part for table in tables):
             if part is not None and is_file(part):
                 raise ValueError(f'part = "{part}" is a file of your own, which a plan does not run: run the scene')
@@ -127,12 +126,11 @@ def plan(file: SceneFile) -> Plan:
             mesh, node_sets = make_mesh(file, Path(folder))
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
         joined = bodies.joined(built, file.folder)
-        if isinstance(built, StructureScene):
-            remarks = _openings(built, mesh, node_sets, joined)
+        remarks = _openings(built, mesh, node_sets, joined)
         free = free_dofs(3 * nodes, joined.clamps, node_sets)
         full = len(free)
         pairs, masters = _contact(built, mesh, node_sets, free)
-        held = int(isinstance(built, PartScene) and built.geometry.no_turning is not None)
+        held = int(built.geometry is not None and built.geometry.no_turning is not None)
         modes, cutoff = built.reduction.modes, built.reduction.cutoff
         sparse = without_masters(built, pairs * len(components(scene)), held > 0)
         if sparse:
@@ -169,7 +167,7 @@ def plan(file: SceneFile) -> Plan:
     )
 
 
-def _openings(scene: StructureScene, mesh: Any, node_sets: dict[str, np.ndarray], joined: bodies.Joined) -> list[str]:
+def _openings(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], joined: bodies.Joined) -> list[str]:
     """Remarks on tied faces, and on those in contact whose gap is that of the geometry, that lie apart.
 
     Raises  ValueError for constraints that the run refuses

@@ -4,30 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.sparse import issparse
 
-from tribodyn.fem.assembly import Assembly, materials_of
+from tribodyn.fem.assembly import materials_of
 from tribodyn.fem.elasticity import densities
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry.facts import facts
-from tribodyn.geometry.sources import cad
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.result.summary import LARGEST_BEND
 from tribodyn.workflows.run import bodies, matrix_model, part_reduction
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import MeshScene, PartScene
-from tribodyn.workflows.scene.structure import StructureScene
+from tribodyn.workflows.scene.schema import MeshScene
 
 if TYPE_CHECKING:
     from tribodyn.workflows.run.modelling import Model
@@ -64,7 +60,7 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
             yield from matrix_model.lines(matrix_model.read(file.scene.model, file.folder))
         return
     scene = file.mesh_scene
-    names = [body.name for body in part.mesh.bodies] if isinstance(part.mesh, Assembly) else [""]
+    names = [body.name for body in part.mesh.bodies]
     material = part_reduction.material(scene, part.mesh)
     found, plain, counts = [], {}, []
     for name, (piece, own) in zip(names, materials_of(part.mesh, material), strict=True):
@@ -113,15 +109,9 @@ def _unpressed(balance: HarmonicBalance, omega: float) -> bool:
 def notes(file: SceneFile, part: Part) -> Iterator[str]:
     """What was done to the files of a scene, and what of them is not used."""
     scene = file.mesh_scene
-    if isinstance(part.mesh, Assembly):
-        yield from (note for body in part.mesh.bodies for note in body.notes)
-    if isinstance(scene, StructureScene):
-        for deck in bodies.of_decks(scene, file.folder).values():
-            yield from deck.notes
-    elif isinstance(scene, PartScene) and scene.geometry.mesh is not None:
-        path = file.folder / scene.geometry.mesh
-        if Path(path).suffix.lower() not in cad.ENDINGS:  # which would be meshed again, and loses nothing
-            yield from mesh_reader.read_with_notes(path)[2]
+    yield from (note for body in part.mesh.bodies for note in body.notes)
+    for deck in bodies.of_decks(scene, file.folder).values():
+        yield from deck.notes
 
 
 def _mm(point: np.ndarray, between: str = ", ") -> str:

@@ -32,8 +32,7 @@ from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.reduction.residual_flexibility import residual_flexibility
 from tribodyn.reduction.speed_line import SpeedLine, reduce_alike
 from tribodyn.workflows.run import joints, part_reduction
-from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene
-from tribodyn.workflows.scene.structure import StructureScene
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 
 SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
 
@@ -65,9 +64,7 @@ def check_sectors(scene: MeshScene) -> None:
     """Raise ValueError where a part of the scene is made for another number of sectors than its wheel has."""
     if scene.wheel is None:
         return
-    tables = list(scene.bodies.values()) if isinstance(scene, StructureScene) else []
-    own = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
-    given = [table.parameters for table in (*tables, own) if table is not None]
+    given = [table.parameters for table in (*scene.bodies.values(), scene.geometry) if table is not None]
     for parameters in given:
         made_for = parameters.get("n_blades", scene.wheel.sectors)
         if made_for != scene.wheel.sectors:

@@ -22,7 +22,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run import bodies
 from tribodyn.workflows.run.part_reduction import BOLTS
-from tribodyn.workflows.scene.structure import StructureScene
+from tribodyn.workflows.scene.schema import MeshScene
 
 
 def output(name: str) -> str:
@@ -30,7 +30,7 @@ def output(name: str) -> str:
     return f"{BOLTS}{name}"
 
 
-def rods(scene: StructureScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> dict[str, Bolt]:
+def rods(scene: MeshScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> dict[str, Bolt]:
     """The bolts with the stiffness of their shanks; that of a constant force has none.
 
     Raises  ValueError for unknown faces, an orthotropic shank, or a bolt that crosses nothing
@@ -75,7 +75,7 @@ class BoltsAlone:
 
 
 def tightened(
-    scene: StructureScene,
+    scene: MeshScene,
     rods: Mapping[str, Bolt],
     alone: BoltsAlone,
     reached: float = 1e-10,

@@ -25,7 +25,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.loads import KINDS
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 # relative, of a number that acts on contact, loads or damping alone. With 1e-7 forces round: the law of scaling of the
 # beam's stiffness is 2e-6 off, for 3e-8; with 1e-5 a peak at a corner, seen from 3e-4 half widths, 3e-4, for 3e-6
@@ -199,15 +199,16 @@ class Varying:
         """What the full system moves by where a key is doubled; springs and all that they are not need no assembly."""
         scene, part, of_spring = self.scene, self.part, key.startswith("springs.")
         assert part is not None
+        assert isinstance(scene, MeshScene)
         own = part.system
-        if isinstance(scene, PartScene) and (of_spring or (key == "material.young" and _loaded_alike(scene))):
+        if scene.material is not None and (of_spring or (key == "material.young" and _loaded_alike(scene))):
             seen = [scene.springs[key.split(".")[1]]] if of_spring else scene.springs.values()
             added = part.restricted(sum(bodies.spring(one).matrix(part.mesh, part.node_sets) for one in seen))
             change = added if of_spring else own.stiffness - added
             still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
             return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
         twice, mesh, node_sets = self.file.changed(f"{key}={value!r}"), part.mesh, dict(part.node_sets)
-        if not isinstance(scene, PartScene):  # its mesh has the materials
+        if scene.material is None:  # its mesh has the materials
             with TemporaryDirectory() as folder:
                 mesh, node_sets = modelling.make_mesh(twice, Path(folder))
         new = modelling.make_part(twice.mesh_scene, mesh, node_sets, twice.folder).system
@@ -220,7 +221,7 @@ class Varying:
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""
         scene = self.scene
-        if key not in ("material.young", "material.density") or not isinstance(scene, PartScene) or self._spins:
+        if key not in ("material.young", "material.density") or not isinstance(scene, MeshScene) or self._spins:
             return False
         return _loaded_alike(scene) and not (scene.springs and key == "material.young")
 
@@ -237,8 +238,10 @@ def _touches(key: str) -> bool:
     return key.startswith(("contact", "material")) and not key.endswith(".density")
 
 
-def _loaded_alike(scene: PartScene) -> bool:
-    """Whether no load depends on what the part is made of."""
+def _loaded_alike(scene: MeshScene) -> bool:
+    """Whether no load depends on what the part is made of, and no lumped mass or bolt stands beside it."""
+    if scene.masses or scene.bolts:
+        return False
     loads = {**scene.loads.static, **scene.loads.harmonic}.values()
     return all(load.value is not None or load.pressure is not None for load in loads)
 

@@ -19,16 +19,16 @@ from tribodyn.hbm import continuation
 from tribodyn.workflows.scene.fields import IN_UNIT
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.own import LawTable
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.solution import PartResponse
-from tribodyn.workflows.scene.structure import NamedContact, StructureScene
+from tribodyn.workflows.scene.structure import NamedContact
 
 OWN_FILE = r"\.py$"
 
 
 def json_schema() -> dict[str, Any]:
     """The schema of every kind of scene, draft 7: tables, keys, defaults, meanings, own numbers of parts and laws."""
-    kinds: Any = PartScene | StructureScene | MatrixScene
+    kinds: Any = MeshScene | MatrixScene
     schema = TypeAdapter(kinds).json_schema(schema_generator=_Generator)
     return {"$schema": "http://json-schema.org/draft-07/schema#", "title": "tribodyn scene"} | _plain(schema)
 

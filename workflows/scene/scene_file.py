@@ -13,8 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from tribodyn.workflows.scene.fields import UnknownKey, unknown_key
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
-from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
-from tribodyn.workflows.scene.structure import StructureScene
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 CASES = Path(__file__).parents[1] / "cases"
 MOST_PROBLEMS = 3  # reported in one sentence
@@ -55,14 +54,6 @@ class SceneFile:
     def changed(self, *overrides: str) -> SceneFile:
         """The same with further overrides; raises SceneError."""
         return parse(self.text, f"{self.name}.toml", (*self.overrides, *overrides), self.folder)
-
-    @property
-    def part_scene(self) -> PartScene:
-        """The scene, for what needs a mesh; raises SceneError where it is one of matrices."""
-        if not isinstance(self.scene, PartScene):
-            kind = "of several bodies or joints" if isinstance(self.scene, StructureScene) else "of matrices"
-            raise SceneError(f"{self.name} is a scene {kind}, but this needs one of a single part")
-        return self.scene
 
     @property
     def mesh_scene(self) -> MeshScene:
@@ -149,11 +140,8 @@ def checked(kind: type[Kind], data: dict[str, Any], label: str, folder: Path | N
 
 
 def kind_of(data: dict[str, Any]) -> type[Scene]:
-    """A scene with a [model] is one of matrices, one with bodies, named joints or none one of a structure."""
-    if "model" in data:
-        return MatrixScene
-    beyond = StructureScene.model_fields.keys() - PartScene.model_fields.keys()
-    return StructureScene if beyond & data.keys() or "contact" not in data else PartScene
+    """A scene with a [model] is one of matrices, another one has a mesh."""
+    return MatrixScene if "model" in data else MeshScene
 
 
 def from_json(text: str) -> Scene:

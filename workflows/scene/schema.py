@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import (
     Field,
@@ -39,6 +39,17 @@ from tribodyn.workflows.scene.solution import (
     Solver,
     VerdictOptions,
 )
+from tribodyn.workflows.scene.structure import (
+    GROUND,
+    BodyTable,
+    BoltTable,
+    CouplingTable,
+    DeckTable,
+    LinkTable,
+    NamedContact,
+    PointMassTable,
+    TieTable,
+)
 from tribodyn.workflows.scene.wear import Wear
 
 CENTRIFUGAL = "centrifugal"
@@ -57,7 +68,7 @@ class Heading(Table):
 
 
 class Scene(Table, ABC):
-    """What every scene has, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
+    """What every scene has, whatever its model is made from; see MeshScene, and MatrixScene in matrix_scene."""
 
     scene: Heading = Heading()
     """Title and source."""
@@ -101,7 +112,7 @@ class Scene(Table, ABC):
 
 
 class MeshScene(Scene):
-    """What every scene with a mesh has; see PartScene for one part, StructureScene in structure for several bodies."""
+    """A scene with a mesh: one part in [geometry], or bodies and what joins them, with loads, response and wear."""
 
     springs: dict[str, SpringTable] = Field(default_factory=dict)
     """Springs by name."""
@@ -123,14 +134,35 @@ class MeshScene(Scene):
     """How far its blades differ."""
     flow: FlowTable | None = None
     """The flow round its blades, for `tribodyn wheel flutter`."""
-
-    one_body: ClassVar[bool] = False
-    """Whether it can have a single body only."""
+    bodies: dict[str, BodyTable] = Field(default_factory=dict)
+    """Bodies by name."""
+    decks: dict[str, DeckTable] = Field(default_factory=dict)
+    """Decks of other FE programs by name, which bring bodies and what joins, holds and loads them."""
+    materials: dict[str, SolidMaterial] = Field(default_factory=dict)
+    """Materials by name."""
+    geometry: Geometry | None = None
+    """A single part or mesh, instead of bodies."""
+    material: SolidMaterial | None = None
+    """Its material."""
+    contact: FaceContact | None = None
+    """A single contact, instead of contacts."""
+    contacts: dict[str, NamedContact] = Field(default_factory=dict)
+    """Joints by name."""
+    ties: dict[str, TieTable] = Field(default_factory=dict)
+    """Faces glued together, by name."""
+    couplings: dict[str, CouplingTable] = Field(default_factory=dict)
+    """Points that carry faces, by name."""
+    links: dict[str, LinkTable] = Field(default_factory=dict)
+    """Points of couplings that move alike, by name."""
+    masses: dict[str, PointMassTable] = Field(default_factory=dict)
+    """Lumped masses by name."""
+    bolts: dict[str, BoltTable] = Field(default_factory=dict)
+    """Bolts by name."""
 
     @property
-    @abstractmethod
-    def joints(self) -> Mapping[str, FaceContact]:
+    def joints(self) -> dict[str, FaceContact]:
         """The contacts by name."""
+        return {**({} if self.contact is None else {"contact": self.contact}), **self.contacts}
 
     @model_validator(mode="before")
     @classmethod
@@ -150,7 +182,7 @@ class MeshScene(Scene):
         folder = folder_of(info)
         if folder is None or not isinstance(data, dict) or not isinstance(data.get("surfaces"), dict):
             return data
-        several = data.get("contacts")
+        several = data.get("contacts") or None
         contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
         lacking = [name for name, contact in contacts.items() if takes_asperities(contact)]
         try:
@@ -170,7 +202,7 @@ class MeshScene(Scene):
             return data
         loads = data.get("loads")
         static = loads.get("static") if isinstance(loads, dict) else None
-        several = data.get("contacts")
+        several = data.get("contacts") or None
         contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
         prefix = "contacts." if several is contacts else ""
         found = {
@@ -222,12 +254,13 @@ class MeshScene(Scene):
         if self.flow is not None:
             self.flow.coefficients(self.wheel.sectors)
         for contact in self.joints.values():
-            outward = contact.meets_next or self.one_body
+            outward = contact.meets_next or self.geometry is not None
             if outward and (contact.opposite is None or not isinstance(contact.group, str)):
                 raise ValueError("wheel: the contact needs one group, the right face, and its opposite, the left one")
         for key, has in (
             ("contact.plane", any(contact.plane is not None for contact in self.joints.values())),
             ("motion", bool(self.motion)),
+            ("geometry.no_turning", self.geometry is not None and self.geometry.no_turning is not None),
             ("prescribed", bool(self.prescribed)),
             ("reduction.relative", self.reduction.relative),
             ("reduction.solver", self.reduction.solver != "direct"),
@@ -253,25 +286,46 @@ class MeshScene(Scene):
                     raise ValueError(f"prescribed.{name}: springs.{spring} must hold {held.group} to the ground")
         return self
 
-
-class PartScene(MeshScene):
-    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
-
-    geometry: Geometry
-    """Part or mesh."""
-    material: SolidMaterial
-    """Material."""
-    contact: FaceContact
-    """The contact faces and their law."""
-    one_body: ClassVar[bool] = True
-
-    @property
-    def joints(self) -> dict[str, FaceContact]:
-        """The one contact by its name."""
-        return {"contact": self.contact}
-
     @model_validator(mode="after")
-    def _turns(self) -> PartScene:
-        if self.wheel is not None and self.geometry.no_turning is not None:
-            raise ValueError("geometry.no_turning has no meaning for a sector of a wheel: leave it out")
+    def _whole(self) -> MeshScene:
+        several = bool(self.bodies or self.decks)
+        if several == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
+            raise ValueError("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
+        if self.wear is not None and not self.joints:
+            raise ValueError("contact is missing: [wear] needs [contact] or [contacts.NAME]")
+        if not self.joints and self.response.method != "natural":
+            raise ValueError('response.method: without contact the response is linear: give "natural"')
+        if self.contact is not None and self.contacts:
+            raise ValueError("expected either [contact] or [contacts.NAME], and not both")
+        for name in self.bodies:
+            if "." in name or name == GROUND:
+                raise ValueError(f'bodies.{name}: give a name without a dot that is not "{GROUND}"')
+        made_of = [(f"bodies.{name}", one) for name, body in self.bodies.items() for one in body.materials]
+        made_of += [(f"decks.{name}", deck.material) for name, deck in self.decks.items() if deck.material is not None]
+        made_of += [(f"bolts.{name}", bolt.material) for name, bolt in self.bolts.items() if bolt.material is not None]
+        for where, material in made_of:
+            if material not in self.materials:
+                raise ValueError(f"{where}: {unknown_key(f'materials.{material}', [*self.materials])}")
+        taken = [*self.loads.static, *self.loads.harmonic]
+        for name in self.bolts:
+            if name in taken or name == CENTRIFUGAL:
+                raise ValueError(f"bolts.{name} has the name of a load: give it another")
+        for name in self.couplings:
+            if name in self.bodies:
+                raise ValueError(f"couplings.{name} has the name of a body: give it another")
+        for name, link in self.links.items():
+            for coupling in (link.first, link.second):
+                if coupling not in self.couplings:
+                    raise ValueError(f"links.{name}: {unknown_key(f'couplings.{coupling}', [*self.couplings])}")
+        for name, tie in self.ties.items():
+            if tie.first == tie.second:
+                raise ValueError(f"ties.{name}: first and second are one face: give the face that it is glued to")
+        for name, contact in self.contacts.items():
+            if contact.opposite in contact.groups:
+                raise ValueError(f"contacts.{name}: first and second are one face: give the face that it touches")
+            for tied, tie in self.ties.items():
+                if {tie.first, tie.second} == {*contact.groups, contact.opposite}:
+                    raise ValueError(f"contacts.{name} and ties.{tied} join the same two faces: take one of them out")
+            if contact.wear is not None and self.wear is None:
+                raise ValueError(f"contacts.{name}.wear needs [wear], which sets how far the wear goes")
         return self

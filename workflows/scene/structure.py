@@ -1,4 +1,4 @@
-"""A scene of several bodies with named joints between them; what holds of one part too is in schema.
+"""Tables of a scene about its bodies, what they are made from and what joins them.
 
 Groups of a body are named "body.group".
 """
@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from tribodyn.geometry.sources.picking import Rule
-from tribodyn.workflows.scene.body import Geometry, Meshed, SolidMaterial
+from tribodyn.workflows.scene.body import Meshed
 from tribodyn.workflows.scene.contact import FaceContact
 from tribodyn.workflows.scene.fields import (
     Angle,
@@ -21,9 +21,7 @@ from tribodyn.workflows.scene.fields import (
     Table,
     quantity,
     refuse_slips,
-    unknown_key,
 )
-from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import JointWearTable
 
@@ -278,82 +276,4 @@ class BoltTable(Table):
         shank = self.diameter is not None and self.material is not None
         if self.state == "locked" and shank == (self.stiffness is not None):
             raise ValueError("a locked bolt needs either diameter and material of its shank, or its stiffness")
-        return self
-
-
-class StructureScene(MeshScene):
-    """Bodies, what joins them, loads, reduction, response and wear; a single part may stand in [geometry]."""
-
-    bodies: dict[str, BodyTable] = Field(default_factory=dict)
-    """Bodies by name."""
-    decks: dict[str, DeckTable] = Field(default_factory=dict)
-    """Decks of other FE programs by name, which bring bodies and what joins, holds and loads them."""
-    materials: dict[str, SolidMaterial] = Field(default_factory=dict)
-    """Materials by name."""
-    geometry: Geometry | None = None
-    """A single part or mesh, instead of bodies."""
-    material: SolidMaterial | None = None
-    """Its material."""
-    contact: FaceContact | None = None
-    """A single contact, instead of contacts."""
-    contacts: dict[str, NamedContact] = Field(default_factory=dict)
-    """Joints by name."""
-    ties: dict[str, TieTable] = Field(default_factory=dict)
-    """Faces glued together, by name."""
-    couplings: dict[str, CouplingTable] = Field(default_factory=dict)
-    """Points that carry faces, by name."""
-    links: dict[str, LinkTable] = Field(default_factory=dict)
-    """Points of couplings that move alike, by name."""
-    masses: dict[str, PointMassTable] = Field(default_factory=dict)
-    """Lumped masses by name."""
-    bolts: dict[str, BoltTable] = Field(default_factory=dict)
-    """Bolts by name."""
-
-    @property
-    def joints(self) -> dict[str, FaceContact]:
-        """The contacts by name."""
-        return {**({} if self.contact is None else {"contact": self.contact}), **self.contacts}
-
-    @model_validator(mode="after")
-    def _whole(self) -> StructureScene:
-        several = bool(self.bodies or self.decks)
-        if several == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
-            raise ValueError("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
-        if self.wear is not None and not self.joints:
-            raise ValueError("contact is missing: [wear] needs [contact] or [contacts.NAME]")
-        if not self.joints and self.response.method != "natural":
-            raise ValueError('response.method: without contact the response is linear: give "natural"')
-        if self.contact is not None and self.contacts:
-            raise ValueError("expected either [contact] or [contacts.NAME], and not both")
-        for name in self.bodies:
-            if "." in name or name == GROUND:
-                raise ValueError(f'bodies.{name}: give a name without a dot that is not "{GROUND}"')
-        made_of = [(f"bodies.{name}", one) for name, body in self.bodies.items() for one in body.materials]
-        made_of += [(f"decks.{name}", deck.material) for name, deck in self.decks.items() if deck.material is not None]
-        made_of += [(f"bolts.{name}", bolt.material) for name, bolt in self.bolts.items() if bolt.material is not None]
-        for where, material in made_of:
-            if material not in self.materials:
-                raise ValueError(f"{where}: {unknown_key(f'materials.{material}', [*self.materials])}")
-        taken = [*self.loads.static, *self.loads.harmonic]
-        for name in self.bolts:
-            if name in taken or name == CENTRIFUGAL:
-                raise ValueError(f"bolts.{name} has the name of a load: give it another")
-        for name in self.couplings:
-            if name in self.bodies:
-                raise ValueError(f"couplings.{name} has the name of a body: give it another")
-        for name, link in self.links.items():
-            for coupling in (link.first, link.second):
-                if coupling not in self.couplings:
-                    raise ValueError(f"links.{name}: {unknown_key(f'couplings.{coupling}', [*self.couplings])}")
-        for name, tie in self.ties.items():
-            if tie.first == tie.second:
-                raise ValueError(f"ties.{name}: first and second are one face: give the face that it is glued to")
-        for name, contact in self.contacts.items():
-            if contact.opposite in contact.groups:
-                raise ValueError(f"contacts.{name}: first and second are one face: give the face that it touches")
-            for tied, tie in self.ties.items():
-                if {tie.first, tie.second} == {*contact.groups, contact.opposite}:
-                    raise ValueError(f"contacts.{name} and ties.{tied} join the same two faces: take one of them out")
-            if contact.wear is not None and self.wear is None:
-                raise ValueError(f"contacts.{name}.wear needs [wear], which sets how far the wear goes")
         return self

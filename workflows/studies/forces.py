@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.constraints import named
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.part import Part
@@ -105,7 +104,7 @@ def of_scene(file: SceneFile, scene: MeshScene) -> Forces:
         q = full_displacement(balance, solved.state.flat, force.reshape(solved.state.flat.shape), omega)[:, 0]
     load = _loads(scene, part, balance.excitation, q)
     contact = _contact_forces(scene, part, force[:, :, 0])
-    bodies = [b.name for b in part.mesh.bodies if b.name] if isinstance(part.mesh, Assembly) else []
+    bodies = [b.name for b in part.mesh.bodies if b.name]
     sets = {name: named(part.node_sets, name) for name in bodies} or {"part": np.arange(len(part.points))}
     free = np.zeros(3 * len(part.points), bool)
     free[part.free] = True

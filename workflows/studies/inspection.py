@@ -20,7 +20,7 @@ from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources.deck import Deck
 from tribodyn.workflows.pictures import groups as group_pictures
 from tribodyn.workflows.result.readable import named_lines
-from tribodyn.workflows.run import decks, modelling, part_reduction, sanity_checks
+from tribodyn.workflows.run import decks, modelling, sanity_checks
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
@@ -277,9 +277,7 @@ def _check_materials(solids: Sequence[Body]) -> list[str]:
 
 def _solids(file: scene_file.SceneFile, part: Any) -> list[Body]:
     """The bodies of a part."""
-    if isinstance(part.mesh, Assembly):
-        return [replace(body, name=body.name or file.name) for body in part.mesh.bodies]
-    return [Body(file.name, part.mesh, part.node_sets, part_reduction.material(file.mesh_scene, part.mesh))]
+    return [replace(body, name=body.name or file.name) for body in part.mesh.bodies]
 
 
 def measured(solids: Sequence[Body], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:

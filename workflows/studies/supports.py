@@ -19,7 +19,7 @@ from tribodyn.hbm.wear.laws.impact import loading_work
 from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import quantity
-from tribodyn.workflows.scene.schema import PartScene, Scene
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 from tribodyn.workflows.studies.files import write_files
 
 SAMPLES = 256  # of a cycle, at the least
@@ -30,9 +30,9 @@ def supports_of(scene: Scene) -> dict[str, tuple[float, str]]:
 
     Raises  ValueError, naming the table that is missing, where there is none
     """
-    springs = scene.springs if isinstance(scene, PartScene) else {}
+    springs = scene.springs if isinstance(scene, MeshScene) else {}
     grounded = {name: spring for name, spring in springs.items() if spring.opposite is None}
-    if not grounded or not isinstance(scene, PartScene):
+    if not grounded or not isinstance(scene, MeshScene):
         raise ValueError("the scene has no spring to the ground: a support is a table such as [springs.left_pin]")
     outputs = {"response": scene.response, **scene.response.others}
     found = {

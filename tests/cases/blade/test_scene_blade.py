@@ -124,7 +124,7 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
 
 
 def model_scene():
-    return scene_file.read("blade_thesis", COARSE).part_scene
+    return scene_file.read("blade_thesis", COARSE).mesh_scene
 
 
 def test_every_blade_has_its_phase(finished):
@@ -194,11 +194,11 @@ def test_flexible_disk_couples_through_its_seam(folder):
     scene = scene_file.read("blade_thesis", (*COARSE, *disk))
     mesh, nodes = modelling.make_mesh(scene, folder)
     assert len(named(nodes, "cyclic_left")) > 0
-    part = modelling.make_part(scene.part_scene, mesh, nodes)
-    reduced = sector.reduced(scene.part_scene, sector.sector(scene.part_scene, part))
+    part = modelling.make_part(scene.mesh_scene, mesh, nodes)
+    reduced = sector.reduced(scene.mesh_scene, sector.sector(scene.mesh_scene, part))
     free = nodal_diameters(reduced.sector, (0, 5, 10), 1)[:, 0]
     assert np.ptp(free) > 0.1
-    spinning = scene_file.read("blade_thesis", (*COARSE, *disk, "wheel.speed=6000 rpm")).part_scene
+    spinning = scene_file.read("blade_thesis", (*COARSE, *disk, "wheel.speed=6000 rpm")).mesh_scene
     spun = sector.reduced(spinning, sector.sector(spinning, modelling.make_part(spinning, mesh, nodes)))
     assert (nodal_diameters(spun.sector, (0, 5, 10), 1)[:, 0] > free).all()
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene
 
 STATIC_UNIT, HARMONIC_UNIT = 0.5e-3, 20e-6  # [m] of one published unit of liner displacement (ours)
 FORCE_UNIT = 1e3  # [Pa] of one published unit of force (ours)
@@ -33,7 +33,7 @@ class Case:
     overrides: tuple[str, ...] = ()
 
 
-def cases(scene: PartScene) -> list[Case]:
+def cases(scene: MeshScene) -> list[Case]:
     """All configurations; the scene itself is the flat, vertical leaf with the liner at rest."""
     contact = scene.contact.normal_stiffness or 0.0
     spring = scene.springs["left_pin"].stiffness

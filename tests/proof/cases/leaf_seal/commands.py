@@ -50,6 +50,6 @@ def leaf(
         found = accuracy.compute(folder)
         said, record = found.text(), found.record()
     else:
-        one = fit.of_scene(read_scene("leaf_seal_thesis").part_scene) if work == "check" else fit.search(aside)
+        one = fit.of_scene(read_scene("leaf_seal_thesis").mesh_scene) if work == "check" else fit.search(aside)
         said, record = fit.as_text(one), one.record()
     print(json.dumps(record, indent=2) if as_json else said)

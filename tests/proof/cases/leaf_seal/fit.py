@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from tests.proof.joint_springs import JointSprings, joint_springs
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.source import read_scene
 
 PUBLISHED = {
@@ -145,12 +145,12 @@ def reduced_leaf(parameters: Dimensions) -> JointSprings:
     return joint_springs(read_scene("leaf_seal_thesis", said))
 
 
-def dimensions(scene: PartScene) -> Dimensions:
+def dimensions(scene: MeshScene) -> Dimensions:
     """The leaf of a scene."""
     return dict(scene.geometry.parameters)
 
 
-def of_scene(scene: PartScene) -> Fit:
+def of_scene(scene: MeshScene) -> Fit:
     """The leaf as a scene has it, beside the published ratios; its unit is the best one."""
     parameters = dimensions(scene)
     spring = next(iter(scene.springs.values())).stiffness
@@ -194,7 +194,7 @@ def chosen(own: Fit, others: Sequence[Fit]) -> Fit:
     return best if own.rms - best.rms > 2 * doubt(own, best) else own
 
 
-def fit(scene: PartScene, pin_column: int, start: Sequence[float] | None = None, max_steps: int = 20) -> Fit:
+def fit(scene: MeshScene, pin_column: int, start: Sequence[float] | None = None, max_steps: int = 20) -> Fit:
     """Fit the shape of the leaf by least squares over all ratios; the same numbers at every run.
 
     start : in the order of SHAPE, whose starts are taken where None
@@ -235,7 +235,7 @@ def search(tell: Callable[[str], None]) -> Fit:
 
     tell : called with a sentence on every fit
     """
-    scene = read_scene("leaf_seal_thesis").part_scene
+    scene = read_scene("leaf_seal_thesis").mesh_scene
     with threadpool_limits(1):
         first = dimensions(scene)
         own = fit(scene, int(first["pin_column"]), shape_of(first))

@@ -111,7 +111,7 @@ def respond(file: SceneFile) -> LeafResponse:
     Raises  SolveFailed where not even the first point of the curve is found
     """
     start = time.process_time()
-    scene = file.part_scene
+    scene = file.mesh_scene
     model = build(file, Progress())
     balance, part = model.balance, model.part
     assert part is not None

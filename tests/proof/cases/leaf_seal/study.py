@@ -179,7 +179,7 @@ def whole(folder: Path, resume: bool, tell: Callable[[str], None]) -> Study:
     folder.mkdir(parents=True, exist_ok=True)
     tell("  ".join(f"{name:{_width(name)}}" for name in COLUMNS))
     with threadpool_limits(1):
-        records = study(cases(read_scene("leaf_seal_thesis").part_scene), folder, resume, tell)
+        records = study(cases(read_scene("leaf_seal_thesis").mesh_scene), folder, resume, tell)
         first = _response(records[0])
         paths = draw([replace(records[0], response=first), *records[1:]], folder)
         allocated = "" if first is None else sizes(first)

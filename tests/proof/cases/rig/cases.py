@@ -89,7 +89,7 @@ def compute(file: SceneFile, tell: Callable[[str], None]) -> Study:
     """
     clock = time.process_time()
     with threadpool_limits(1):
-        scene = file.part_scene
+        scene = file.mesh_scene
         assert scene.wear is not None
         tell("frequencies before and after the fit of the joints")
         joints = joints_of(file)

@@ -132,7 +132,7 @@ def run(
 
 
 def _coefficient(rig: Rig, file: SceneFile, tell: Callable[[str], None]) -> Identification:
-    wear = file.part_scene.wear
+    wear = file.mesh_scene.wear
     assert wear is not None
     return fit_coefficient(wear_down(rig, 0.0, tell), wear.numbers["coefficient"])
 

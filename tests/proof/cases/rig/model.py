@@ -14,7 +14,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.modelling import Model, build
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.source import read_scene
 
 PLATFORM, SHAKER = "platform", "shaker"  # names in the scene
@@ -61,9 +61,9 @@ class Rig:
         return cls(file, np.zeros(plain(file).interface.n_pair))
 
     @property
-    def scene(self) -> PartScene:
+    def scene(self) -> MeshScene:
         """The scene, with what was changed."""
-        return self.file.part_scene
+        return self.file.mesh_scene
 
     @property
     def frequency(self) -> float:
@@ -147,7 +147,7 @@ class Rig:
 
 def check(file: SceneFile) -> None:
     """Raise SceneError where a scene lacks what the fits and the study of the rig change or look at."""
-    scene = file.part_scene
+    scene = file.mesh_scene
     wear, springs = scene.wear, [name for tied in TIED.values() for name in tied]
     for missing, key in (
         (list(scene.prescribed) != [PLATFORM], f"one table under prescribed, [prescribed.{PLATFORM}]"),
@@ -165,6 +165,6 @@ def check(file: SceneFile) -> None:
 
 def _reaction(file: SceneFile, model: Model, state: State) -> float:
     """Static force at the prescribed nodes of a scene in a solved state of its model [N]."""
-    given, found = next(iter(file.part_scene.prescribed.values())), model.balance.model.info.reaction
+    given, found = next(iter(file.mesh_scene.prescribed.values())), model.balance.model.info.reaction
     assert found is not None
     return float(found.force(given.displacement, state.cycle.force[:, :, 0]).sum())
