@@ -13,9 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry import airfoil, blocks, checks
-from tribodyn.geometry.airfoil import Section
-from tribodyn.geometry.platform import Platform, platform, unit
+from tribodyn.geometry import blocks, checks
+from tribodyn.geometry.platform import Platform, Section, between, platform, unit
 
 MESH = ("n_along", "n_up", "n_span", "n_through", "n_side", "n_end", "n_root", "n_disk")  # numbers of elements or nodes
 
@@ -147,7 +146,7 @@ def turned(points: np.ndarray, angle: float) -> np.ndarray:
 
 def airfoil_at(p: Parameters, q: np.ndarray) -> np.ndarray:
     """Map (n, 3) fractions of chord, thickness, span into space."""
-    x, y = airfoil.between(p.root, p.tip, q[:, 2]).at(q[:, 0], q[:, 1])
+    x, y = between(p.root, p.tip, q[:, 2]).at(q[:, 0], q[:, 1])
     return np.column_stack([x, y, p.hub_radius + q[:, 2] * p.span])
 
 

@@ -1,5 +1,7 @@
 """A platform around an airfoil section: three by three blocks, the section in the middle, straight edges outside.
 
+The sections are cambered, blunt at both edges, turned by their stagger.
+
 Rows i run from front to rear, columns j from left to right; corner (i, j) of the 4 x 4 corners belongs to blocks on
 all its sides, so blocks meet node to node by construction.
 """
@@ -11,10 +13,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.geometry.airfoil import Section
 from tribodyn.geometry.blocks import Block
 
 Names = Mapping[tuple[int, int], Mapping[str, str]]
+
+
+@dataclass(frozen=True)
+class Section:
+    """chord, thickness : [m]; camber : height of the mean line over the chord; edge : thickness at the leading and the
+    trailing edge over that at mid-chord; stagger : angle from x to the chord [rad].
+    """
+
+    chord: float
+    thickness: float
+    camber: float
+    edge: float
+    stagger: float
+
+    def at(self, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions x, y [m] at fractions u of the chord and v of the thickness, centred on the mean line.
+
+        Mean line and thickness are parabolas: no sharp edge folds a cell
+        """
+        bulge = 4 * u * (1 - u)
+        slope = 4 * self.camber * (1 - 2 * u)
+        offset = (v - 0.5) * self.thickness * (self.edge + (1 - self.edge) * bulge)
+        along = (u - 0.5) * self.chord - offset * slope / np.hypot(1, slope)
+        across = self.camber * self.chord * (bulge - 2 / 3) + offset / np.hypot(1, slope)
+        c, s = np.cos(self.stagger), np.sin(self.stagger)
+        return along * c - across * s, along * s + across * c
+
+
+def between(root: Section, tip: Section, height: np.ndarray) -> Section:
+    """Section at fractions `height` of the span, every property linear from root to tip (arrays like `height`)."""
+    names = ("chord", "thickness", "camber", "edge", "stagger")
+    a, b = ([getattr(s, n) for n in names] for s in (root, tip))
+    return Section(*(np.asarray(p + (q - p) * height) for p, q in zip(a, b, strict=True)))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

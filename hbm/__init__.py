@@ -2,7 +2,6 @@
 
 harmonics, excitation                 basis and loads
 balance, newton, krylov, anderson     the balance and how it is solved
-homotopy                              a number led to its goal in steps that Newton can follow
 rest                                  the preloaded state that friction begins from
 mistuning                             wheels whose blades differ
 outcome                               how a solve or a run ended

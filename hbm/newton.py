@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar, cast
 
@@ -9,7 +10,6 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
 from tribodyn.hbm.contact.law import ContactCycle
-from tribodyn.hbm.homotopy import SHARES, lead
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
@@ -33,6 +33,19 @@ class Rules:
 
 RULES = Rules()
 CURES = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
+
+
+@dataclass(frozen=True)
+class Strides:
+    """first : step; growth : of a step that succeeds; shortest : step that is not tried any more."""
+
+    first: float = 0.25
+    growth: float = 1.5
+    shortest: float = 1e-3
+
+
+SHARES = Strides()  # of a load or of an opening
+DECADES = Strides(first=1.0, growth=1.6, shortest=0.02)  # of a decimal logarithm
 
 
 class Evaluation(Protocol):
@@ -355,3 +368,20 @@ def solve_from_rest(
     else:
         outcome = SolveEnd.NO_REST.say(f": the part, or a body of it, may tip or slide ({last.outcome})")
     return Solution(first.state, outcome, steps, products, first.history)
+
+
+def lead(level: float, goal: float, strides: Strides, solve: Callable[[float, float], bool]) -> float:
+    """How far a number of a problem comes from a level, where it is solved, towards its goal.
+
+    solve : whether there is a solution at its first argument beside the one at its second, the level reached so far;
+        it keeps what it finds
+    Source  Allgower and Georg 1990, chapter 1
+    """
+    stride = strides.first
+    while level != goal and stride > strides.shortest:
+        target = min(level + stride, goal) if goal > level else max(level - stride, goal)
+        if solve(target, level):
+            level, stride = target, strides.growth * stride
+        else:
+            stride *= 0.5
+    return level

@@ -1,4 +1,4 @@
-"""Static displacement given, static force unknown: a platform that is held at a height.
+"""What is held in a reduced model: static displacement given, static force unknown, as of a platform at a height.
 
 In harmonic 0 the chosen coordinates X_k have a known value and the force that keeps them there is unknown; in the other
 harmonics they move like any others. Tamatam 2021 rearranges the unknowns for it (eq. 5.2-5.9). Here harmonic 0 sees a
@@ -15,9 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as sla
+from scipy.linalg import null_space
 
 from tribodyn.fem.constraints import partition
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.limits import LIMITS
+from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel, StaticReaction
 
 
@@ -89,3 +92,22 @@ def _cut(
             matrix[np.ix_(held, held)] = np.diag(np.diag(matrix)[held])
     loads = {other: np.where(np.isin(np.arange(system.n_dof), held), 0.0, load) for other, load in system.loads.items()}
     return SecondOrderSystem(M, K, damping, {**loads, name: push}, system.outputs)
+
+
+def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
+    """The model without the motions that break rows @ q_full = 0.
+
+    rows : (k, n_full), such as Part.held; none leaves the model as it is
+    Returns the model in coordinates p, q = N p with N an orthonormal basis of what is allowed; they are no longer the
+        displacements of single DOFs, but the contact map, loads, outputs and the way back know that
+    Raises  ValueError for a model without a full field, or one whose harmonics see different systems
+    """
+    if len(rows) == 0:
+        return model
+    if model.basis is None or model.per_harmonic is not None:
+        raise ValueError("motions can be held only in a model that was reduced from one mesh for all harmonics")
+    held = rows @ model.basis
+    N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
+    held_model = model.projected(N)
+    frequency, _ = linear_modes(held_model, n=min(LIMITS.reported_modes, N.shape[1]))
+    return replace(held_model, info=replace(held_model.info, free_frequency=frequency))

@@ -56,6 +56,7 @@ print(result.wear.depth[-1].max())  # [m]
 # td.verify
 light = td.run("beam", overrides={**UNWORN, "loads.harmonic.shake.value": "1 kN"})
 print(td.verify(light, at=700.0).record()["largest_difference"])
+print(*td.verify("results/small", states=2).lines(), sep="\n")
 
 # td.export
 print(td.export("results/small", ["csv", "npz"], "results/small/export"))
@@ -154,9 +155,6 @@ print(*td.studies.folds("stop.toml").lines(), sep="\n")
 
 # td.studies.derivatives
 print(*td.studies.derivatives("beam", overrides=UNWORN).lines(), sep="\n")
-
-# td.studies.verify_states
-print(*td.studies.verify_states("results/small", 2).lines(), sep="\n")
 
 # td.studies.forces
 print(*td.studies.forces("beam", overrides=UNWORN).lines(), sep="\n")

@@ -24,8 +24,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import amplitude
-from tribodyn.hbm.homotopy import SHARES, lead
-from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.newton import SHARES, NewtonOptions, Solution, lead
 from tribodyn.hbm.threads import single
 
 START_OFFSET = 1e4  # times the largest travel of a slider that the unloaded cycle allows

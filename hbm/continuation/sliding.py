@@ -15,8 +15,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import ContactParameters
-from tribodyn.hbm.homotopy import DECADES, lead
-from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.newton import DECADES, NewtonOptions, Solution, lead
 from tribodyn.hbm.threads import single
 
 FRICTION = "friction"  # what laws call their coefficient

@@ -21,10 +21,9 @@ import scipy.linalg as sla
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
-from tribodyn.hbm.homotopy import DECADES, lead
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.linear.speed_line import compliance_of
-from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.newton import DECADES, NewtonOptions, Solution, lead
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 

@@ -25,19 +25,26 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.law import STICKS
-from tribodyn.hbm.continuation import parameter
-from tribodyn.hbm.continuation.bordered import Direction
+from tribodyn.hbm.contact import compiled_law
+from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.continuation import bordered, parameter
+from tribodyn.hbm.continuation.bordered import Direction, Metric
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
-from tribodyn.hbm.stability import crossing, wave_exponents
-from tribodyn.hbm.stability.perturbed_contact import answer_of
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.stability import wave_exponents
 from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
+from tribodyn.hbm.time import time_step
 
 FOLD = "fold"
+_WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
+TRIALS = 12
+ACCURACY = 1e-6  # of the share of the way between the points
+STEPS = 256  # of a period
+MOST_MEMORY = 10  # numbers that a pair remembers; the linearised steps of laws with more fill the memory
 
 
 @dataclass(frozen=True)
@@ -54,7 +61,6 @@ class HillRules:
 
 
 RULES = HillRules()
-_WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
 
 
 @dataclass(frozen=True)
@@ -217,7 +223,7 @@ def _locate(
         def growth(balance: HarmonicBalance, state: State) -> float:
             return float(stability(balance, state).exponents.real[low:high].mean())
 
-        share, value = crossing.locate(path, *ends, growth, (r0, r1)) or (share, value)
+        share, value = _zero_of_growth(path, *ends, growth, (r0, r1)) or (share, value)
     return Bifurcation(i + share, value, kind)
 
 
@@ -359,3 +365,80 @@ def _central(values: np.ndarray, centre: np.ndarray, spread: np.ndarray, wanted:
         if len(chosen) == wanted:
             break
     return values[chosen]
+
+
+def _zero_of_growth(
+    path: Parameter,
+    start: Direction,
+    stop: Direction,
+    growth: Callable[[HarmonicBalance, State], float],
+    rates: tuple[float, float],
+) -> tuple[float, float] | None:
+    """The share of the way from start to stop at which the growth rate is zero, and the parameter there.
+
+    start, stop : neighbouring points of the curve; growth : of a motion [1/s]; rates : it at both, of different sign
+    Returns None where no motion is found between them
+    Source  regula falsi, Illinois; each trial is solved in the hyperplane normal to the chord
+    """
+    chord = stop - start
+    metric = Metric(float(np.linalg.norm(chord.x)) or 1.0, abs(chord.p) or 1.0)
+    low, high, weights = (0.0, rates[0]), (1.0, rates[1]), [1.0, 1.0]
+    share, value = 0.0, start.p
+    for _ in range(TRIALS):
+        a, b = weights[0] * low[1], weights[1] * high[1]
+        share = low[0] + (high[0] - low[0]) * a / (a - b)
+        solution, value = bordered.correct(path, start + chord * share, chord, metric, NewtonOptions())
+        if not solution.converged:
+            return None
+        rate = growth(path.place(value)[0], solution.state)
+        if rate * low[1] > 0:
+            low, weights = (share, rate), [1.0, 0.5 * weights[1]]
+        else:
+            high, weights = (share, rate), [0.5 * weights[0], 1.0]
+        near = abs(rate) <= ACCURACY * max(abs(rates[0]), abs(rates[1]))
+        if near or high[0] - low[0] <= ACCURACY:
+            break
+    return share, value
+
+
+def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[complex], np.ndarray] | None:
+    """Derivative of g = k x - f (n_pair, c, nc, c, nc) on the amplitudes of exp((rate + i k) w t), |k| <= top, by rate.
+
+    None for a law without a memory, on which nothing depends, or with much of it
+    Raises  ValueError for several laws
+    """
+    joint = balance.contact.merged("stability")
+    parameters, memory = joint.parameters, balance.memory
+    if not 0 < memory.shape[1] <= MOST_MEMORY:
+        return None
+    normal = parameters.components.index("n") if "n" in parameters.components else -1
+    contact = time_step.Contact(parameters.packed(), parameters.gap, normal, np.zeros((1, 1)))
+    law, (n_pair, c, _), n_state = compiled_law.pointer(joint.module.step), state.x.shape, memory.shape[1]
+    angle, nc = 2 * np.pi * np.arange(1, STEPS + 1) / STEPS, 2 * top + 1
+    x = np.ascontiguousarray((state.x @ balance.basis.functions(angle).T).transpose(2, 0, 1))
+    memory, bits = time_step.memory_after(law, x, contact, memory)
+    slopes, work = np.zeros((STEPS, n_pair, c + n_state, 2 * c + n_state)), time_step.room(c, n_state)
+    for j in range(STEPS):
+        time_step.pass_on(law, contact, x[j - 1], bits == SEPARATES, x[j], memory, bits, work, slopes[j:])
+    of_x, of_s, of_x0 = np.split(slopes, [c, c + n_state], axis=3)
+    waves = np.exp(1j * np.outer(angle, np.arange(-top, top + 1)))
+    p = np.kron(np.eye(c), waves[:, None]).reshape(STEPS, 1, c, c * nc)
+    stuck = np.einsum("pa,ab,km->pakbm", balance.compliance.k.reshape(n_pair, c), np.eye(c), np.eye(nc))
+
+    def departure(rate: complex) -> np.ndarray:
+        turn = np.exp(-rate * 2 * np.pi / STEPS)
+        driven = of_x @ p + turn * (of_x0 @ np.roll(p, 1, axis=0))
+        passed_on = turn * of_s
+        kept = np.zeros((STEPS + 1, n_pair, n_state, c * nc + n_state), complex)  # from no memory, and of one
+        kept[0, :, :, c * nc :] = np.eye(n_state)
+        for j in range(STEPS):
+            np.matmul(passed_on[j, :, c:], kept[j], out=kept[j + 1])
+            kept[j + 1, :, :, : c * nc] += driven[j, :, c:]
+        s, of_one = kept[..., : c * nc], kept[..., c * nc :]
+        # as a period before; a slider that rests does so
+        first = np.linalg.pinv(np.eye(n_state) - of_one[-1], rcond=1e-9) @ s[-1]
+        now = driven[:, :, :c] + passed_on[:, :, :c] @ (s[:-1] + of_one[:-1] @ first)
+        force = np.tensordot(waves.conj(), now, (0, 0)).transpose(1, 2, 0, 3)
+        return stuck - force.reshape(n_pair, c, nc, c, nc) / STEPS
+
+    return departure

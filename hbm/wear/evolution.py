@@ -13,7 +13,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.sites import Site
-from tribodyn.hbm.homotopy import SHARES, lead
+from tribodyn.hbm.newton import SHARES, lead
 from tribodyn.hbm.outcome import CONVERGED, Outcome, WearEnd
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.history import WearRow

@@ -60,7 +60,7 @@ def _show_results_in(shell: Any) -> None:
         shell.display_formatter.formatters["text/html"].for_type_by_name(
             "tribodyn.workflows.result.result",
             "Result",
-            lambda result: importlib.import_module("tribodyn.workflows.report.notebook").shown(result),
+            lambda result: importlib.import_module("tribodyn.workflows.report.page").shown(result),
         )
 
 

@@ -18,6 +18,6 @@ from tribodyn.workflows.studies.scenes import (
     run_to_accuracy as run_to_accuracy,
     scene_names as scene_names,
 )
-from tribodyn.workflows.studies.verification import verify as verify
+from tribodyn.workflows.studies.worn_states import verify as verify
 
 def _show_results_in(shell: object) -> None: ...

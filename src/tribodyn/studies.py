@@ -26,4 +26,4 @@ from tribodyn.workflows.studies.measured.compare import Compared as Compared, co
 from tribodyn.workflows.studies.supports import Supports as Supports, supports as supports
 from tribodyn.workflows.studies.surfaces import FaceAsperities as FaceAsperities, asperities as asperities
 from tribodyn.workflows.studies.verification import Comparison as Comparison
-from tribodyn.workflows.studies.worn_states import WornStates as WornStates, verify_states as verify_states
+from tribodyn.workflows.studies.worn_states import WornStates as WornStates

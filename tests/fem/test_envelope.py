@@ -12,8 +12,8 @@ from tribodyn.fem.material import Material
 from tribodyn.fem.springs import Spring
 from tribodyn.geometry import leaf_seal, mesh as mesh_file
 from tribodyn.reduction.craig_bampton import craig_bampton
-from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import linear_modes, system_modes
+from tribodyn.reduction.prescribed import hold
 
 STEEL = Material(210e9, 0.3, 7860.0)
 PARAMETERS = leaf_seal.Parameters(n_column=9, n_web=1, pin_column=1)

@@ -12,7 +12,7 @@ import pytest
 from tests.helpers.rough_faces import gaussian
 from tribodyn.geometry.asperities import identify
 from tribodyn.hbm.contact import law as contact_law
-from tribodyn.hbm.contact.bed import bed
+from tribodyn.hbm.contact.bed_cycle import bed
 from tribodyn.hbm.contact.law import ContactParameters
 
 tm = pytest.importorskip("tamaas", reason="tamaas has no wheel for this platform: pip install tamaas")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
-from tribodyn.hbm.contact.stiffness.elastic import ElasticPair, require_positive
+from tribodyn.hbm.contact.stiffness import ElasticPair, require_positive
 
 
 @dataclass(frozen=True)

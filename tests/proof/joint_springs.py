@@ -17,9 +17,9 @@ from scipy.linalg import eigh
 
 from tribodyn.fem.springs import Spring
 from tribodyn.reduction.craig_bampton import craig_bampton
-from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.prescribed import hold
 from tribodyn.reduction.relative import relative
 from tribodyn.workflows.run import joints, modelling
 from tribodyn.workflows.scene.scene_file import SceneFile

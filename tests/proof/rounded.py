@@ -19,8 +19,7 @@ from scipy.integrate import quad
 from scipy.special import xlogy
 
 from tests.proof.hertz import require_shear_within
-from tribodyn.hbm.contact.stiffness.elastic import ElasticPair, require_positive
-from tribodyn.hbm.contact.stiffness.rectangle import arc_excess, half_contact
+from tribodyn.hbm.contact.stiffness import ElasticPair, arc_excess, half_contact, require_positive
 
 
 @dataclass(frozen=True)

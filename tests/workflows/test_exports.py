@@ -23,7 +23,7 @@ from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
 from tribodyn.reduction import foreign
 from tribodyn.reduction.nastran_matrix import read_op4
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.export import formats, matrix_file, tables, vtk
+from tribodyn.workflows.export import curves, formats, vtk
 from tribodyn.workflows.pictures import exploded
 from tribodyn.workflows.result import faces, states, store
 from tribodyn.workflows.result.result import Result
@@ -63,7 +63,7 @@ def test_pandas_reads_every_table_with_all_digits(tmp_path: Path) -> None:
     given = result()
     for path in formats.write(given, ["csv"], tmp_path):
         read = pd.read_csv(path)
-        wanted = tables.tables(given)[path.stem]
+        wanted = curves.tables(given)[path.stem]
         assert list(read.columns) == list(wanted)
         for name, column in wanted.items():
             np.testing.assert_array_equal(read[name].to_numpy(), column)
@@ -218,8 +218,8 @@ def test_xarray_opens_the_result_file(tmp_path: Path) -> None:
 
 
 def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) -> None:
-    model = matrix_file.reduced_model(small)
-    wanted = matrix_file.arrays(model)
+    model = formats.reduced_model(small)
+    wanted = formats.arrays(model)
     written = formats.write(small, ["npz", "abaqus", "op4", "matlab"], tmp_path)
     npz = foreign.read_matrices(tmp_path / "npz" / "reduced.npz")
     inp = foreign.read_matrices(

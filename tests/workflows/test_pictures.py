@@ -19,8 +19,7 @@ from PIL import Image
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.pictures import film, maps, offscreen, plots, render, view
-from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
-from tribodyn.workflows.pictures.film_of_wear import WearFilm
+from tribodyn.workflows.pictures.film import CycleFilm, WearFilm
 from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, RED, STATUS
 from tribodyn.workflows.result.states import shown_states
 

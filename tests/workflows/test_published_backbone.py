@@ -12,7 +12,7 @@ import pytest
 from tests.helpers.command import leave
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.curves import backbones
-from tribodyn.workflows.studies.published import published_backbone
+from tribodyn.workflows.studies.curves.backbones import published_backbone
 
 TABLE = """[backbone]
 source = "others"

@@ -17,7 +17,7 @@ from tests.helpers.browser import DESK, PHONE, chromium, clicked_zoomed_and_turn
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.report import page
-from tribodyn.workflows.report.solid import solid
+from tribodyn.workflows.report.charts import solid
 from tribodyn.workflows.result import faces
 
 selenium = pytest.importorskip("selenium.webdriver")

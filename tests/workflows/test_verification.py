@@ -13,6 +13,7 @@ from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
 from tribodyn.workflows.studies import verification
+from tribodyn.workflows.studies.worn_states import verify
 
 SMALL = [
     "verdict.enabled=false",
@@ -84,7 +85,7 @@ def test_more_harmonics_come_closer(folder: Path) -> None:
     found = []
     for highest in (3, 9, 15):
         override = [f"harmonics.kept={list(range(highest + 1))}"]
-        comparison = verification.verify(result, 700.0, overrides=override, steps=512, progress=Progress())
+        comparison = verify(result, 700.0, overrides=override, steps=512, progress=Progress())
         found.append(comparison.found)
     assert all(one.motion.periodic for one in found)
     for values in zip(*((one.waveform["response"], abs(one.energy), one.largest) for one in found), strict=True):
@@ -104,7 +105,7 @@ def test_more_harmonics_come_closer(folder: Path) -> None:
 def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = store.load(folder / "result.h5")
     assert result.wear is not None
-    comparison = verification.verify(result, row=1, steps=128)
+    comparison = verify(result, row=1, steps=128)
     assert comparison.found.omega == result.wear.omega[1]
     assert comparison.solution.steps == 0  # it starts at the solution of the row
     assert comparison.record()["preload"]["balance_N"] == pytest.approx(result.wear.preload[1], rel=1e-6)

@@ -18,7 +18,7 @@ WORDS = {  # word -> where it is, its help on the page of all of them
     "plan": ("scenes:plan", "Show what a scene will model, and what it will cost, before running it."),
     "show": ("scenes:show", "Show what a result holds."),
     "draw": ("scenes:draw", "Draw pictures or films of a result."),
-    "verify": ("scenes:verify", "Check a result against direct time integration."),
+    "verify": ("verify:verify", "Check a result against direct time integration."),
     "report": ("scenes:report", "Write one HTML file that shows results."),
     "export": ("scenes:export", "Write a result in the formats of other programs."),
     "curve": ("curve:app", "Follow curves: backbone, ring-down, folds, track."),

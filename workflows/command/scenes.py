@@ -10,14 +10,14 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from tribodyn.workflows.command.word import QUIET, show_found, word
-from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, quantity
+from tribodyn.workflows.command.word import QUIET, word
+from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress, console_progress
+from tribodyn.workflows.run.progress import console_progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import draft, inspection, scenes
 
@@ -198,54 +198,6 @@ def _draw(
         complain(missing)
     for path in written:
         report(str(path))
-
-
-def verify(
-    result: Path,
-    *,
-    at: str | None = None,
-    row: int | None = None,
-    states: int | None = None,
-    steps: int | None = None,
-    overrides: Overrides = (),
-    out: Path | None = None,
-    as_json: Json = False,
-) -> None:
-    """Check a result against direct time integration of the same model with the same contact law.
-
-    Parameters
-    ----------
-    result
-        Folder or file of a result.
-    at
-        Frequency such as 410Hz; the peak of the response, or the frequency of the row, by default.
-    row
-        Wear row whose depth the contact has; unworn by default.
-    states
-        So many worn states of a wear run, spread over its cycles, one line each.
-    steps
-        Time steps per period; 256 or 32 for each harmonic by default.
-    out
-        Folder of tables and pictures; pictures/ beside the result by default.
-    as_json
-        Print JSON for machines.
-    """
-    make_room(out)
-    if states is not None and (at is not None or row is not None):
-        raise ValueError("expected one of --states, and --at with --row")
-    hertz = None if at is None else quantity("--at", at, "Hz")
-    folder = out or store.result_file(result).parent / "pictures"
-    loaded, progress = store.load(result), Progress() if as_json else console_progress()
-    if states is not None:
-        from tribodyn.workflows.studies import worn_states
-
-        along = worn_states.verify_states(loaded, states, steps=steps, overrides=overrides, progress=progress)
-        show_found(along, along.write(folder), as_json)
-    else:
-        from tribodyn.workflows.studies import verification
-
-        found = verification.verify(loaded, hertz, row=row, steps=steps, overrides=overrides, progress=progress)
-        show_found(found, found.write(folder), as_json)
 
 
 def report(*result: Path, out: Path | None = None) -> None:

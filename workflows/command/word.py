@@ -27,7 +27,7 @@ from tribodyn.workflows.scene import source
 from tribodyn.workflows.scene.fields import Quantity
 
 NAMES = {"start": "--from", "stop": "--to", "overrides": "--set"}
-Into = Literal["results", "beside", "here", "asked"]
+Into = Literal["results", "beside", "pictures", "here", "asked"]
 SUPPLIED = ("progress", "folder", "overrides")  # parameters that are not given as options of their own names
 
 
@@ -120,14 +120,15 @@ def word(
     """The function behind a word of the command line.
 
     words : such as "curve track", to tell how to continue
-    into : where --out is not given, tables and pictures go to results/NAME, beside the result, beside the file
-        that is given, or nowhere
+    into : where --out is not given, tables and pictures go to results/NAME, beside the result, to its pictures,
+        beside the file that is given, or nowhere
     """
     hints = get_type_hints(study, include_extras=True)
     parameters = inspect.signature(study).parameters
     options = [Option.of(p, hints[name]) for name, p in parameters.items() if name not in SUPPLIED]
     said = meanings(study.__doc__ or "", list(parameters))
-    writes = "folder" in parameters or hasattr(hints["return"], "write")
+    found = hints["return"]
+    writes = "folder" in parameters or all(hasattr(kind, "write") for kind in get_args(found) or (found,))
 
     def call(*placed: Any, **named: Any) -> None:
         bound = signature.bind(*placed, **named)
@@ -181,6 +182,7 @@ QUIET = Annotated[Flag, Parameter(help="Print no progress.")]
 _OUT = {
     "results": "Folder of tables and pictures; results/NAME by default.",
     "beside": "Folder of tables and pictures; that of the result by default.",
+    "pictures": "Folder of tables and pictures; pictures/ beside the result by default.",
     "here": "Folder of what is written; that of the file by default.",
     "asked": "Folder of tables and pictures; none are written by default.",
 }
@@ -231,7 +233,8 @@ def _folder(first: Any, into: str) -> Path | None:
         return None if into == "asked" else Path(first).parent
     if into == "results":
         return Path("results") / (Path(first).name.removesuffix(".toml") if first is not None else "study")
-    return store.result_file(first).parent
+    beside = store.result_file(first).parent
+    return beside / "pictures" if into == "pictures" else beside
 
 
 def _not_none(hint: Any) -> Any:

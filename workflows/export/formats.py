@@ -1,12 +1,139 @@
-"""The formats that `tribodyn export` knows, by name."""
+"""The formats that `tribodyn export` knows, by name; the reduced model for other solvers is written here."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
-from tribodyn.workflows.export import curves, matrix_file, vtk
+import numpy as np
+import scipy.sparse as sp
+from scipy.io import savemat
+
+from tribodyn.reduction import nastran_matrix
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.workflows.export import curves, vtk
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.progress import Progress
+
+
+def reduced_model(result: Result) -> ReducedModel:
+    """The reduced model that a result was computed with, made again from its scene.
+
+    Raises  ValueError where its parts are not there any more
+    """
+    from tribodyn.workflows.result.provenance import rebuilt
+
+    return modelling.build(rebuilt(result), Progress(), result.harmonics).reduced
+
+
+def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:
+    """M, K, C (n, n), B (n_contact, n), loads and outputs by name as a harmonic sees them; complex for a wheel."""
+    model.require_masters("an export of matrices")
+    system, B = model.at_harmonic(harmonic)
+    found = {"M": _dense(system.mass), "K": _dense(system.stiffness), "B": _dense(B)}
+    if system.damping is not None:
+        found["C"] = _dense(system.damping)
+    found |= {f"load_{name}": _dense(vector) for name, vector in system.loads.items()}
+    found |= {f"output_{name}": _dense(vector) for name, vector in system.outputs.items()}
+    i = model.interface
+    return found | {
+        "contact_area": i.area,
+        "contact_gap": i.gap,
+        "contact_points": i.points,
+        "contact_frames": i.frames,
+    }
+
+
+def _dense(matrix: Any) -> np.ndarray:
+    return np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix)
+
+
+def write_npz(result: Result, folder: Path) -> list[Path]:
+    """reduced.npz, that a scene's [model] reads again."""
+    model, path = reduced_model(result), folder / "reduced.npz"
+    found = arrays(model)
+    if 0 in result.harmonics and model.per_harmonic is not None:
+        static = arrays(model, 0)
+        found |= {f"{name}_harmonic_0": static[name] for name in ("M", "K", "C", "B") if name in static}
+    np.savez_compressed(path, components=np.array(model.interface.components), **found)  # type: ignore[arg-type]
+    return [path]
+
+
+def _symmetric(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """M, K, C without the rounding of their reduction, so that they come back bit for bit."""
+    return found | {name: (found[name] + found[name].conj().T) / 2 for name in ("M", "K", "C") if name in found}
+
+
+def _about(model: ReducedModel, folder: Path, **more: Any) -> Path:
+    """reduced.json, which describes the matrices beside it."""
+    path = folder / "reduced.json"
+    about = {
+        "components": model.interface.components,
+        "units": "SI",
+        "contact": "x = B q, row pair * n_component + component",
+    }
+    path.write_text(json.dumps(about | more, indent=2), encoding="utf-8")
+    return path
+
+
+def write_matlab(result: Result, folder: Path) -> list[Path]:
+    """reduced.mat with the same variables as reduced.npz, which a scene's [model] reads again."""
+    model, path = reduced_model(result), folder / "reduced.mat"
+    components = np.array(model.interface.components, dtype=object)
+    savemat(path, _symmetric(arrays(model)) | {"components": components}, long_field_names=True, do_compression=True)
+    return [path]
+
+
+def write_op4(result: Result, folder: Path) -> list[Path]:
+    """reduced.op4, with M, K, C, B, AREA, GAP, LOADS and OUTPUTS in binary, and reduced.json, which names columns."""
+    model = reduced_model(result)
+    found = _symmetric(arrays(model))
+    held: dict[str, np.ndarray] = {name: found[name] for name in ("M", "K", "C", "B") if name in found}
+    held |= {"AREA": found["contact_area"][:, None], "GAP": found["contact_gap"][:, None]}
+    columns = {}
+    for kind in ("load", "output"):
+        names = [name for name in found if name.startswith(f"{kind}_")]
+        columns[f"{kind}s"] = [name.removeprefix(f"{kind}_") for name in names]
+        if names:
+            held[f"{kind}s".upper()] = np.column_stack([found[name] for name in names])
+    nastran_matrix.write_op4(folder / "reduced.op4", held)
+    return [folder / "reduced.op4", _about(model, folder, **columns)]
+
+
+def write_abaqus(result: Result, folder: Path) -> list[Path]:
+    """reduced_M.inp, reduced_K.inp, reduced_C.inp as *MATRIX INPUT reads them, and reduced.inp that assembles them.
+
+    Coordinate i of the model is degree of freedom 1 of node i + 1; the lower triangle of a symmetric matrix is written.
+    Raises  ValueError for the complex matrices of a wheel
+    """
+    model, written, called = reduced_model(result), [], []
+    found = _symmetric(arrays(model))
+    if np.iscomplexobj(found["K"]):
+        raise ValueError("abaqus: the matrices of a wheel are complex, which Abaqus does not take; export npz")
+    words = {"K": "STIFFNESS", "M": "MASS", "C": "VISCOUS DAMPING"}
+    for name in words:
+        if name not in found:
+            continue
+        path = folder / f"reduced_{name}.inp"
+        lower = np.tril(found[name])
+        rows, columns = np.nonzero(lower)
+        with path.open("w", encoding="ascii") as file:
+            for i, j in zip(rows, columns, strict=True):
+                file.write(f"{i + 1},1,{j + 1},1,{lower[i, j]:.16e}\n")
+        written.append(path)
+        called.append(name)
+    top = folder / "reduced.inp"
+    lines = ["*HEADING", f"reduced model of {result.provenance['scene_name']}, SI units", "*NODE, NSET=COORDINATES"]
+    lines += [f"{i + 1}, {float(i)}, 0., 0." for i in range(len(found["K"]))]
+    for name in called:
+        lines.append(f"*MATRIX INPUT, NAME={name}, INPUT=reduced_{name}.inp, TYPE=SYMMETRIC")
+    lines.append("*MATRIX ASSEMBLE, " + ", ".join(f"{words[name]}={name}" for name in called))
+    top.write_text("\n".join([*lines, ""]), encoding="ascii")
+    return [*written, top]
+
 
 FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
     "vtk": ("series for ParaView over wear and over a cycle (.pvd, .vtu, .vtp)", vtk.write_vtk),
@@ -17,10 +144,10 @@ FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
         "worn part with its fields (.xdmf; another format with --mesh-ending)",
         lambda r, f: vtk.write_mesh(r, f / "part.xdmf"),
     ),
-    "npz": ("reduced matrices for NumPy, and for a scene's [model]", matrix_file.write_npz),
-    "matlab": ("reduced matrices for MATLAB, and for a scene's [model]", matrix_file.write_matlab),
-    "op4": ("reduced matrices, Nastran OUTPUT4", matrix_file.write_op4),
-    "abaqus": ("reduced matrices, Abaqus *MATRIX INPUT", matrix_file.write_abaqus),
+    "npz": ("reduced matrices for NumPy, and for a scene's [model]", write_npz),
+    "matlab": ("reduced matrices for MATLAB, and for a scene's [model]", write_matlab),
+    "op4": ("reduced matrices, Nastran OUTPUT4", write_op4),
+    "abaqus": ("reduced matrices, Abaqus *MATRIX INPUT", write_abaqus),
 }
 
 

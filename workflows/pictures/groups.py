@@ -1,4 +1,4 @@
-"""The bodies of a file or scene with their groups in colour, from two sides."""
+"""The bodies of a file or scene with their groups in colour, and a scene before it is run."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from tribodyn.extras import package
-from tribodyn.fem.assembly import Body
+from tribodyn.fem.assembly import Body, pieces
+from tribodyn.fem.part import Part
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.shots import SHADE
-from tribodyn.workflows.pictures.style import BODY, INK, LAYOUT, PAPER
+from tribodyn.workflows.pictures.style import BODIES, BODY, CYCLE, GREY, INK, LAYOUT, PAPER, RED
 from tribodyn.workflows.pictures.view import polygons
+from tribodyn.workflows.scene.schema import MeshScene
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d", "#8c564b", "#17becf")
+ARROW = 0.18  # length of an arrow over the size of the whole
 
 
 def draw(solids: Sequence[Body], path: Path, most: int = 20) -> Path:
@@ -60,3 +63,45 @@ def draw(solids: Sequence[Body], path: Path, most: int = 20) -> Path:
 def surface_of(pv: Any, mesh: Any, facets: np.ndarray) -> Any:
     """Some facets of a mesh as pyvista has them."""
     return pv.PolyData(mesh.p.T, polygons(mesh.facets[:, facets].T))
+
+
+def draw_scene(scene: MeshScene, part: Part, path: Path) -> Path:
+    """Draw an assembled part: contacts in colour, what is held, loads as arrows. Raises RenderingUnavailable"""
+    offscreen.check()
+    import pyvista as pv
+
+    view = pv.Plotter(off_screen=True, window_size=LAYOUT.apart)
+    view.set_background(PAPER)
+    size, legend = float(np.linalg.norm(np.ptp(part.points, axis=0))), []
+    for number, piece in enumerate(pieces(part.mesh)):
+        outer = surface_of(pv, piece.mesh, np.flatnonzero(piece.mesh.f2t[1] < 0))
+        view.add_mesh(outer, color=BODIES[number % len(BODIES)], opacity=0.45, **SHADE)
+        view.add_mesh(outer.extract_feature_edges(30), color=GREY, line_width=1)
+    for number, (name, pairs) in enumerate((part.joints or part.pairs).items()):
+        faces, colour = part.interface.faces, CYCLE[number % len(CYCLE)]
+        own = faces[((faces >= pairs.start) & (faces < pairs.stop)).all(axis=1)]
+        if len(own):
+            view.add_mesh(pv.PolyData(part.interface.points, polygons(own)), color=colour, lighting=False)
+        else:
+            view.add_points(part.interface.points[pairs], color=colour, point_size=9)
+        legend.append((f"contact {name}", colour))
+    held = np.setdiff1d(np.arange(len(part.points)), part.free // 3)
+    if len(held):
+        view.add_points(part.points[held], color=INK, point_size=7, render_points_as_spheres=True)
+        legend.append(("held", INK))
+    for loads, colour, kind in ((scene.loads.static, GREY, "static"), (scene.loads.harmonic, RED, "harmonic")):
+        for name, load in loads.items():
+            if load.direction is None or not load.group:
+                continue
+            along, centre = np.asarray(load.direction), part.points[part.node_sets[load.group]].mean(axis=0)
+            start = centre - ARROW * size * along
+            arrow = pv.Arrow(start=start, direction=along, scale=ARROW * size, shaft_radius=0.03, tip_radius=0.08)
+            view.add_mesh(arrow, color=colour)
+            legend.append((f"{kind} load {name}", colour))
+    for number, (label, colour) in enumerate(legend, 1):
+        view.add_text(label, position=(16, LAYOUT.apart[1] - 26 * number), font_size=9, color=colour)
+    view.add_axes(color=INK)
+    view.view_isometric()
+    view.screenshot(str(path))
+    view.close()
+    return path

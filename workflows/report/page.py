@@ -22,8 +22,7 @@ from tribodyn.version import __version__
 from tribodyn.workflows.pictures import offscreen, plots, render
 from tribodyn.workflows.pictures.style import STYLE
 from tribodyn.workflows.report import text
-from tribodyn.workflows.report.charts import charts
-from tribodyn.workflows.report.solid import solid
+from tribodyn.workflows.report.charts import charts, solid
 from tribodyn.workflows.result.result import Result
 
 HEADING = "part"  # the picture that heads the page
@@ -285,3 +284,15 @@ def _provenance(result: Result, path: Path | None) -> str:
     ]
     rows.append(("report by", f"tribodyn {__version__}"))
     return _table(rows)
+
+
+def shown(result: Result) -> str:
+    """HTML of a result; the part stands in a frame of its own, which needs nothing from the notebook."""
+    parts = [f"<pre>{escape(chr(10).join(text.brief(result)))}</pre>"]
+    figures = plots.figures(result)
+    if "frf" in figures:
+        parts.append(embedded("response", partial(figures["frf"], result), dpi=90))
+    viewer = part_alone(result)
+    if viewer:
+        parts.append(f'<iframe width="100%" height="680" style="border:0" srcdoc="{escape(viewer)}"></iframe>')
+    return "".join(parts)

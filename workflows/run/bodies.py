@@ -19,8 +19,7 @@ from tribodyn.fem.part import Stiff
 from tribodyn.fem.springs import Mass, Spring
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_reader, parts, placing, refine
-from tribodyn.geometry.overlap import overlap
-from tribodyn.geometry.placing import rotation
+from tribodyn.geometry.placing import overlap, rotation
 from tribodyn.geometry.sources import cad, picking
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure

@@ -28,9 +28,9 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import SingularStuckSystem, UnbalancedLoad
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.damping import modal_damping, rayleigh, rayleigh_of_ratios
-from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.prescribed import hold
 from tribodyn.workflows.run import (
     bodies,
     curve,

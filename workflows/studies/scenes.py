@@ -36,10 +36,10 @@ def picture(source: Source, path: AnyPath, overrides: Overrides = ()) -> Path:
 
     Raises  SceneError: the scene has no mesh, or asks for what cannot be; RenderingUnavailable
     """
-    from tribodyn.workflows.pictures import scene_picture
+    from tribodyn.workflows.pictures import groups
 
     file = read_scene(source, overrides)
-    return scene_picture.draw(file.mesh_scene, modelling.part_of(file, Progress()), Path(path))
+    return groups.draw_scene(file.mesh_scene, modelling.part_of(file, Progress()), Path(path))
 
 
 def build(source: Source, overrides: Overrides = (), *, progress: Report = None) -> Model:

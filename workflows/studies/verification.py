@@ -24,16 +24,12 @@ from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
-from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.store import Held, held
-from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress, Report, reporter
-from tribodyn.workflows.scene.fields import Frequency
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.schema import Scene
-from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies.files import write_files
 
 STEPS, STEPS_PER_HARMONIC = 256, 32  # per period; per period of the highest harmonic kept
@@ -193,31 +189,6 @@ class Comparison:
             direction = balance.contact.components[component]
             right.set(xlabel=f"{direction} / {unit}", ylabel=f"force / {unit_f}", title=f"Pair {pair}")
         return figure
-
-
-def verify(
-    result: Held,
-    at: Frequency | None = None,
-    *,
-    row: int | None = None,
-    steps: int | None = None,
-    overrides: Overrides = (),
-    progress: Report = None,
-) -> Comparison:
-    """Check a result against direct time integration of the same model with the same contact law.
-
-    result : folder or file of a result
-    at : frequency such as 410Hz; the peak of the response, or the frequency of the row, by default
-    row : wear row whose depth the contact has; unworn by default
-    steps : time steps per period; 256 or 32 for each harmonic by default
-    Raises  ValueError: the result has no such row or no solution to start from; SolveFailed: no balance solution
-    """
-    found, report = held(result), reporter(progress)
-    file = rebuilt(found, override_texts(overrides))
-    with limited(file.scene.solver.threads):
-        unworn = modelling.build(file, report, found.harmonics).balance
-    omega = None if at is None else 2 * np.pi * at
-    return held_against(found, file.scene, unworn, omega, row, steps, report)
 
 
 def held_against(

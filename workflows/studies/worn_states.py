@@ -22,6 +22,7 @@ from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
+from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies import verification
 from tribodyn.workflows.studies.files import write_files
@@ -108,24 +109,39 @@ class WornStates:
         return figure
 
 
-def verify_states(
-    result: Held, states: int, *, steps: int | None = None, overrides: Overrides = (), progress: Report = None
-) -> WornStates:
-    """Check so many states of a wear run, spread over its cycles, against direct time integration.
+def verify(
+    result: Held,
+    at: Frequency | None = None,
+    *,
+    row: int | None = None,
+    states: int | None = None,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> Comparison | WornStates:
+    """Check a result against direct time integration of the same model with the same contact law.
 
-    result : folder or file of a result with a wear run
-    states : number of the states
+    result : folder or file of a result
+    at : frequency such as 410Hz; the peak of the response, or the frequency of the row, by default
+    row : wear row whose depth the contact has; unworn by default
+    states : so many worn states of a wear run, spread over its cycles, one line each
     steps : time steps per period; 256 or 32 for each harmonic by default
-    Raises  ValueError: the result has no wear run, or less than one state is asked for
+    Raises  ValueError: the result has no such row, no wear run or no solution to start from; SolveFailed: no balance
+        solution
     """
     result, report = held(result), reporter(progress)
-    if result.wear is None:
+    if states is not None and (at is not None or row is not None):
+        raise ValueError("expected one of --states, and --at with --row")
+    if states is not None and result.wear is None:
         raise ValueError("the result has no wear run: take a scene with [wear]")
-    if states < 1:
+    if states is not None and states < 1:
         raise ValueError(f"--states must be at least 1, not {states}")
     file = rebuilt(result, override_texts(overrides))
     with limited(file.scene.solver.threads):
         unworn = modelling.build(file, report, result.harmonics).balance
+    if states is None or result.wear is None:
+        omega = None if at is None else 2 * np.pi * at
+        return verification.held_against(result, file.scene, unworn, omega, row, steps, report)
     found: dict[int, Comparison | str] = {}
     alone: dict[int, LeftAlone] = {}
     for row in spread(result.wear, states):

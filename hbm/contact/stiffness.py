@@ -1,4 +1,7 @@
-"""Rectangular punch on an elastic half-space: the total k_n and k_t of a patch.
+"""Contact stiffness of elastic bodies: the total k_n and k_t of a rectangular punch on an elastic half-space.
+
+It is the compliance of half-spaces. A finite element model that resolves the bodies under the patch already holds most
+of it: a contact stiffness from here then counts it twice, as the thesis does (Tamatam 2021, 2.4.1).
 
 Three-dimensional counterpart of Ciavarella, Hills and Monno, in the place of Allara, J. Sound Vib. 320 (2009) 527-544,
 which extends the plane formulation and which we have not reproduced line by line. Here
@@ -19,16 +22,59 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from math import acos, cos, isfinite, pi, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
-
-from tribodyn.hbm.contact.stiffness.elastic import ElasticPair, require_positive
 
 N_STRIPS = 5
 """Strips over half of the shorter side on the coarse mesh; the fine mesh has twice as many."""
 LONGEST = 1e9
 """Largest ratio of the sides; a finer mesh changes k_n and k_t by less than 3e-4 up to there."""
+Influence = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Double primitive, in x and y, of the displacement under a unit point force."""
+
+
+class ElasticPair(NamedTuple):
+    """Young's moduli E1, E2 [Pa] and Poisson's ratios nu1, nu2 [-]; a rigid body has E = inf.
+
+    Normal and tangential problems are taken as uncoupled: exact for equal bodies, otherwise Goodman's approximation (a
+    rigid disc bonded to a half-space of nu = 0.3 is 2.9 % stiffer against normal load than the frictionless one).
+    """
+
+    E1: float
+    nu1: float
+    E2: float
+    nu2: float
+
+    @property
+    def modulus(self) -> float:
+        """Plane contact modulus E* [Pa], 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2."""
+        return 1 / sum((1 - nu**2) / young for young, nu in self.bodies)
+
+    @property
+    def bodies(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """(E, nu) of each body."""
+        return (self.E1, self.nu1), (self.E2, self.nu2)
+
+    def checked(self) -> ElasticPair:
+        """Self, or a ValueError that names the number that cannot be."""
+        for name, value in zip(("E1", "E2"), (self.E1, self.E2), strict=True):
+            if not value > 0:
+                raise ValueError(f"{name} is {value:g} Pa: Young's modulus must be positive (inf for a rigid body)")
+        for name, value in zip(("nu1", "nu2"), (self.nu1, self.nu2), strict=True):
+            if not -1 < value <= 0.5:
+                raise ValueError(f"{name} is {value:g}: Poisson's ratio must lie above -1 and not above 0.5")
+        if not (isfinite(self.E1) or isfinite(self.E2)):
+            raise ValueError("E1 and E2 are both infinite: one body must be elastic")
+        return self
+
+
+def require_positive(**lengths: float) -> None:
+    """Raise ValueError for the first argument that is not a positive finite number."""
+    for name, value in lengths.items():
+        if not (value > 0 and isfinite(value)):
+            raise ValueError(f"{name} is {value:g}: it must be a positive finite number (SI units)")
 
 
 @cache
@@ -132,10 +178,6 @@ def flat_rectangle(a: float, b: float, pair: ElasticPair) -> tuple[float, float]
         return isotropic * _inverse_distance(x, y) + directed * _along_shear(x, y)
 
     return _extrapolated(a, b, normal), _extrapolated(a, b, tangential)
-
-
-Influence = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Double primitive, in x and y, of the displacement under a unit point force."""
 
 
 def _inverse_distance(x: np.ndarray, y: np.ndarray) -> np.ndarray:
