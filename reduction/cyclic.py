@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.sparse import vstack
 
-from tribodyn.fem import wheel
+from tribodyn.fem import cyclic
 from tribodyn.fem.cyclic import Sector, at_index, seam_map
 from tribodyn.fem.modes import StaticDivergence, modes, turning_frequencies
 from tribodyn.fem.system import SecondOrderSystem
@@ -125,12 +125,12 @@ def wave_of(reduced: ReducedSector, engine_order: int, index_of: WaveIndex) -> R
 
 
 def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
-    """All sectors at once, real and with contacts between all neighbours; stiffness as in fem.wheel.assemble.
+    """All sectors at once, real and with contacts between all neighbours; stiffness as in fem.cyclic.assemble_wheel.
 
     Loads and outputs are named "<name>@<sector>". The basis is left out: sector n moves by
-    reduced.basis @ (fem.wheel.sector_maps(reduced.sector)[n] @ q) in its own frame
+    reduced.basis @ (fem.cyclic.sector_maps(reduced.sector)[n] @ q) in its own frame
     """
-    system, interface = wheel.assemble(reduced.sector, stiffness)
+    system, interface = cyclic.assemble_wheel(reduced.sector, stiffness)
     return ReducedModel(system, interface, None, _shared_info(reduced))
 
 

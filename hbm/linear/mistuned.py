@@ -22,7 +22,7 @@ import numpy as np
 from scipy import fft
 from scipy.linalg import inv, lu_factor, lu_solve
 
-from tribodyn.fem.wheel import of_sector
+from tribodyn.fem.cyclic import of_sector
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import Expansion

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import small_wheel as small
-from tribodyn.fem import cyclic, wheel
+from tribodyn.fem import cyclic
 from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.modes import modes
@@ -32,7 +32,7 @@ def test_rotation_is_right_handed_about_its_axis():
 def test_every_nodal_diameter_is_that_of_the_assembled_wheel(sector):
     """Item 1 of the issue, unreduced: all modes of the wheel below a bound are those of the sector, to 1e-8."""
     k = sector.interface.stiffness(*small.STIFFNESS)
-    system, interface = wheel.assemble(sector)
+    system, interface = cyclic.assemble_wheel(sector)
     for springs, all_springs in ((None, None), (k, np.tile(k, (small.N, 1)))):
         half = nodal_diameters(sector, range(small.N // 2 + 1), 4, springs)
         mine = np.concatenate([half, half[1:-1]])  # waves forwards and backwards
@@ -79,7 +79,7 @@ def test_an_unclamped_wheel_moves_rigidly_in_the_waves_it_should(tmp_path):
 
 
 def test_wheel_is_closed_and_named(sector):
-    system, interface = wheel.assemble(sector)
+    system, interface = cyclic.assemble_wheel(sector)
     assert interface.n_pair == small.N * sector.interface.n_pair
     assert set(system.loads) == {f"{name}@{n}" for name in small.LOADS for n in range(small.N)}
     radius = np.hypot(*interface.points[:, 1:].T).reshape(small.N, -1)
@@ -91,11 +91,11 @@ def test_a_stiffer_blade_takes_its_own_frequency_with_it(tmp_path):
     """On a rigid disk with open shrouds blades are alone: each frequency scales with the root of its factor."""
     sector = small.full_sector(tmp_path / "s.msh")[1]
     factors = np.linspace(0.9, 1.1, small.N)
-    system, _ = wheel.assemble(sector, factors)
+    system, _ = cyclic.assemble_wheel(sector, factors)
     alone = modes(sector.system.stiffness, sector.system.mass, 1)[0][0]
     assert modes(system.stiffness, system.mass, small.N)[0] == pytest.approx(alone * np.sqrt(factors), rel=1e-9)
     with pytest.raises(ValueError, match="mistuning needs 8 positive stiffness factors"):
-        wheel.assemble(sector, [1.0, 2.0])
+        cyclic.assemble_wheel(sector, [1.0, 2.0])
 
 
 def test_faces_that_do_not_match_are_one_sentence(tmp_path):

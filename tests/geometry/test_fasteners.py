@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribodyn.geometry import bolt, facts, lap_beam, mesh, nut, washer
+from tribodyn.geometry import bolt, lap_beam, mesh, nut, washer
 
 HEXAGON = np.sqrt(3) / 2 * 12.7e-3**2  # area by the width across flats
 
@@ -28,13 +28,13 @@ def test_volumes_are_those_of_the_drawing(tmp_path):
     expected = (
         p.width * p.height * (p.length - p.lap) + p.width * p.height / 2 * p.lap - 3 * disk(p.hole) * p.height / 2
     )
-    assert facts.facts(body).volume == pytest.approx(expected, rel=1e-6)
+    assert mesh.facts(body).volume == pytest.approx(expected, rel=1e-6)
     body, _, q = made(bolt, tmp_path)
-    assert facts.facts(body).volume == pytest.approx(disk(q.diameter) * q.length + HEXAGON * q.head_height, rel=3e-4)
+    assert mesh.facts(body).volume == pytest.approx(disk(q.diameter) * q.length + HEXAGON * q.head_height, rel=3e-4)
     body, _, n = made(nut, tmp_path)
-    assert facts.facts(body).volume == pytest.approx((HEXAGON - disk(n.bore)) * n.height, rel=1e-4)
+    assert mesh.facts(body).volume == pytest.approx((HEXAGON - disk(n.bore)) * n.height, rel=1e-4)
     body, _, w = made(washer, tmp_path)
-    assert facts.facts(body).volume == pytest.approx((disk(w.diameter) - disk(w.bore)) * w.thickness, rel=3e-4)
+    assert mesh.facts(body).volume == pytest.approx((disk(w.diameter) - disk(w.bore)) * w.thickness, rel=3e-4)
 
 
 def test_the_lap_meets_itself_turned_by_half_a_turn(tmp_path):
@@ -44,9 +44,9 @@ def test_the_lap_meets_itself_turned_by_half_a_turn(tmp_path):
     turned = lap * [-1, 1, -1]
     apart = np.linalg.norm(lap[:, None] - turned[None], axis=2).min(axis=1)
     assert apart.max() < 1e-12
-    pads = [facts.area(body, body.boundaries[f"pad_{i}"]) for i in (1, 2, 3)]
+    pads = [mesh.area(body, body.boundaries[f"pad_{i}"]) for i in (1, 2, 3)]
     np.testing.assert_allclose(pads, disk(p.pad) - disk(p.hole), rtol=1e-3)
-    assert facts.area(body, body.boundaries["lap"]) == pytest.approx(p.lap * p.width - 3 * disk(p.hole), rel=1e-4)
+    assert mesh.area(body, body.boundaries["lap"]) == pytest.approx(p.lap * p.width - 3 * disk(p.hole), rel=1e-4)
     assert body.doflocs.T[sets["tip"][0]] == pytest.approx([-0.36, 0, 0], abs=1e-12)
 
 

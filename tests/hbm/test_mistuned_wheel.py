@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import small_wheel as small
-from tribodyn.fem.wheel import sector_maps
+from tribodyn.fem.cyclic import sector_maps
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint

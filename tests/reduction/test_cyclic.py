@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as sla
 
 from tests.helpers import small_wheel as small
-from tribodyn.fem import cyclic, wheel
+from tribodyn.fem import cyclic
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.cyclic import at_index
 from tribodyn.fem.modes import modes
@@ -34,7 +34,7 @@ def published():
 def test_reduced_sector_and_reduced_wheel_agree_to_rounding(reduced):
     """Item 1 of the issue, reduced: every frequency of the wheel, free and stuck, is one of a sector."""
     k = reduced.sector.interface.stiffness(*small.STIFFNESS)
-    system, interface = wheel.assemble(reduced.sector)
+    system, interface = cyclic.assemble_wheel(reduced.sector)
     n = at_index(reduced.sector, 0)[0].n_dof
     for springs, all_springs in ((None, None), (k, np.tile(k, (small.N, 1)))):
         mine = np.sort(waves.nodal_diameters(reduced.sector, range(small.N), n, springs).ravel())

@@ -33,9 +33,8 @@ from tribodyn.workflows.pictures.figures import (
     status_legend,
     status_name,
 )
-from tribodyn.workflows.pictures.loops import loop_of, loop_size
 from tribodyn.workflows.pictures.offscreen import check
-from tribodyn.workflows.pictures.plots import cycle_axis
+from tribodyn.workflows.pictures.plots import cycle_axis, loop_of, loop_size
 from tribodyn.workflows.pictures.render import Moving
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
 from tribodyn.workflows.pictures.style import (

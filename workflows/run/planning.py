@@ -176,7 +176,7 @@ def _openings(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], joi
         Tie(f"contacts.{name}", face, contact.opposite, contact.reach)
         for name, contact in scene.joints.items()
         for face in contact.groups
-        if contact.opposite is not None and contact.gap is None
+        if contact.opposite is not None and contact.gap is None and (scene.wheel is None or not contact.meets_next)
     ]
     for one in joined.constraints:
         one.build(mesh, node_sets)

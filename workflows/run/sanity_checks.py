@@ -17,7 +17,7 @@ from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.geometry.facts import facts
+from tribodyn.geometry.mesh import facts
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.result.summary import LARGEST_BEND
 from tribodyn.workflows.run import bodies, matrix_model, part_reduction

@@ -15,7 +15,7 @@ from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes, stiffest
-from tribodyn.geometry.facts import area, facts
+from tribodyn.geometry.mesh import area, facts
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources.deck import Deck
 from tribodyn.workflows.pictures import groups as group_pictures
