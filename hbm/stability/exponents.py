@@ -25,8 +25,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact import compiled_law
-from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.contact.law import STICKS
 from tribodyn.hbm.continuation import bordered, parameter
 from tribodyn.hbm.continuation.bordered import Direction, Metric
 from tribodyn.hbm.continuation.branch import Branch
@@ -34,17 +33,14 @@ from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.stability import wave_exponents
+from tribodyn.hbm.stability import perturbed_contact, wave_exponents
 from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
-from tribodyn.hbm.time import time_step
 
 FOLD = "fold"
 _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
-TRIALS = 12
+TRIALS = 12  # of a bifurcation between two points
 ACCURACY = 1e-6  # of the share of the way between the points
-STEPS = 256  # of a period
-MOST_MEMORY = 10  # numbers that a pair remembers; the linearised steps of laws with more fill the memory
 
 
 @dataclass(frozen=True)
@@ -293,7 +289,7 @@ def _answer(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> wav
     if balance.contact.stiffness.size * basis.n_coeff > RULES.most_settled:
         return None
     with suppress(ValueError):
-        return answer_of(balance, state, basis.harmonics[-1])
+        return perturbed_contact.answer_of(balance, state, basis.harmonics[-1])
     return None
 
 
@@ -399,46 +395,3 @@ def _zero_of_growth(
         if near or high[0] - low[0] <= ACCURACY:
             break
     return share, value
-
-
-def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[complex], np.ndarray] | None:
-    """Derivative of g = k x - f (n_pair, c, nc, c, nc) on the amplitudes of exp((rate + i k) w t), |k| <= top, by rate.
-
-    None for a law without a memory, on which nothing depends, or with much of it
-    Raises  ValueError for several laws
-    """
-    joint = balance.contact.merged("stability")
-    parameters, memory = joint.parameters, balance.memory
-    if not 0 < memory.shape[1] <= MOST_MEMORY:
-        return None
-    normal = parameters.components.index("n") if "n" in parameters.components else -1
-    contact = time_step.Contact(parameters.packed(), parameters.gap, normal, np.zeros((1, 1)))
-    law, (n_pair, c, _), n_state = compiled_law.pointer(joint.module.step), state.x.shape, memory.shape[1]
-    angle, nc = 2 * np.pi * np.arange(1, STEPS + 1) / STEPS, 2 * top + 1
-    x = np.ascontiguousarray((state.x @ balance.basis.functions(angle).T).transpose(2, 0, 1))
-    memory, bits = time_step.memory_after(law, x, contact, memory)
-    slopes, work = np.zeros((STEPS, n_pair, c + n_state, 2 * c + n_state)), time_step.room(c, n_state)
-    for j in range(STEPS):
-        time_step.pass_on(law, contact, x[j - 1], bits == SEPARATES, x[j], memory, bits, work, slopes[j:])
-    of_x, of_s, of_x0 = np.split(slopes, [c, c + n_state], axis=3)
-    waves = np.exp(1j * np.outer(angle, np.arange(-top, top + 1)))
-    p = np.kron(np.eye(c), waves[:, None]).reshape(STEPS, 1, c, c * nc)
-    stuck = np.einsum("pa,ab,km->pakbm", balance.compliance.k.reshape(n_pair, c), np.eye(c), np.eye(nc))
-
-    def departure(rate: complex) -> np.ndarray:
-        turn = np.exp(-rate * 2 * np.pi / STEPS)
-        driven = of_x @ p + turn * (of_x0 @ np.roll(p, 1, axis=0))
-        passed_on = turn * of_s
-        kept = np.zeros((STEPS + 1, n_pair, n_state, c * nc + n_state), complex)  # from no memory, and of one
-        kept[0, :, :, c * nc :] = np.eye(n_state)
-        for j in range(STEPS):
-            np.matmul(passed_on[j, :, c:], kept[j], out=kept[j + 1])
-            kept[j + 1, :, :, : c * nc] += driven[j, :, c:]
-        s, of_one = kept[..., : c * nc], kept[..., c * nc :]
-        # as a period before; a slider that rests does so
-        first = np.linalg.pinv(np.eye(n_state) - of_one[-1], rcond=1e-9) @ s[-1]
-        now = driven[:, :, :c] + passed_on[:, :, :c] @ (s[:-1] + of_one[:-1] @ first)
-        force = np.tensordot(waves.conj(), now, (0, 0)).transpose(1, 2, 0, 3)
-        return stuck - force.reshape(n_pair, c, nc, c, nc) / STEPS
-
-    return departure
