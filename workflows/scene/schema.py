@@ -177,39 +177,30 @@ class MeshScene(Scene):
 
     @model_validator(mode="before")
     @classmethod
-    def _asperities_of_its_faces(cls, data: Any, info: ValidationInfo) -> Any:
-        """A law that takes a table of asperities and is given none has that of the measured faces."""
-        folder = folder_of(info)
-        if folder is None or not isinstance(data, dict) or not isinstance(data.get("surfaces"), dict):
-            return data
-        several = data.get("contacts") or None
-        contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
-        lacking = [name for name, contact in contacts.items() if takes_asperities(contact)]
-        try:
-            surfaces = Surfaces.model_validate(data["surfaces"]) if lacking else None
-        except ValidationError:  # reported where the table itself is read
-            return data
-        if surfaces is None:
-            return data
-        found = {name: with_asperities(dict(contacts[name]), surfaces, folder) for name in lacking}
-        return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _numbers_when_hot(cls, data: Any) -> Any:
-        """A contact with a table over temperature has the numbers of its own one."""
+    def _numbers_of_its_contacts(cls, data: Any, info: ValidationInfo) -> Any:
+        """A contact has the numbers of its temperature, and the asperities of the measured faces that its law wants."""
         if not isinstance(data, dict):
             return data
-        loads = data.get("loads")
-        static = loads.get("static") if isinstance(loads, dict) else None
-        several = data.get("contacts") or None
+        loads, several, folder = data.get("loads"), data.get("contacts") or None, folder_of(info)
         contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
-        prefix = "contacts." if several is contacts else ""
+        prefix, static = (
+            "contacts." if several is contacts else "",
+            loads.get("static") if isinstance(loads, dict) else None,
+        )
         found = {
             name: with_numbers_when_hot(prefix + name, contact, static)
             for name, contact in contacts.items()
             if isinstance(contact, dict) and contact.get("by_temperature") is not None
         }
+        lacking = [name for name, contact in contacts.items() if takes_asperities(contact)]
+        if lacking and folder is not None and isinstance(data.get("surfaces"), dict):
+            try:
+                surfaces = Surfaces.model_validate(data["surfaces"])
+            except ValidationError:  # reported where the table itself is read
+                return data
+            found |= {
+                name: with_asperities({**contacts[name], **found.get(name, {})}, surfaces, folder) for name in lacking
+            }
         if not found:
             return data
         return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}

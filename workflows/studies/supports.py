@@ -32,7 +32,7 @@ def supports_of(scene: Scene) -> dict[str, tuple[float, str]]:
     """
     springs = scene.springs if isinstance(scene, MeshScene) else {}
     grounded = {name: spring for name, spring in springs.items() if spring.opposite is None}
-    if not grounded or not isinstance(scene, MeshScene):
+    if not isinstance(scene, MeshScene) or not grounded:
         raise ValueError("the scene has no spring to the ground: a support is a table such as [springs.left_pin]")
     outputs = {"response": scene.response, **scene.response.others}
     found = {
