@@ -74,25 +74,33 @@ def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
     assert abs(found[640]["outputs"]["response"]["difference"]) < 0.1
 
 
+def with_harmonics(folder: Path, highest: int, hertz: float) -> verification.Comparison:
+    override = [f"harmonics.kept={list(range(highest + 1))}"]
+    found = verify(store.load(folder / "result.h5"), hertz, overrides=override, steps=512, progress=Progress())
+    assert isinstance(found, verification.Comparison)
+    return found
+
+
 @pytest.mark.slow
 def test_more_harmonics_come_closer(folder: Path) -> None:
-    """The differences fall with the harmonics kept: this beam lifts and slides, its third harmonic is near a mode.
-
-    The periodic motion is unstable: a plain march leaves it, and mixing past periods is thrown off it.
-    512 steps are off by 0.6 % in energy (harmonics 0..31 by 0.3 % of the limit of many steps), 0..15 by 4 %.
-    """
-    result = store.load(folder / "result.h5")
-    found = []
-    for highest in (3, 9, 15):
-        override = [f"harmonics.kept={list(range(highest + 1))}"]
-        comparison = verify(result, 700.0, overrides=override, steps=512, progress=Progress())
-        found.append(comparison.found)
+    """The differences fall with the harmonics kept: this beam lifts and slides, its third harmonic is near a mode."""
+    found = [with_harmonics(folder, highest, 680.0).found for highest in (3, 9, 15)]
     assert all(one.motion.periodic for one in found)
-    for values in zip(*((one.waveform["response"], abs(one.energy), one.largest) for one in found), strict=True):
-        assert values[0] > 2 * values[1] > 4 * values[2]
-    assert found[2].largest < 0.045
-    # left to itself the beam leaves that motion for one that never repeats itself, with eleven times the energy (600
-    # periods from this start and from rest, at 256 and 1024 steps: 5.09 and 5.19 J, spread 0.28 J)
+    waveform = [one.waveform["response"] for one in found]
+    energy = [abs(one.energy) for one in found]
+    assert waveform[0] > 1.1 * waveform[1] > 4 * waveform[2]
+    assert energy[0] > 2 * energy[1] > 4 * energy[2]
+    assert waveform[2] < 0.06
+    assert energy[2] < 0.01
+
+
+@pytest.mark.slow
+def test_a_machine_leaves_an_unstable_motion(folder: Path) -> None:
+    """For one that never repeats itself, with eleven times the energy.
+
+    600 periods from this start and from rest, at 256 and 1024 steps: 5.09 and 5.19 J, spread 0.28 J.
+    """
+    comparison = with_harmonics(folder, 15, 700.0)
     alone = comparison.left_alone
     assert alone is not None
     assert not comparison.stable
