@@ -44,8 +44,7 @@ class Strides:
     shortest: float = 1e-3
 
 
-SHARES = Strides()  # of a load or of an opening
-DECADES = Strides(first=1.0, growth=1.6, shortest=0.02)  # of a decimal logarithm
+STRIDES = Strides()  # of a load, of an opening, of a decimal logarithm
 
 
 class Evaluation(Protocol):
@@ -358,7 +357,7 @@ def solve_from_rest(
         return beyond.converged
 
     if last.converged:
-        factor = lead(factor, 1.0, SHARES, loaded)
+        factor = lead(factor, 1.0, loaded)
     if factor == 1.0:
         return Solution(last.state, CONVERGED, steps, products, last.history)
     if last.converged and (loose := _unheld(balance, last.state) or _unheld(balance, beyond.state)):
@@ -370,18 +369,19 @@ def solve_from_rest(
     return Solution(first.state, outcome, steps, products, first.history)
 
 
-def lead(level: float, goal: float, strides: Strides, solve: Callable[[float, float], bool]) -> float:
+def lead(level: float, goal: float, solve: Callable[[float, float], bool], first: float = STRIDES.first) -> float:
     """How far a number of a problem comes from a level, where it is solved, towards its goal.
 
     solve : whether there is a solution at its first argument beside the one at its second, the level reached so far;
         it keeps what it finds
+    first : step
     Source  Allgower and Georg 1990, chapter 1
     """
-    stride = strides.first
-    while level != goal and stride > strides.shortest:
+    stride = first
+    while level != goal and stride > STRIDES.shortest:
         target = min(level + stride, goal) if goal > level else max(level - stride, goal)
         if solve(target, level):
-            level, stride = target, strides.growth * stride
+            level, stride = target, STRIDES.growth * stride
         else:
             stride *= 0.5
     return level

@@ -24,7 +24,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import amplitude
-from tribodyn.hbm.newton import SHARES, NewtonOptions, Solution, lead
+from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.threads import single
 
 START_OFFSET = 1e4  # times the largest travel of a slider that the unloaded cycle allows
@@ -197,6 +197,6 @@ def _solve_pushed(
         x = trial.state.x if trial.converged else x
         return trial.converged
 
-    if lead(0.0, 1.0, SHARES, pushed) < 1.0:
+    if lead(0.0, 1.0, pushed) < 1.0:
         return solution
     return newton.solve(balance.with_memory(far), omega, x, options)

@@ -15,7 +15,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import ContactParameters
-from tribodyn.hbm.newton import DECADES, NewtonOptions, Solution, lead
+from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.threads import single
 
 FRICTION = "friction"  # what laws call their coefficient
@@ -41,7 +41,7 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
         return found.converged
 
     first = next((level for level in STARTS if rougher(level)), None)
-    if first is None or lead(first, 0.0, DECADES, rougher) > 0.0 or found is None:
+    if first is None or lead(first, 0.0, rougher) > 0.0 or found is None:
         return None
     return replace(found, steps=spent, products=products)
 

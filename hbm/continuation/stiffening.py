@@ -23,7 +23,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.linear.speed_line import compliance_of
-from tribodyn.hbm.newton import DECADES, NewtonOptions, Solution, lead
+from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
@@ -87,7 +87,7 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
 
     levels = (-float(decade) for decade in range(RULES.decades + 1))
     first = next((level for level in levels if spent < RULES.most_steps and solved(level)), None)
-    if first is None or lead(first, 0.0, DECADES, stiffer) < 0.0:
+    if first is None or lead(first, 0.0, stiffer) < 0.0:
         return None
     x = known[-1][1]
     soft = _softened(balance, 0.0, soft)

@@ -13,7 +13,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.sites import Site
-from tribodyn.hbm.newton import SHARES, lead
+from tribodyn.hbm.newton import lead
 from tribodyn.hbm.outcome import CONVERGED, Outcome, WearEnd
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.history import WearRow
@@ -266,7 +266,7 @@ def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.nda
         x = solution.state.x if solution.converged else x
         return solution.converged
 
-    lead(0.0, 1.0, replace(SHARES, first=0.5), opened)
+    lead(0.0, 1.0, opened, first=0.5)
     return x, solves
 
 
