@@ -23,31 +23,23 @@ from tribodyn.geometry.placing import overlap, rotation
 from tribodyn.geometry.sources import cad, picking
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
-from tribodyn.workflows.scene.body import Geometry, Meshed, SolidMaterial
+from tribodyn.workflows.scene.body import Meshed, SolidMaterial
 from tribodyn.workflows.scene.loads import SpringTable
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.structure import AXES
-
-
-def part_mesh(part: str, parameters: Mapping[str, int | float], path: Path) -> tuple[Any, dict[str, np.ndarray]]:
-    """The mesh of a parametric part, which is kept at `path`."""
-    kind = parts.load(part)
-    kind.build(kind.Parameters(**parameters), path)
-    return mesh_reader.read(path)
-
 
 Noted = tuple[Any, dict[str, np.ndarray], tuple[str, ...]]
 """A mesh, its node sets, and sentences on what was done to its file and is not used of it."""
 
 
-def geometry_mesh(geometry: Geometry, folder: Path, scratch: Path) -> Noted:
-    """The mesh of [geometry]: read from a file in `folder`, or built and kept in `scratch`."""
-    if geometry.mesh is not None:
-        mesh, node_sets, notes = mesh_reader.read_with_notes(folder / geometry.mesh)
-        return *refine.halved(mesh, node_sets, geometry.halved), notes
-    assert geometry.part_name is not None
-    mesh, node_sets = part_mesh(geometry.part_name, geometry.parameters, scratch / "mesh.msh")
-    return *refine.halved(mesh, node_sets, geometry.halved), ()
+def _read(table: Meshed, folder: Path, path: Path, sizes: cad.Sizes | None = None) -> Noted:
+    """The mesh that a table gives: of a file in `folder`, or of a part, which is kept at `path`."""
+    if table.mesh is not None:
+        return mesh_reader.read_with_notes(folder / table.mesh, sizes)
+    assert table.part_name is not None
+    part = parts.load(table.part_name)
+    part.build(part.Parameters(**table.parameters), path)
+    return *mesh_reader.read(path), ()
 
 
 def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
@@ -57,7 +49,8 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
     """
     if scene.geometry is not None:
         assert scene.material is not None
-        mesh, node_sets, notes = geometry_mesh(scene.geometry, folder, scratch)
+        mesh, node_sets, notes = _read(scene.geometry, folder, scratch / "mesh.msh")
+        mesh, node_sets = refine.halved(mesh, node_sets, scene.geometry.halved)
         bodies = [Body("", mesh, node_sets, solid(scene.material), notes)]
     else:
         bodies = []
@@ -99,12 +92,7 @@ def of_decks(scene: MeshScene, folder: Path) -> dict[str, decks.CarriedDeck]:
 
 
 def _placed(table: structure.BodyTable, folder: Path, path: Path) -> Noted:
-    notes: tuple[str, ...] = ()
-    if table.mesh is not None:
-        mesh, node_sets, notes = mesh_reader.read_with_notes(folder / table.mesh, _sizes(table))
-    else:
-        assert table.part_name is not None
-        mesh, node_sets = part_mesh(table.part_name, table.parameters, path)
+    mesh, node_sets, notes = _read(table, folder, path, _sizes(table))
     if table.volume is not None:
         mesh, node_sets = placing.taken(mesh, node_sets, table.volume)
     mesh = placing.placed(mesh, table.unit, np.eye(3), np.zeros(3))
@@ -118,11 +106,12 @@ def _placed(table: structure.BodyTable, folder: Path, path: Path) -> Noted:
 
 
 def _sizes(table: structure.BodyTable) -> cad.Sizes | None:
-    """Sizes of elements in the unit of a CAD file, of which only the body's own solid is meshed; None for a mesh.
+    """Sizes of elements in the unit of a CAD file, of which only the body's own solid is meshed; None for others.
 
     Raises  ValueError where sizes are asked of a file that is a mesh already
     """
-    assert table.mesh is not None
+    if table.mesh is None:
+        return None
     if Path(table.mesh).suffix.lower() not in cad.ENDINGS:
         if table.size is not None or table.face_sizes:
             raise ValueError(f"size and face_sizes are for CAD files, '{table.mesh}' is meshed already: leave them out")
