@@ -12,8 +12,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import maximum_filter
 
-from tribodyn.geometry.surface import LIMITS, HeightMap, mended, split
-from tribodyn.geometry.surface_pair import centred
+from tribodyn.geometry.surface import LIMITS, HeightMap, centred, mended, split
 
 
 @dataclass(frozen=True)

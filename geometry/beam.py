@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry import blocks, checks, grid
+from tribodyn.geometry import blocks, checks
 
 MESH = ("n_patch", "n_length", "n_height")  # numbers of elements or nodes
 
@@ -55,12 +55,12 @@ def build(parameters: Parameters, path: str | Path) -> None:
     p = parameters
     middle, patch_start = p.length / 2, p.length - p.patch_length
     n_root = min(max(round(p.n_length * middle / patch_start), 1), p.n_length - 1)
-    root = grid.towards_start(0.0, middle, n_root, p.length_grading)
-    outer = grid.towards_end(middle, patch_start, p.n_length - n_root, p.length_grading)
+    root = blocks.towards_start(0.0, middle, n_root, p.length_grading)
+    outer = blocks.towards_end(middle, patch_start, p.n_length - n_root, p.length_grading)
     n_element = (p.n_patch - 1) // 2
-    along_patch = grid.towards_ends(patch_start, p.length, n_element, p.grading)
-    across = grid.towards_ends(0.0, p.width, n_element, p.grading)
-    up = grid.towards_ends(0.0, p.height, p.n_height, p.height_grading)
+    along_patch = blocks.towards_ends(patch_start, p.length, n_element, p.grading)
+    across = blocks.towards_ends(0.0, p.width, n_element, p.grading)
+    up = blocks.towards_ends(0.0, p.height, p.n_height, p.height_grading)
     beam = blocks.body(
         [
             blocks.Block(np.concatenate([root, outer[1:]]), across, up, "beam", {"u-": "clamp"}),

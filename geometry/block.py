@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry import blocks, checks, grid
+from tribodyn.geometry import blocks, checks
 
 MESH = ("n_length", "n_width", "n_height")  # numbers of elements
 
@@ -47,12 +47,12 @@ def build(parameters: Parameters, path: str | Path) -> None:
     below and "pad_max" above
     """
     p = parameters
-    across, up = grid.towards_ends(0.0, p.width, p.n_width), grid.towards_ends(0.0, p.height, p.n_height)
+    across, up = blocks.towards_ends(0.0, p.width, p.n_width), blocks.towards_ends(0.0, p.height, p.n_height)
     padded = p.pad_end > p.pad_start
     ends = sorted({0.0, p.length, *((p.pad_start, p.pad_end) if padded else ())})
     parts = []
     for start, end in pairwise(ends):
-        x = grid.towards_ends(start, end, max(round(p.n_length * (end - start) / p.length), 1))
+        x = blocks.towards_ends(start, end, max(round(p.n_length * (end - start) / p.length), 1))
         kind = "pad" if padded and start == p.pad_start else "z"
         sides = {"v-": "y_min", "v+": "y_max", "w-": f"{kind}_min", "w+": f"{kind}_max"}
         sides |= {"u-": "x_min"} if start == 0.0 else {}

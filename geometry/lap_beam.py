@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry import blocks, checks, grid, rings
+from tribodyn.geometry import blocks, checks, rings
 
 MESH = ("n_side", "n_pad", "n_field", "n_lap", "n_end", "n_length")  # numbers of elements
 
@@ -77,7 +77,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     parts.append(blocks.Block(-strip[::-1], y, below, "beam", lap))
     parts.append(blocks.Block(strip, y, below, "beam", lap))
     end = p.lap / 2 - p.length
-    x = grid.towards_end(end, -p.lap / 2, p.n_length, p.grading)
+    x = blocks.towards_end(end, -p.lap / 2, p.n_length, p.grading)
     parts += [blocks.Block(x, y, z, "beam", {"u-": "end"}) for z in (below, above)]
     made = blocks.body(parts)
     at = {"tip": (end, 0.0, 0.0), "top": (end, 0.0, half)}

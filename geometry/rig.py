@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry import blocks, checks, grid
+from tribodyn.geometry import blocks, checks
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def _column(p: Parameters) -> blocks.JoinedBlocks:
     root, up = _root_lines(p), np.unique(np.concatenate(_height_lines(p)))
     behind = np.array([-p.column_length, root[0]])
     whole = np.append(behind[0], root)
-    across = p.thickness / 2 + grid.towards_start(0.0, p.column_depth, 3, 2.0)
+    across = p.thickness / 2 + blocks.towards_start(0.0, p.column_depth, 3, 2.0)
     below = np.linspace(-p.column_height, 0.0, 3)
     above = np.array([p.height, p.height + OURS.column_above])
     return blocks.body(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import skfem
 
-from tribodyn.geometry import blocks, grid, mesh as mesh_file
+from tribodyn.geometry import blocks, mesh as mesh_file
 
 LINE = np.linspace(0.0, 1.0, 4)
 
@@ -17,16 +17,16 @@ def read(path, *bodies):
 @pytest.mark.parametrize("n", [1, 2, 5, 6, 9])
 @pytest.mark.parametrize("grading", [0.4, 1.0, 2.0, 7.0])
 def test_graded_lines(n, grading):
-    line = grid.towards_ends(0.1, 0.3, n, grading)
+    line = blocks.towards_ends(0.1, 0.3, n, grading)
     assert len(line) == n + 1
     assert (line[0], line[-1]) == (0.1, 0.3)
     lengths = np.diff(line)
     np.testing.assert_allclose(lengths, lengths[::-1])
     if n > 2:
         assert lengths[n // 2] / lengths[0] == pytest.approx(grading)
-    one_sided = np.diff(grid.towards_start(0.1, 0.3, n, grading))
+    one_sided = np.diff(blocks.towards_start(0.1, 0.3, n, grading))
     np.testing.assert_allclose(one_sided[1:] / one_sided[:-1], grading ** (1 / max(n - 1, 1)))
-    np.testing.assert_allclose(np.diff(grid.towards_end(0.1, 0.3, n, grading)), one_sided[::-1])
+    np.testing.assert_allclose(np.diff(blocks.towards_end(0.1, 0.3, n, grading)), one_sided[::-1])
 
 
 @pytest.mark.parametrize("mirror", [False, True])

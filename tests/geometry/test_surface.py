@@ -7,9 +7,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tribodyn.geometry.surface import HeightMap, check, fill_holes, level, prepare, remove_outliers, split
+from tribodyn.geometry.surface import (
+    HeightMap,
+    centred,
+    check,
+    facing_gap,
+    fill_holes,
+    level,
+    mirrored,
+    onto_nodes,
+    prepare,
+    remove_outliers,
+    split,
+    synthetic_pair,
+)
 from tribodyn.geometry.surface_io import read
-from tribodyn.geometry.surface_pair import centred, facing_gap, mirrored, onto_nodes, synthetic_pair
 
 MICRO = 1e-6
 

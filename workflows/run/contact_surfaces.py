@@ -8,8 +8,7 @@ import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.geometry.surface import prepare
-from tribodyn.geometry.surface_pair import centred, facing_gap, onto_nodes
+from tribodyn.geometry.surface import centred, facing_gap, onto_nodes, prepare
 from tribodyn.workflows.scene.contact import Surfaces
 from tribodyn.workflows.scene.contact_numbers import faces
 

@@ -215,7 +215,7 @@ class FaceContact(ContactTable):
 
 
 class SyntheticPair(Table):
-    """A made-up pair of faces, see geometry.surface_pair.synthetic_pair."""
+    """A made-up pair of faces, see geometry.surface.synthetic_pair."""
 
     seed: Annotated[StrictInt, Field(ge=0)]
     """Seed of the random numbers."""

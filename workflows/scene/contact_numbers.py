@@ -74,7 +74,7 @@ def _warmed(contact: Mapping[str, Any], static: Any) -> float:
 def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:
     """The face of body 1, and that of body 2 unless it is flat, in the same coordinates."""
     from tribodyn.geometry import surface_io
-    from tribodyn.geometry.surface_pair import mirrored, synthetic_pair
+    from tribodyn.geometry.surface import mirrored, synthetic_pair
 
     if surfaces.synthetic is not None:
         made = surfaces.synthetic

@@ -12,8 +12,7 @@ import numpy as np
 
 from tribodyn.geometry import surface_io
 from tribodyn.geometry.asperities import Asperities, identify
-from tribodyn.geometry.surface import HeightMap
-from tribodyn.geometry.surface_pair import mirrored
+from tribodyn.geometry.surface import HeightMap, mirrored
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
 
