@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribodyn.geometry import mesh
 from tribodyn.geometry.gmsh_session import session
+from tribodyn.geometry.mesh import area, facts
 from tribodyn.geometry.sources import picking, read
 from tribodyn.geometry.sources.cad import Sizes
 
@@ -36,10 +36,10 @@ def test_solids_are_bodies_that_stay_apart(blocks):
     source = read.read(blocks, "mm")
     assert len(source.bodies) == 2
     for body in source.bodies.values():
-        found = mesh.facts(body.mesh)
+        found = facts(body.mesh)
         assert found.volume == pytest.approx(60e-3 * 20e-3 * 10e-3, rel=1e-9)
         assert sorted(np.round(found.high - found.low, 9)) == [0.01, 0.02, 0.06]
-        areas = {name: mesh.area(body.mesh, ids) for name, ids in body.mesh.boundaries.items()}
+        areas = {name: area(body.mesh, ids) for name, ids in body.mesh.boundaries.items()}
         assert len(areas) == 6
         assert sum(areas.values()) == pytest.approx(2 * (60 * 20 + 60 * 10 + 20 * 10) * 1e-6)
     assert any("second order" in sentence for sentence in source.notes)
@@ -104,8 +104,8 @@ def test_drawings_are_meshed(tmp_path):
     )
     drawing.write_text("\n".join(text) + "\n")
     (body,) = read.read(drawing, "mm").bodies.values()
-    assert mesh.facts(body.mesh).volume == pytest.approx(6e-9)
-    assert mesh.area(body.mesh, body.mesh.boundaries["end"]) == pytest.approx(6e-6)
+    assert facts(body.mesh).volume == pytest.approx(6e-9)
+    assert area(body.mesh, body.mesh.boundaries["end"]) == pytest.approx(6e-6)
 
 
 def test_faces_are_picked_by_rule(blocks):
@@ -113,7 +113,7 @@ def test_faces_are_picked_by_rule(blocks):
     body = min(source.bodies.values(), key=lambda one: one.mesh.p[2].min())
     mesh = body.mesh
     top = picking.by_normal(mesh, (0, 0, 1), 5.0)
-    assert mesh.area(mesh, top) == pytest.approx(60e-3 * 20e-3)
+    assert area(mesh, top) == pytest.approx(60e-3 * 20e-3)
     np.testing.assert_array_equal(np.sort(picking.nearest(mesh, (0.03, 0.01, 0.02))), np.sort(top))
     np.testing.assert_array_equal(np.sort(picking.within_box(mesh, (0, 0, 0.01), (0.06, 0.02, 0.01))), np.sort(top))
     with pytest.raises(ValueError, match="no face of the boundary lies within the box"):
