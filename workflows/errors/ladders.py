@@ -115,7 +115,7 @@ def ladders_of(scene: Scene, study: Study, names: Sequence[str] = ()) -> tuple[L
 
 def _of_any(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
     """Names and settings of what scenes have without a study."""
-    if isinstance(scene, MeshScene):
+    if isinstance(scene, MeshScene) and scene.geometry is not None:
         modes = scene.reduction.modes
         if modes:
             yield "modes", _numbers("reduction.modes", sorted({0, modes // 3, modes, 3 * modes}))
