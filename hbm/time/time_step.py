@@ -291,7 +291,7 @@ def solve_small(M, pivots, r):
 def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, work, r, J, M, pivots):
     """Newton on x + own f(x) = b for one pair from the guess x, which is overwritten; returns bits, 0: failed.
 
-    bits : of the guess, whose force is in `work` then; 0 where it is not known
+    bits : of the guess, whose force and memory are in `work` then; 0 where it is not known
     M, pivots : factors of 1 + own J, kept from solution to solution as long as the slope J stays what it was
     """
     f, slope = work[0], work[2]
@@ -353,6 +353,7 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, pivots, m
             continue
         if known != 0:
             put_vector(f[i], work[0])
+            put_vector(memory[i], work[1])
         bits[i] = solve_pair(
             step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], normal, own, b, 0.1 * near, known, work,
             r, J[i], M[i], pivots[i],

@@ -9,13 +9,15 @@ from scipy.integrate import solve_ivp
 from tests.helpers.verification_models import interface, oscillator, random_structure
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact import compiled_law, law as contact_law
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.contact.law import STICKS, ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options, TimeStepper
+from tribodyn.hbm.time.time_step import Contact, Space, sweep
 from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 300.0
@@ -222,3 +224,23 @@ def test_what_has_no_equation_of_motion_is_refused():
     with pytest.raises(ValueError, match="steps per period"):
         Options(steps=2)
     assert interface(np.eye(2), ("t1", "n")).n_pair == 1
+
+
+def test_a_pair_that_rounding_solves_keeps_its_own_memory():
+    """Its equation holds before the law is asked: what the pair before has left in the work space is not its own."""
+    law = compiled_law.pointer(contact_law.load("jenkins").step)
+    parameters = ContactParameters.of(("t1", "t2", "n"), np.ones((2, 3)), friction=0.5)
+    contact = Contact(parameters.packed(), parameters.gap, 2, np.eye(6))
+    s = np.array([[1e-4, 2e-4], [3e-4, 4e-4]])
+    x, f = np.array([[1e-3, 1e-3, 1e-2], [0.5, 0.5, 0.5]]), np.array([[0.0, 0.0, 0.0], [1e3, 1e3, 1e3]])
+    x_free = np.concatenate([np.full(3, 2e-2), np.full(3, 0.5 + 4e-16)])  # less than what rounds 1000 off
+    space, memory = Space.of(2, 3, 2), s.copy()
+    space.bits[1] = STICKS
+    work, r, b, y, bits, J, M, pivots = space[:8]
+    sweep(
+        law, contact, x_free, x.copy(), np.zeros(2, bool), s, x, f, y, bits, J, M, pivots, memory, 2e-15, False, work,
+        r, b,
+    )  # fmt: skip
+    assert bits.all()
+    assert np.isfinite(x).all()
+    assert np.array_equal(memory[1], s[1])
