@@ -203,15 +203,35 @@ def at_peak(
     gradient, *near = (beside(ends[0], side) for side in (0.0, -RULES.along, RULES.along))
     near = [replace(one, quantities=one.quantities[:1]) for one in near]
     names, steps, (own, *points) = _fixed([gradient, *near], changes)
-    slopes = [p.values[0] * np.concatenate([p.by_frequency[:1], p.columns[0]]) for p in points]
+    curvature, moves = _bend(points, width)
+    left = -own.by_frequency[0] / own.values[0] / curvature
+    own = replace(own, values=own.values + left * own.by_frequency)
+    return _gathered(gradient, names, steps, own, solves + 2, gradient.state.omega + left, moves)
+
+
+def _bend(points: Sequence[_Fixed], width: float) -> tuple[float, np.ndarray]:
+    """(ln A)_ww of two points beside a peak, and the d omega of it by every column."""
+    slopes = [np.concatenate([p.by_frequency[:1], p.columns[0]]) / p.values[0] for p in points]
     curvature, *mixed = (slopes[1] - slopes[0]) / (2 * RULES.along * width)
     if not curvature < 0:
         raise NoDerivative("the response has no maximum beside this point")
-    left = -own.values[0] * own.by_frequency[0] / curvature
-    own = replace(own, values=own.values + left * own.by_frequency)
-    return _gathered(
-        gradient, names, steps, own, solves + 2, gradient.state.omega + left, -np.asarray(mixed) / curvature
-    )
+    return float(curvature), -np.asarray(mixed) / curvature
+
+
+def peak_moves(
+    balance: HarmonicBalance,
+    state: State,
+    output: str,
+    changes: Iterable[Change],
+    options: NewtonOptions | None = None,
+) -> np.ndarray:
+    """(n_change + n_pair,) d omega of the peak that a state is at, by the changes and by the gap of every pair."""
+    here, near = _slope(balance, state, output), []
+    for side in (-RULES.along, RULES.along):
+        omega = state.omega + side * here.width
+        beside = _solved(balance, omega, here.predict(omega), options)
+        near.append(Gradient(balance, beside, tuple(quantities(balance, beside, output)[:1])))
+    return _bend(_fixed(near, changes)[2], here.width)[1]
 
 
 def _at_corner(

@@ -15,7 +15,7 @@ model, such as the shapes of a reduction, x and y are compared at the same g, wh
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -294,11 +294,6 @@ class Gradient:
             raise NoDerivative(f"the adjoint is not solved: {reached:.0e} of it is left, as at a fold of the response")
         return solution
 
-    @property
-    def force_weights(self) -> np.ndarray:
-        """(n_quantity, n_pair, n_component, n_coeff) dq / df of the contact forces."""
-        return self._adjoints[2].reshape(-1, *self.state.x.shape)
-
     def by_frequency(self) -> np.ndarray:
         """(n_quantity,) dq / d omega at fixed parameters."""
         total = np.zeros(len(self.quantities))
@@ -316,8 +311,9 @@ class Gradient:
         if "n" not in balance.contact.components or not balance.basis.has_static:
             return np.zeros((len(self.quantities), balance.contact.n_pair))
         step, gap = RULES.of_gap * float(np.abs(self.state.x).max()), balance.contact.gap
-        above, below = (replace(self.own, contact=balance.contact.with_gap(gap + side)) for side in (step, -step))
-        return (self.moves_to(above) - self.moves_to(below)) / (2 * step)
+        above, below = (self._force(balance.contact.with_gap(gap + side), balance.memory) for side in (step, -step))
+        slope = (above - below) / (2 * step)
+        return np.einsum("qpch,pch->qp", self._adjoints[2].reshape(-1, *slope.shape), slope)
 
     @cached_property
     def own(self) -> Posed:
@@ -333,55 +329,50 @@ class Gradient:
         k, base = balance.reference_stiffness[:, None], posed.excitation.base
         moved = self.state.flat if base is None else self.state.flat + balance.loaded(base)
         g = basis.to_complex(k * moved - self.state.cycle.force.reshape(moved.shape))
-        found = []
-        for i, (h, side) in enumerate(zip(basis.harmonics, sides, strict=True)):
-            total = side.B.conj().T @ g[:, i]
-            for (order, name), value in posed.excitation.loads.items():
-                if order == h:
-                    total = total + (balance.load_factor if h else 1.0) * value * side.system.loads[name]
-            found.append(total)
-        return found
+        sized = zip(basis.harmonics, sides, g.T, strict=True)
+        return [side.B.conj().T @ part + self._loads(posed, side.system, h) for h, side, part in sized]
 
-    def moves_to(self, posed: Posed) -> np.ndarray:
-        """(n_quantity, n_pair) what each pair's force of another problem adds to the quantities, to first order."""
-        if posed.contact is self.balance.contact and posed.memory is self.balance.memory:
-            return np.zeros((len(self.quantities), self.balance.contact.n_pair))
-        force = posed.contact.cycle(self.state.x, self.balance.basis, posed.memory, jacobian=False).force
-        return np.einsum("qpch,pch->qp", self.force_weights, force - self.state.cycle.force)
+    def _force(self, contact: Contact, memory: np.ndarray) -> np.ndarray:
+        """(n_pair, n_component, n_coeff) what another contact adds to the forces at the same x [N]."""
+        if contact is self.balance.contact and memory is self.balance.memory:
+            return np.zeros_like(self.state.x)
+        cycle = contact.cycle(self.state.x, self.balance.basis, memory, jacobian=False)
+        return np.asarray(cycle.force - self.state.cycle.force)
 
-    def structure_to(self, posed: Posed) -> np.ndarray:
-        """(n_quantity,) what its model and loads add, to first order."""
-        balance, omega, own = self.balance, self.state.omega, self.balance.model
-        if posed.model is own and posed.excitation is balance.excitation:
-            return np.zeros(len(self.quantities))
-        l, w, _ = self._adjoints
-        base, before = posed.excitation.base, balance.excitation.base
-        stretched = 0.0
+    def _structure(self, above: Posed, below: Posed) -> tuple[np.ndarray, np.ndarray]:
+        """What model and loads of one problem add to x and outputs of another at the same u and contact forces."""
+        balance, own = self.balance, self.balance.model
+        if above.model is below.model and above.excitation is below.excitation:
+            return np.zeros_like(self.state.flat), np.zeros((len(self._sides[0].C), balance.basis.n_coeff))
+        if above.model.interface.B is not own.interface.B or below.model.interface.B is not own.interface.B:
+            there, here = (self._seen(one, _sides(one, balance, self.state.omega)) for one in (above, below))
+            return there[0] - here[0], there[1] - here[1]
+        moved = []  # in the same coordinates
+        for h, side, u in zip(balance.basis.harmonics, self._sides, self.u, strict=True):
+            up, down = (one.model.at_harmonic(h)[0] for one in (above, below))
+            changed = self._loads(above, up, h) - self._loads(below, down, h)
+            if up is not down:
+                changed = changed - _difference(up, down, 1j * h * self.state.omega, u)
+            moved.append(side.solve(changed))
+        x, y = self._real(self._sides, moved)
+        base, before = above.excitation.base, below.excitation.base
         if base is not None and before is not None and base is not before:
-            stretched = -np.einsum("qnc,nc->q", l, balance.loaded(base - before))
-        if posed.model.interface.B is own.interface.B:  # the same coordinates
-            sides = _sides(posed, balance, None)
-            total = np.zeros(len(self.quantities)) + stretched
-            forces = zip(self._forces(posed, sides), self._forces(self.own, self._sides), strict=True)
-            for i, (h, (new, old)) in enumerate(zip(balance.basis.harmonics, forces, strict=True)):
-                changed = new - old
-                if sides[i].system is not self._sides[i].system:
-                    changed = changed - _difference(sides[i].system, self._sides[i].system, 1j * h * omega, self.u[i])
-                total += np.real(w[i].conj().T @ changed)
-            return total
-        x, y = self._seen(posed, _sides(posed, balance, omega))
-        x_own, y_own = self._seen(self.own, self._sides)
-        seen = np.stack([q.of_output for q in self.quantities])
-        return np.einsum("qnc,nc->q", l, x - x_own) + np.einsum("qnc,nc->q", seen, y - y_own)
+            x = x - balance.loaded(base - before)
+        return x, y
+
+    def _loads(self, posed: Posed, system: SecondOrderSystem, h: int) -> np.ndarray:
+        """(n,) loads of a harmonic."""
+        factor, loads = self.balance.load_factor if h else 1.0, posed.excitation.loads
+        total = np.zeros(len(system.mass), complex)
+        for (order, name), value in loads.items():
+            if order == h:
+                total += factor * value * system.loads[name]
+        return total
 
     def _seen(self, posed: Posed, sides: list[_Side]) -> tuple[np.ndarray, np.ndarray]:
         """x and outputs of a problem under this g."""
-        balance, basis = self.balance, self.balance.basis
-        u = self._moved(posed, sides)
-        x, y = (
-            basis.to_real(np.stack([rows(side) @ v for side, v in zip(sides, u, strict=True)], axis=-1))
-            for rows in (lambda side: side.B, lambda side: side.C)
-        )
+        balance = self.balance
+        x, y = self._real(sides, self._moved(posed, sides))
         base, residual = posed.excitation.base, posed.model.residual
         if residual is not None:
             moved = self.state.flat if base is None else self.state.flat + balance.loaded(base)
@@ -389,12 +380,43 @@ class Gradient:
             x = x + residual.apply(k * moved - self.state.cycle.force.reshape(moved.shape))
         return x if base is None else x - balance.loaded(base), y
 
-    def by(self, change: Change) -> tuple[np.ndarray, np.ndarray]:
-        """One-sided derivatives of the quantities above and below a parameter, both (n_quantity,)."""
-        sides = (change.above, change.below, *(change.twice or ()))
-        up, down, *far = (self.moves_to(side).sum(axis=1) + self.structure_to(side) for side in sides)
+    def _real(self, sides: list[_Side], u: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients of x and of the outputs of coordinates u (n,) of each harmonic."""
+        maps = ([side.B for side in sides], [side.C for side in sides])
+        x, y = (
+            self.balance.basis.to_real(np.stack([rows @ v for rows, v in zip(of, u, strict=True)], axis=-1))
+            for of in maps
+        )
+        return x, y
+
+    def effects(self, change: Change) -> tuple[np.ndarray, np.ndarray]:
+        """One-sided slopes above and below a parameter of contact forces at
+        the same x, and of x and outputs at the same forces, in one vector."""
+        up, down = self._added(change.above, change.below)
+        far = self._added(*change.twice) if change.twice else ()
         if change.twice is not None:
             up = (8 * (up - down) - (far[0] - far[1])) / 12 if far else (up - down) / 2
             down = -up
-        by_touching = self.by(change.touching) if change.touching is not None else (0.0, 0.0)
-        return up / change.step + by_touching[0], -down / change.step + by_touching[1]
+        above, below = up / change.step, -down / change.step
+        if change.touching is None:
+            return above, below
+        besides = self.effects(change.touching)
+        return above + besides[0], below + besides[1]
+
+    def _added(self, above: Posed, below: Posed) -> tuple[np.ndarray, np.ndarray]:
+        """Vectors of `effects` of two problems to both sides of this one, halfway between them but for the contact."""
+        half = np.concatenate([part.ravel() for part in self._structure(above, below)]) / 2
+        up, down = (self._force(one.contact, one.memory).ravel() for one in (above, below))
+        return np.concatenate([up, half]), np.concatenate([down, -half])
+
+    @cached_property
+    def _rows(self) -> np.ndarray:
+        """(n_quantity, n) of a vector of `effects`."""
+        l, _, weights = self._adjoints
+        n, seen = len(self.quantities), np.stack([q.of_output for q in self.quantities])
+        return np.concatenate([weights.reshape(n, -1), l.reshape(n, -1), seen.reshape(n, -1)], axis=1)
+
+    def by(self, change: Change) -> tuple[np.ndarray, np.ndarray]:
+        """One-sided derivatives of the quantities above and below a parameter, both (n_quantity,)."""
+        above, below = self.effects(change)
+        return self._rows @ above, self._rows @ below

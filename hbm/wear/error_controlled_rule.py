@@ -292,7 +292,7 @@ def _step_of(
     higher: tuple[OperatingPoint, ...] | None = None
     look = _next_look(problem, state, rows)
     while True:
-        searches = [_Search(slope) for slope in slopes]
+        searches = [Search(slope) for slope in slopes]
         first, second = _stages(problem, state, stride, drift, searches)
         slopes = np.array([search.slope for search in searches])
         solves += first.solves + second.solves
@@ -476,7 +476,7 @@ def _share_to(target: float, start: float, end: float) -> float:
 
 
 def _stages(
-    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[_Search]
+    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[Search]
 ) -> tuple[WearState, WearState]:
     """Both stages of a step from a state; the second is the state after it."""
     omega = np.array([point.state.omega for point in state.points])
@@ -486,7 +486,7 @@ def _stages(
         guess.append(point.state.x + balance.gap_response(point.state, GAMMA * stride * state.rate))
     cycles = state.cycles + GAMMA * stride
     ahead = GAMMA * stride
-    first = _stage(problem, state, state.depth, ahead, cycles, guess, omega + ahead * drift, searches)
+    first = stage(problem, state, state.depth, ahead, cycles, guess, omega + ahead * drift, searches)
     if first.failure:
         return first, replace(first, solves=0)
     base = state.depth + (1 - GAMMA) / GAMMA * (first.depth - state.depth)
@@ -494,10 +494,10 @@ def _stages(
     for before, after in zip(state.points, first.points, strict=True):
         guess.append(before.state.x + (after.state.x - before.state.x) / GAMMA)
         further.append(before.state.omega + (after.state.omega - before.state.omega) / GAMMA)
-    return first, _stage(problem, first, base, ahead, state.cycles + stride, guess, np.array(further), searches)
+    return first, stage(problem, first, base, ahead, state.cycles + stride, guess, np.array(further), searches)
 
 
-def _stage(
+def stage(
     problem: WearProblem,
     near: WearState,
     base: np.ndarray,
@@ -505,12 +505,12 @@ def _stage(
     cycles: float,
     guess: Sequence[np.ndarray],
     omega: np.ndarray,
-    searches: Sequence[_Search],
+    searches: Sequence[Search],
 ) -> WearState:
     """Solve depth = base + stretch rate(depth) with every duty at its site; the wear per work of `near` is tried."""
     duties = problem.mission
     unworn = [problem.in_duty(duty) for duty in duties]
-    gain = _gain(problem, near)
+    gain = depth_per_work(problem, near)
     x, depth = np.concatenate(guess, axis=1), near.depth + stretch * near.rate
     solves = rounds = retreats = 0
     known: tuple[np.ndarray, np.ndarray] | None = None  # frequencies and x that the search went on from
@@ -538,7 +538,7 @@ def _stage(
         if not solution.converged:
             return found
         after = np.array([s.next(w, c.distance) for s, w, c in zip(searches, omega, corrections, strict=True)])
-        turned = _gain(problem, found)
+        turned = depth_per_work(problem, found)
         settled = np.all(np.abs(turned - gain) * found.work * stretch <= RULES.gain_accuracy * np.abs(depth).max())
         if settled and np.all(np.abs(after - omega) <= [c.accuracy for c in corrections]):
             return found
@@ -550,8 +550,8 @@ def _stage(
         omega, gain = after, turned
 
 
-def _gain(problem: WearProblem, state: WearState) -> np.ndarray:
-    """(n_pair,) wear depth per friction work [m/J]; a pair at rest is taken to wear as the working ones on average."""
+def depth_per_work(problem: WearProblem, state: WearState) -> np.ndarray:
+    """(n_pair,) [m/J] of a state; a pair at rest is taken to wear as the working ones on average."""
     gain, area = np.zeros_like(state.rate), problem.area
     for name, wear in problem.wearing.items():
         pairs = problem.balance.contact.joint(name).rows
@@ -566,7 +566,7 @@ def _gain(problem: WearProblem, state: WearState) -> np.ndarray:
     return gain
 
 
-class _Search:
+class Search:
     """The frequency at which a miss vanishes, from the misses so far; the miss falls as the frequency rises."""
 
     def __init__(self, slope: float):

@@ -175,18 +175,13 @@ class WearingBalance:
         along = np.zeros((n_pair, n_duty * width))
         column = np.zeros((n_pair, n_duty * width))
         bend, gain = np.ones(n_pair), self.cycles * self.gain
-        t = first.contact.tangential
         for i, (share, sample, part) in enumerate(zip(self.shares, samples, parts, strict=True)):
             rows = slice(i * width, (i + 1) * width)
             jac = sample.cycle.jacobian
             assert jac is not None
             jacobian[:, rows, rows] = jac
             column[:, rows] = sample.column
-            moved = jac.reshape(*part.shape, width).transpose(0, 3, 1, 2)
-            slope = first.basis.work_per_cycle(moved, part[:, None])[:, :, t].sum(axis=2)
-            turned = np.zeros_like(part)  # the work of f against a unit of each coefficient of x
-            turned[:, t] = -np.pi * (sample.cycle.force @ first.basis.rate)[:, t]
-            along[:, rows] = share * (slope + turned.reshape(n_pair, width))
+            along[:, rows] = share * work_slope(first, part, sample.cycle)
             bend = bend + gain * sample.falls
         slope = gain[:, None] * along / bend[:, None]
         jacobian -= column[:, :, None] * slope[:, None, :]  # a depth acts as a static shift of the normal displacement
@@ -241,6 +236,17 @@ class WearingBalance:
             falls = share * balance.basis.work_per_cycle(column.reshape(x.shape), x)[:, t].sum(axis=1)
             made.append(_Sample(cycle, column, work, np.where(work > 0, falls, 0.0)))
         return made
+
+
+def work_slope(balance: HarmonicBalance, x: np.ndarray, cycle: ContactCycle) -> np.ndarray:
+    """(n_pair, n_component * n_coeff) d friction work of a pair / d its x, at the gap that it has [N]."""
+    basis, t, jac = balance.basis, balance.contact.tangential, cycle.jacobian
+    assert jac is not None
+    moved = jac.reshape(*x.shape, -1).transpose(0, 3, 1, 2)
+    slope = basis.work_per_cycle(moved, x[:, None])[:, :, t].sum(axis=2)
+    turned = np.zeros_like(x)  # the work of f against a unit of each coefficient of x
+    turned[:, t] = -np.pi * (cycle.force @ basis.rate)[:, t]
+    return np.asarray(slope + turned.reshape(len(x), -1))
 
 
 @dataclass(frozen=True)

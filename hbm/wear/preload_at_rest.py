@@ -33,9 +33,7 @@ class PreloadAtRest:
         if problem.lost_below_at_rest is None or state.failure:
             return state
         if self._quiet is None:
-            first, output = problem.mission[0], problem.balance.compliance.output_names[0]
-            site = AtFrequency(output, state.points[0].state.omega, first.site.newton)
-            self._quiet = replace(problem, mission=(replace(first, site=site, share=1.0, load=0.0),))
+            self._quiet = self.quiet(state)
         self._before = assess(self._quiet, state.depth, 0.0, self._before)
         solves = state.solves + self._before.solves
         if self._before.failure:
@@ -43,3 +41,9 @@ class PreloadAtRest:
             return replace(state, lost=failure, preload_at_rest=float(np.nan), solves=solves)
         preload = problem.preload_of(self._before)
         return replace(state, preload_at_rest=preload, solves=solves)
+
+    def quiet(self, state: WearState) -> WearProblem:
+        """The problem without harmonic loads, at the frequency of a state."""
+        first, output = self._problem.mission[0], self._problem.balance.compliance.output_names[0]
+        site = AtFrequency(output, state.points[0].state.omega, first.site.newton)
+        return replace(self._problem, mission=(replace(first, site=site, share=1.0, load=0.0),))

@@ -311,7 +311,7 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
 @pytest.mark.parametrize("steepness", [0.5, 1.0, 10.0, 30.0])
 def test_the_frequency_of_a_peak_is_found_where_its_distance_is_taken_for_far_too_large(steepness: float) -> None:
     """The frequencies that are tried stay beside the peak: further off there may be no solution."""
-    search, peak = error_controlled_rule._Search(error_controlled_rule.RULES.unknown_slope), 1.002
+    search, peak = error_controlled_rule.Search(error_controlled_rule.RULES.unknown_slope), 1.002
     tried = [1.0]
     while abs(tried[-1] - peak) > 1e-5 and len(tried) <= error_controlled_rule.RULES.max_corrections:
         tried.append(search.next(tried[-1], steepness * (peak - tried[-1])))

@@ -146,11 +146,25 @@ def test_derivatives_of_a_mode_are_those_of_modes_found_anew():
     np.testing.assert_allclose(found.elasticities["contact.friction"], difference, rtol=1e-5)
 
 
+@pytest.mark.slow
+def test_the_laws_of_scaling_hold_for_a_life():
+    """All loads times c: c times as deep in a life over c. All stiffness and mass times c: over c as deep, as long."""
+    overrides = (*BEAM, "wear.motion=balance", "wear.at=800 Hz", LOCATED)
+    found = td.studies.derivatives("beam", of="life", overrides=overrides)
+    rows = found.elasticities
+    loads = sum(row for key, row in rows.items() if key.startswith("loads."))
+    body = sum(row for key, row in rows.items() if key.endswith(("stiffness", "young", "density")))
+    np.testing.assert_allclose([loads, body], [[-1, 1, 1], [0, -1, -1]], atol=2e-5)
+    np.testing.assert_allclose(rows["wear.coefficient"], [-1, 0, 0], atol=1e-9)
+    assert found.lines()[0].startswith("life ")
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
         (("--of", "mode"), "give --amplitude of the mode, or backbone.modal_amplitude in the scene"),
         (("--amplitude", "1 mm"), "--amplitude is that of --of mode"),
+        (("--of", "life", "--set", "wear.at=800 Hz", "--at", "1 Hz"), "--at a frequency of --of response or fold"),
     ],
 )
 def test_what_is_missing_is_one_sentence(capsys, words, sentence):

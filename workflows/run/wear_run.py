@@ -29,7 +29,7 @@ from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.structure import NamedContact
-from tribodyn.workflows.scene.wear import Wear
+from tribodyn.workflows.scene.wear import JointWearTable, Wear
 
 KEEPING = 0.05  # share of the time that goes into writing steps: a kill loses as many as take twenty times one writing
 
@@ -115,11 +115,22 @@ def wear_problem(
 
 def coefficients(scene: Scene) -> dict[str, float]:
     """Wear coefficient [m3/J] of every joint whose volume goes with the friction work; none where a scene wears not."""
+    return {name: value for value, joints in coefficient_keys(scene).values() for name in joints}
+
+
+def coefficient_keys(scene: Scene) -> dict[str, tuple[float, tuple[str, ...]]]:
+    """The same by the keys of the scene: coefficient, and the joints that wear by it."""
     if scene.wear is None:
         return {}
     own = {name: c.wear for name, c in scene.joints.items() if isinstance(c, NamedContact) and c.wear is not None}
-    tables = dict.fromkeys(scene.joints, scene.wear) | own
-    return {name: table.numbers["coefficient"] for name, table in tables.items() if table.law == "energy"}
+    rest = tuple(name for name in scene.joints if name not in own)
+    tables: list[tuple[str, JointWearTable, tuple[str, ...]]] = [("wear", scene.wear, rest)]
+    tables += [(f"contacts.{name}.wear", table, (name,)) for name, table in own.items()]
+    return {
+        f"{key}.coefficient": (table.numbers["coefficient"], joints)
+        for key, table, joints in tables
+        if table.law == "energy" and joints and table.numbers["coefficient"]
+    }
 
 
 def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:

@@ -19,6 +19,8 @@ from tribodyn.hbm.derivatives import Derivatives
 from tribodyn.hbm.gradient import Change, NoDerivative
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import limited
+from tribodyn.hbm.wear import tangent
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.style import CYCLE, GREY
 from tribodyn.workflows.run import curve, pipeline, settings, wear_run
@@ -27,6 +29,7 @@ from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.varying import STEP, Varying, keys
 from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.scene.wear import Place
 from tribodyn.workflows.studies.curves import backbones
@@ -35,13 +38,14 @@ from tribodyn.workflows.studies.files import write_files
 
 SHOWN = 12  # parameters in the picture
 OF_ROWS = {"peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
-PLOTTED = ("frequency", "amplitude", "damping", "energy", "preload")
+PLOTTED = ("frequency", "amplitude", "damping", "energy", "preload", "life", "depth", "volume")
 # step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
 OF_MODE = 1e-4
 DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
 Slopes = dict[tuple[str, str], float]
 UNITS = {
     "frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3", "damping": "",
+    "life": "cycles", "depth": "m", "volume": "m3",
 }  # fmt: skip
 MICROMETRE = 1e-6
 
@@ -105,7 +109,7 @@ class ResponseDerivatives:
         }
 
     def lines(self) -> list[str]:
-        """Elasticities, the strongest on the amplitude first."""
+        """Elasticities, the strongest on the amplitude or the life first."""
         f = self.found
         names = ["phase [rad]" if name == "phase" else name for name in f.names]
         width = [max(12, len(name) + 2) for name in names]
@@ -127,7 +131,8 @@ class ResponseDerivatives:
                 f"{above:+.4g} above it and {below:+.4g} below{where}, and the table their mean"
             )
         share = 100 * self.seconds / self.response_seconds
-        lines.append(f"{self.seconds:.3g} s, {share:.2g} % of the {self.response_seconds:.3g} s of the response")
+        what = "life" if "life" in f.names else "response"
+        lines.append(f"{self.seconds:.3g} s, {share:.2g} % of the {self.response_seconds:.3g} s of the {what}")
         if self.anew:
             lines.append(f"most of them for {len(self.anew)} keys with which the model is reduced anew")
         return lines
@@ -159,7 +164,7 @@ class ResponseDerivatives:
 def derivatives(
     scene: Source,
     *,
-    of: Literal["response", "fold", "mode"] = "response",
+    of: Literal["response", "fold", "mode", "life"] = "response",
     at: Frequency | None = None,
     amplitude: Length | None = None,
     only: tuple[str, ...] = (),
@@ -172,7 +177,8 @@ def derivatives(
     is reduced anew, such as the stiffness of one body of several, take four reductions each.
 
     scene : name of a scene or a .toml file
-    of : the response; the frequency of its fold; frequency and damping of the nonlinear mode of [backbone]
+    of : the response; the frequency of its fold; frequency and damping of the nonlinear mode of [backbone]; the life by
+        [wear] until 0.1 % of the preload is left, with the largest depth and the volume that are worn then
     at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too. The fold
         next to it; that of the largest amplitude by default
     amplitude : of the observed displacement in the mode, which stays; the last modal one of [backbone] by default
@@ -181,10 +187,14 @@ def derivatives(
     """
     file = read_scene(scene, overrides)
     known = keys(file.scene)
+    if of == "life":
+        if file.scene.wear is None:
+            raise SceneError("a life needs [wear] in the scene")
+        known |= {key: value for key, (value, _) in wear_run.coefficient_keys(file.scene).items()}
     unknown = [key for key in only if key not in known]
     if unknown:
         raise SceneError(f"{unknown[0]} is no number that a response depends on: these are {', '.join(known)}")
-    if (amplitude is not None and of != "mode") or (at is not None and of == "mode"):
+    if (amplitude is not None and of != "mode") or (at is not None and of in ("mode", "life")):
         raise SceneError("--amplitude is that of --of mode, and --at a frequency of --of response or fold")
     if of == "mode" and amplitude is None and file.scene.backbone is None:
         raise SceneError("give --amplitude of the mode, or backbone.modal_amplitude in the scene")
@@ -199,10 +209,13 @@ def _of_scene(
     """Of a scene that was read; at : frequency [Hz], or the amplitude of a mode [m]; wanted : key -> value."""
     varying = Varying(file, report, OF_MODE if of == "mode" else STEP)
     balance, clock = varying.model.balance, process_time()
-    mode = branch = None
+    mode = branch = worn = None
     if of == "mode":
         asked = AmplitudeRange.of(file, None if at is None else at / DECADES, at, None, None)
         mode = backbones.along(file, balance, asked, report)
+    elif of == "life":
+        with report.track("wear") as advance:
+            worn = wear_run.worn_out(file, varying.model, _share(file.scene))
     else:
         with report.track("frequency response") as advance:
             branch = curve.follow_response(file.scene, balance, advance)
@@ -212,6 +225,8 @@ def _of_scene(
         try:
             if mode is not None:
                 found = _of_mode(varying, mode, wanted, advance, modal=at is None)
+            elif worn is not None:
+                found = _of_life(varying, worn, wanted, advance)
             else:
                 assert branch is not None
                 found = _found(varying, branch, at, wanted, advance, of == "fold")
@@ -248,6 +263,20 @@ def _of_mode(
     point = problem.at(x, mode.omega[-1], mode.damping[-1], mode.modal_amplitude[-1])
     changes, options = _changes(varying, wanted, advance), settings.newton_options(varying.scene)
     return exact.at_mode(problem, point, changes, options, modal)
+
+
+def _share(scene: Scene) -> float:
+    """Of the first preload, where the life that a result states ends."""
+    assert scene.wear is not None
+    return (scene.wear.lost_below if scene.wear.end_at == "at_rest" else 0.0) or LIFE_SHARE
+
+
+def _of_life(varying: Varying, worn: WearHistory, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
+    scene, by_key = varying.scene, wear_run.coefficient_keys(varying.scene)
+    problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
+    coefficients = {key: by_key[key] for key in wanted if key in by_key}
+    own = {key: value for key, value in wanted.items() if key not in by_key}
+    return tangent.of_life(problem, worn, _changes(varying, own, advance), coefficients, _share(scene))
 
 
 def _found(

@@ -1,0 +1,147 @@
+"""Derivatives of a life against the same steps taken again, laws of scaling, and where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers.pressed_body import balance_of, pressed_body, wear_problem
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
+from tribodyn.hbm.gradient import Change, NoDerivative, Posed
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.wear import error_controlled_rule, tangent, thesis_rule
+from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess, state_of
+from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
+
+EXACT = NewtonOptions(tolerance=1e-12)
+SHARE, STEP, LOADS = 0.2, 1e-6, ("press", "shake")
+AT = AtFrequency("tip", 420.0, EXACT)
+PEAK = replace(AtPeak("tip", 250.0, 1200.0, newton=EXACT), tolerance=1e-7)
+
+
+def problem_of(site, name="", factor=1.0, **changes) -> WearProblem:
+    """The problem with one of its numbers times a factor; gaps open by (factor - 1) 0.1 mm."""
+    balance = balance_of(pressed_body(), (0, 1))
+
+    def changed(p):
+        springs = [factor if name == of else 1.0 for of in ("t1", "t2", "n")]
+        numbers = {of: factor * value if name == of else value for of, value in p.numbers.items()}
+        return replace(p, numbers=numbers, stiffness=p.stiffness * np.array(springs))
+
+    if name in LOADS:
+        loads = {of: factor * value if of[1] == name else value for of, value in balance.excitation.loads.items()}
+        excitation = replace(balance.excitation, loads=loads)
+        balance = HarmonicBalance.of(balance.model, balance.contact.joints, balance.basis, excitation, 1500.0)
+    elif name == "gap":
+        balance = balance.with_gap(balance.contact.gap + 1e-4 * (factor - 1))
+    else:
+        balance = balance.with_contact(balance.contact.with_parameters(changed))
+    coefficient = 1e-9 * (factor if name == "coefficient" else 1.0)
+    given = {"mission": (Duty(site),), "lost_below": SHARE, "wear": JointWear.of("energy", coefficient=coefficient)}
+    return wear_problem(balance=balance, **(given | changes))
+
+
+def found_of(problem, worn, site, names, share=SHARE):
+    own = Posed.of(problem.balance)
+
+    def posed(name, factor):
+        there = problem_of(site, name, factor).balance
+        return replace(own, excitation=there.excitation) if name in LOADS else replace(own, contact=there.contact)
+
+    changes = [Change(name, STEP, *(posed(name, 1 + side) for side in (STEP, -STEP))) for name in names]
+    return tangent.of_life(problem, worn, changes, {"coefficient": (1.0, ["contact"])}, share)
+
+
+def again(worn, end, site, name, factor, longer):
+    """Cycles, largest depth and volume behind the steps of a run with one number changed, and ln of the preload left.
+
+    longer : factor on all steps
+    """
+    problem, rows = problem_of(site, name, factor), worn.rows()
+    state = assess(problem, np.zeros_like(problem.area), 0.0, state_of(problem, rows[0]))
+    first = problem.preload_of(state)
+    for row in rows[:end]:
+        stride = longer * row.cycles_in_step
+        if len(row.plan):
+            searches = [error_controlled_rule.Search(slope) for slope in row.plan[1:-1]]
+            state = error_controlled_rule._stages(problem, state, stride, np.zeros(1), searches)[1]
+        else:
+            state = assess(problem, state.depth + stride * state.rate, state.cycles + stride, state)
+        assert not state.failure
+    left = np.log(problem.preload_of(state) / first)
+    return np.array([state.cycles, state.depth.max(), problem.area @ state.depth]), left
+
+
+def elasticity_anew(worn, site, name, guess):
+    """Central difference of runs whose steps keep their shares of a life that ends at the same share of the preload."""
+    end, h = int(np.flatnonzero(worn.preload < SHARE * worn.preload[0])[0]), 1e-4
+    values, left = again(worn, end, site, "", 1.0, 1.0)
+    slope = (again(worn, end, site, "", 1.0, 1 + h)[1] - left) / h
+    sides = []
+    for factor in (1 + h, 1 - h):
+        longer = 1 + guess * (factor - 1)
+        longer -= (again(worn, end, site, name, factor, longer)[1] - left) / slope
+        sides.append(again(worn, end, site, name, factor, longer)[0])
+    return (sides[0] - sides[1]) / (2 * h) / values
+
+
+@pytest.mark.parametrize(
+    ("rule", "site", "names"),
+    [
+        ("error_controlled", AT, ("friction", "gap")),
+        ("thesis", AT, ("press",)),
+        pytest.param("error_controlled", PEAK, ("friction", "t1", "shake", "gap"), marks=pytest.mark.slow),
+    ],
+    ids=["frequency", "thesis", "peak"],
+)
+def test_derivatives_of_a_life_are_those_of_its_steps_taken_again(rule, site, names):
+    problem = problem_of(site)
+    if rule == "thesis":
+        worn = thesis_rule.evolve(problem, 1e-5)
+    else:
+        worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+    found = found_of(problem, worn, site, [name for name in names if name != "gap"])
+    for name in names:
+        slope = found.by_gap.sum(axis=1) * 1e-4 if name == "gap" else found.slopes[:, found.parameters.index(name)]
+        elasticity = slope / found.values
+        wanted = elasticity_anew(worn, site, name, elasticity[0])
+        np.testing.assert_allclose(elasticity, wanted, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(found.slopes[:, -1] / found.values, [-1.0, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("at_rest", [False, True])
+def test_all_loads_times_c_wear_c_times_as_deep_in_a_life_over_c(at_rest):
+    """Contacts without gap are homogeneous: displacements go with c, work with its square."""
+    ends = {"lost_below": 0.0, "lost_below_at_rest": SHARE} if at_rest else {}
+    problem = problem_of(AT, **ends)
+    worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+    assert (worn.preload_at_rest is not None) == at_rest
+    found = found_of(problem, worn, AT, LOADS)
+    total = found.slopes[:, :2].sum(axis=1) / found.values
+    np.testing.assert_allclose(total, [-1.0, 1.0, 1.0], atol=1e-5)
+
+
+def test_where_a_life_has_no_derivative_is_a_sentence():
+    problem = problem_of(AT)
+    worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+    jumped, marched, stepped = worn.omega.copy(), np.zeros(len(worn.cycles), int), worn.plan.copy()
+    jumped[2:] *= 1.5
+    marched[1], stepped[1, 0] = 3, 0.0
+    moving = np.zeros((len(marched), 1))
+    in_time = {"periods": marched, "moving": moving, "spread": 0.0 * marched, "mean_error": 0.0 * marched}
+    for told, run in (
+        ("the response jumps from 66.8", replace(worn, omega=jumped)),
+        ("the motion is followed in time", replace(worn, settled=marched == 0, **in_time)),
+        ("stepped over the end of a branch", replace(worn, plan=stepped)),
+    ):
+        with pytest.raises(NoDerivative, match=f"cycles.* {told}"):
+            found_of(problem, run, AT, ())
+    with pytest.raises(NoDerivative, match="no life"):
+        found_of(problem, worn, AT, (), share=1e-3)
+    archard = replace(problem, wear=JointWear.of("archard", coefficient=1e-9))
+    with pytest.raises(NoDerivative, match="archard"):
+        found_of(archard, worn, AT, ())
