@@ -79,11 +79,12 @@ class Varying:
         if isinstance(self.scene, MeshScene):
             with progress.stage("mesh, mass and stiffness, reduction"):
                 part, plain = self._made(file)
-            reduced = part_reduction.with_prescribed(self.scene, part, modelling.damped(self.scene, plain))
+            self._damped = modelling.damped(self.scene, plain)
+            reduced = part_reduction.with_prescribed(self.scene, part, self._damped)
         else:
             assert isinstance(self.scene, MatrixScene)
             plain = matrix_model.make(self.scene, file.folder)
-            reduced = modelling.damped(self.scene, plain)
+            reduced = self._damped = modelling.damped(self.scene, plain)
         self.part, self.plain = part, plain
         self.model = modelling.make_model(self.scene, part, reduced)
         self.own = Posed.of(self.model.balance)
@@ -126,7 +127,11 @@ class Varying:
             part, plain = self._made(file)
         reduced = self.own.model
         if plain is not self.plain or self._damps(scene, plain):
-            reduced = modelling.damped(scene, plain)
+            if key == "damping.modal":  # the same modes
+                more = value / keys(self.scene)[key]
+                reduced = self._damped.with_damping(lambda system, _: more * np.asarray(system.damping))
+            else:
+                reduced = modelling.damped(scene, plain)
             if isinstance(scene, MeshScene) and part is not None:
                 reduced = part_reduction.with_prescribed(scene, part, reduced)
         if self._settles:
