@@ -18,6 +18,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.run.sanity_checks import check_speed
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.many import design, study, study_file, task
 from tribodyn.workflows.studies.wheels import wheel
 
 EXACT = newton.NewtonOptions(tolerance=1e-11)
@@ -118,3 +119,21 @@ def test_a_speed_that_does_not_excite_the_range_is_told(given, said):
     assert not said or "24000" in remarks[0]  # rpm at which engine order 1 excites 400 Hz
     fits = one.model_copy(update={"wheel": one.wheel.model_copy(update={"speed": 402.0})})
     assert not check_speed(fits, None)
+
+
+def test_a_study_follows_each_engine_order_at_its_own_frequencies(tmp_path: Path) -> None:
+    """On one line of speeds; the row of the order that meets a mode with open contacts has its peak."""
+    text = WHEEL.replace('frequency = ["400 Hz", "404 Hz"]', 'speed = ["6000 rpm", "7500 rpm"]')
+    (tmp_path / "wheel.toml").write_text(text, encoding="utf-8")
+    quick = ["contact.gap='1 mm'", "response.points=3", "reduction.modes=4", "verdict.enabled=false"]
+    tables = {
+        "study": {"scene": "wheel.toml", "design": "list", "set": quick}, "vary": {"wheel.engine_order": [-1, -2, -3]}
+    }  # fmt: skip
+    asked = study_file.parse(tables, "orders.toml", tmp_path)
+    tasks, refused = study._tasks(asked, design.runs(asked))
+    assert not refused
+    for order, one in zip((1, 2, 3), tasks, strict=True):
+        assert one.scene().scene.response.frequency == pytest.approx((100 * order, 125 * order))
+    row = task.solve(tasks[1])
+    assert row.status == "complete"
+    assert 230 < row.numbers["peak_hz_first"] < 240
