@@ -41,7 +41,6 @@ class ComplianceRules:
 
 
 RULES = ComplianceRules()
-NONE = np.zeros((0, 0), np.float32)
 
 
 class ContactCompliance:
@@ -97,7 +96,7 @@ class ContactCompliance:
         self.shared_real = self._one_real()
         self.coarse = self._coarse_modes()
         self._points: dict[float, CompliancePoint] = {}
-        self._active: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] | None = None
+        self._active: tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
 
     def stuck_frequencies(self, harmonic: int) -> np.ndarray:
         """(n,) lowest natural frequencies of the structure that a harmonic sees, its contacts stuck, undamped [Hz]."""
@@ -159,19 +158,17 @@ class ContactCompliance:
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.ascontiguousarray(left[:, size**2 > RULES.preconditioned_share * len(self.groups)])
 
-    def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """W_0, empty where there is none, modes and these transposed of each group at some contact rows.
+    def on_rows(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """W_0, empty where there is none, modes and these transposed of one real system at some contact rows.
 
         In single precision; the last ones are kept.
         """
         if self._active is None or not np.array_equal(self._active[0], rows):
-            parts = []
-            for e, _ in self.groups:
-                w0, b = NONE if e.w0_single is None else e.w0_single, e.b_single
-                if len(rows) < self.n_contact:
-                    w0, b = w0[np.ix_(rows, rows)] if len(w0) else w0, b[rows]
-                parts.append((w0, b, np.ascontiguousarray(b.T)))
-            self._active = (rows, parts)
+            e = self.groups[0][0]
+            w0, b = e.w0_single, e.b_single
+            if len(rows) < self.n_contact:
+                w0, b = w0[np.ix_(rows, rows)] if len(w0) else w0, b[rows]
+            self._active = (rows, (w0, b, np.ascontiguousarray(b.T)))
         return self._active[1]
 
     def at(self, omega: float) -> CompliancePoint:
@@ -290,8 +287,15 @@ class CompliancePoint:
             return self.nearly(g) + residual.apply(g)
         if self.compliance.shared_real:
             return self._apply_shared_real(g)
-        contacts, basis = slice(0, self.compliance.n_contact), self.compliance.basis
-        return basis.to_real(self._through_ports(basis.to_complex(g), contacts, contacts))
+        return _moved(self.dense, self.compliance.basis, g)
+
+    @cached_property
+    def dense(self) -> np.ndarray:
+        """(n_harmonic, n_contact, n_contact) G_h where harmonics share no system: Newton asks for many products."""
+        contacts = slice(0, self.compliance.n_contact)
+        pairs = zip(self.compliance.groups, self.ports, strict=True)
+        ports = {p: port for (_, positions), at in pairs for p, port in zip(positions, at, strict=True)}
+        return np.array([ports[p].matrix(contacts, contacts) for p in range(len(ports))])
 
     @property
     def left_out(self) -> float:
@@ -352,8 +356,21 @@ class CompliancePoint:
         return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """The product with G restricted to contact rows (active ones), to the accuracy a Newton direction needs."""
-        return JacobianProduct(self, rows)
+        """G restricted to contact rows (active ones) times (n_active, n_coeff), as exact as a Newton direction needs.
+
+        In single precision, where harmonics share a system by W_0 and modes alone
+        """
+        c = self.compliance
+        parts = c.on_rows(rows) if c.shared_real else ()
+        dense = None if c.shared_real else self.dense[:, rows[:, None], rows].astype(np.complex64)
+
+        def product(d: np.ndarray) -> np.ndarray:
+            if dense is not None:
+                return _moved(dense, c.basis, d)
+            found: np.ndarray = all_harmonics.nearly_displaced(d, *parts, *self.core)
+            return found
+
+        return product
 
     def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """U (n_rows, r) and A (r n_coeff, r n_coeff) with G ~ U A U^T on contact rows; r may be 0."""
@@ -380,24 +397,6 @@ class CompliancePoint:
         return blocks.reshape(size * basis.n_coeff, size * basis.n_coeff)
 
 
-class JacobianProduct:
-    """G restricted to active rows, as exact as a Newton direction needs: W_0 and modes, single precision."""
-
-    def __init__(self, point: CompliancePoint, rows: np.ndarray):
-        self._point = point
-        self._compliance = point.compliance
-        self._parts = self._compliance.on_rows(rows)
-
-    def __call__(self, d: np.ndarray) -> np.ndarray:
-        """G d for d (n_active, n_coeff)."""
-        c = self._compliance
-        if c.shared_real:
-            found: np.ndarray = all_harmonics.nearly_displaced(d, *self._parts[0], *self._point.core)
-            return found
-        force = c.basis.to_complex(d).astype(np.complex64)
-        moved = np.empty_like(force)
-        for (w0, b, _), ports, (_, positions) in zip(self._parts, self._point.ports, c.groups, strict=True):
-            for port, p in zip(ports, positions, strict=True):
-                f = force[:, p]
-                moved[:, p] = w0 @ f + b @ port.through_core(b.conj().T @ f)
-        return c.basis.to_real(moved)
+def _moved(dense: np.ndarray, basis: HarmonicBasis, force: np.ndarray) -> np.ndarray:
+    """Coefficients (n, n_coeff) of G_h (n_harmonic, n, n) times forces (n, n_coeff), as precise as the matrices."""
+    return basis.to_real((dense @ basis.to_complex(force).T[..., None].astype(dense.dtype))[..., 0].T)

@@ -156,7 +156,7 @@ class Expansion:
         before = np.inf
         for m, order in (c for c in RULES.truncations if c[0] < len(lam)):  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
-            moved = self.at(s).apply(np.eye(RULES.n_probe), slice(0, RULES.n_probe))[RULES.n_probe :]
+            moved = self.at(s).matrix(slice(RULES.n_probe, None), slice(0, RULES.n_probe))
             error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())
             # near a resonance rounding of the direct solve itself is what remains: more modes would not help
             if error <= wanted or 0.5 * before < error < RULES.rounding:
@@ -335,17 +335,19 @@ class PortCompliance:
 
     def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
         """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
+        return self.matrix(rows, columns) @ force
+
+    def matrix(self, rows: slice = slice(None), columns: slice = slice(None)) -> np.ndarray:
+        """Displacement of the ports in `rows` under unit forces at those in `columns`."""
         x, ratio = self.expansion, self.ratio
-        z = _product(x.b[columns].conj().T, force).astype(complex)
-        for k, e in enumerate(x.e_in, start=1):
-            z -= ratio**k * _product(e[columns].conj().T, force)
-        y = self.through_core(z)
-        out = _product(x.b[rows], y) + _product(x.w0[rows, columns], force)
-        for k, e in enumerate(x.e, start=1):
-            out -= ratio**k * _product(e[rows], y)
+        left, right = x.b[rows].astype(complex), x.b[columns].conj().T.astype(complex)
+        for k, (e, e_in) in enumerate(zip(x.e, x.e_in, strict=True), start=1):
+            left -= ratio**k * e[rows]
+            right -= ratio**k * e_in[columns].conj().T
+        found: np.ndarray = left @ self.through_core(right) + x.w0[rows, columns]
         for k, w in enumerate(x.higher, start=1):
-            out += x.unit * ratio**k * _product(w[rows, columns], force)
-        return out
+            found += x.unit * ratio**k * w[rows, columns]
+        return found
 
     def slope(self, force: np.ndarray) -> np.ndarray:
         """d (apply) / d s of all ports under forces (n_port, ...)."""

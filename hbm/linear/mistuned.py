@@ -82,7 +82,7 @@ class Alike:
         if s in self._kept:
             self._kept.move_to_end(s)
             return self._kept[s]
-        found = self._of_every_index(lambda one: one.at(s).apply(np.eye(self.n_port, dtype=complex)))
+        found = self._of_every_index(lambda one: one.at(s).matrix())
         self._kept[s] = found
         while len(self._kept) > 1 and len(self._kept) * found.nbytes > ROOM:
             self._kept.popitem(last=False)

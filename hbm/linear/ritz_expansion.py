@@ -49,7 +49,8 @@ class RitzExpansion(Expansion):
         self.c = np.zeros_like(stuck) if rate is None else phi.T @ np.asarray(rate) @ phi
         self.b = ports @ phi
         self.b_single = self.b[: len(b)].astype(np.float32)
-        self.w0, self.w0_single, self.order, self.n_mode = None, None, 1, len(self.lam)  # type: ignore[assignment]
+        self.w0, self.order, self.n_mode = None, 1, len(self.lam)  # type: ignore[assignment]
+        self.w0_single = np.zeros((0, 0), np.float32)
         self.e, self.e_in, self.higher, self.t = [], [], [], np.zeros((0, 0, 0))
         self.error = residual.error(s_max)
 

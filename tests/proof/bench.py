@@ -128,7 +128,7 @@ class Work:
 
 
 def _work(balance: HarmonicBalance, calls: dict[str, int]) -> tuple[Work, ...]:
-    """The products of a curve, as `CompliancePoint.apply` and `JacobianProduct` make them."""
+    """The products of a curve, as `CompliancePoint.apply` and its `jacobian_product` make them."""
     c, m = balance.compliance, balance.basis.n_coeff
     x, n, cores = c.groups[0][0], c.n_contact, len(balance.basis.dynamic)
     whole, powers = x.columns[:n], x.single[:n]
@@ -137,7 +137,7 @@ def _work(balance: HarmonicBalance, calls: dict[str, int]) -> tuple[Work, ...]:
     nearly = {8: solved, 4: 2 * m * (n * n + 2 * n * x.n_mode)}
     return (
         Work("evaluation", calls["apply"], whole.nbytes + powers.nbytes + x.left.nbytes + core, exact),
-        Work("Krylov product", calls["__call__"], x.w0_single.nbytes + 2 * x.b_single.nbytes + core, nearly),
+        Work("Krylov product", calls["product"], x.w0_single.nbytes + 2 * x.b_single.nbytes + core, nearly),
     )
 
 
@@ -233,7 +233,7 @@ def _measure(balance: HarmonicBalance, harmonics: str, windows: tuple[int, int],
         dense_inversion=p.inversion / max(p.contact + p.balance + p.inversion, 1e-300),
         thesis_seconds=THESIS_SECONDS.get(harmonics),
         work=work,
-        products=shares["apply"] + shares["__call__"],
+        products=shares["apply"] + shares["product"],
         roofline=sum(map(machine.seconds, work)),
     )
 
@@ -272,7 +272,7 @@ def _shares(stats: pstats.Stats) -> tuple[dict[str, float], dict[str, int]]:
     Beside them the share and the calls of the matrix products, which are parts of balance and direction
     """
     names = {("contact/joint.py", "cycle"): "contact", ("hbm/balance.py", "solve"): "direction"}
-    names |= {("linear/compliance.py", of): of for of in ("apply", "__call__")}
+    names |= {("linear/compliance.py", of): of for of in ("apply", "product")}
     seconds, calls = dict.fromkeys(names.values(), 0.0), dict.fromkeys(names.values(), 0)
     entries = stats.stats  # type: ignore[attr-defined]
     for (path, _, function), (_, count, _, cumulative, _) in entries.items():

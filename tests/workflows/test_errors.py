@@ -13,6 +13,7 @@ import pytest
 
 import tribodyn as td
 from tests.proof import reference
+from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.stability.stays import MULTIPLIERS
 from tribodyn.workflows.errors import accuracy, in_time, measure, refine, states, verdict
@@ -21,6 +22,7 @@ from tribodyn.workflows.errors.in_time import Finding
 from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.errors.states import relative
 from tribodyn.workflows.result.verdict import QUANTITIES, Change, Refinement, Statement, Status, Verdict, loaded
+from tribodyn.workflows.run import wear_run
 from tribodyn.workflows.scene import scene_file
 
 SMALL = (
@@ -168,6 +170,15 @@ def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
     stated(judged, result.wear.unstable_share or 0.0)
     left = replace(result.wear, growth=np.where(np.arange(len(result.wear.growth)) < 2, 1e-3, -1e-3))
     assert left.unstable_share == pytest.approx(left.cycles_in_step[:2].sum() / left.cycles_in_step.sum())
+
+
+def test_a_refined_run_begins_at_the_peak_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = scene_file.read("beam", (*TINY, "wear.rule=thesis", "wear.step=1 um", "wear.max_steps=1"))
+    model = td.build(file)
+    first, wanted = states.unworn(file, model), wear_run.worn_out(file, model)
+    monkeypatch.delattr(AtPeak, "first")
+    begun = wear_run.worn_out(file, model, start=(first.here.state.omega, first.here.state.x))
+    assert begun.amplitude == pytest.approx(wanted.amplitude, rel=1e-5)
 
 
 def stated(result: td.Result, unstable: float) -> None:

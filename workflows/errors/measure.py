@@ -40,6 +40,7 @@ class Table:
 
     first : the scene's own unworn state, None without one, as `why` says
     ratio : of the refined mesh, None where that was not solved; worn_ratio : of the mesh that was worn beside it
+    last : the state of the combined refinement on that mesh
     """
 
     rows: list[Change] = field(default_factory=list)
@@ -47,6 +48,7 @@ class Table:
     why: str = ""
     ratio: float | None = None
     worn_ratio: float | None = None
+    last: State | None = None
 
     def add(self, refinement: Refinement, before: Answers, after: Answers, how: str) -> None:
         """What a refinement changed in a state."""
@@ -128,8 +130,8 @@ def _step_by_step(file: SceneFile, finer: SceneFile, ratio: float, table: Table,
     if last is None:
         table.refuse(Refinement.COMBINED, table.rows[-1].how)
         return
-    table.ratio = ratio
-    table.add(Refinement.COMBINED, own.answers, last, f"{how}, more modes, harmonics 0 to {top_of(own)}")
+    table.ratio, table.last = ratio, last
+    table.add(Refinement.COMBINED, own.answers, last.answers, f"{how}, more modes, harmonics 0 to {top_of(own)}")
 
 
 def _on_own_mesh(file: SceneFile, why: str, table: Table, say: Callable[[str], None]) -> None:
@@ -140,7 +142,7 @@ def _on_own_mesh(file: SceneFile, why: str, table: Table, say: Callable[[str], N
     if last is None or not isinstance(file.scene, MatrixScene):
         table.refuse(Refinement.COMBINED, why if last else table.rows[-1].how)
     else:
-        table.add(Refinement.COMBINED, own.answers, last, f"more modes, harmonics 0 to {top_of(own)}")
+        table.add(Refinement.COMBINED, own.answers, last.answers, f"more modes, harmonics 0 to {top_of(own)}")
 
 
 def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> State | None:
@@ -170,7 +172,7 @@ def _load(file: SceneFile) -> float:
     return 1.0 if wear is None else wear.duties[0].load
 
 
-def _more_harmonics(state: State, table: Table, say: Callable[[str], None]) -> Answers | None:
+def _more_harmonics(state: State, table: Table, say: Callable[[str], None]) -> State | None:
     """A state with more harmonics, followed from its own solution, from the next to the highest ones."""
     top = top_of(state)
     say(f"harmonics 0 to {top}")
@@ -187,9 +189,9 @@ def _more_harmonics(state: State, table: Table, say: Callable[[str], None]) -> A
     except REFUSALS as refusal:
         table.refuse(Refinement.HARMONICS, f"{how}: {refusal}")
         return None
-    answers = states.answers_of(wide, point)
-    table.add(Refinement.HARMONICS, state.answers, answers, how)
-    return answers
+    found = State(state.cycles, wide, state.site, point)
+    table.add(Refinement.HARMONICS, state.answers, found.answers, how)
+    return found
 
 
 def _estimates(file: SceneFile, model: Model, table: Table, result: Result, options: Options) -> None:
@@ -249,7 +251,8 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     how = "" if bare else f"{ratio:.3g} times the elements along every edge, "
     how += f"more modes, harmonics 0 to {top}" + (f", {steps:g} times the wear steps" if steps > 1 else "")
     try:
-        depth, there = worn_through(other, modelling.build(other, Progress()))
+        begun = table.last if ratio == table.ratio else None
+        depth, there = worn_through(other, modelling.build(other, Progress()), begun)
     except REFUSALS as refusal:
         table.refuse(Refinement.COMBINED, f"{how}: {refusal}", OF_WEAR)
         return
@@ -258,11 +261,17 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     table.rows += [Change(Refinement.COMBINED, name, a, b, relative(a, b), how) for name, a, b in pairs]
 
 
-def worn_through(file: SceneFile, model: Model) -> tuple[float, float]:
-    """Largest depth [m] and life [cycles] of a scene worn as it says; raises RuntimeError where no life ends."""
+def worn_through(file: SceneFile, model: Model, begun: State | None = None) -> tuple[float, float]:
+    """Largest depth [m] and life [cycles] of a scene worn as it says, from an unworn state of its mesh and harmonics.
+
+    begun : that state, None where it is looked for. Raises RuntimeError where no life ends
+    """
     wear = file.scene.wear
     assert wear is not None
-    worn = wear_run.worn_out(file, model, wear.lost_below)
+    basis = model.balance.basis
+    at = None if begun is None else begun.here.state
+    start = None if begun is None or at is None else (at.omega, begun.balance.basis.transfer(at.x, basis))
+    worn = wear_run.worn_out(file, model, wear.lost_below, start)
     life = life_of(worn, model, wear)
     if worn.ended.failed or life is None:
         raise RuntimeError(str(worn.end))

@@ -10,7 +10,6 @@ from time import process_time
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
@@ -60,10 +59,9 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
         advance(done, note, (row.cycles + row.cycles_in_step, row.preload))
 
     problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
-    if result.response is not None:
-        problem = replace(
-            problem, mission=tuple(_from_response(d, result.response, model.balance) for d in problem.mission)
-        )
+    found = result.response
+    if found is not None and (peak := found.peak(settings.OUTPUT)) is not None:
+        problem = _begun(problem, (float(found.omega[peak]), model.balance.shaped(found.contact[peak])))
     limit = settings.step_limit(scene, patch.free_deflection, patch.area)
     try:
         worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
@@ -77,20 +75,24 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
     return result
 
 
-def _from_response(duty: Duty, branch: Branch, balance: HarmonicBalance) -> Duty:
-    """A duty at the peak of the response, which is known already."""
-    peak = branch.peak(settings.OUTPUT)
-    if peak is None or duty.load != 1 or duty.balance is not None or not isinstance(duty.site, AtPeak):
-        return duty
-    x = balance.shaped(branch.contact[peak])
-    return replace(duty, start=(float(branch.omega[peak]), x))
+def _begun(problem: WearProblem, start: tuple[float, np.ndarray] | None) -> WearProblem:
+    """A problem whose duties at the peak begin at one that is known, see `Duty.start`."""
+
+    there = [duty.load == 1 and duty.balance is None and isinstance(duty.site, AtPeak) for duty in problem.mission]
+    mission = (replace(duty, start=start) if at else duty for duty, at in zip(problem.mission, there, strict=True))
+    return replace(problem, mission=tuple(mission))
 
 
-def worn_out(file: SceneFile, model: Model, left: float = LIFE_SHARE) -> WearHistory:
-    """Wear by the scene's rule until a share `left` of the preload is left, of which nothing is kept."""
+def worn_out(
+    file: SceneFile, model: Model, left: float = LIFE_SHARE, start: tuple[float, np.ndarray] | None = None
+) -> WearHistory:
+    """Wear by the scene's rule until a share `left` of the preload is left, of which nothing is kept.
+
+    start : peak that its duties there begin at, as `Duty.start` has it
+    """
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
-    problem = wear_problem(file.scene, file.folder, balance, left, wanted.end_at == "at_rest")
+    problem = _begun(wear_problem(file.scene, file.folder, balance, left, wanted.end_at == "at_rest"), start)
     limit = settings.step_limit(file.scene, references.free_deflection(balance), problem.area)
     return evolve(problem, wanted, limit, wanted.max_steps)
 
