@@ -95,8 +95,7 @@ def modal(forces, n_e, ratio, has_static, real, imag, pivots, static):
 @numba.njit(cache=True)
 def displaced(moved, higher, left, n, n_e, unit, ratio, has_static, real, imag, pivots, static):
     """Displacement (n, n_coeff) from forces times [W_0, modes] and the W_k, as rows; left : (m + n_e m, n_port)."""
-    # the copy here and the typed 0 below make one kernel of `modal` serve both: each takes a second to compile
-    n_port = left.shape[1]
+    n_port = left.shape[1]  # this copy and the typed 0 below make one kernel of `modal` serve both: a second each
     y = modal(moved[:, n_port:].copy(), n_e, ratio, has_static, real, imag, pivots, static)
     return gathered(np.dot(y, left), moved, higher, n, n_port, unit, ratio, has_static)
 
