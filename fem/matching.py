@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 TOLERANCE = 1e-4  # largest distance of two matching nodes, as a part of the length of the first face
 
@@ -20,7 +20,7 @@ def partners(points: np.ndarray, others: np.ndarray, what: str, length: float | 
     Returns (k,) numbers of the others, all different
     Raises  Mismatch, naming what and the worst place, where a point has no partner
     """
-    distance, partner = cKDTree(others).query(points)
+    distance, partner = scipy.spatial.cKDTree(others).query(points)
     lost = distance > TOLERANCE * (_length(points) if length is None else length)
     if lost.any() or len(np.unique(partner)) < len(partner):
         worst = points[distance.argmax()]
@@ -40,7 +40,7 @@ def facing_partners(
     points, normals : (k, 3); others : (m, 3); reach : farthest distance along the normal [m]
     Returns None where a point has no partner of its own
     """
-    _, partner = cKDTree(others).query(points)
+    _, partner = scipy.spatial.cKDTree(others).query(points)
     apart = others[partner] - points
     opening = np.einsum("kx,kx->k", apart, normals)
     across = np.linalg.norm(apart - opening[:, None] * normals, axis=1)

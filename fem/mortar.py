@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 from skfem import ElementTriP1, MeshHex1
 from skfem.quadrature import get_quadrature
 
@@ -260,7 +260,7 @@ def dual(one: Side, shared: Common) -> tuple[np.ndarray, np.ndarray]:
 def _candidates(one: Side, two: Side, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of facets that may meet."""
     r_1, r_2 = (np.linalg.norm(s.points - s.centre[:, None], axis=2).max(axis=1) for s in (one, two))
-    near = cKDTree(two.centre).query_ball_point(one.centre, r_1 + r_2.max() + reach)
+    near = scipy.spatial.cKDTree(two.centre).query_ball_point(one.centre, r_1 + r_2.max() + reach)
     i = np.repeat(np.arange(len(near)), [len(n) for n in near])
     j = np.concatenate([np.sort(np.asarray(n, dtype=int)) for n in near]) if len(i) else np.zeros(0, dtype=int)
     apart = two.centre[j] - one.centre[i]

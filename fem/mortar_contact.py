@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from scipy.sparse import coo_matrix, csr_matrix
-from scipy.spatial import cKDTree
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
 from tribodyn.fem.matching import Mismatch
@@ -101,7 +101,7 @@ def mortar_halves(
 
 def apart(one: Side, two: Side, reach: float) -> str:
     """Why two sides do not meet, in a sentence."""
-    distance, other = cKDTree(two.centre).query(one.centre)
+    distance, other = scipy.spatial.cKDTree(two.centre).query(one.centre)
     nearest = int(distance.argmin())
     facing = float(one.normal[nearest] @ two.normal[other[nearest]])
     if distance.min() <= reach + one.length and facing > 0:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+import scipy
 
 from tribodyn.fem.assembly import Assembly, materials_of
 from tribodyn.fem.elasticity import at_elements, strained
@@ -68,10 +68,10 @@ def temperature_at(path: Path, points: np.ndarray) -> np.ndarray:
         raise ValueError(f"the field '{path}' cannot be read ({trouble}): give lines x, y, z, value") from None
     if table.shape[1] != 4 or not np.isfinite(table).all():
         raise ValueError(f"the field '{path}' has {table.shape[1]} columns: give x, y, z and the value, all finite")
-    nearest = NearestNDInterpolator(table[:, :3], table[:, 3])(points)
+    nearest = scipy.interpolate.NearestNDInterpolator(table[:, :3], table[:, 3])(points)
     if len(table) < 5 or np.linalg.matrix_rank(table[:, :3] - table[0, :3]) < 3:
         return np.asarray(nearest)
-    inside = LinearNDInterpolator(table[:, :3], table[:, 3])(points)
+    inside = scipy.interpolate.LinearNDInterpolator(table[:, :3], table[:, 3])(points)
     return np.where(np.isnan(inside), nearest, inside)
 
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import scipy
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from tribodyn.geometry.gmsh_session import save, session
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
@@ -190,7 +190,7 @@ def _smallest_distance(nodes: np.ndarray, cells: np.ndarray) -> float:
 
 def _join(nodes: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """Number coincident nodes once; returns the new number of each old node, and the nodes kept."""
-    pairs = cKDTree(nodes).query_pairs(tolerance, output_type="ndarray")
+    pairs = scipy.spatial.cKDTree(nodes).query_pairs(tolerance, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(nodes), len(nodes)))
     _, label = connected_components(graph, directed=False)
     _, first, node_of = np.unique(label, return_index=True, return_inverse=True)
@@ -209,7 +209,7 @@ def _check_cells(cells: np.ndarray, n_node: int) -> None:
 
 
 def _nodes_at(nodes: np.ndarray, positions: Sequence[float] | np.ndarray, name: str, tolerance: float) -> np.ndarray:
-    distance, numbers = cKDTree(nodes).query(np.atleast_2d(np.asarray(positions, dtype=float)))
+    distance, numbers = scipy.spatial.cKDTree(nodes).query(np.atleast_2d(np.asarray(positions, dtype=float)))
     if distance.max() > tolerance:
         at = ", ".join(f"{x:.6g}" for x in np.atleast_2d(positions)[distance.argmax()])
         raise ValueError(f"no mesh node lies at point '{name}' ({at}) m: place a grid line there")

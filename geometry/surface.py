@@ -12,11 +12,9 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
+import scipy
 import scipy.sparse as sp
-from scipy.interpolate import RegularGridInterpolator
-from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
 from scipy.sparse.linalg import spsolve
-from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 GAUSS_CONSTANT = np.sqrt(np.log(2) / np.pi)
 """alpha of ISO 16610-21: a wave as long as the cut-off passes with one half of its amplitude."""
@@ -159,9 +157,9 @@ def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     Returns the map with NaN at spikes, and what was done
     """
     measured = np.isfinite(surface.z)
-    nearest = distance_transform_edt(~measured, return_distances=False, return_indices=True)
+    nearest = scipy.ndimage.distance_transform_edt(~measured, return_distances=False, return_indices=True)
     closed = surface.z[tuple(nearest)]
-    distance = np.abs(closed - median_filter(closed, size=5, mode="nearest"))
+    distance = np.abs(closed - scipy.ndimage.median_filter(closed, size=5, mode="nearest"))
     sigma = 1.4826 * np.median(distance[measured])
     low, high = np.percentile(level(surface).z[measured], (5, 95))
     spikes = measured & (distance > LIMITS.spike * sigma) & (distance > 0.1 * (high - low))
@@ -301,10 +299,10 @@ def onto_nodes(surface: HeightMap, nodes: np.ndarray, cells_across: int = 8) -> 
                 f"{low[k]:g} to {high[k]:g} m: centre it on the patch or measure the whole face"
             )
     try:
-        sides = ConvexHull(nodes).equations
-    except (QhullError, ValueError):
+        sides = scipy.spatial.ConvexHull(nodes).equations
+    except (scipy.spatial.QhullError, ValueError):
         raise ValueError(f"{surface.name}: {len(nodes)} contact nodes on a line span no area to average over") from None
-    tree = cKDTree(nodes)
+    tree = scipy.spatial.cKDTree(nodes)
     distance = tree.query(nodes, 2)[0][:, 1].min()
     if not distance > 0:
         raise ValueError(f"{surface.name}: two contact nodes are in the same place")
@@ -316,7 +314,7 @@ def onto_nodes(surface: HeightMap, nodes: np.ndarray, cells_across: int = 8) -> 
     cells = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     cells = cells[(cells @ sides[:, :2].T + sides[:, 2] <= 0).all(axis=1)]
     limits = np.array([[surface.x[0], surface.y[0]], [surface.x[-1], surface.y[-1]]])
-    heights = RegularGridInterpolator((surface.x, surface.y), surface.z)(np.clip(cells, *limits))
+    heights = scipy.interpolate.RegularGridInterpolator((surface.x, surface.y), surface.z)(np.clip(cells, *limits))
     owner = tree.query(cells)[1]
     share = np.bincount(owner, minlength=len(nodes))
     return np.bincount(owner, heights, minlength=len(nodes)) / share
@@ -361,7 +359,9 @@ def synthetic_pair(
     form = ridge * np.sin(np.pi * across / width) ** 4 + np.zeros((len(x), len(y)))
 
     def waves(length: float, rms: float) -> np.ndarray:
-        field = gaussian_filter(random.standard_normal(form.shape), length / (2 * np.pi) / spacing, mode="reflect")
+        field = scipy.ndimage.gaussian_filter(
+            random.standard_normal(form.shape), length / (2 * np.pi) / spacing, mode="reflect"
+        )
         return rms * field / field.std()
 
     rough = [waves(1e-3, waviness) + waves(50e-6, roughness) for _ in range(2)]

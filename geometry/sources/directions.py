@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from tribodyn.geometry.placing import rotation
 
@@ -116,7 +116,7 @@ class Listed:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(n, 3, 3) directions at points (n, 3), rows."""
-        apart, which = cKDTree(self.centres).query(points, k=range(1, min(4, len(self.centres)) + 1))
+        apart, which = scipy.spatial.cKDTree(self.centres).query(points, k=range(1, min(4, len(self.centres)) + 1))
         equally_near = apart <= 1.000001 * apart[:, :1]
         mean = np.einsum("nk,nkij->nij", equally_near, self.rows[which])
         return np.where(

@@ -106,7 +106,7 @@ def _cycle(x, load, x_grid, load_grid, normal, k, mu, memory, hs, skip, force, j
         for c in range(n_tangential):
             u, kt, w = x[i, c], k[i, c], memory[i, c]
             if _cannot_slip(kt, mu[i], w, u, N, hs):
-                n_segment = _append(segments, 0, 0.0, TURN, STICK, w, -1.0, 0.0)
+                n_segment = _append(segments, np.int64(0), 0.0, TURN, STICK, w, -1.0, 0.0)
             else:
                 r = mu[i] / kt
                 n_edge = _edges(r, u, N, x_grid[i, c], load_grid[i], contact, closed, n_contact, hs, edges, touching)
@@ -227,7 +227,7 @@ def _roots(c, hs, value_grid, slope_grid, end_grid, out, n):
 def _contact(load, grid, hs, contact, closed):
     """Split the period where the load changes sign; returns the number of intervals and of the closed ones."""
     contact[0] = 0.0
-    n = _roots(load, hs, grid[0], grid[1], grid[3], contact, 1)
+    n = _roots(load, hs, grid[0], grid[1], grid[3], contact, np.int64(1))  # of the type of the call below
     contact[n] = TURN
     n_closed = 0
     for j in range(n):  # without a change of sign the mean decides, else the signs alternate

@@ -25,7 +25,7 @@ from math import acos, cos, isfinite, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 N_STRIPS = 5
 """Strips over half of the shorter side on the coarse mesh; the fine mesh has twice as many."""
@@ -154,7 +154,7 @@ def half_contact(flat: float, edge_radius: float, load: float, pair: ElasticPair
     low = min((0.1 * wanted) ** (1 / 3), 0.5)
     while excess(low) > 0:
         low /= 2
-    return flat / cos(brentq(excess, low, acos(1 / (2 * grown)), xtol=1e-300, rtol=1e-14))
+    return flat / cos(scipy.optimize.brentq(excess, low, acos(1 / (2 * grown)), xtol=1e-300, rtol=1e-14))
 
 
 def arc_excess(psi: float) -> float:

@@ -95,7 +95,7 @@ def modal(forces, n_e, ratio, has_static, real, imag, pivots, static):
 @numba.njit(cache=True)
 def displaced(moved, higher, left, n, n_e, unit, ratio, has_static, real, imag, pivots, static):
     """Displacement (n, n_coeff) from forces times [W_0, modes] and the W_k, as rows; left : (m + n_e m, n_port)."""
-    n_port = left.shape[1]  # the copy makes one kernel of `modal` serve here and below: each takes seconds to compile
+    n_port = left.shape[1]  # this copy and the typed 0 below make one kernel of `modal` serve both: a second each
     y = modal(moved[:, n_port:].copy(), n_e, ratio, has_static, real, imag, pivots, static)
     return gathered(np.dot(y, left), moved, higher, n, n_port, unit, ratio, has_static)
 
@@ -122,7 +122,7 @@ def nearly_displaced(force, w0, b, b_turned, ratio, has_static, real, imag, pivo
         pushed += np.dot(rows, b[start:stop])
         if len(w0):
             still += np.dot(rows, w0[start:stop])
-    y = modal(pushed[:n_coeff].astype(np.float64), 0, ratio, has_static, real, imag, pivots, static)
+    y = modal(pushed[:n_coeff].astype(np.float64), np.int64(0), ratio, has_static, real, imag, pivots, static)
     moved = np.dot(y.astype(b.dtype), b_turned)
     if len(w0):
         moved += still[:n_coeff]

@@ -215,31 +215,31 @@ def slopes_of(touched, work, D):
     _, _, J, dfs, dsx, dss, _, before = work
     c = J.shape[0]
     D[:] = 0.0
-    add(J, D, 0, 0)
-    add(dsx, D, c, 0)
+    add(J, D[:c, :c])
+    add(dsx, D[c:, :c])
     if not touched:
-        add(dfs, D, 0, c)
-        add(dss, D, c, c)
+        add(dfs, D[:c, c:])
+        add(dss, D[c:, c:])
         return
-    add_product(dfs, before[:, c:], D, 0, c)
-    add_product(dss, before, D, c, 0)
+    add_product(dfs, before[:, c:], D[:c, c:])
+    add_product(dss, before[:, 0:], D[c:, 0:])
 
 
 @numba.njit(**PLAIN)
-def add(M, D, row, column):
-    """Add the matrix M to a larger one, from a row and a column of that on."""
+def add(M, D):
+    """Add the matrix M to D, a view of a larger one: of one type, so that this compiles once."""
     for a in range(M.shape[0]):
         for b in range(M.shape[1]):
-            D[row + a, column + b] += M[a, b]
+            D[a, b] += M[a, b]
 
 
 @numba.njit(**PLAIN)
-def add_product(A, B, D, row, column):
-    """Add A B to a larger matrix, from a row and a column of that on."""
+def add_product(A, B, D):
+    """Add A B to D, a view of a larger matrix."""
     for a in range(A.shape[0]):
         for b in range(B.shape[1]):
             for k in range(A.shape[1]):
-                D[row + a, column + b] += A[a, k] * B[k, b]
+                D[a, b] += A[a, k] * B[k, b]
 
 
 @numba.njit(**PLAIN)
@@ -525,7 +525,7 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
             full = np.eye(n_pair * c)
             for i in range(n_pair):
                 o = i * c
-                add(np.dot(np.ascontiguousarray(A[o : o + c].T), np.ascontiguousarray(J[i])), full, 0, o)
+                add(np.dot(np.ascontiguousarray(A[o : o + c].T), np.ascontiguousarray(J[i])), full[0:, o : o + c])
             direction = np.linalg.solve(full, r)
         put(x_best - length * direction.reshape(x.shape), x)
     return -1, scale
@@ -650,7 +650,7 @@ def along(step, before, xs, contact, memory, bits, forces):
             )
             put_vector(work[1], memory[i])
             if forces.shape[0] > 0:
-                put(work[0], forces[j, i])
+                put_vector(work[0], forces[j, i])
 
 
 @numba.njit(cache=True)

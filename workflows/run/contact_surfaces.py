@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+import scipy
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.geometry.surface import centred, facing_gap, onto_nodes, prepare
@@ -47,9 +47,9 @@ def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> n
     tangents = interface.frames[pairs].mean(axis=0)[:2]
     points = interface.points[pairs] if interface.nodes is None else interface.nodes.points
     at, wanted = rows[:, :3] @ tangents.T, points @ tangents.T
-    found = LinearNDInterpolator(at, rows[:, 3])(wanted)
+    found = scipy.interpolate.LinearNDInterpolator(at, rows[:, 3])(wanted)
     outside = ~np.isfinite(found)
-    found[outside] = NearestNDInterpolator(at, rows[:, 3])(wanted[outside])
+    found[outside] = scipy.interpolate.NearestNDInterpolator(at, rows[:, 3])(wanted[outside])
     found = found if interface.nodes is None else interface.mean[pairs] @ found
     return np.asarray(found - found.min())
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from tribodyn.fem.assembly import named_in
 from tribodyn.geometry.sources import cad, read as sources
@@ -160,7 +160,7 @@ def _candidates(source: Any) -> Iterator[Candidate]:
 def _near(one: Any, two: Any, near: float) -> tuple[float, float, Any] | None:
     """Least distance of two faces [m], share of the smaller one near, normal there; None where they are apart."""
     (centre, normal, wide), (places, normals, widths) = one, two
-    _, at = cKDTree(places).query(centre)
+    _, at = scipy.spatial.cKDTree(places).query(centre)
     apart = places[at] - centre
     gap = np.abs((apart * normal).sum(axis=1))
     aside = np.linalg.norm(apart - (apart * normal).sum(axis=1)[:, None] * normal, axis=1)
