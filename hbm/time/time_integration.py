@@ -114,7 +114,7 @@ def integrate(
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
     options, balance = options or Options(), balance.standing(omega)
-    whole, begin = _in_time(balance, omega, start, options)
+    whole, begin = in_time(balance, omega, start, options)
     stepper = TimeStepper(whole, omega, options)
     motion = stepper.start_from(begin) if begin is not None else _rest(stepper)
     return _of_sector(balance, _to_periodic(stepper, motion, options, with_slopes))
@@ -137,7 +137,7 @@ def leave_alone(
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
     options, balance = replace(options or Options(), accelerate=False), balance.standing(omega)
-    whole, begin = _in_time(balance, omega, start, options)
+    whole, begin = in_time(balance, omega, start, options)
     assert begin is not None
     stepper = TimeStepper(whole, omega, options)
     search = PeriodSearch(stepper, replace(options, max_periods=periods, patience=periods), False)
@@ -160,7 +160,7 @@ def leave_alone(
     )
 
 
-def _in_time(
+def in_time(
     balance: HarmonicBalance, omega: float, start: State | None, options: Options
 ) -> tuple[HarmonicBalance, State | None]:
     """The problem that has an equation of motion in time, and the start: a wave as the sectors until it repeats."""

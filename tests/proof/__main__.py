@@ -90,7 +90,13 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
 
 
 def scoreboard(
-    *, scenes: int = 40, seed: int = 1, seconds: float = 60.0, out: Path = Path("scoreboard"), as_json: Json = False
+    *,
+    scenes: int = 40,
+    seed: int = 1,
+    seconds: float = 60.0,
+    wear: Flag = False,
+    out: Path = Path("scoreboard"),
+    as_json: Json = False,
 ) -> None:
     """Compare stated errors and error bounds of random scenes with references that are finer in every setting.
 
@@ -104,6 +110,8 @@ def scoreboard(
         Of the draw.
     seconds
         Processor seconds that the run of a scene may take, and its reference again.
+    wear
+        Scenes that all wear, along their motion in time.
     out
         Folder of the rows, the table and the histogram.
     as_json
@@ -112,7 +120,7 @@ def scoreboard(
     from tests.proof import scoreboard as board, scoreboard_table as table
 
     make_room(out)
-    rows = board.run(scenes, seed, out, seconds, aside)
+    rows = board.run(scenes, seed, out, seconds, aside, wear)
     table.write(rows, out)
     print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else table.summary(rows))
     broken = sum(one.violated for row in rows for one in (*row.judged, *row.bound))

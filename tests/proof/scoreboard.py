@@ -63,7 +63,11 @@ class Judged:
 
 @dataclass(frozen=True)
 class Row:
-    """One scene. outcome : "measured", or what ended it; seconds : of the processor, of run, verdict and reference."""
+    """One scene.
+
+    outcome : "measured", or what ended it; seconds : of the processor, of run, verdict and reference
+    wearing : whether it was drawn as one of scenes that all wear
+    """
 
     number: int
     seed: int
@@ -76,6 +80,7 @@ class Row:
     changes: tuple[dict[str, Any], ...]
     seconds: tuple[float, float, float]
     ratio: float | None = None
+    wearing: bool = False
 
     def record(self) -> str:
         """One line of JSON."""
@@ -104,17 +109,20 @@ def _torn(folder: Path) -> bool:
     return bool(text) and not text.endswith("\n")
 
 
-def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str], None]) -> list[Row]:
+def run(
+    scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str], None], wearing: bool = False
+) -> list[Row]:
     """Draw, run, judge and check scenes, those that `folder` holds of this seed left out; all rows of the seed.
 
     scenes : how many; 0: none, only what `folder` holds
     seconds : of the processor, that the run of a scene may take, and its reference again
+    wearing : scenes that all wear, of which no error bound is asked for
     """
     folder.mkdir(parents=True, exist_ok=True)
-    kept = [row for row in rows_in(folder) if row.seed == seed]
+    kept = [row for row in rows_in(folder) if (row.seed, row.wearing) == (seed, wearing)]
     done = {row.number for row in kept}
     for number in (n for n in range(scenes) if n not in done):
-        row = measured(number, seed, seconds)
+        row = measured(number, seed, seconds, wearing)
         with (folder / ROWS).open("a", encoding="utf-8") as file:
             file.write("\n" * _torn(folder) + row.record() + "\n")
         kept.append(row)
@@ -124,13 +132,13 @@ def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str
     return sorted((row for row in kept if not scenes or row.number < scenes), key=lambda row: row.number)
 
 
-def measured(number: int, seed: int, seconds: float) -> Row:
+def measured(number: int, seed: int, seconds: float, wearing: bool = False) -> Row:
     """The row of one scene."""
-    row = Row(number, seed, "", "", 0, 0, (), (), (), (0.0, 0.0, 0.0))
+    row = Row(number, seed, "", "", 0, 0, (), (), (), (0.0, 0.0, 0.0), wearing=wearing)
     with TemporaryDirectory() as place:
         folder = Path(place)
         try:
-            drawn = draw(number, seed, folder)
+            drawn = draw(number, seed, folder, wearing)
         except (ValueError, RuntimeError, np.linalg.LinAlgError) as refusal:
             return replace(row, outcome=f"not drawn: {refusal}")
         row = replace(row, family=drawn.family)
@@ -153,7 +161,7 @@ def measured(number: int, seed: int, seconds: float) -> Row:
             n_pair=model.balance.contact.n_pair,
             harmonics=max(result.harmonics),
             judged=tuple(_judged(name, said, truth) for name in QUANTITIES),
-            bound=_bound(file, seconds) if number % BOUNDED == 1 else (),
+            bound=_bound(file, seconds) if number % BOUNDED == 1 and not wearing else (),
             changes=tuple(asdict(one) for one in said.changes),
             ratio=said.ratio,
             seconds=(ran, said.seconds, referred),

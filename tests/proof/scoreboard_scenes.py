@@ -34,6 +34,8 @@ WORN = 0.5  # share of the scenes that are worn
 DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
 # frequencies at which they wear, over the resonance of the free part: half of them well below, where more motions stay
 BESIDE = ((0.4, 0.6), (0.4, 0.6), (0.85, 0.95), (1.05, 1.15))
+# where all scenes wear
+IN_TIME: Table = {"rule": "error_controlled", "tolerance": 0.03, "motion": "time", "max_steps": 400}
 TOPS = (1, 1, 2, 3, 3, 5)  # highest harmonic kept
 HIGHEST = {"wheel": 3, "rig": 3}  # the same, at most: with more their reference takes minutes
 # times the drawn damping where they wear, and of rigs: with little of it most such motions are unstable
@@ -54,10 +56,15 @@ class Drawn:
         return parse(self.text, f"{self.family}_{self.number}.toml", overrides, folder)
 
 
-def draw(number: int, seed: int, folder: Path) -> Drawn:
-    """Scene `number` of a seed; families come in turn. Raises ValueError, RuntimeError where it has no resonance."""
+def draw(number: int, seed: int, folder: Path, wearing: bool = False) -> Drawn:
+    """Scene `number` of a seed; families come in turn.
+
+    wearing : all are worn, along their motion in time, which no wheel is; else some, along that of the balance
+    Raises  ValueError, RuntimeError where it has no resonance
+    """
     rng = np.random.default_rng([seed, number])
-    family = tuple(FAMILIES)[number % len(FAMILIES)]
+    families = [name for name in FAMILIES if not (wearing and name == "wheel")]
+    family = families[number % len(families)]
     tables = FAMILIES[family](rng)
     shutil.copy(bracket.__file__, folder)
     table: Table = {"scene": {"title": f"{family} {number} of seed {seed}"}} | tables
@@ -68,13 +75,14 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
     guess: Table = {"frequency": [1.0, 1e5], "points": 10}
     text = as_toml(table | {"response": table["response"] | guess})
     balance = modelling.build(parse(text, "drawn.toml", (), folder), Progress()).balance
-    worn, at = bool(rng.uniform() < WORN), float(rng.uniform(*BESIDE[int(rng.integers(len(BESIDE)))]))
+    worn, at = bool(rng.uniform() < WORN) or wearing, float(rng.uniform(*BESIDE[int(rng.integers(len(BESIDE)))]))
     drive = float(10 ** rng.uniform(*(WEARING if worn else DRIVE)))
     low, high, place, force = _placed(balance, drive, at if worn else None)
     table["response"] |= {"frequency": [low, high], "points": int(rng.choice([30, 50]))}
     table["loads"]["harmonic"]["shake"]["value"] = force
     if worn:
-        table["wear"] = {"coefficient": "1e4 um3/J", "max_steps": 80, "lost_below": LIFE_SHARE} | _rule(rng)
+        table["wear"] = {"coefficient": "1e4 um3/J", "max_steps": 80, "lost_below": LIFE_SHARE}
+        table["wear"] |= IN_TIME if wearing else _rule(rng)
         table["wear"] |= {"at": {"frequency": place}}
     if worn or family == "rig":
         table["damping"]["modal"] *= DAMPED

@@ -49,12 +49,20 @@ def test_the_reference_is_finer_in_every_setting(tmp_path: Path) -> None:
     assert fine.solver.tolerance < scene.solver.tolerance
 
 
+def test_scenes_that_all_wear_do_so_in_time(tmp_path: Path) -> None:
+    drawn = scoreboard_scenes.draw(4, SEED, tmp_path, wearing=True)
+    assert drawn.family == "rig"  # the fifth of five families: no wave of a wheel is worn in time
+    wear = drawn.file(tmp_path).scene.wear
+    assert wear is not None
+    assert (wear.motion, wear.rule) == ("time", "error_controlled")
+
+
 def test_rows_are_kept_and_taken_up_again(rows: list[Row], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[int] = []
 
-    def measured(number: int, seed: int, seconds: float) -> Row:
+    def measured(number: int, seed: int, seconds: float, wearing: bool) -> Row:
         calls.append(number)
-        return replace(rows[0], number=number, seed=seed)
+        return replace(rows[0], number=number, seed=seed, wearing=wearing)
 
     monkeypatch.setattr(scoreboard, "measured", measured)
     assert scoreboard.run(2, SEED, tmp_path, 1.0, lambda said: None) == [replace(rows[0], number=n) for n in range(2)]
@@ -65,6 +73,8 @@ def test_rows_are_kept_and_taken_up_again(rows: list[Row], tmp_path: Path, monke
     again = scoreboard.run(3, SEED, tmp_path, 1.0, lambda sentence: None)
     assert calls == [0, 1, 2]
     assert again[0] == replace(rows[0], number=0)
+    worn = scoreboard.run(1, SEED, tmp_path, 1.0, lambda sentence: None, wearing=True)  # other scenes of the same seed
+    assert (worn, calls) == ([replace(rows[0], number=0, wearing=True)], [0, 1, 2, 0])
 
 
 def test_a_violated_error_is_reported(tmp_path: Path) -> None:

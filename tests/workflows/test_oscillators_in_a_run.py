@@ -88,7 +88,7 @@ def test_an_oscillator_that_hammers_on_a_stop_is_right_or_not_reported(gap: floa
     assert one.error is not None
     off = abs(one.value / in_time(result, 0.05, 0.1, stop=stop, gap=gap) - 1)
     assert off > one.error, "an error that holds needs no flag"
-    assert one.status in (Status.CONTRADICTED, Status.NOT_PERIODIC, Status.UNSTABLE)
+    assert one.status in (Status.CONTRADICTED, Status.UNSETTLED, Status.UNSTABLE)
 
 
 @pytest.mark.parametrize(("force", "stable"), [(0.5, True), (1.5, False)])
@@ -99,7 +99,7 @@ def test_negative_damping_that_friction_limits_is_right_or_not_reported(
     contact += f"\nfriction = 1.0\nnormal_load = {OMEGA**2}"
     result = ran(tmp_path, -0.02, contact, force, [6.0, 30.0], [1, 3, 5, 7])
     one = loaded(result.verdict).statements["amplitude"]
-    assert one.status == (Status.REPORTED if stable else Status.UNSTABLE)
+    assert one.status in ((Status.REPORTED,) if stable else (Status.UNSTABLE, Status.UNSETTLED))
     if stable:
         found = in_time(result, -0.02, force, spring=4 * OMEGA**2, limit=OMEGA**2)
         assert one.value == pytest.approx(found, rel=one.error)

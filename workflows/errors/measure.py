@@ -231,8 +231,8 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
         table.refuse(Refinement.COMBINED, "no life has ended", OF_WEAR)
         return
     top = top_of(own, options)
-    periods = 0 if wear.periods is None else wear.periods.sum()  # one costs about as much as a solve
-    work = float(wear.solves.sum() + periods) * own.balance.contact.stiffness.size * (2 * top + 1)
+    periods = 0 if wear.periods is None else wear.periods.sum()  # marched with as many steps, whatever the harmonics
+    work = float(wear.solves.sum() * (2 * top + 1) + periods) * own.balance.contact.stiffness.size
     bare = isinstance(file.scene, MatrixScene)
     ratio = 1.0 if bare else table.ratio or options.ratios[0]
     if bare and work > options.max_wear:

@@ -12,9 +12,10 @@ from time import process_time
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.workflows.errors import in_time
-from tribodyn.workflows.errors.in_time import Finding
+from tribodyn.workflows.errors.in_time import Left
 from tribodyn.workflows.errors.measure import OF_WEAR, Table, measure
 from tribodyn.workflows.errors.options import DEFAULT, Options
+from tribodyn.workflows.errors.states import State
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import QUANTITIES, Change, Refinement, Statement, Status, Verdict
@@ -34,10 +35,24 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, opt
     with progress.stage("errors"):
         table = measure(file, model, result, progress.detail, options)
     with progress.stage("time integration"):
-        findings = in_time.check(file, model.balance, result, table.first, file.scene.verdict.in_time, options)
+        look = None
+        if table.first is not None and in_time.is_checked(table.first, file.scene.verdict.in_time, options):
+            look = _look(table.first)
+        if look is not None and result.wear_steps and file.scene.wear is not None:
+            table.rows += in_time.rows(file, model.balance, result)
     values = values_of(table, result)
-    statements = {name: _statement(name, values[name], table, findings, result, options) for name in QUANTITIES}
+    statements = {name: _statement(name, values[name], table, look, result, options) for name in QUANTITIES}
     return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock, table.worn_ratio)
+
+
+def _look(state: State) -> Left | str | None:
+    """The unworn state beside what a machine does, why that does not settle, None without an equation in time."""
+    try:
+        return in_time.left(state)
+    except ValueError:
+        return None
+    except RuntimeError as refusal:
+        return str(refusal)
 
 
 def values_of(table: Table, result: Result) -> dict[str, float | None]:
@@ -52,7 +67,7 @@ def values_of(table: Table, result: Result) -> dict[str, float | None]:
 
 
 def _statement(
-    name: str, value: float | None, table: Table, findings: Sequence[Finding], result: Result, options: Options
+    name: str, value: float | None, table: Table, look: Left | str | None, result: Result, options: Options
 ) -> Statement:
     if value is None:
         return Statement(None, None, None, Status.ABSENT, _absent(name, table, result))
@@ -61,15 +76,13 @@ def _statement(
     own = [row for row in table.rows if row.quantity == name]
     error, why = error_of(own, table.worn_ratio if name in OF_WEAR else table.ratio, options)
     dominated = dominating(own)
-    unstable = (result.wear.unstable_share or 0.0) if result.wear is not None and name in OF_WEAR else 0.0
-    error = None if error is None else error + unstable  # what a machine wears there instead is not known
-    if unstable > options.largest:
-        return Statement(value, error, dominated, Status.UNSTABLE, f"for {unstable:.0%} of the cycles")
-    followed = () if result.wear is None else result.wear.cycles[result.wear.in_time]  # in time, which needs no check
-    concerned = [one for one in findings if one.cycles not in followed] if name in OF_WEAR else findings[:1]
-    worn = in_time.missed(concerned, result) if name in OF_WEAR and concerned else None
-    for finding in () if name == "peak_frequency" else concerned:
-        status, reason = finding.judged(name, error, worn)
+    if name in OF_WEAR and look is None and result.wear is not None:
+        unstable = result.wear.unstable_share or 0.0  # what a machine wears there instead is not known
+        error = None if error is None else error + unstable
+        if unstable > options.largest:
+            return Statement(value, error, dominated, Status.UNSTABLE, f"for {unstable:.0%} of the cycles")
+    elif name not in (*OF_WEAR, "peak_frequency") and look is not None:
+        status, reason = (Status.UNSETTLED, look) if isinstance(look, str) else look.judged(name, error)
         if status is not None:
             return Statement(value, error, dominated, status, reason)
     if error is None:
@@ -88,7 +101,10 @@ def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEF
     by_chance = [row for row in rows if row.refinement in (Refinement.MOTION, Refinement.WEAR_STEPS)]
     least = max((row.relative or 0.0 for row in by_chance), default=0.0)
     chance = least if marched else 0.0
-    aside = sum(row.relative or 0.0 for row in rows if row.refinement == Refinement.OTHER_MOTION)
+    others = [row for row in rows if row.refinement == Refinement.OTHER_MOTION]
+    aside = sum(row.relative or 0.0 for row in others)
+    for row in (one for one in others if one.relative is None):
+        return None, row.how
     for row in rows:
         if row.refinement == Refinement.COMBINED:
             if row.relative is None:

@@ -36,7 +36,7 @@ class Status(StrEnum):
     TOO_LARGE = "not reported (error above 50 %)"
     UNSTABLE = "not reported (the motion is unstable)"
     CONTRADICTED = "not reported (time integration contradicts it)"
-    NOT_PERIODIC = "not reported (time integration finds no periodic motion)"
+    UNSETTLED = "not reported (the motion in time does not settle)"
     ABSENT = "none"
 
 
