@@ -172,8 +172,9 @@ class _Tangent:
         normal = balance.contact.components.index("n") * n_coeff
         gap, along = -jac[:, :, normal], work_slope(balance, solved.x, solved.cycle)
         force, x = np.zeros((*gap.shape, base.shape[1])), np.zeros((size, base.shape[1]))
+        gradient = Gradient(balance, solved, ())
         for i, change in enumerate(changes):
-            mean = np.mean(Gradient(balance, solved, ()).effects(change), axis=0)
+            mean = np.mean(gradient.effects(change), axis=0)
             force[..., i], x[:, i] = mean[:size].reshape(gap.shape), mean[size : 2 * size]
         by_work, falls = depth_per_work(problem, state)[:, None], -_work(balance, gap[..., None], solved.x)
         grows = by_work * state.work[:, None] * self.grows
