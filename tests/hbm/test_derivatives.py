@@ -78,8 +78,7 @@ def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again
         return replace(made, memory=balance.memory)
 
     driven = ["loads", "base"]
-    for p in driven:
-        changes.append(Change(p, step, *(replace(posed, excitation=loaded(p, 1 + s)) for s in (step, -step))))
+    changes += [Change(p, step, *(replace(posed, excitation=loaded(p, 1 + s)) for s in (step, -step))) for p in driven]
     found = at_frequency(balance, solved.state, "tip", changes)
 
     def again(other):
