@@ -1,6 +1,6 @@
 """Exact derivatives at a frequency, and along a resonance peak, a fold and a nonlinear mode.
 
-At a peak of A(w, p), where the slope a_w of a = A^2 / 2 vanishes, dw/dp = - a_wp / a_ww, and dq/dp has q_w dw/dp
+At a peak of A(w, p), where the slope a_w of a = ln A vanishes, dw/dp = - a_wp / a_ww, and dq/dp has q_w dw/dp
 besides. a_wp and a_ww are differences along the curve of the exact gradient, of all parameters together. A peak that is
 a corner of the curve, where a contact transition begins, stays where both sides meet: dw/dp = - [A_p] / [A_w], with
 the jumps of both.
