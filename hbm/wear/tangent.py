@@ -59,6 +59,8 @@ def of_life(
     preload = worn.preload if worn.preload_at_rest is None else worn.preload_at_rest
     end = int(np.flatnonzero(preload < share * preload[0])[0])
     end -= int(preload[end] <= 0)  # all apart: the row before is the last that tells of the parameters
+    if end == 0:
+        raise NoDerivative("the first step of wear parts the contact")
     rows = worn.rows()[: end + 1]
     _check(problem, rows)
     changes = tuple(changes)  # all at once: each state asks for all of them
