@@ -133,6 +133,8 @@ def test_a_peak_that_is_a_corner_follows_first_slip():
     assert found.names[:2] == ("frequency", "amplitude")
     np.testing.assert_allclose(found.values[:2], [omega / (2 * np.pi), stuck(omega)[0]], rtol=1e-6)
     np.testing.assert_allclose(found.slopes[:2, 0], np.array([1 / (2 * np.pi), tip]) / slider / 0.2, rtol=5e-6)
+    with pytest.raises(NoDerivative, match="peak is a corner of the curve"):
+        derivatives.peak_moves(balance, state, "tip", ())
 
 
 def test_a_fold_moves_as_folds_found_anew_and_tells_both_sides_of_a_corner():
