@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from tests.helpers.pressed_body import balance_of, pressed_body, wear_problem
 from tests.helpers.steps_again import EXACT, elasticity_anew
@@ -14,8 +15,9 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.wear import error_controlled_rule, tangent, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear.step_control import Tolerance
 
 SHARE, STEP, LOADS = 0.2, 1e-6, ("press", "shake")
@@ -90,6 +92,26 @@ def test_all_loads_times_c_wear_c_times_as_deep_in_a_life_over_c(at_rest):
     found = found_of(problem, worn, AT, LOADS)
     total = found.slopes[:, :2].sum(axis=1) / found.values
     np.testing.assert_allclose(total, [-1.0, 1.0, 1.0], atol=1e-5)
+
+
+def test_a_pair_that_just_touches_marks_the_derivatives():
+    ends = {"lost_below": 0.0, "lost_below_at_rest": SHARE}
+
+    def opened(gap):
+        problem = problem_of(AT, **ends)
+        return replace(problem, balance=problem.balance.with_gap(np.array([0.0, 0.0, gap, 0.0])))
+
+    def pressed(gap):
+        problem = opened(gap)
+        rest = PreloadAtRest(problem).quiet(assess(problem, np.zeros(4), 0.0, None))
+        return assess(rest, np.zeros(4), 0.0, None).points[0].state.x[2, 2, 0] - gap
+
+    touching = brentq(pressed, 0.0, 1e-2, xtol=1e-16)
+    for gap, marked in ((touching, True), (0.5 * touching, False)):
+        problem = opened(gap)
+        worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+        found = found_of(problem, worn, AT, ("press",))
+        assert found.corner.tolist() == 2 * [marked]
 
 
 def test_where_a_life_has_no_derivative_is_a_sentence():

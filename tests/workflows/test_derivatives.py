@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,8 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
     ratio = friction * 0.5 / record["quantities"]["amplitude"]
     assert record["elasticities"]["contact.friction"]["amplitude"] == pytest.approx(ratio)
     assert all(path.stat().st_size > 0 for path in beam.write(tmp_path))
+    marked = replace(beam.found, names=("life", *beam.found.names[1:]), corner=np.ones_like(beam.found.corner))
+    assert sum("the table is that of one side" in line for line in replace(beam, found=marked).lines()) == 1
 
 
 @pytest.mark.parametrize("name", ["beam", "blade", pytest.param("rig", marks=pytest.mark.slow)])
