@@ -121,7 +121,7 @@ def wave_of(reduced: ReducedSector, engine_order: int, index_of: WaveIndex) -> R
     system, B = wave.model(1)
     info = replace(_shared_info(reduced), engine_order=engine_order)
     interface = replace(reduced.sector.interface, B=B)
-    return ReducedModel(system, interface, None, info, wave.model, wave.basis, wave.at_index)
+    return ReducedModel(system, interface, None, info, wave.model, wave.moved, wave.at_index)
 
 
 def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
@@ -190,9 +190,11 @@ class _Wave:
         """Small system and contact map of any wave of the wheel."""
         return self.index_of(index % self.reduced.sector.n_sectors)[:2]
 
-    def basis(self, h: int) -> np.ndarray:
-        """From the small coordinates of harmonic h to the full ones."""
-        return self.reduced.basis @ self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)[2]
+    def moved(self, q: np.ndarray, h: int) -> np.ndarray:
+        """Full coordinates (n_full, ...) of the small ones q (n, ...) of harmonic h."""
+        own = np.tensordot(self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)[2], q, axes=1)
+        basis = self.reduced.basis  # real: two products in place of a complex copy
+        return np.tensordot(basis, own.real, axes=1) + 1j * np.tensordot(basis, own.imag, axes=1)
 
 
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:
