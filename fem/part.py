@@ -29,7 +29,7 @@ class Stiff(Protocol):
 class Part:
     """system : over the free DOFs; interface : likewise; free : (n_free,) DOF of the mesh that each one is,
     node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; mesh : scikit-fem's, or an assembly
-    held : (k, n_free) motions that are held besides, held @ q = 0, for reduction.held
+    held : (k, n_free) motions that are held besides, held @ q = 0, for reduction.prescribed
     pairs : contact face -> its pairs in the interface; node_sets : as geometry.mesh.read gives them
     joints : joint -> its pairs
     follow : (n_dof, n_free) displacement of all DOFs where some follow others, None where they are free or held

@@ -1,6 +1,6 @@
 """Exact derivatives at a frequency, and along a resonance peak, a fold and a nonlinear mode.
 
-At a peak of A(w, p), where the slope a_w of a = A^2 / 2 vanishes, dw/dp = - a_wp / a_ww, and dq/dp has q_w dw/dp
+At a peak of A(w, p), where the slope a_w of a = ln A vanishes, dw/dp = - a_wp / a_ww, and dq/dp has q_w dw/dp
 besides. a_wp and a_ww are differences along the curve of the exact gradient, of all parameters together. A peak that is
 a corner of the curve, where a contact transition begins, stays where both sides meet: dw/dp = - [A_p] / [A_w], with
 the jumps of both.
@@ -203,18 +203,20 @@ def at_peak(
     gradient, *near = (beside(ends[0], side) for side in (0.0, -RULES.along, RULES.along))
     near = [replace(one, quantities=one.quantities[:1]) for one in near]
     names, steps, (own, *points) = _fixed([gradient, *near], changes)
-    curvature, moves = _bend(points, width)
+    curvature, moves = _bend(points, width, float(own.by_frequency[0] / own.values[0]))
     left = -own.by_frequency[0] / own.values[0] / curvature
     own = replace(own, values=own.values + left * own.by_frequency)
     return _gathered(gradient, names, steps, own, solves + 2, gradient.state.omega + left, moves)
 
 
-def _bend(points: Sequence[_Fixed], width: float) -> tuple[float, np.ndarray]:
-    """(ln A)_ww of two points beside a peak, and the d omega of it by every column."""
+def _bend(points: Sequence[_Fixed], width: float, between: float) -> tuple[float, np.ndarray]:
+    """(ln A)_ww of two points beside a peak, with the slope halfway `between` them, and the d omega by every column."""
     slopes = [np.concatenate([p.by_frequency[:1], p.columns[0]]) / p.values[0] for p in points]
     curvature, *mixed = (slopes[1] - slopes[0]) / (2 * RULES.along * width)
     if not curvature < 0:
         raise NoDerivative("the response has no maximum beside this point")
+    if abs(slopes[0][0] + slopes[1][0] - 2 * between) > RULES.corner * abs(slopes[1][0] - slopes[0][0]):
+        raise NoDerivative("the curve has a corner beside the peak, where a contact transition begins")
     return float(curvature), -np.asarray(mixed) / curvature
 
 
@@ -226,12 +228,16 @@ def peak_moves(
     options: NewtonOptions | None = None,
 ) -> np.ndarray:
     """(n_change + n_pair,) d omega of the peak that a state is at, by the changes and by the gap of every pair."""
-    here, near = _slope(balance, state, output), []
+    here, near = _slope(balance, _solved(balance, state.omega, state.x, options), output), []
+    if here.miss > RULES.along:  # one that a run ended at for another reason than a slope that vanishes
+        (here, *other), _, _ = _peak(balance, state, output, options)
+        if other:
+            raise NoDerivative("the peak is a corner of the curve, where a contact transition begins")
     for side in (-RULES.along, RULES.along):
-        omega = state.omega + side * here.width
+        omega = here.omega + side * here.width
         beside = _solved(balance, omega, here.predict(omega), options)
         near.append(Gradient(balance, beside, tuple(quantities(balance, beside, output)[:1])))
-    return _bend(_fixed(near, changes)[2], here.width)[1]
+    return _bend(_fixed(near, changes)[2], here.width, here.distance / here.width**2)[1]
 
 
 def _at_corner(

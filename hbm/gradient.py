@@ -160,7 +160,7 @@ class _Side:
     system: SecondOrderSystem
     B: np.ndarray
     C: np.ndarray
-    factor: tuple[np.ndarray, np.ndarray] | None
+    factor: tuple[np.ndarray, np.ndarray]
 
     def solve(self, force: np.ndarray) -> np.ndarray:
         """D_s^-1 force."""
@@ -171,16 +171,14 @@ class _Side:
         return np.asarray(sla.lu_solve(self.factor, force, trans=2))
 
 
-def _sides(posed: Posed, balance: HarmonicBalance, omega: float | None) -> list[_Side]:
-    """The linear side of a problem, harmonic by harmonic; not factorised where no frequency [rad/s] is given."""
+def _sides(posed: Posed, balance: HarmonicBalance, omega: float) -> list[_Side]:
+    """The linear side of a problem at a frequency [rad/s], harmonic by harmonic."""
     found = []
     for h in balance.basis.harmonics:
         system, B = posed.model.at_harmonic(h)
         C = np.stack([system.outputs[name] for name in balance.compliance.output_names])
-        factor = None
-        if omega is not None:
-            stiffness = stuck_dynamic_stiffness(system, B, balance.reference_stiffness, 1j * h * omega)
-            factor = sla.lu_factor(stiffness if h or np.iscomplexobj(B) else stiffness.real, overwrite_a=True)
+        stiffness = stuck_dynamic_stiffness(system, B, balance.reference_stiffness, 1j * h * omega)
+        factor = sla.lu_factor(stiffness if h or np.iscomplexobj(B) else stiffness.real, overwrite_a=True)
         found.append(_Side(system, np.asarray(B), C, factor))
     return found
 
@@ -347,18 +345,17 @@ class Gradient:
         if above.model.interface.B is not own.interface.B or below.model.interface.B is not own.interface.B:
             there, here = (self._seen(one, _sides(one, balance, self.state.omega)) for one in (above, below))
             return there[0] - here[0], there[1] - here[1]
-        moved = []  # in the same coordinates
-        for h, side, u in zip(balance.basis.harmonics, self._sides, self.u, strict=True):
-            up, down = (one.model.at_harmonic(h)[0] for one in (above, below))
-            changed = self._loads(above, up, h) - self._loads(below, down, h)
+        base, before = above.excitation.base, below.excitation.base
+        slid = np.zeros_like(self.state.flat) if base is None or before is None else balance.loaded(base - before)
+        pulls, moved = balance.basis.to_complex(balance.reference_stiffness[:, None] * slid), []
+        for h, side, u, pull in zip(balance.basis.harmonics, self._sides, self.u, pulls.T, strict=True):
+            up, down = (one.model.at_harmonic(h)[0] for one in (above, below))  # in the same coordinates
+            changed = self._loads(above, up, h) - self._loads(below, down, h) + side.B.conj().T @ pull
             if up is not down:
                 changed = changed - _difference(up, down, 1j * h * self.state.omega, u)
             moved.append(side.solve(changed))
         x, y = self._real(self._sides, moved)
-        base, before = above.excitation.base, below.excitation.base
-        if base is not None and before is not None and base is not before:
-            x = x - balance.loaded(base - before)
-        return x, y
+        return x - slid, y
 
     def _loads(self, posed: Posed, system: SecondOrderSystem, h: int) -> np.ndarray:
         """(n,) loads of a harmonic."""

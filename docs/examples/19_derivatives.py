@@ -80,7 +80,7 @@ state = "free"
 enabled = false
 """)
 
-print(*td.studies.derivatives("slider.toml").lines(), sep="\n")
+print(td.studies.derivatives("slider.toml"))
 with td.plot.axes(12, 4, columns=3) as (figure, (peaks, curves, stop)):
     for friction in np.arange(0.1, 0.75, 0.08):
         new = {"contact.friction": friction}

@@ -56,7 +56,7 @@ print(result.wear.depth[-1].max())  # [m]
 # td.verify
 light = td.run("beam", overrides={**UNWORN, "loads.harmonic.shake.value": "1 kN"})
 print(td.verify(light, at=700.0).record()["largest_difference"])
-print(*td.verify("results/small", states=2).lines(), sep="\n")
+print(td.verify("results/small", states=2))
 
 # td.export
 print(td.export("results/small", ["csv", "npz"], "results/small/export"))
@@ -129,11 +129,11 @@ print(td.plot.shades(3))
 
 # td.studies.backbone
 bone = td.studies.backbone("beam", 1e-6, 1e-4, points=6, overrides=UNWORN)
-print(*bone.lines(), sep="\n")
+print(bone)
 
 # td.studies.ring_down
 decay = td.studies.ring_down("beam", 1e-7, 1e-6, points=6, periods=10, steps=64, overrides=UNWORN)
-print(*decay.lines(), sep="\n")
+print(decay)
 
 # td.studies.track
 line = td.studies.track("beam", "load", 1.0, 1.2, points=3, overrides=UNWORN)
@@ -151,19 +151,19 @@ response = { dofs = [2], frequency = ["150 Hz", "300 Hz"] }
 damping = { modal = "1 %" }
 harmonics = { kept = [0, 1, 2, 3] }
 """, encoding="utf-8")  # fmt: skip
-print(*td.studies.folds("stop.toml").lines(), sep="\n")
+print(td.studies.folds("stop.toml"))
 
 # td.studies.derivatives
-print(*td.studies.derivatives("beam", overrides=UNWORN).lines(), sep="\n")
+print(td.studies.derivatives("beam", overrides=UNWORN))
 
 # td.studies.forces
-print(*td.studies.forces("beam", overrides=UNWORN).lines(), sep="\n")
+print(td.studies.forces("beam", overrides=UNWORN))
 
 # td.studies.supports
 coarse = {"geometry.n_column": 7, "geometry.pin_column": 2, "response.points": 20, "verdict.enabled": False}
 seal = td.run("leaf_seal", overrides=coarse)
 areas = {"left_pin": 9.8e-6, "right_pin": 9.8e-6}  # [m2]
-print(*td.studies.supports(seal, areas, 2e-15).lines(), sep="\n")
+print(td.studies.supports(seal, areas, 2e-15))
 
 # td.studies.grid
 settings = [f"{key}={json.dumps(value)}" for key, value in UNWORN.items() if value is not None] + ["wear="]
@@ -180,7 +180,7 @@ spread = {
     "vary": {"contact.friction": {"distribution": "normal", "mean": 0.5, "cov": "10 %"}},
     "lives": {"number": "peak_m_first"},
 }
-print(*td.studies.lives(spread, "results/spread", workers=1).lines(), sep="\n")
+print(td.studies.lives(spread, "results/spread", workers=1))
 
 # td.studies.optimise
 wanted = {
@@ -188,7 +188,7 @@ wanted = {
     "vary": {"damping.modal": {"distribution": "uniform", "low": "1 %", "high": "4 %"}},
     "optimise": {"evaluations": 3, "aims": [{"number": "peak_m_first", "want": "low"}]},
 }
-print(*td.studies.optimise(wanted, "results/best", workers=1).lines(), sep="\n")
+print(td.studies.optimise(wanted, "results/best", workers=1))
 
 # td.studies.identify
 task = {
@@ -198,25 +198,25 @@ task = {
 print(td.studies.identify("beam", task, overrides=UNWORN).changes)
 
 # td.studies.posterior
-print(*td.studies.posterior("beam", task, trials=12, overrides=UNWORN).lines(), sep="\n")
+print(td.studies.posterior("beam", task, trials=12, overrides=UNWORN))
 
 # td.studies.compare
 hertz = np.linspace(600.0, 900.0, 7)
 columns = np.stack([hertz, 1e-3 / (1 + ((hertz - 800) / 50) ** 2)], 1)
 np.savetxt("measured.csv", columns, delimiter=",", header="frequency_Hz,displacement_m", comments="")
-print(*td.studies.compare("beam", "measured.csv", overrides=UNWORN).lines(), sep="\n")
+print(td.studies.compare("beam", "measured.csv", overrides=UNWORN))
 
 # td.studies.asperities
 draw = np.random.default_rng(1)
 face = td.studies.HeightMap(np.arange(64) * 1e-5, np.arange(64) * 1e-5, 1e-6 * draw.standard_normal((64, 64)))
-print(*td.studies.asperities(face).lines(), sep="\n")
+print(td.studies.asperities(face))
 
 # td.wheel.build
 wheel = td.wheel.build(td.read_scene("blade"))
 families = {state: wheel.diagram(range(6), 2, state == "stuck") for state in ("free", "stuck")}
 
 # td.wheel.modes
-print(*td.wheel.modes("blade", families=2, speeds=2).lines(), sep="\n")
+print(td.wheel.modes("blade", families=2, speeds=2))
 
 # td.wheel.campbell
 speeds, waves = td.wheel.campbell(wheel, 100.0, 2, (1, 2))
@@ -244,14 +244,14 @@ few |= {
     "response.points": 20,
     "verdict.enabled": False,
 }
-print(*td.wheel.mistuned("blade", spread=0.02, overrides=few).lines(), sep="\n")
+print(td.wheel.mistuned("blade", spread=0.02, overrides=few))
 
 # td.wheel.patterns
 apart = {**few, "mistuning.frequency": "1 %", "mistuning.patterns": 2}
-print(*td.wheel.patterns("blade", "results/patterns", workers=1, overrides=apart).lines(), sep="\n")
+print(td.wheel.patterns("blade", "results/patterns", workers=1, overrides=apart))
 
 # td.wheel.pattern_motion
-print(*td.wheel.pattern_motion("blade", 1, overrides=apart).lines(), sep="\n")
+print(td.wheel.pattern_motion("blade", 1, overrides=apart))
 
 # td.matrices.from_arrays
 matrices = td.matrices.from_arrays(0.5 * np.eye(3), chain)

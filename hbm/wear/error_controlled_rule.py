@@ -94,11 +94,13 @@ def evolve(
     on_row: Callable[[WearRow], None] | None = None,
     resume: WearHistory | None = None,
     motion: Literal["balance", "machine", "time"] = "balance",
+    watched: bool = True,
 ) -> WearHistory:
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
     motion : along which it wears: the balance's; that of a machine, followed in time where it leaves the balance's, see
         hbm.wear.machine_motion; or in time everywhere
+    watched : whether rows have the growth of perturbations; a machine's motion depends on it, nothing else does
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is its estimate over the tolerance. The
     last touch of a vibrating contact does not end in finite time: `least_preload_share` ends the run where
     `lost_below` does not.
@@ -122,7 +124,7 @@ def evolve(
     end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps and state is not None:
         state = at_rest.of(state)
-        if motion != "time":  # where nothing depends on it
+        if motion == "machine" or (watched and motion == "balance"):
             state = with_growth(problem, state, always=machine is not None)
         if machine is not None:
             state = machine.of(state)
@@ -277,13 +279,9 @@ def _step_of(
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
     shortest = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
     stride = 10 * shortest
-    drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), RULES.unknown_slope)
     if rows and rows[-1].plan[0] > 0:
-        stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:-1]
-        top = problem.balance.basis.harmonics[-1]
-        if fewer_harmonics.top_harmonic(whole.balance.basis, list(rows[-1].duty_displacement)) == top:
-            omega = np.array([point.state.omega for point in state.points])
-            drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
+        stride = float(rows[-1].plan[0])
+    drift, slopes = begun(problem, state, rows, whole)
     stride = min(stride, _until_lost_at_rest(whole, state, rows))
     target = _event(problem, state, rows)
     solves, longest = state.solves, np.inf
@@ -479,14 +477,8 @@ def _stages(
     problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[Search]
 ) -> tuple[WearState, WearState]:
     """Both stages of a step from a state; the second is the state after it."""
-    omega = np.array([point.state.omega for point in state.points])
-    guess = []
-    for duty, point in zip(problem.mission, state.points, strict=True):
-        balance = problem.in_duty(duty, state.depth)
-        guess.append(point.state.x + balance.gap_response(point.state, GAMMA * stride * state.rate))
-    cycles = state.cycles + GAMMA * stride
     ahead = GAMMA * stride
-    first = stage(problem, state, state.depth, ahead, cycles, guess, omega + ahead * drift, searches)
+    first = first_stage(problem, state, stride, drift, searches)
     if first.failure:
         return first, replace(first, solves=0)
     base = state.depth + (1 - GAMMA) / GAMMA * (first.depth - state.depth)
@@ -494,10 +486,35 @@ def _stages(
     for before, after in zip(state.points, first.points, strict=True):
         guess.append(before.state.x + (after.state.x - before.state.x) / GAMMA)
         further.append(before.state.omega + (after.state.omega - before.state.omega) / GAMMA)
-    return first, stage(problem, first, base, ahead, state.cycles + stride, guess, np.array(further), searches)
+    return first, _stage(problem, first, base, ahead, state.cycles + stride, guess, np.array(further), searches)
 
 
-def stage(
+def begun(
+    problem: WearProblem, state: WearState, rows: Sequence[WearRow], whole: WearProblem
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n_duty,) d omega / d cycles, and d miss / d omega of the searches, that a step begins with; see `_step_of`."""
+    drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), RULES.unknown_slope)
+    if rows and rows[-1].plan[0] > 0:
+        slopes, top = rows[-1].plan[1:-1], problem.balance.basis.harmonics[-1]
+        if fewer_harmonics.top_harmonic(whole.balance.basis, list(rows[-1].duty_displacement)) == top:
+            omega = np.array([point.state.omega for point in state.points])
+            drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
+    return drift, slopes
+
+
+def first_stage(
+    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[Search]
+) -> WearState:
+    """The first stage of a step from a state."""
+    guess, ahead = [], GAMMA * stride
+    for duty, point in zip(problem.mission, state.points, strict=True):
+        balance = problem.in_duty(duty, state.depth)
+        guess.append(point.state.x + balance.gap_response(point.state, ahead * state.rate))
+    omega = np.array([point.state.omega for point in state.points]) + ahead * drift
+    return _stage(problem, state, state.depth, ahead, state.cycles + ahead, guess, omega, searches)
+
+
+def _stage(
     problem: WearProblem,
     near: WearState,
     base: np.ndarray,

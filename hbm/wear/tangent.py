@@ -31,7 +31,7 @@ from tribodyn.hbm.derivatives import Derivatives, peak_moves
 from tribodyn.hbm.gradient import Change, Gradient, NoDerivative, Posed
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
-from tribodyn.hbm.wear.error_controlled_rule import GAMMA, Search, depth_per_work, stage
+from tribodyn.hbm.wear.error_controlled_rule import GAMMA, Search, begun, depth_per_work, first_stage
 from tribodyn.hbm.wear.evolution import WearProblem, WearState, assess, state_of
 from tribodyn.hbm.wear.fewer_harmonics import top_harmonic
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, cycles_to_preload
@@ -59,6 +59,8 @@ def of_life(
     preload = worn.preload if worn.preload_at_rest is None else worn.preload_at_rest
     end = int(np.flatnonzero(preload < share * preload[0])[0])
     end -= int(preload[end] <= 0)  # all apart: the row before is the last that tells of the parameters
+    if end == 0:
+        raise NoDerivative("the first step of wear parts the contact")
     rows = worn.rows()[: end + 1]
     _check(problem, rows)
     changes = tuple(changes)  # all at once: each state asks for all of them
@@ -72,9 +74,9 @@ def of_life(
         opens[joint.rows, i] = 1.0
     tangent, depth = _Tangent(problem, changes, grows, opens), np.zeros_like(opens)
     after = first = state_of(problem, rows[0])
-    for row, following in pairwise(rows):
-        before, after = after, state_of(problem, following)
-        depth = tangent.along(row, before, after, depth)
+    for i, row in enumerate(rows[:-1]):
+        before, after = after, state_of(problem, rows[i + 1])
+        depth = tangent.along(row, rows[:i], before, after, depth)
     ends, deepest, area = [first, after], int(after.depth.argmax()), problem.area
     if worn.preload_at_rest is not None:
         quiet = PreloadAtRest(problem).quiet(first)
@@ -138,29 +140,25 @@ class _Tangent:
     grows: np.ndarray
     opens: np.ndarray
 
-    def along(self, row: WearRow, before: WearState, after: WearState, depth: np.ndarray) -> np.ndarray:
-        """Derivatives of the depth (n_pair, n) behind a step from those before it."""
+    def along(
+        self, row: WearRow, past: Sequence[WearRow], before: WearState, after: WearState, depth: np.ndarray
+    ) -> np.ndarray:
+        """Derivatives of the depth (n_pair, n) behind a step from those before it; past : the rows before."""
         stride = row.cycles_in_step
         if not len(row.plan):  # of the thesis's rule
             return depth + stride * self.moved(before, depth, 0.0).rate
-        reach, middle = GAMMA * stride, self._between(row, before, after)
+        reach, middle = GAMMA * stride, self._between(row, past, before)
         rate = (row.worn / stride - GAMMA * after.rate) / (1 - GAMMA)
         if middle.failure or np.abs(middle.rate - rate).max() > 1e-2 * rate.max():
             raise NoDerivative(f"at {middle.cycles:.4g} cycles the response passes to another motion within a step")
         between = self.moved(middle, depth, reach).depth
         return self.moved(after, depth + (1 - GAMMA) / GAMMA * (between - depth), reach).depth
 
-    def _between(self, row: WearRow, before: WearState, after: WearState) -> WearState:
-        """The first stage of a step again, from what both its ends have."""
-        omega, x = (
-            (1 - GAMMA) * first + GAMMA * last
-            for first, last in (
-                [getattr(state.points[0].state, name) for state in (before, after)] for name in ("omega", "x")
-            )
-        )
-        reach, searches = GAMMA * row.cycles_in_step, [Search(float(row.plan[1]))]
-        cycles, omegas = row.cycles + reach, np.array([omega])
-        return stage(self.problem, before, before.depth, reach, cycles, [x], omegas, searches)
+    def _between(self, row: WearRow, past: Sequence[WearRow], before: WearState) -> WearState:
+        """The first stage of a step again, as the run came to it."""
+        drift, slopes = begun(self.problem, before, past, self.problem)
+        searches = [Search(float(slope)) for slope in slopes]
+        return first_stage(self.problem, before, row.cycles_in_step, drift, searches)
 
     def moved(self, state: WearState, base: np.ndarray, stretch: float) -> _Moved:
         """Derivatives of a state whose depth is `base` + stretch * rate, base (n_pair, n) by its columns."""
@@ -193,7 +191,10 @@ class _Tangent:
         dx, by_omega = np.split(solution.reshape(n_pair, -1, len(right)), [-1], axis=2)
         depth = depth + np.einsum("pc,pcn->pn", slope, dx)
         if not isinstance(duty.site, AtFrequency):
-            moves = peak_moves(balance, solved, duty.site.output, changes, duty.site.newton)
+            try:
+                moves = peak_moves(balance, solved, duty.site.output, changes, duty.site.newton)
+            except NoDerivative as reason:
+                raise NoDerivative(f"at {state.cycles:.4g} cycles {reason}") from None
             by_gap, turn = moves[len(changes) :], np.einsum("pc,pcn->pn", slope, by_omega)
             omega = by_gap @ (depth + self.opens)
             omega[: len(changes)] += moves[: len(changes)]

@@ -7,7 +7,7 @@
     td.plot.response(result).savefig("response.png")
 
     life = td.studies.lives("scatter.toml")
-    print(*life.lines(), sep="\\n")
+    print(life)
 
     matrices = td.matrices.read("part.npz")         # or td.matrices.from_arrays(M, K)
     rows = matrices.contact_rows([[1, 0, -1]], ("t1",), area=1e-4)  # x = q_0 - q_2

@@ -1,4 +1,4 @@
-"""Studies: each is one function whose result has `record()`, `lines()` and, where there are files, `write(folder)`.
+"""Studies: each is one function whose result prints its lines and has `record()` and, with files, `write(folder)`.
 
 A scene is a name, the path of a .toml file, its tables as a dict, or one that was read. The words `tribodyn curve`
 and `study` are made from these functions.

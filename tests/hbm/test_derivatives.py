@@ -38,10 +38,11 @@ def balance_of(name, components, transitions):
     numbers = own(name, friction=0.4, normal_load=rng.uniform(20, 60, PAIRS), cubic=1e14)
     gap = -1e-5 * rng.random(PAIRS)
     parameters = ContactParameters.of(components, rng.uniform(0.5, 2, (PAIRS, len(components))) * K, gap=gap, **numbers)
-    excitation = Excitation.of({"static": 150.0}, {1: {"shaker": 260.0 - 40j}})
-    return HarmonicBalance.of(
-        model, Joint("j", name, parameters), HarmonicBasis((0, 1, 2, 3), 64, transitions), excitation, 2e3
-    )
+    basis = HarmonicBasis((0, 1, 2, 3), 64, transitions)
+    base = np.zeros((len(rows), basis.n_coeff))
+    base[:, :3] = 1e-6 * rng.normal(size=(len(rows), 3))
+    excitation = replace(Excitation.of({"static": 150.0}, {1: {"shaker": 260.0 - 40j}}), base=base)
+    return HarmonicBalance.of(model, Joint("j", name, parameters), basis, excitation, 2e3)
 
 
 def with_number(balance, name, factor):
@@ -66,26 +67,28 @@ def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again
         Change(p, step, *(replace(posed, contact=with_number(balance, p, 1 + s)) for s in (step, -step))) for p in names
     ]
 
-    def loaded(factor):
+    def loaded(name, factor):
         given = balance.excitation
+        if name == "base":
+            return replace(given, base=factor * given.base)
         return replace(given, loads={of: factor * value for of, value in given.loads.items()})
 
-    def reloaded(factor):
-        made = HarmonicBalance.of(balance.model, balance.contact.joints, balance.basis, loaded(factor), 2e3)
+    def reloaded(name, factor):
+        made = HarmonicBalance.of(balance.model, balance.contact.joints, balance.basis, loaded(name, factor), 2e3)
         return replace(made, memory=balance.memory)
 
-    loads = [loaded(1 + s) for s in (step, -step)]
-    changes.append(Change("loads", step, *(replace(posed, excitation=e) for e in loads)))
+    driven = ["loads", "base"]
+    changes += [Change(p, step, *(replace(posed, excitation=loaded(p, 1 + s)) for s in (step, -step))) for p in driven]
     found = at_frequency(balance, solved.state, "tip", changes)
 
     def again(other):
         state = newton.solve(other, OMEGA, found.state.x, EXACT).state
         return np.array([q.value for q in derivatives.quantities(other, state, "tip")])
 
-    for i, p in enumerate([*names, "loads"]):
+    for i, p in enumerate([*names, *driven]):
         h = 2e-5
-        if p == "loads":
-            pair = [reloaded(1 + s) for s in (h, -h)]
+        if p in driven:
+            pair = [reloaded(p, 1 + s) for s in (h, -h)]
         else:
             pair = [balance.with_contact(with_number(balance, p, 1 + s)) for s in (h, -h)]
         difference = (again(pair[0]) - again(pair[1])) / (2 * h)
@@ -130,6 +133,8 @@ def test_a_peak_that_is_a_corner_follows_first_slip():
     assert found.names[:2] == ("frequency", "amplitude")
     np.testing.assert_allclose(found.values[:2], [omega / (2 * np.pi), stuck(omega)[0]], rtol=1e-6)
     np.testing.assert_allclose(found.slopes[:2, 0], np.array([1 / (2 * np.pi), tip]) / slider / 0.2, rtol=5e-6)
+    with pytest.raises(NoDerivative, match="peak is a corner of the curve"):
+        derivatives.peak_moves(balance, state, "tip", ())
 
 
 def test_a_fold_moves_as_folds_found_anew_and_tells_both_sides_of_a_corner():

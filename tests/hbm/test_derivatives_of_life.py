@@ -140,6 +140,9 @@ def test_where_a_life_has_no_derivative_is_a_sentence():
     ):
         with pytest.raises(NoDerivative, match=f"cycles.* {told}"):
             found_of(problem, run, AT, ())
+    parted = np.where(np.arange(len(worn.preload)) == 0, worn.preload, 0.0)
+    with pytest.raises(NoDerivative, match="first step"):
+        found_of(problem, replace(worn, preload=parted), AT, ())
     with pytest.raises(NoDerivative, match="no life"):
         found_of(problem, worn, AT, (), share=1e-3)
     archard = replace(problem, wear=JointWear.of("archard", coefficient=1e-9))

@@ -16,7 +16,7 @@ from tribodyn.workflows.studies.fits.fit_file import Answers, Asked
 
 def plain(file: SceneFile) -> ReducedModel:
     """The reduction of a scene, not damped, with nothing prescribed."""
-    part, _ = modelling.with_surfaces(file.mesh_scene, modelling.part_of(file, Progress()), file.folder)
+    part, _ = modelling.with_surfaces(file, modelling.part_of(file, Progress()))
     return modelling.plain_of(file, part)
 
 

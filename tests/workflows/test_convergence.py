@@ -151,7 +151,7 @@ def test_the_setting_that_is_needed_is_the_first_from_which_all_are_good() -> No
     assert needed is not None
     assert needed.setting.label == "n=3"
     assert made_up("n", [1, 2], [0.004, 0.0]).needed("amplitude", 0.001).setting.label == "n=2"
-    text = "\n".join(Converged(Settlings("made up", (), 4.0, (one,))).lines())
+    text = str(Converged(Settlings("made up", (), 4.0, (one,))))
     assert "1% on amplitude needs n=3 or finer" in text
     assert "the setting of the scene, n=1, is good for 1% on all: amplitude 0.004" in text
     assert "for 1% on amplitude use n=1: 0.4%, 1 s" in text

@@ -146,11 +146,14 @@ def test_derivatives_of_a_mode_are_those_of_modes_found_anew():
     np.testing.assert_allclose(found.elasticities["contact.friction"], difference, rtol=1e-5)
 
 
+AT_800_HZ = (*BEAM, "wear.motion=balance", "wear.at=800 Hz", LOCATED)
+
+
 @pytest.mark.slow
-def test_the_laws_of_scaling_hold_for_a_life():
+@pytest.mark.parametrize(("scene", "overrides"), [("beam", AT_800_HZ), ("blade", BLADE)], ids=["beam", "blade"])
+def test_the_laws_of_scaling_hold_for_a_life(scene, overrides):
     """All loads times c: c times as deep in a life over c. All stiffness and mass times c: over c as deep, as long."""
-    overrides = (*BEAM, "wear.motion=balance", "wear.at=800 Hz", LOCATED)
-    found = td.studies.derivatives("beam", of="life", overrides=overrides)
+    found = td.studies.derivatives(scene, of="life", overrides=overrides)
     rows = found.elasticities
     loads = sum(row for key, row in rows.items() if key.startswith("loads."))
     body = sum(row for key, row in rows.items() if key.endswith(("stiffness", "young", "density")))

@@ -2,40 +2,46 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import scipy
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.geometry.surface import centred, facing_gap, onto_nodes, prepare
-from tribodyn.workflows.scene.contact import Surfaces
+from tribodyn.workflows.run import kept
 from tribodyn.workflows.scene.contact_numbers import faces
+from tribodyn.workflows.scene.scene_file import SceneFile
 
 FLAT = 1e-6  # part of its size by which a flat patch may bulge
 
 
-def surface_gap(surfaces: Surfaces, interface: ContactInterface, folder: Path) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Gap (n_pair,) [m] of a flat contact from the faces that a scene names, files relative to `folder`.
+def surface_gap(file: SceneFile, interface: ContactInterface) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Gap (n_pair,) [m] of a flat contact from the faces that a scene names.
 
     Returns it with a sentence for each thing that was changed in a height map
 
     Raises  ValueError where the patch is not flat, or where a height map or the mating height cannot be what the scene
         gives
     """
+    surfaces = file.mesh_scene.surfaces
+    assert surfaces is not None
     nodes = patch_coordinates(interface, surfaces.axes)
     size = np.ptp(nodes, axis=0)
     if abs(surfaces.mating_height) > size.max():
         raise ValueError(
             f'surfaces.mating_height is {surfaces.mating_height:g} m, more than the face is long: give its unit, "3 um"'
         )
-    repairs: list[str] = []
-    heights = np.zeros((2, len(nodes)))
-    for i, face in enumerate(faces(surfaces, folder)):
-        prepared = prepare(face, surfaces.cutoff, (float(size[0]), float(size[1])))
-        heights[i] = onto_nodes(centred(prepared.waviness), nodes)
-        repairs += prepared.repairs
-    return facing_gap(heights[0], heights[1], surfaces.mating_height), tuple(repairs)
+
+    def made() -> tuple[np.ndarray, tuple[str, ...]]:
+        repairs: list[str] = []
+        heights = np.zeros((2, len(nodes)))
+        for i, face in enumerate(faces(surfaces, file.folder)):
+            prepared = prepare(face, surfaces.cutoff, (float(size[0]), float(size[1])))
+            heights[i] = onto_nodes(centred(prepared.waviness), nodes)
+            repairs += prepared.repairs
+        return heights, tuple(repairs)
+
+    heights, repairs = kept.heights(file, nodes, made)
+    return facing_gap(heights[0], heights[1], surfaces.mating_height), repairs
 
 
 def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> np.ndarray:

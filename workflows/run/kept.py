@@ -1,4 +1,4 @@
-"""Parts and reductions on disk under a hash of all that they are made of: what one run has made no other makes again.
+"""Parts, reductions and heights of faces on disk under a hash of what they are made of: no other run makes them again.
 
 An entry is a pickle behind its own digest; one that is damaged is made anew. It is written under another name and
 renamed when it is whole, and a run waits for one that makes what it wants. Those unused for longest go where all
@@ -22,6 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
+import numpy as np
 from filelock import FileLock
 
 from tribodyn.fem.cyclic import Sector
@@ -110,6 +111,13 @@ def sector(scene: MeshScene, whole: Part, make: Callable[[], Sector]) -> Sector:
         last["sector"] = own, make()
     found: Sector = last["sector"][1]
     return found
+
+
+def heights(file: SceneFile, nodes: np.ndarray, make: Callable[[], T]) -> T:
+    """Heights of measured faces at contact nodes, whatever the mating height: as they are kept, else made and kept."""
+    table = file.mesh_scene.model_dump(mode="json", include={"surfaces"})
+    del table["surfaces"]["mating_height"]
+    return _kept(file, "heights", (table, nodes.tobytes()), make)
 
 
 def folder() -> Path | None:

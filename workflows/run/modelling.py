@@ -77,7 +77,7 @@ def build(file: SceneFile, progress: Progress, chosen: tuple[int, ...] = ()) -> 
         with progress.stage("matrices"):
             reduced = damped(scene, matrix_model.make(scene, file.folder))
     else:
-        part, repairs = with_surfaces(file.mesh_scene, part_of(file, progress), file.folder)
+        part, repairs = with_surfaces(file, part_of(file, progress))
         for sentence in repairs:
             progress.say(sentence)
         with progress.stage("reduction"):
@@ -167,10 +167,11 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
     )
 
 
-def with_surfaces(scene: MeshScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
+def with_surfaces(file: SceneFile, part: Part) -> tuple[Part, tuple[str, ...]]:
     """The part with the waviness of measured faces in its gap, and a sentence for each repair of a height map."""
+    scene = file.mesh_scene
     for name, contact in scene.joints.items():
-        rows = contact.opening(folder)
+        rows = contact.opening(file.folder)
         if rows is not None:
             pairs = part.joints[name]
             gap = np.array(part.interface.gap, float)
@@ -178,7 +179,7 @@ def with_surfaces(scene: MeshScene, part: Part, folder: Path) -> tuple[Part, tup
             part = replace(part, interface=replace(part.interface, gap=gap))
     if scene.surfaces is None:
         return part, ()
-    gap, repairs = surface_gap(scene.surfaces, part.interface, folder)
+    gap, repairs = surface_gap(file, part.interface)
     return replace(part, interface=replace(part.interface, gap=part.interface.gap + gap)), repairs
 
 

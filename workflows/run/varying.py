@@ -92,7 +92,7 @@ class Varying:
 
     @staticmethod
     def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
-        part, _ = modelling.with_surfaces(file.mesh_scene, modelling.part_of(file, Progress()), file.folder)
+        part, _ = modelling.with_surfaces(file, modelling.part_of(file, Progress()))
         return part, modelling.plain_of(file, part)
 
     def change(self, key: str, value: float) -> Change:

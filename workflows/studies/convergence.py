@@ -27,7 +27,7 @@ from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.result.verdict import NAMES, QUANTITIES
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 
 WANTED = 0.01
 FLAT = 1e-6  # area over the mean one of a triangle that is no part of a map
@@ -36,8 +36,8 @@ FLOOR = 1e-8  # errors below this are drawn here
 MARKERS = "osD^v<>PX*hp"
 
 
-@dataclass(frozen=True)
-class Converged:
+@dataclass(frozen=True, repr=False)
+class Converged(StudyResult):
     """The settings of a scene, measured."""
 
     table: Settlings

@@ -34,7 +34,7 @@ from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.scene.wear import Place
 from tribodyn.workflows.studies.curves import backbones
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 
 SHOWN = 12  # parameters in the picture
 OF_ROWS = {"peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
@@ -50,8 +50,8 @@ UNITS = {
 MICROMETRE = 1e-6
 
 
-@dataclass(frozen=True)
-class ResponseDerivatives:
+@dataclass(frozen=True, repr=False)
+class ResponseDerivatives(StudyResult):
     """Derivatives of a scene's response at one point of it.
 
     found : by key of the scene; at : the values of the keys, SI units; joints : joint -> its pairs

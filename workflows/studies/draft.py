@@ -19,6 +19,7 @@ from tribodyn.geometry.sources import cad, read as sources
 from tribodyn.geometry.sources.picking import outline
 from tribodyn.workflows.scene.json_schema import json_schema
 from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.studies.files import StudyResult
 
 SCHEMA = "scene.schema.json"
 
@@ -56,8 +57,8 @@ class Candidate:
     friction: float | None = None
 
 
-@dataclass(frozen=True)
-class Draft:
+@dataclass(frozen=True, repr=False)
+class Draft(StudyResult):
     """A scene and what it is made of.
 
     text : of the scene beside the file; name : of it; unit : of length in the file, and why; candidates : best first

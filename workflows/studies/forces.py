@@ -22,6 +22,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import StudyResult
 
 TOLERANCE = 1e-12  # of the contact at rest: the balance of forces is to be seen to 1e-8
 
@@ -47,8 +48,8 @@ class BodyForces:
         return float(np.linalg.norm(forces.sum(axis=0))) / scale if scale > 0 else 0.0
 
 
-@dataclass(frozen=True)
-class Forces:
+@dataclass(frozen=True, repr=False)
+class Forces(StudyResult):
     """Static forces on the bodies of a scene."""
 
     bodies: tuple[BodyForces, ...]

@@ -26,10 +26,11 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
 from tribodyn.workflows.scene.source import AnyPath, Overrides, read_scene
 from tribodyn.workflows.scene.structure import DeckTable
+from tribodyn.workflows.studies.files import StudyResult
 
 
-@dataclass(frozen=True)
-class Inspection:
+@dataclass(frozen=True, repr=False)
+class Inspection(StudyResult):
     """What was found, in SI units; see `record` for the fields. solids : the bodies, material {} where none is known"""
 
     solids: tuple[Body, ...]

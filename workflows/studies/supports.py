@@ -20,7 +20,7 @@ from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import quantity
 from tribodyn.workflows.scene.schema import MeshScene, Scene
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 
 SAMPLES = 256  # of a cycle, at the least
 
@@ -60,8 +60,8 @@ def support_work(basis: HarmonicBasis, displacement: np.ndarray, stiffness: floa
     return np.asarray(loading_work(stiffness * z, z))
 
 
-@dataclass(frozen=True)
-class Supports:
+@dataclass(frozen=True, repr=False)
+class Supports(StudyResult):
     """Wear at every support of a part along a response curve.
 
     frequency : (n_point,) [Hz]; work : support -> (n_point,) that the part puts into its spring per cycle [J]

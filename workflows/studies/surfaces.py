@@ -15,12 +15,13 @@ from tribodyn.geometry.asperities import Asperities, identify
 from tribodyn.geometry.surface import HeightMap, mirrored
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
+from tribodyn.workflows.studies.files import StudyResult
 
 Face = HeightMap | str | PathLike[str]
 
 
-@dataclass(frozen=True)
-class FaceAsperities:
+@dataclass(frozen=True, repr=False)
+class FaceAsperities(StudyResult):
     """Asperities with the table of the contact law `rough`. rows : of the table"""
 
     found: Asperities

@@ -30,7 +30,7 @@ from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.schema import Scene
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 
 STEPS, STEPS_PER_HARMONIC = 256, 32  # per period; per period of the highest harmonic kept
 TOLERANCE = 1e-6  # drift over a period, far below the differences that are looked for
@@ -39,8 +39,8 @@ LEFT_ALONE = 120  # periods of a plain march where the balance solution is unsta
 STRIDE = 5e-3  # of the frequency, from the nearest solution to the one asked for
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(StudyResult):
     """The balance at one frequency and what time integration says.
 
     balance, solution : the problem, with the wear of `row` (None: unworn), and its solution

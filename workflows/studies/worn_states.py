@@ -25,7 +25,7 @@ from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies import verification
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 from tribodyn.workflows.studies.verification import Comparison
 
 HEADER = (
@@ -40,8 +40,8 @@ def spread(wear: WearHistory, count: int) -> list[int]:
     return sorted({int(np.argmin(np.abs(wear.cycles - cycles))) for cycles in parts})
 
 
-@dataclass(frozen=True)
-class WornStates:
+@dataclass(frozen=True, repr=False)
+class WornStates(StudyResult):
     """States of a wear run beside time integration, by row of the run.
 
     found : the comparison, or why there is none; alone : what a plain march does, where the motion is unstable or there

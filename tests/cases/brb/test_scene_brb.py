@@ -46,7 +46,7 @@ def built(name: str) -> modelling.Model:
     if name in ("brb", "brb_locked"):
         return modelling.build(scene_file.read(name, COARSE if name == "brb" else COARSER), Progress())
     file, plain = scene_file.read(name, COARSE), built("brb")
-    part, _ = modelling.with_surfaces(file.mesh_scene, plain.part, file.folder)
+    part, _ = modelling.with_surfaces(file, plain.part)
     reduced = replace(
         plain.reduced,
         system=replace(plain.reduced.system, damping=None),

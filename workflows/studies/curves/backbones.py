@@ -26,7 +26,7 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Length
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class AmplitudeRange:
         return cls(*own.modal_amplitude, mode, points, modal=True)
 
 
-@dataclass(frozen=True)
-class SceneBackbone:
+@dataclass(frozen=True, repr=False)
+class SceneBackbone(StudyResult):
     """The backbone of a scene.
 
     balance : of the scene; mode : its points; published : of the same mode by others, None for none

@@ -28,11 +28,11 @@ from tribodyn.workflows.scene.fields import Length, quantity
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, along
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 
 
-@dataclass(frozen=True)
-class Decay:
+@dataclass(frozen=True, repr=False)
+class Decay(StudyResult):
     """A free decay and the backbone along which it goes.
 
     mode : the backbone, converged to its last point; decay : from there

@@ -18,10 +18,11 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import StudyResult
 
 
-@dataclass(frozen=True)
-class FoldsFound:
+@dataclass(frozen=True, repr=False)
+class FoldsFound(StudyResult):
     """The response curve of a scene, by arc length, and its folds in the order of the curve."""
 
     branch: Branch

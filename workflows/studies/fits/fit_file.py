@@ -34,6 +34,7 @@ from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
+from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.fits import posterior as posteriors
 from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
 from tribodyn.workflows.studies.fits.identification import DIFFERENCE, Identification, Measured, Parameter, fit
@@ -139,8 +140,8 @@ def read(task: AnyPath | Mapping[str, Any]) -> Task:
     return scene_file.checked(Task, scene_file.tables(path, "fit"), path.name, path.parent)
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(StudyResult):
     """The numbers of a scene that fit the measured ones best.
 
     found : with their errors; changes : overrides "section.key=value" that put them into the scene

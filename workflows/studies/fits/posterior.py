@@ -21,7 +21,7 @@ from scipy.stats import qmc
 from tribodyn.extras import package
 from tribodyn.workflows.pictures.style import BLUE, INK, RED, STYLE
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 from tribodyn.workflows.studies.many.distributions import Marginal
 from tribodyn.workflows.studies.many.surrogate import Surrogate
@@ -48,8 +48,8 @@ class Summary:
     high: float
 
 
-@dataclass(frozen=True)
-class Posterior:
+@dataclass(frozen=True, repr=False)
+class Posterior(StudyResult):
     """Samples of parameters and of what follows from them.
 
     samples : (n, n_parameter) values in SI units; predicted : name -> (n,) values of numbers that were not measured

@@ -20,6 +20,7 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.many import lives_picture, quantiles, study as studies, study_file
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.quantiles import RARE, Sample
@@ -64,8 +65,8 @@ class Quantile:
         return f"P{100 * self.share:.6g}"
 
 
-@dataclass(frozen=True)
-class Lives:
+@dataclass(frozen=True, repr=False)
+class Lives(StudyResult):
     """A number as a distribution.
 
     table : of the full runs; runs : that have the number; open : of them, those with only a lower bound of it

@@ -15,6 +15,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.many import pictures, study as studies, study_file
 from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.space import Space
@@ -27,8 +28,8 @@ from tribodyn.workflows.studies.many.trades import Known, chebyshev, ends, propo
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
 
 
-@dataclass(frozen=True)
-class Optimum:
+@dataclass(frozen=True, repr=False)
+class Optimum(StudyResult):
     """What an optimisation came to.
 
     table : of all runs; front : rows of the table that no other allowed one beats in all aims, by the first aim

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from tribodyn.workflows.result.store import replacing
+from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.many import pictures
 from tribodyn.workflows.studies.many.distributions import si
 from tribodyn.workflows.studies.many.task import ENDS, RUN, SINGLE, Row
@@ -25,8 +26,8 @@ LIFE = "life_cycles"
 FEWEST = 5  # complete runs that a correlation needs
 
 
-@dataclass(frozen=True)
-class StudyTable:
+@dataclass(frozen=True, repr=False)
+class StudyTable(StudyResult):
     """What came out of a study.
 
     columns : name -> (n_run,) of numbers in SI units, nan where there is none, or of texts; run, status and sentence,

@@ -18,7 +18,7 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 from tribodyn.workflows.studies.measured.beside import Beside, beside
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run
 from tribodyn.workflows.studies.measured.reading import read
@@ -49,8 +49,8 @@ class Shown:
         return f"{(100 if relative else 1) * x:{sign}.3g} {'%' if relative else 'deg'}" if np.isfinite(x) else "-"
 
 
-@dataclass(frozen=True)
-class Compared:
+@dataclass(frozen=True, repr=False)
+class Compared(StudyResult):
     """A measurement and a scene.
 
     name : of the scene; measured : in its directions, repeated runs as their mean

@@ -22,12 +22,12 @@ from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
 
-@dataclass(frozen=True)
-class Flutter:
+@dataclass(frozen=True, repr=False)
+class Flutter(StudyResult):
     """What a flow does to a wheel.
 
     eigenvalues : index of the wave, above 0 with the rotation -> eigenvalue with contacts stuck [1/s]

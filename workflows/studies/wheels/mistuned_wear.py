@@ -22,13 +22,13 @@ from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import where_it_can_be, write_files
+from tribodyn.workflows.studies.files import StudyResult, where_it_can_be, write_files
 from tribodyn.workflows.studies.wheels.mistuned_motion import nodes, write_wheel
 from tribodyn.workflows.studies.wheels.patterns import Blades, asked_of
 
 
-@dataclass(frozen=True)
-class MistunedWear:
+@dataclass(frozen=True, repr=False)
+class MistunedWear(StudyResult):
     """A worn wheel.
 
     blades : the wheel; number : of its pattern; history : of all pairs, sector by sector; blade : whose peak is tracked

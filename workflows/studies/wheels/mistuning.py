@@ -22,14 +22,14 @@ from tribodyn.workflows.pictures.style import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Number, quantity
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.files import StudyResult, write_files
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
 TOLERANCE = 3e-3  # of the curves between their points
 
 
-@dataclass(frozen=True)
-class Mistuned:
+@dataclass(frozen=True, repr=False)
+class Mistuned(StudyResult):
     """Responses of a wheel, and of the same wheel with all sectors alike.
 
     stiffness : (n_sectors,) factors; heights : (n_point, n_sectors) amplitudes of the wheel at its points [m]

@@ -45,6 +45,7 @@ from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.many import pool
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.task import Row, Status
@@ -263,8 +264,8 @@ def solve(task: PatternTask) -> Row:
     return Row(task.number, task.key, "complete", "complete", numbers, time.process_time() - start)
 
 
-@dataclass(frozen=True)
-class Patterns:
+@dataclass(frozen=True, repr=False)
+class Patterns(StudyResult):
     """What the patterns of a scene came to.
 
     rows : by number, of all that were asked for; n_sectors : of the wheel; folder : of table and picture

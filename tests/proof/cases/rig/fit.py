@@ -23,6 +23,7 @@ from tests.proof.cases.rig.joints import Joints, joints_of
 from tests.proof.cases.rig.model import TIED, Rig, check
 from tests.proof.cases.rig.published import LIFE_MEASURED, OPEN, PRELOAD, STUCK, TABLE_5_3, WORK
 from tests.proof.cases.rig.wear import RigWear, wear_down
+from tribodyn.workflows.run import kept
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
 from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit as identify
@@ -74,11 +75,12 @@ def fit_column(scene: str, overrides: Sequence[str] = ()) -> Identification:
 def fit_height(rig: Rig) -> Identification:
     """Platform height to the published preload."""
     parameter = Parameter("platform", 5e-6, 50e-6, (rig.height,), "m")
-    return identify(
-        [parameter],
-        [Measured("preload", PRELOAD, "N")],
-        lambda values: np.array([rig.with_height(values["platform"]).at_rest().preload]),
-    )
+    with kept.at_hand():
+        return identify(
+            [parameter],
+            [Measured("preload", PRELOAD, "N")],
+            lambda values: np.array([rig.with_height(values["platform"]).at_rest().preload]),
+        )
 
 
 def fit_damping(rig: Rig) -> Identification:
@@ -89,7 +91,8 @@ def fit_damping(rig: Rig) -> Identification:
         damped = rig.with_damping(values["modal damping"])
         return np.array([max(damped.with_force(force).cycle().energy, 1e-9) for force in TABLE_5_3])
 
-    return identify([Parameter("modal damping", 0.005, 0.06, (0.01, 0.03), "-")], measured, energies)
+    with kept.at_hand():
+        return identify([Parameter("modal damping", 0.005, 0.06, (0.01, 0.03), "-")], measured, energies)
 
 
 def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
