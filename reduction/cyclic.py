@@ -53,8 +53,7 @@ def reduce_sector(
     model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
     assert model.basis is not None
     info = replace(model.info, joints=dict(sector.joints))
-    if sector.prestress is not None:
-        rest = sector.prestress
+    if (rest := sector.prestress) is not None:
         info = replace(info, prestress_residual=rest.residual, prestress_rotation=rest.rotation)
     return in_coordinates(sector, model.system, model.basis, info)
 
@@ -191,10 +190,9 @@ class _Wave:
         return self.index_of(index % self.reduced.sector.n_sectors)[:2]
 
     def moved(self, q: np.ndarray, h: int) -> np.ndarray:
-        """Full coordinates (n_full, ...) of the small ones q (n, ...) of harmonic h."""
-        own = np.tensordot(self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)[2], q, axes=1)
-        basis = self.reduced.basis  # real: two products in place of a complex copy
-        return np.tensordot(basis, own.real, axes=1) + 1j * np.tensordot(basis, own.imag, axes=1)
+        """Full coordinates (n_full,) or (n_full, k) of the small ones q (n,) or (n, k) of harmonic h."""
+        own = self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)[2] @ q
+        return self.reduced.basis @ own.real + 1j * (self.reduced.basis @ own.imag)
 
 
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:
@@ -239,8 +237,7 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     N = np.zeros((S.shape[1], len(others) + within.shape[1]), dtype=right.dtype)
     N[others, np.arange(len(others))] = 1.0
     N[faces, len(others) :] = within
-    ahead = np.conj(sector.phase(index))
-    follow = N + ahead * right.conj().T @ (left @ N)
+    follow = N + np.conj(sector.phase(index)) * right.conj().T @ (left @ N)
     return S @ np.concatenate([right.conj().T, follow], axis=1), len(right) + len(accessories)
 
 

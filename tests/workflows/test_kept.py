@@ -6,14 +6,12 @@ import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.helpers.structures import BLOCKS, STACK
-from tests.helpers.wheel_scene import WHEEL
-from tribodyn.workflows.run import kept, modelling, pipeline, sector
+from tribodyn.workflows.run import kept, modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -105,28 +103,6 @@ def test_a_result_is_that_without_anything_kept(
         assert results[0].response is not None
         np.testing.assert_array_equal(one.response.response, results[0].response.response)
         np.testing.assert_array_equal(one.patch.area, results[0].patch.area)
-
-
-def test_a_wheel_at_hand_is_at_rest_once_whatever_its_modes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TRIBODYN_CACHE", "off")
-    speeds, spun = [], sector.spun
-
-    def counted(scene: Any, *given: Any) -> Any:
-        speeds.append(scene.wheel.speed)
-        return spun(scene, *given)
-
-    def linear(*overrides: str) -> np.ndarray:
-        text = WHEEL.replace("sectors = 6", 'sectors = 6\nspeed = "6000 rpm"')
-        model = modelling.build(scene_file.parse(text, "w.toml", overrides, Path()), Progress())
-        return model.balance.x_lin(2 * np.pi * 402)
-
-    monkeypatch.setattr(sector, "spun", counted)
-    with kept.at_hand():
-        linear("reduction.modes=8")
-        found = linear("reduction.modes=12")
-        linear("reduction.modes=12", "wheel.speed=5400 rpm")
-    assert speeds == [100.0, 90.0]
-    np.testing.assert_array_equal(found, linear("reduction.modes=12"))
 
 
 def test_a_file_that_is_named_counts_by_its_bytes(made: list[str], tmp_path: Path) -> None:

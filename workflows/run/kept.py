@@ -25,7 +25,6 @@ from typing import IO, Any, TypeVar
 import numpy as np
 from filelock import FileLock
 
-from tribodyn.fem.cyclic import Sector
 from tribodyn.fem.part import Part
 from tribodyn.hbm.threads import limited, usable
 from tribodyn.reduction.model import ReducedModel
@@ -73,7 +72,7 @@ def early_of(scene: MeshScene) -> str:
 
 @contextmanager
 def at_hand() -> Iterator[None]:
-    """Within it the last part, sector and reduction stay in memory too, for scenes that differ little."""
+    """Within it the last part and the last reduction stay in memory too, for scenes that differ little."""
     before = _last.set({})
     try:
         yield
@@ -98,19 +97,6 @@ def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) ->
         springs = joints.contact_stiffness(scene, joints.unreduced(whole)).tobytes()
     found = _kept(file, "reduction", (json.loads(early_of(scene)), springs), make)
     return replace(found, interface=replace(found.interface, gap=interface.gap))
-
-
-def sector(scene: MeshScene, whole: Part, make: Callable[[], Sector]) -> Sector:
-    """The full sector of a wheel about its equilibrium, as it is in memory within `at_hand`: modes do not change it."""
-    early, last = json.loads(early_of(scene)), _last.get()
-    del early["reduction"]
-    if last is None:
-        return make()
-    own = early, whole.interface.gap.tobytes()
-    if "sector" not in last or last["sector"][0] != own:
-        last["sector"] = own, make()
-    found: Sector = last["sector"][1]
-    return found
 
 
 def heights(file: SceneFile, nodes: np.ndarray, make: Callable[[], T]) -> T:

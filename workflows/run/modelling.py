@@ -208,7 +208,7 @@ def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
     if scene.wheel is not None and scene.wheel.along_speed:
         return sector.along_speed(scene, part)
     if scene.wheel is not None:
-        small = sector.reduced(scene, kept.sector(scene, part, lambda: sector.sector(scene, part)))
+        small = sector.reduced(scene, sector.sector(scene, part))
         contact = ReducedModel(small.sector.system, small.sector.interface, info=small.info)
         springs = joints.contact_stiffness(scene, contact)
         return travelling_wave(small, scene.wheel.engine_order, springs=springs)

@@ -17,7 +17,7 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.readable import measured
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import curve, kept, modelling, references, sanity_checks, settings, wear_run
+from tribodyn.workflows.run import curve, modelling, references, sanity_checks, settings, wear_run
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
@@ -48,7 +48,7 @@ def run(
     scene, clock = file.scene, Clock(earlier)
     settings.check_names(scene)
     keep = Keeper(None if folder is None else folder / "result.h5", clock)
-    with alone_in(folder), limited(scene.solver.threads), kept.at_hand():
+    with alone_in(folder), limited(scene.solver.threads):
         model = modelling.build(file, progress, () if earlier is None else earlier.harmonics)
         for line in () if progress.silent else sanity_checks.lines(file, model):
             (progress.say if line.startswith("warning: ") else progress.detail)(line)
