@@ -305,13 +305,19 @@ class Gradient:
 
     def by_gap(self) -> np.ndarray:
         """(n_quantity, n_pair) dq / d gap of each pair [1/m]."""
+        slope = np.mean(self.of_gap(), axis=0)
+        return np.einsum("qpch,pch->qp", self._adjoints[2].reshape(-1, *slope.shape), slope)
+
+    def of_gap(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n_pair, n_component, n_coeff) d force / d gap of each pair at the same x, above and below it [N/m]."""
         balance = self.balance
         if "n" not in balance.contact.components or not balance.basis.has_static:
-            return np.zeros((len(self.quantities), balance.contact.n_pair))
+            return np.zeros_like(self.state.x), np.zeros_like(self.state.x)
         step, gap = RULES.of_gap * float(np.abs(self.state.x).max()), balance.contact.gap
-        above, below = (self._force(balance.contact.with_gap(gap + side), balance.memory) for side in (step, -step))
-        slope = (above - below) / (2 * step)
-        return np.einsum("qpch,pch->qp", self._adjoints[2].reshape(-1, *slope.shape), slope)
+        above, below = (
+            self._force(balance.contact.with_gap(gap + side), balance.memory) / side for side in (step, -step)
+        )
+        return above, below
 
     @cached_property
     def own(self) -> Posed:

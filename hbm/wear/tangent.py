@@ -18,7 +18,7 @@ Source  ours; of the step Alexander 1977, see error_controlled_rule
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -27,7 +27,7 @@ import scipy.linalg as sla
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.sites import BesidePeak
-from tribodyn.hbm.derivatives import Derivatives, peak_moves
+from tribodyn.hbm.derivatives import RULES as EXACT, Derivatives, peak_moves
 from tribodyn.hbm.gradient import Change, Gradient, NoDerivative, Posed
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
@@ -94,7 +94,7 @@ def of_life(
     by, values = slopes[:, :last], np.array([life, after.depth[deepest], area @ after.depth])
     return Derivatives(
         ("life", "depth", "volume"), values, (*(change.name for change in changes), *coefficients), by,
-        np.zeros(last, bool), by, by, np.zeros(3), by_gap, first.points[0].state, 2 * len(rows),
+        np.full(last, bool(tangent.corners)), by, by, np.zeros(3), by_gap, first.points[0].state, 2 * len(rows),
     )  # fmt: skip
 
 
@@ -133,12 +133,14 @@ class _Tangent:
     """The columns of a tangent, the changes first.
 
     grows : (n_pair, n) d ln depth per work; opens : (n_pair, n) d gap besides the wear
+    corners : cycles of the states where a pair is at a corner of its force, and the tangent that of one side
     """
 
     problem: WearProblem
     changes: tuple[Change, ...]
     grows: np.ndarray
     opens: np.ndarray
+    corners: list[float] = field(default_factory=list)
 
     def along(
         self, row: WearRow, past: Sequence[WearRow], before: WearState, after: WearState, depth: np.ndarray
@@ -171,6 +173,9 @@ class _Tangent:
         gap, along = -jac[:, :, normal], work_slope(balance, solved.x, solved.cycle)
         force, x = np.zeros((*gap.shape, base.shape[1])), np.zeros((size, base.shape[1]))
         gradient = Gradient(balance, solved, ())
+        above, below = gradient.of_gap()
+        if 2 * np.abs(above - below).max() > EXACT.corner * np.abs(above + below).max():
+            self.corners.append(state.cycles)
         for i, change in enumerate(changes):
             mean = np.mean(gradient.effects(change), axis=0)
             force[..., i], x[:, i] = mean[:size].reshape(gap.shape), mean[size : 2 * size]

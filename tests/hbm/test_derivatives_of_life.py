@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from tests.helpers.pressed_body import balance_of, pressed_body, wear_problem
+from tests.helpers.steps_again import EXACT, elasticity_anew
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed
-from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear import error_controlled_rule, tangent, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess, state_of
+from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear.step_control import Tolerance
 
-EXACT = NewtonOptions(tolerance=1e-12)
 SHARE, STEP, LOADS = 0.2, 1e-6, ("press", "shake")
 AT = AtFrequency("tip", 420.0, EXACT)
 PEAK = replace(AtPeak("tip", 250.0, 1200.0, newton=EXACT), tolerance=1e-7)
@@ -56,39 +58,6 @@ def found_of(problem, worn, site, names, share=SHARE):
     return tangent.of_life(problem, worn, changes, {"coefficient": (1.0, ["contact"])}, share)
 
 
-def again(worn, end, site, name, factor, longer):
-    """Cycles, largest depth and volume behind the steps of a run with one number changed, and ln of the preload left.
-
-    longer : factor on all steps
-    """
-    problem, rows = problem_of(site, name, factor), worn.rows()
-    state = assess(problem, np.zeros_like(problem.area), 0.0, state_of(problem, rows[0]))
-    first = problem.preload_of(state)
-    for row in rows[:end]:
-        stride = longer * row.cycles_in_step
-        if len(row.plan):
-            searches = [error_controlled_rule.Search(slope) for slope in row.plan[1:-1]]
-            state = error_controlled_rule._stages(problem, state, stride, np.zeros(1), searches)[1]
-        else:
-            state = assess(problem, state.depth + stride * state.rate, state.cycles + stride, state)
-        assert not state.failure
-    left = np.log(problem.preload_of(state) / first)
-    return np.array([state.cycles, state.depth.max(), problem.area @ state.depth]), left
-
-
-def elasticity_anew(worn, site, name, guess):
-    """Central difference of runs whose steps keep their shares of a life that ends at the same share of the preload."""
-    end, h = int(np.flatnonzero(worn.preload < SHARE * worn.preload[0])[0]), 1e-4
-    values, left = again(worn, end, site, "", 1.0, 1.0)
-    slope = (again(worn, end, site, "", 1.0, 1 + h)[1] - left) / h
-    sides = []
-    for factor in (1 + h, 1 - h):
-        longer = 1 + guess * (factor - 1)
-        longer -= (again(worn, end, site, name, factor, longer)[1] - left) / slope
-        sides.append(again(worn, end, site, name, factor, longer)[0])
-    return (sides[0] - sides[1]) / (2 * h) / values
-
-
 @pytest.mark.parametrize(
     ("rule", "site", "names"),
     [
@@ -108,7 +77,7 @@ def test_derivatives_of_a_life_are_those_of_its_steps_taken_again(rule, site, na
     for name in names:
         slope = found.by_gap.sum(axis=1) * 1e-4 if name == "gap" else found.slopes[:, found.parameters.index(name)]
         elasticity = slope / found.values
-        wanted = elasticity_anew(worn, site, name, elasticity[0])
+        wanted = elasticity_anew(worn, SHARE, partial(problem_of, site, name), elasticity[0])
         np.testing.assert_allclose(elasticity, wanted, rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(found.slopes[:, -1] / found.values, [-1.0, 0.0, 0.0], atol=1e-12)
 
@@ -123,6 +92,26 @@ def test_all_loads_times_c_wear_c_times_as_deep_in_a_life_over_c(at_rest):
     found = found_of(problem, worn, AT, LOADS)
     total = found.slopes[:, :2].sum(axis=1) / found.values
     np.testing.assert_allclose(total, [-1.0, 1.0, 1.0], atol=1e-5)
+
+
+def test_a_pair_that_just_touches_marks_the_derivatives():
+    ends = {"lost_below": 0.0, "lost_below_at_rest": SHARE}
+
+    def opened(gap):
+        problem = problem_of(AT, **ends)
+        return replace(problem, balance=problem.balance.with_gap(np.array([0.0, 0.0, gap, 0.0])))
+
+    def pressed(gap):
+        problem = opened(gap)
+        rest = PreloadAtRest(problem).quiet(assess(problem, np.zeros(4), 0.0, None))
+        return assess(rest, np.zeros(4), 0.0, None).points[0].state.x[2, 2, 0] - gap
+
+    touching = brentq(pressed, 0.0, 1e-2, xtol=1e-16)
+    for gap, marked in ((touching, True), (0.5 * touching, False)):
+        problem = opened(gap)
+        worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+        found = found_of(problem, worn, AT, ("press",))
+        assert found.corner.tolist() == 2 * [marked]
 
 
 def test_where_a_life_has_no_derivative_is_a_sentence():

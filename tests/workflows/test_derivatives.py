@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import tribodyn as td
 from tests.helpers.coarse_scenes import BEAM, BLADE, RIG
+from tests.helpers.steps_again import elasticity_anew, exactly
 from tribodyn.hbm import derivatives as exact
 from tribodyn.hbm.threads import limited
+from tribodyn.hbm.wear import tangent
 from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.run import references, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.varying import Varying, keys
 from tribodyn.workflows.scene import scene_file
@@ -65,6 +69,8 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
     ratio = friction * 0.5 / record["quantities"]["amplitude"]
     assert record["elasticities"]["contact.friction"]["amplitude"] == pytest.approx(ratio)
     assert all(path.stat().st_size > 0 for path in beam.write(tmp_path))
+    marked = replace(beam.found, names=("life", *beam.found.names[1:]), corner=np.ones_like(beam.found.corner))
+    assert sum("the table is that of one side" in line for line in replace(beam, found=marked).lines()) == 1
 
 
 @pytest.mark.parametrize("name", ["beam", "blade", pytest.param("rig", marks=pytest.mark.slow)])
@@ -160,6 +166,34 @@ def test_the_laws_of_scaling_hold_for_a_life(scene, overrides):
     np.testing.assert_allclose([loads, body], [[-1, 1, 1], [0, -1, -1]], atol=2e-5)
     np.testing.assert_allclose(rows["wear.coefficient"], [-1, 0, 0], atol=1e-9)
     assert found.lines()[0].startswith("life ")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("site", "changes"),
+    [
+        ({}, ("wear.at=200 Hz", "wear.motion=balance", "loads.harmonic.wave.value=20 kN")),
+        ({"tolerance": 1e-6}, ("damping.modal=3 %",)),
+    ],
+    ids=["frequency", "peak"],
+)
+def test_derivatives_of_the_blades_life_are_those_of_its_steps_taken_again(site, changes):
+    file, key, share = scene_file.read("blade", (*BLADE, *changes)), "contact.friction", 0.3
+
+    def varying(factor=1.0):
+        return Varying(file.changed(f"{key}={0.5 * factor!r}"), Progress())
+
+    def problem_of(factor):
+        return exactly(wear_run.wear_problem(file.scene, file.folder, varying(factor).model.balance, share), **site)
+
+    with limited(1):
+        own, problem = varying(), problem_of(1.0)
+        limit = settings.step_limit(file.scene, references.free_deflection(own.model.balance), problem.area)
+        worn = wear_run.evolve(problem, file.scene.wear, limit, file.scene.wear.max_steps)
+        found = tangent.of_life(problem, worn, [own.change(key, 0.5)], {}, share)
+        elasticity = found.slopes[:, 0] * 0.5 / found.values
+        difference = elasticity_anew(worn, share, problem_of, elasticity[0])
+    np.testing.assert_allclose(elasticity, difference, rtol=1e-5, atol=5e-6)
 
 
 @pytest.mark.parametrize(

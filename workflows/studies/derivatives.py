@@ -120,7 +120,12 @@ class ResponseDerivatives(StudyResult):
             lines.append("".join(f"{value:>+{w}.4f}" for value, w in zip(row, width, strict=True)) + f"  {key}")
         if f.follows_corner:
             lines.append("the peak is a corner of the curve, which moves with the contact transition that begins there")
-        for key in self.corners:
+        if "life" in f.names and self.corners:
+            lines.append(
+                "warning: at a state of the wear a pair is at a corner of its contact force, such as grazing or first "
+                "slip: the table is that of one side"
+            )
+        for key in self.corners if "life" not in f.names else ():
             i = f.parameters.index(key)
             first = "amplitude" if "amplitude" in f.names else "frequency"
             at = f.names.index(first)

@@ -1,0 +1,56 @@
+"""The steps of a wear run taken again with one number changed: differences that derivatives of a life have to meet."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.wear.error_controlled_rule import Search, _stages, begun
+from tribodyn.hbm.wear.evolution import assess, state_of
+
+EXACT = NewtonOptions(tolerance=1e-12)
+
+
+def exactly(problem, **site):
+    """The problem with solutions to rounding at its only place, whose other settings are given."""
+    (duty,) = problem.mission
+    return replace(problem, mission=(replace(duty, site=replace(duty.site, newton=EXACT, **site)),))
+
+
+def again(problem, worn, end, longer):
+    """Cycles, largest depth and volume behind the steps of a run of another problem, and ln of the preload left.
+
+    longer : factor on all steps
+    """
+    rows = worn.rows()
+    state = assess(problem, np.zeros_like(problem.area), 0.0, state_of(problem, rows[0]))
+    first = problem.preload_of(state)
+    for i, row in enumerate(rows[:end]):
+        stride = longer * row.cycles_in_step
+        if len(row.plan):
+            drift, slopes = begun(problem, state_of(problem, row), rows[:i], problem)
+            state = _stages(problem, state, stride, drift / longer, [Search(float(slope)) for slope in slopes])[1]
+        else:
+            state = assess(problem, state.depth + stride * state.rate, state.cycles + stride, state)
+        assert not state.failure
+    left = np.log(problem.preload_of(state) / first)
+    return np.array([state.cycles, state.depth.max(), problem.area @ state.depth]), left
+
+
+def elasticity_anew(worn, share, problem_of, guess):
+    """Central difference of runs whose steps keep their shares of a life that ends at the same share of the preload.
+
+    problem_of : factor on the number -> problem; guess : the elasticity of the life, near it
+    """
+    end, h = int(np.flatnonzero(worn.preload < share * worn.preload[0])[0]), 1e-4
+    same = problem_of(1.0)
+    values, left = again(same, worn, end, 1.0)
+    slope = (again(same, worn, end, 1 + h)[1] - left) / h
+    sides = []
+    for factor in (1 + h, 1 - h):
+        longer, problem = 1 + guess * (factor - 1), problem_of(factor)
+        longer -= (again(problem, worn, end, longer)[1] - left) / slope
+        sides.append(again(problem, worn, end, longer)[0])
+    return (sides[0] - sides[1]) / (2 * h) / values
