@@ -150,14 +150,13 @@ class StaticReaction:
     """The static force that keeps prescribed coordinates where they are.
 
     name : of the load whose static amplitude is the height
-    dofs : (k,) coordinates of the reduced model; shape : (k,) their displacement per unit height [m/m]
+    dofs : (k,) coordinates of the reduced model, each displaced by the height
     psi : (n, k) static shapes of unit displacements of each; stiffness : (k, k) psi^T K psi [N/m]
     support : (k,) springs in the model that act about the prescribed position [N/m]
     """
 
     name: str
     dofs: np.ndarray
-    shape: np.ndarray
     psi: np.ndarray
     stiffness: np.ndarray
     support: np.ndarray
@@ -173,4 +172,4 @@ class StaticReaction:
         load = -np.asarray(self.model.interface.B).T @ np.ravel(contact_force)
         for name, value in (loads or {}).items():
             load = load + value * self.model.system.loads[name]
-        return (self.stiffness @ self.shape - self.support * self.shape) * height - self.psi.T @ load
+        return (self.stiffness.sum(axis=1) - self.support) * height - self.psi.T @ load
