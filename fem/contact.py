@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import block_diag, csr_matrix, eye_array, kron, vstack
+from scipy.sparse import block_diag, csr_matrix, eye_array, issparse, kron, vstack
 
 from tribodyn.fem.constraints import named
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames, unit
@@ -183,12 +183,12 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
         fields["nodes"] = join([i.nodes or i for i in interfaces])
         means = [eye_array(i.n_pair) if i.mean is None else i.mean for i in interfaces]
         fields["mean"] = block_diag(means, format="csr")
-    width = max(i.faces.shape[1] for i in interfaces)
+    width, maps = max(i.faces.shape[1] for i in interfaces), [i.B for i in interfaces]
     faces = [np.pad(i.faces, ((0, 0), (0, width - i.faces.shape[1])), mode="edge") for i in interfaces]
     return ContactInterface(
         components=interfaces[0].components,
         **fields,
-        B=vstack([i.B for i in interfaces], format="csr"),
+        B=vstack(maps, format="csr") if issparse(maps[0]) else np.concatenate(maps),
         faces=np.concatenate([of + start for of, start in zip(faces, first, strict=False)]),
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, issparse, kron, vstack
 
 from tribodyn.fem.constraints import named
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact import ContactFaces, join
 from tribodyn.fem.interface import ContactInterface, unit
 from tribodyn.fem.matching import partners
 from tribodyn.fem.part import Part
@@ -202,15 +202,8 @@ def assemble_wheel(
         None if system.gyroscopic is None else summed(system.gyroscopic, ones),
         None if system.circulatory is None else summed(system.circulatory, ones),
     )
-    B = [half.B @ P - sector.left @ maps[k - 1] for k, P in enumerate(maps)]
-    turns = [np.linalg.matrix_power(sector.turn, k) for k in range(n_sectors)]
-    interface = replace(
-        half,
-        points=np.concatenate([half.points @ R.T for R in turns]),
-        frames=np.concatenate([half.frames @ R.T for R in turns]),
-        area=np.tile(half.area, n_sectors),
-        gap=np.tile(half.gap, n_sectors),
-        B=vstack(B, format="csr") if issparse(half.B) else np.concatenate(B),
-        faces=np.concatenate([half.faces + k * half.n_pair for k in range(n_sectors)]),
-    )
-    return wheel, interface
+    contacts = []
+    for k, P in enumerate(maps):
+        back, B = np.linalg.matrix_power(sector.turn, k).T, half.B @ P - sector.left @ maps[k - 1]
+        contacts.append(replace(half, points=half.points @ back, frames=half.frames @ back, B=B))
+    return wheel, join(contacts)

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.factor import Factor, factorise
+from tribodyn.fem.system import dense
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def modes(
     if not 1 <= n <= size:
         raise ValueError(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
     if size <= EIGEN.dense_below or 2 * n >= size or not issparse(K):
-        values, phi = eigh(_dense(K), _dense(M), subset_by_index=[0, n - 1])
+        values, phi = eigh(dense(K), dense(M), subset_by_index=[0, n - 1])
     else:
         if factor is None:
             factor, sigma = _factorise_shifted(K, M, sigma)
@@ -151,10 +152,6 @@ def _factorise(K: Any, definite: bool = True) -> Factor:
     if not np.iscomplexobj(K):
         return factorise(K, definite)
     return _OfHermitian(factorise(block_array([[K.real, -K.imag], [K.imag, K.real]]), definite))
-
-
-def _dense(matrix: Any) -> np.ndarray:
-    return matrix.toarray() if issparse(matrix) else np.asarray(matrix)
 
 
 def _signs(phi: np.ndarray) -> np.ndarray:

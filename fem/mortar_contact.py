@@ -87,9 +87,10 @@ def mortar_halves(
         polygons += list(side_polygons(one.nodes[whole, :3], one.nodes[whole, 3:]))
     at_points = np.array([[place[int(node)] for node in polygon] for polygon in polygons], dtype=int).reshape(-1, n)
     faces = new[at_points[kept[at_points].all(axis=1)]]
+    every, first_place = np.unique(one.nodes.ravel(), return_index=True)
     interface = ContactInterface(
         components=tuple(components),
-        points=one.points.reshape(-1, 3)[_first_place(one.nodes, nodes[kept])],
+        points=one.points.reshape(-1, 3)[first_place[np.searchsorted(every, nodes[kept])]],
         frames=_mean_frames(directions),
         area=area,
         gap=gap,
@@ -151,11 +152,6 @@ def _map(
     rows.data[np.abs(rows.data) < 1e-14] = 0.0  # rounding must not make a DOF a master
     rows.eliminate_zeros()
     return rows
-
-
-def _first_place(nodes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    flat, place = np.unique(nodes.ravel(), return_index=True)
-    return place[np.searchsorted(flat, wanted)]
 
 
 def _mean_frames(directions: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.sparse import issparse
 
 
 @dataclass(frozen=True)
@@ -60,3 +61,8 @@ class SecondOrderSystem:
             congruent(self.gyroscopic, -1.0),
             congruent(self.circulatory, -1.0),
         )
+
+
+def dense(matrix: Any) -> np.ndarray:
+    """A sparse or dense matrix as an array."""
+    return np.asarray(matrix.toarray() if issparse(matrix) else matrix)

@@ -81,7 +81,8 @@ def body(blocks: Sequence[Block], points: Mapping[str, Sequence[float] | np.ndar
             faces.setdefault(name, []).append(_faces(numbers, side))
 
     all_nodes, all_cells = np.vstack(nodes), np.vstack(cells)
-    spacing = _smallest_distance(all_nodes, all_cells)
+    corners = all_nodes[all_cells[:, :8]]
+    spacing = float(np.linalg.norm(corners[:, [1, 3, 4]] - corners[:, :1], axis=2).min() / 2)  # the smallest
     node_of, joined = _join(all_nodes, _JOIN * spacing)
     all_cells = node_of[all_cells]
     _check_cells(all_cells, len(joined))
@@ -181,11 +182,6 @@ def _faces(numbers: np.ndarray, side: str) -> np.ndarray:
     m, n = ((k - 1) // 2 for k in plane.shape)
     steps = (2 * REFERENCE_POINTS["quad9"]).astype(int)
     return np.stack([plane[a : a + 2 * m - 1 : 2, b : b + 2 * n - 1 : 2].ravel() for a, b in steps], axis=1)
-
-
-def _smallest_distance(nodes: np.ndarray, cells: np.ndarray) -> float:
-    corners = nodes[cells[:, :8]]
-    return float(np.linalg.norm(corners[:, [1, 3, 4]] - corners[:, :1], axis=2).min() / 2)
 
 
 def _join(nodes: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:

@@ -97,7 +97,8 @@ def build(parameters: Parameters, path: str | Path) -> None:
     ]
     at_pin = half * (1 - 2 * p.pin_column / (p.n_column - 1))
     seat, middle = np.array([below, p.pin_height, above]), p.thickness / 2
-    heights = _second_order(np.unique(np.concatenate([s.v for s in strips])))
+    ends = np.unique(np.concatenate([s.v for s in strips]))
+    heights = np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
 
     def line(theta: float, at: np.ndarray, z: float) -> np.ndarray:
         return place(np.stack([np.full(at.shape, theta), at, np.full(at.shape, z)], axis=1))
@@ -112,8 +113,3 @@ def build(parameters: Parameters, path: str | Path) -> None:
         "lower_corner": line(half, np.array([low]), 0.0),
     }
     blocks.write(path, blocks.body(strips, points))
-
-
-def _second_order(vertices: np.ndarray) -> np.ndarray:
-    """Vertices and the mid-side nodes between them."""
-    return np.sort(np.concatenate([vertices, (vertices[1:] + vertices[:-1]) / 2]))

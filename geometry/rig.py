@@ -192,7 +192,9 @@ def _beam(p: Parameters) -> blocks.JoinedBlocks:
     thick = across * (p.thickness / p.contact_width)
     cover = np.array([thick[0] - OURS.cover_depth, thick[0]])
     quarters = p.solid_length * np.array([0.25, 0.5, 0.75, 1.0])
-    span = _lines_through([0.0, p.shaker_distance, *quarters], p.longest)
+    stops = sorted({0.0, p.shaker_distance, *quarters})
+    pieces = [np.linspace(a, b, int(np.ceil((b - a) / p.longest)) + 1)[:-1] for a, b in pairwise(stops)]
+    span = np.concatenate([*pieces, stops[-1:]])
     specimen = p.contact_x + along * (OURS.shank / p.contact_length)
     arm = np.concatenate([span[-1:], specimen, [p.free_length]])
     taper = p.contact_z + np.array([0.0, p.foot, (p.foot + p.protrusion) / 2, p.protrusion])
@@ -219,13 +221,6 @@ def _beam(p: Parameters) -> blocks.JoinedBlocks:
         ],
         points=points,
     )
-
-
-def _lines_through(stops: list[float], longest: float) -> np.ndarray:
-    """Grid lines at every stop and evenly between them, none farther apart than `longest`."""
-    stops = sorted(set(stops))
-    pieces = [np.linspace(a, b, int(np.ceil((b - a) / longest)) + 1)[:-1] for a, b in pairwise(stops)]
-    return np.concatenate([*pieces, stops[-1:]])
 
 
 def _platform(p: Parameters) -> blocks.JoinedBlocks:

@@ -266,9 +266,9 @@ def _local_linear(z: np.ndarray, axis: int, step: float, cutoff: float) -> np.nd
     return fitted if axis == 0 else fitted.T
 
 
-def centred(surface: HeightMap, at: tuple[float, float] = (0.0, 0.0)) -> HeightMap:
-    """The same map with its middle at a point [m]."""
-    x, y = (axis - (axis[0] + axis[-1]) / 2 + middle for axis, middle in zip((surface.x, surface.y), at, strict=True))
+def centred(surface: HeightMap) -> HeightMap:
+    """The same map with its middle at the origin."""
+    x, y = (axis - (axis[0] + axis[-1]) / 2 for axis in (surface.x, surface.y))
     return replace(surface, x=x, y=y)
 
 

@@ -353,15 +353,16 @@ class Gradient:
             return there[0] - here[0], there[1] - here[1]
         base, before = above.excitation.base, below.excitation.base
         slid = np.zeros_like(self.state.flat) if base is None or before is None else balance.loaded(base - before)
-        pulls, moved = balance.basis.to_complex(balance.reference_stiffness[:, None] * slid), []
-        for h, side, u, pull in zip(balance.basis.harmonics, self._sides, self.u, pulls.T, strict=True):
+        pulled, moved = balance.reference_stiffness[:, None] * slid, []
+        pulls = balance.basis.to_complex(pulled).T
+        for h, side, u, pull in zip(balance.basis.harmonics, self._sides, self.u, pulls, strict=True):
             up, down = (one.model.at_harmonic(h)[0] for one in (above, below))  # in the same coordinates
             changed = self._loads(above, up, h) - self._loads(below, down, h) + side.B.conj().T @ pull
             if up is not down:
                 changed = changed - _difference(up, down, 1j * h * self.state.omega, u)
             moved.append(side.solve(changed))
         x, y = self._real(self._sides, moved)
-        return x - slid, y
+        return x - slid + (0.0 if own.residual is None else own.residual.apply(pulled)), y
 
     def _loads(self, posed: Posed, system: SecondOrderSystem, h: int) -> np.ndarray:
         """(n,) loads of a harmonic."""

@@ -53,8 +53,7 @@ def reduce_sector(
     model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
     assert model.basis is not None
     info = replace(model.info, joints=dict(sector.joints))
-    if sector.prestress is not None:
-        rest = sector.prestress
+    if (rest := sector.prestress) is not None:
         info = replace(info, prestress_residual=rest.residual, prestress_rotation=rest.rotation)
     return in_coordinates(sector, model.system, model.basis, info)
 
@@ -121,7 +120,7 @@ def wave_of(reduced: ReducedSector, engine_order: int, index_of: WaveIndex) -> R
     system, B = wave.model(1)
     info = replace(_shared_info(reduced), engine_order=engine_order)
     interface = replace(reduced.sector.interface, B=B)
-    return ReducedModel(system, interface, None, info, wave.model, wave.basis, wave.at_index)
+    return ReducedModel(system, interface, None, info, wave.model, wave.moved, wave.at_index)
 
 
 def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
@@ -190,9 +189,10 @@ class _Wave:
         """Small system and contact map of any wave of the wheel."""
         return self.index_of(index % self.reduced.sector.n_sectors)[:2]
 
-    def basis(self, h: int) -> np.ndarray:
-        """From the small coordinates of harmonic h to the full ones."""
-        return self.reduced.basis @ self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)[2]
+    def moved(self, q: np.ndarray, h: int) -> np.ndarray:
+        """Full coordinates (n_full,) or (n_full, k) of the small ones q (n,) or (n, k) of harmonic h."""
+        own = self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)[2] @ q
+        return self.reduced.basis @ own.real + 1j * (self.reduced.basis @ own.imag)
 
 
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:
@@ -237,8 +237,7 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     N = np.zeros((S.shape[1], len(others) + within.shape[1]), dtype=right.dtype)
     N[others, np.arange(len(others))] = 1.0
     N[faces, len(others) :] = within
-    ahead = np.conj(sector.phase(index))
-    follow = N + ahead * right.conj().T @ (left @ N)
+    follow = N + np.conj(sector.phase(index)) * right.conj().T @ (left @ N)
     return S @ np.concatenate([right.conj().T, follow], axis=1), len(right) + len(accessories)
 
 

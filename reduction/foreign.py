@@ -39,7 +39,7 @@ import scipy.sparse as sp
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
 from tribodyn.fem.modes import modes
-from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.fem.system import SecondOrderSystem, dense
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_files
 from tribodyn.reduction.abaqus_matrix import Labels
 from tribodyn.reduction.model import ModelInfo, ReducedModel
@@ -338,10 +338,6 @@ def _checked(read: dict[str, sp.csr_matrix], rows: Labels | None, floats: bool =
 
 def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> ReducedModel:
     """The matrices as they are, dense, for hbm; meant for systems already reduced elsewhere (some thousand DOFs)."""
-
-    def dense(matrix: Any) -> np.ndarray:
-        return matrix.toarray() if sp.issparse(matrix) else np.asarray(matrix)
-
     return ReducedModel(
         system=SecondOrderSystem(
             mass=dense(system.mass),

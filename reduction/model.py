@@ -69,7 +69,7 @@ class ReducedModel:
     info : what is known besides, such as the masters, the truncation frequency and the solver
     per_harmonic : harmonic -> (system, B) where a harmonic sees another system than `system`
         (cyclic harmonic index, displacement prescribed in harmonic 0); complex Hermitian where cyclic
-    harmonic_basis : harmonic -> (n_full, n) basis where the coordinates of a harmonic are its own
+    harmonic_basis : q (n, ...), harmonic -> basis @ q where the coordinates of a harmonic are its own
     per_index : of a travelling wave, index -> (system, B) of any wave of the wheel, real for 0 and N/2; matrices of
         index -j are the conjugates of those of j
     along : of a wheel whose speed goes with the frequency, frequency [rad/s] -> the model there
@@ -81,7 +81,7 @@ class ReducedModel:
     basis: np.ndarray | None = None
     info: ModelInfo = field(default_factory=ModelInfo)
     per_harmonic: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
-    harmonic_basis: Callable[[int], np.ndarray] | None = None
+    harmonic_basis: Callable[[np.ndarray, int], np.ndarray] | None = None
     per_index: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
     residual: ResidualFlexibility | None = None
     along: Callable[[float], ReducedModel] | None = None
@@ -102,10 +102,11 @@ class ReducedModel:
 
     def reconstruct(self, q: np.ndarray, h: int = 1) -> np.ndarray:
         """Full displacement (n_full, ...) [m] of reduced coordinates q (n, ...) of harmonic h."""
-        basis = self.basis if self.harmonic_basis is None else self.harmonic_basis(h)
-        if basis is None:
+        if self.harmonic_basis is not None:
+            return self.harmonic_basis(q, h)
+        if self.basis is None:
             raise ValueError("this model came as matrices: it has no full field to reconstruct")
-        return np.tensordot(basis, q, axes=1)
+        return np.tensordot(self.basis, q, axes=1)
 
     def projected(self, basis: np.ndarray) -> ReducedModel:
         """The model in coordinates p, q = basis @ p, basis (n, n_p) real; matrices are made symmetric to rounding."""
@@ -149,14 +150,13 @@ class StaticReaction:
     """The static force that keeps prescribed coordinates where they are.
 
     name : of the load whose static amplitude is the height
-    dofs : (k,) coordinates of the reduced model; shape : (k,) their displacement per unit height [m/m]
+    dofs : (k,) coordinates of the reduced model, each displaced by the height
     psi : (n, k) static shapes of unit displacements of each; stiffness : (k, k) psi^T K psi [N/m]
     support : (k,) springs in the model that act about the prescribed position [N/m]
     """
 
     name: str
     dofs: np.ndarray
-    shape: np.ndarray
     psi: np.ndarray
     stiffness: np.ndarray
     support: np.ndarray
@@ -172,4 +172,4 @@ class StaticReaction:
         load = -np.asarray(self.model.interface.B).T @ np.ravel(contact_force)
         for name, value in (loads or {}).items():
             load = load + value * self.model.system.loads[name]
-        return (self.stiffness @ self.shape - self.support * self.shape) * height - self.psi.T @ load
+        return (self.stiffness.sum(axis=1) - self.support) * height - self.psi.T @ load

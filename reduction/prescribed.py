@@ -24,19 +24,13 @@ from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel, StaticReaction
 
 
-def prescribe(
-    model: ReducedModel,
-    dofs: np.ndarray,
-    name: str,
-    shape: np.ndarray | float = 1.0,
-    support: np.ndarray | float = 0.0,
-) -> ReducedModel:
+def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndarray | float = 0.0) -> ReducedModel:
     """Prescribe the static displacement of some coordinates of a reduced model; the rest of their motion stays free.
 
     dofs : (k,) physical coordinates, outside the contact
     name : of the new load, whose static amplitude is the height [m]
-    shape : displacement of each per unit height; support : springs that hold each about the prescribed position, which
-        are in the stiffness for the sake of the other harmonics and carry no force at that position [N/m]
+    support : springs that hold each about the prescribed position, which are in the stiffness for the sake of the other
+        harmonics and carry no force at that position [N/m]
     Returns the model, whose harmonic 0 sees another system, and whose `info.reaction` gives the force
     Raises  ValueError where a coordinate belongs to the contact, where the name is taken, or where the part can still
         move rigidly
@@ -49,9 +43,8 @@ def prescribe(
         raise ValueError(f"prescribed displacement '{name}' has the name of a load; give it another")
     if np.any(B[:, held]):
         raise ValueError(f"prescribed displacement '{name}' acts on contact nodes; choose nodes outside the contact")
-    place = np.searchsorted(held, np.asarray(dofs, dtype=int))
-    full_shape, springs = np.empty(len(held)), np.empty(len(held))
-    full_shape[place], springs[place] = shape, support
+    springs = np.empty(len(held))
+    springs[np.searchsorted(held, np.asarray(dofs, dtype=int))] = support
 
     K = np.asarray(system.stiffness)
     try:
@@ -66,8 +59,8 @@ def prescribe(
 
     loads = {**system.loads, name: np.zeros(system.n_dof)}
     dynamic = replace(system, loads=loads)
-    static = _cut(system, free, held, name, full_shape)
-    reaction = StaticReaction(name, held, full_shape, psi, psi.T @ K @ psi, springs, model)
+    static = _cut(system, free, held, name)
+    reaction = StaticReaction(name, held, psi, psi.T @ K @ psi, springs, model)
 
     def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         return (static if h == 0 else dynamic), B
@@ -76,14 +69,12 @@ def prescribe(
     return replace(model, system=dynamic, per_harmonic=per_harmonic, info=info)
 
 
-def _cut(
-    system: SecondOrderSystem, free: np.ndarray, held: np.ndarray, name: str, shape: np.ndarray
-) -> SecondOrderSystem:
-    """The system with the held coordinates cut off; the load `name` moves them by `shape` per unit of its amplitude."""
+def _cut(system: SecondOrderSystem, free: np.ndarray, held: np.ndarray, name: str) -> SecondOrderSystem:
+    """The system with the held coordinates cut off; the load `name` moves each of them by its amplitude."""
     K, M = np.array(system.stiffness), np.array(system.mass)
     push = np.zeros(system.n_dof)
-    push[free] = -K[np.ix_(free, held)] @ shape
-    push[held] = np.diag(K)[held] * shape
+    push[free] = -K[np.ix_(free, held)].sum(axis=1)
+    push[held] = np.diag(K)[held]
     damping = None if system.damping is None else np.array(system.damping)
     for matrix in (K, M, damping):
         if matrix is not None:

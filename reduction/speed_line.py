@@ -68,11 +68,6 @@ class SpeedLine:
         """The model at the speed that belongs to a frequency [rad/s]."""
         return wave_of(self.reduced[0], self.engine_order, AtSpeed(self, self.speed(omega)))
 
-    @property
-    def without_last(self) -> SpeedLine:
-        """The same without its last speed."""
-        return replace(self, reduced=self.reduced[:-1], speeds=self.speeds[:-1], made={})
-
     def speed(self, omega: float) -> float:
         """The speed [Hz] whose engine order has a frequency [rad/s]."""
         return omega / (2 * np.pi * abs(self.engine_order))

@@ -13,6 +13,7 @@ from math import gcd
 import numpy as np
 import scipy.linalg as sla
 
+from tribodyn.fem.contact import join
 from tribodyn.fem.cyclic import of_sector
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
@@ -66,16 +67,7 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
         _together(gyroscopic),
         _together(circulatory),
     )
-    one = model.interface
-    interface = replace(
-        one,
-        points=np.tile(one.points, (n, 1)),
-        frames=np.tile(one.frames, (n, 1, 1)),
-        area=np.tile(one.area, n),
-        gap=np.tile(one.gap, n),
-        B=rows[:, :n_contact].reshape(n * n_contact, -1),
-        faces=np.concatenate([one.faces + k * one.n_pair for k in range(n)]),
-    )
+    interface = join([replace(model.interface, B=own[:n_contact]) for own in rows])
     return ReducedModel(whole, interface, None, replace(model.info, joints={}))
 
 

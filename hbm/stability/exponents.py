@@ -280,7 +280,11 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     if answer is not None:
         flow = np.zeros((m, m)) if expansion.flow is None else expansion.flow[:m, :m]
         modes = expansion.lam[:m], expansion.c[:m, :m], flow, phi, static
-        found = wave_exponents.settled(found, (lambda index: modes, 0, 0, state.omega), slope, answer)
+        one, of = np.unique(
+            np.where(found.imag < 0, found.conj(), found), return_inverse=True
+        )  # each with its conjugate
+        one = wave_exponents.settled(one, (lambda index: modes, 0, 0, state.omega), slope, answer)[of]
+        found = np.where(found.imag < 0, one.conj(), one)
     return found * state.omega
 
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import compiled_law
-from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.hbm.time import time_step
 
 STEPS = 256  # of a period
@@ -36,9 +35,8 @@ def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[com
     angle, nc = 2 * np.pi * np.arange(1, STEPS + 1) / STEPS, 2 * top + 1
     x = np.ascontiguousarray((state.x @ balance.basis.functions(angle).T).transpose(2, 0, 1))
     memory, bits = time_step.memory_after(law, x, contact, memory)
-    slopes, work = np.zeros((STEPS, n_pair, c + n_state, 2 * c + n_state)), time_step.room(c, n_state)
-    for j in range(STEPS):
-        time_step.pass_on(law, contact, x[j - 1], bits == SEPARATES, x[j], memory, bits, work, slopes[j:])
+    slopes = np.zeros((STEPS, n_pair, c + n_state, 2 * c + n_state))
+    time_step.slopes_of_period(law, contact, x, memory, bits, slopes)
     of_x, of_s, of_x0 = np.split(slopes, [c, c + n_state], axis=3)
     waves = np.exp(1j * np.outer(angle, np.arange(-top, top + 1)))
     p = np.kron(np.eye(c), waves[:, None]).reshape(STEPS, 1, c, c * nc)

@@ -56,7 +56,7 @@ class Hold:
             return None
         height = float(np.real(balance.excitation.loads.get((0, reaction.name), 0.0)))
         K, B = np.asarray(model.system.stiffness), np.asarray(model.interface.B)
-        return cls(reaction.dofs, reaction.shape * height, height, K, B, balance.compliance.k, load, base)
+        return cls(reaction.dofs, np.full(len(reaction.dofs), height), height, K, B, balance.compliance.k, load, base)
 
     @property
     def at(self) -> np.ndarray:

@@ -545,6 +545,14 @@ def pass_on(step, contact, x, was_open, x_new, memory, bits, work, slopes):
         bits[i] = abs(now)
 
 
+@numba.njit(cache=True)
+def slopes_of_period(step, contact, xs, memory, bits, slopes):
+    """Derivatives of the law (n_step, n_pair, ...) along a periodic displacement xs (n_step, n_pair, c)."""
+    work = room(xs.shape[2], memory.shape[1])
+    for j in range(xs.shape[0]):
+        pass_on(step, contact, xs[j - 1], bits == SEPARATES, xs[j], memory, bits, work, slopes[j:])
+
+
 @numba.njit(**PLAIN)
 def foresee(x_free, f, f_before, bits, A, y, x_new, f_new, was_open):
     """Guess of a step: forces go on as before, but of pairs without; with y = A f_new and x_new under them."""

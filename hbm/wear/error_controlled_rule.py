@@ -94,11 +94,13 @@ def evolve(
     on_row: Callable[[WearRow], None] | None = None,
     resume: WearHistory | None = None,
     motion: Literal["balance", "machine", "time"] = "balance",
+    watched: bool = True,
 ) -> WearHistory:
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
     motion : along which it wears: the balance's; that of a machine, followed in time where it leaves the balance's, see
         hbm.wear.machine_motion; or in time everywhere
+    watched : whether rows have the growth of perturbations; a machine's motion depends on it, nothing else does
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is its estimate over the tolerance. The
     last touch of a vibrating contact does not end in finite time: `least_preload_share` ends the run where
     `lost_below` does not.
@@ -122,7 +124,7 @@ def evolve(
     end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps and state is not None:
         state = at_rest.of(state)
-        if motion != "time":  # where nothing depends on it
+        if motion == "machine" or (watched and motion == "balance"):
             state = with_growth(problem, state, always=machine is not None)
         if machine is not None:
             state = machine.of(state)

@@ -10,7 +10,7 @@ from tribodyn.fem.loads import NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_file, rig
-from tribodyn.reduction.linear import system_modes
+from tribodyn.reduction.linear import linear_modes
 
 
 def read(tmp_path, **changes):
@@ -77,7 +77,7 @@ def test_clamped_beam_has_the_frequency_of_a_cantilever(tmp_path):
         {"shaker": NodalForce("shaker", (0, 1, 0))},
         {},
     )
-    found = system_modes(part.system, part.interface, None, 1)[0][0]
+    found = linear_modes(part, None, 1)[0][0]
     whole = 3.516 / (2 * np.pi) * np.sqrt(E / rho / 12) * p.thickness / p.free_length**2
     missing = p.slot_length * p.slot_height * 0.9  # less the upper specimen
     at = 1.8751 * (1 - 0.5 * p.slot_length / p.free_length)  # the mode there: squares integrate to one over the length

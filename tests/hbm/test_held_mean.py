@@ -60,7 +60,7 @@ def test_motion_in_time_is_that_of_many_harmonics(height: float, force: float) -
     assert reaction is not None
     in_time = reaction.force(height, found.motion.force.mean(axis=2))  # another formula than that of the hold
     np.testing.assert_allclose(in_time, reaction.force(height, state.cycle.force[:, :, 0]), rtol=2e-3)
-    own = reaction.support * reaction.shape * height  # of the springs that act about the height
+    own = reaction.support * height  # of the springs that act about the height
     np.testing.assert_allclose(stepper.hold.in_balance(state) - own, in_time, rtol=2e-3)
 
 

@@ -13,7 +13,7 @@ from tribodyn.reduction import craig_bampton as craig_bampton_module
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.limits import ReductionLimits
-from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
+from tribodyn.reduction.linear import linear_modes, stuck_stiffness
 
 SPRINGS = (470e6, 583e6)
 
@@ -50,7 +50,7 @@ def test_all_modes_are_exact():
     assert model.system.n_dof == n
     k = part.interface.stiffness(*SPRINGS)
     for stiffness in (None, k):
-        full, _ = system_modes(part.system, part.interface, stiffness, n)
+        full, _ = linear_modes(part, stiffness, n)
         reduced, _ = linear_modes(model, stiffness, n)
         assert reduced == pytest.approx(full, rel=1e-9)
     # a forced response, damped, with a stuck contact
@@ -82,14 +82,14 @@ def test_few_modes_are_enough(part, model):
     k = part.interface.stiffness(*SPRINGS)
     finer = craig_bampton(part.system, part.interface, n_modes=30)
     for stiffness in (None, k):
-        full, _ = system_modes(part.system, part.interface, stiffness)
+        full, _ = linear_modes(part, stiffness)
         few, _ = linear_modes(model, stiffness)
         more, _ = linear_modes(finer, stiffness)
         assert (few - full > -1e-8 * full).all()
         assert (more <= few * (1 + 1e-9)).all()
         assert few[0] / full[0] - 1 < 5e-4
     assert (more / full - 1)[:9].max() < 3e-3
-    full, _ = system_modes(part.system, part.interface)
+    full, _ = linear_modes(part)
     assert (linear_modes(finer)[0] / full - 1).max() < 3e-3
 
 

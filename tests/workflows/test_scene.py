@@ -19,6 +19,7 @@ WRONG = {
     "contact.t1=[0,0,0]": ["contact.t1", "not all zero"],
     'contact.components=["t1","q"]': ["contact.components[1]", "'t2'", "'q'"],
     "contact=": ["contact is missing"],
+    "material=": ["material is missing"],
     "loads.static.press.valu=3": ["unknown key loads.static.press.valu", "did you mean value?"],
     "loads.harmonic.shake.value=10 mm": ["loads.harmonic.shake.value", "a force"],
     "loads.harmonic={}": ["loads", "at least one harmonic load"],

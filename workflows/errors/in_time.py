@@ -54,10 +54,11 @@ def is_checked(state: State, asked: bool | None, options: Options) -> bool:
     return state.balance.contact.stiffness.size <= options.max_time_components if asked is None else asked
 
 
-def rows(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[Change]:
+def rows(file: SceneFile, balance: HarmonicBalance, result: Result, options: Options) -> list[Change]:
     """What the life and depth of a result would change along the motions that a machine makes.
 
-    Those of the unworn state, one halfway through the life and one near its end, but for rows that were worn in time
+    Those of the unworn state, one halfway through the life and one near its end, but for rows that were worn in time.
+    Each stands beside the balance with the harmonics of the combined refinement, so that none counts in both rows
     """
     wear = result.wear
     assert wear is not None
@@ -67,7 +68,8 @@ def rows(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[Chan
         return []
     apart: tuple[float | None, float | None] = (None, None)
     try:
-        apart = missed([left(states.worn_state(file, balance, result, row)) for row in looked], result)
+        there = [states.worn_state(file, balance, result, row) for row in looked]
+        apart = missed([left(states.widened(one, one.top(options))) for one in there], result)
     except (ValueError, RuntimeError) as refusal:  # a motion that does not settle, a row that is not solved again
         how += f": {refusal}"
     names = ("life", "depth")

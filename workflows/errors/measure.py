@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from tribodyn.hbm.contact.sampling import sampling_error
-from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
 from tribodyn.hbm.wear.machine_motion import left_aside
@@ -87,7 +86,7 @@ def refined(file: SceneFile, first: State, result: Result, options: Options) -> 
     Where no finer mesh is allowed, one coarser than the scene's own stands in for it, with a ratio below 1
     """
     contact = first.balance.contact.stiffness.size
-    coefficients = 2 * top_of(first, options) + 1
+    coefficients = 2 * first.top(options) + 1
     why = ""
     for ratio in (*options.ratios, 1 / options.coarser):
         try:
@@ -104,11 +103,6 @@ def refined(file: SceneFile, first: State, result: Result, options: Options) -> 
         else:
             return refine.modes(finer, options.modes) or finer, actual, ""
     return None, 1.0, why
-
-
-def top_of(first: State, options: Options = DEFAULT) -> int:
-    """Highest harmonic of the refined balance."""
-    return max(options.harmonics, first.balance.basis.harmonics[-1] + 2)
 
 
 def _step_by_step(file: SceneFile, finer: SceneFile, ratio: float, table: Table, say: Callable[[str], None]) -> None:
@@ -131,7 +125,7 @@ def _step_by_step(file: SceneFile, finer: SceneFile, ratio: float, table: Table,
         table.refuse(Refinement.COMBINED, table.rows[-1].how)
         return
     table.ratio, table.last = ratio, last
-    table.add(Refinement.COMBINED, own.answers, last.answers, f"{how}, more modes, harmonics 0 to {top_of(own)}")
+    table.add(Refinement.COMBINED, own.answers, last.answers, f"{how}, more modes, harmonics 0 to {own.top()}")
 
 
 def _on_own_mesh(file: SceneFile, why: str, table: Table, say: Callable[[str], None]) -> None:
@@ -142,7 +136,7 @@ def _on_own_mesh(file: SceneFile, why: str, table: Table, say: Callable[[str], N
     if last is None or not isinstance(file.scene, MatrixScene):
         table.refuse(Refinement.COMBINED, why if last else table.rows[-1].how)
     else:
-        table.add(Refinement.COMBINED, own.answers, last.answers, f"more modes, harmonics 0 to {top_of(own)}")
+        table.add(Refinement.COMBINED, own.answers, last.answers, f"more modes, harmonics 0 to {own.top()}")
 
 
 def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> State | None:
@@ -174,22 +168,13 @@ def _load(file: SceneFile) -> float:
 
 def _more_harmonics(state: State, table: Table, say: Callable[[str], None]) -> State | None:
     """A state with more harmonics, followed from its own solution, from the next to the highest ones."""
-    top = top_of(state)
-    say(f"harmonics 0 to {top}")
-    how = f"harmonics 0 to {top}"
+    how = f"harmonics 0 to {state.top()}"
+    say(how)
     try:
-        wide = harmonic_choice.widened(state.balance, top, harmonic_choice.ROUGH)
-        wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top))
-        omega, x = state.here.state.omega, state.balance.basis.transfer(state.here.state.x, wide.basis)
-        point = state.site.next(wide, omega, x)
-        if not point.solution.converged:  # no solution is near: the place is looked for as at the start
-            point = state.site.first(wide)
-        if not point.solution.converged:
-            raise RuntimeError(str(point.solution.outcome))
+        found = states.widened(state, state.top())
     except REFUSALS as refusal:
         table.refuse(Refinement.HARMONICS, f"{how}: {refusal}")
         return None
-    found = State(state.cycles, wide, state.site, point)
     table.add(Refinement.HARMONICS, state.answers, found.answers, how)
     return found
 
@@ -198,8 +183,7 @@ def _estimates(file: SceneFile, model: Model, table: Table, result: Result, opti
     """What the contact law, the wear rule and its motions estimate of themselves."""
     own = table.first
     assert own is not None
-    state = own.here.state
-    error = float(sampling_error(own.balance, state.omega, state.x))
+    error = float(sampling_error(own.balance, own.here.state.omega, own.here.state.x))
     for name in OF_STATE[1:]:
         table.rows.append(Change(Refinement.SAMPLES, name, None, None, error, "estimate: located transitions"))
     wear = file.scene.wear
@@ -207,10 +191,9 @@ def _estimates(file: SceneFile, model: Model, table: Table, result: Result, opti
         found = step_error(result.wear, wear.tolerance if wear.rule == "error_controlled" else None)
         for name, one in (("depth", found.depth), ("life", found.cycles)):
             table.rows.append(Change(Refinement.WEAR_STEPS, name, None, None, float(one), "estimate of the wear rule"))
-            if result.wear.in_time.any():
-                how = "standard error of means in time"
-                table.rows.append(Change(Refinement.MOTION, name, None, None, result.wear.scatter, how))
-        if result.wear.in_time.any():
+        if result.wear.in_time.any():  # scatter puts cycles off, not the depth of a contact worn through
+            how = "standard error of means in time"
+            table.rows.append(Change(Refinement.MOTION, "life", None, None, result.wear.scatter, how))
             problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
             aside = abs(left_aside(problem, result.wear, options.looks))
             how = "periodic motions that an irregular one passed by"
@@ -230,7 +213,7 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     if life is None:
         table.refuse(Refinement.COMBINED, "no life has ended", OF_WEAR)
         return
-    top = top_of(own, options)
+    top = own.top(options)
     periods = 0 if wear.periods is None else wear.periods.sum()  # marched with as many steps, whatever the harmonics
     work = float(wear.solves.sum() * (2 * top + 1) + periods) * own.balance.contact.stiffness.size
     bare = isinstance(file.scene, MatrixScene)
@@ -269,9 +252,8 @@ def worn_through(file: SceneFile, model: Model, begun: State | None = None) -> t
     wear = file.scene.wear
     assert wear is not None
     basis = model.balance.basis
-    at = None if begun is None else begun.here.state
-    start = None if begun is None or at is None else (at.omega, begun.balance.basis.transfer(at.x, basis))
-    worn = wear_run.worn_out(file, model, wear.lost_below, start)
+    at = None if begun is None else (begun.here.state.omega, begun.balance.basis.transfer(begun.here.state.x, basis))
+    worn = wear_run.worn_out(file, model, wear.lost_below, at)
     life = life_of(worn, model, wear)
     if worn.ended.failed or life is None:
         raise RuntimeError(str(worn.end))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint
 from tribodyn.hbm.continuation.sites import Site
@@ -14,6 +15,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.history import LIFE_SHARE
+from tribodyn.workflows.errors.options import DEFAULT, Options
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
@@ -51,6 +53,10 @@ class State:
     def answers(self) -> Answers:
         """What it answers."""
         return answers_of(self.balance, self.here)
+
+    def top(self, options: Options = DEFAULT) -> int:
+        """Highest harmonic of the refined balance."""
+        return max(options.harmonics, self.balance.basis.harmonics[-1] + 2)
 
 
 @dataclass(frozen=True)
@@ -155,6 +161,17 @@ def unworn(file: SceneFile, model: modelling.Model, like: Site | OnCurve | None 
         site, load = duty.site, duty.load
     balance = model.balance.with_load(load)
     return _solved(State(0.0, balance, site, site.first(balance)))
+
+
+def widened(state: State, top: int) -> State:
+    """A state with all harmonics up to one, followed from its own solution; raises NoPeak, RuntimeError without one."""
+    wide = harmonic_choice.widened(state.balance, top, harmonic_choice.ROUGH)
+    wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top))
+    x = state.balance.basis.transfer(state.here.state.x, wide.basis)
+    point = state.site.next(wide, state.here.state.omega, x)
+    if not point.solution.converged:  # no solution is near: the place is looked for as at the start
+        point = state.site.first(wide)
+    return _solved(State(state.cycles, wide, state.site, point))
 
 
 def _solved(state: State) -> State:

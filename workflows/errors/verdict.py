@@ -39,7 +39,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, opt
         if table.first is not None and in_time.is_checked(table.first, file.scene.verdict.in_time, options):
             look = _look(table.first)
         if look is not None and result.wear_steps and file.scene.wear is not None:
-            table.rows += in_time.rows(file, model.balance, result)
+            table.rows += in_time.rows(file, model.balance, result, options)
     values = values_of(table, result)
     statements = {name: _statement(name, values[name], table, look, result, options) for name in QUANTITIES}
     return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock, table.worn_ratio)
@@ -97,20 +97,18 @@ def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEF
 
     It is no less than what the wear steps say of themselves: a coarser mesh is worn with the same steps
     """
-    marched = any(row.refinement == Refinement.MOTION for row in rows)  # then means and steps scatter
-    by_chance = [row for row in rows if row.refinement in (Refinement.MOTION, Refinement.WEAR_STEPS)]
-    least = max((row.relative or 0.0 for row in by_chance), default=0.0)
-    chance = least if marched else 0.0
-    others = [row for row in rows if row.refinement == Refinement.OTHER_MOTION]
-    aside = sum(row.relative or 0.0 for row in others)
-    for row in (one for one in others if one.relative is None):
-        return None, row.how
-    for row in rows:
-        if row.refinement == Refinement.COMBINED:
-            if row.relative is None:
-                return None, row.how
-            return max(options.total(max(row.relative, chance), ratio), least) + aside, ""
-    return None, "no refinement was measured"
+
+    def sizes(*of: Refinement) -> list[float]:
+        return [row.relative or 0.0 for row in rows if row.refinement in of]
+
+    needed = (Refinement.COMBINED, Refinement.OTHER_MOTION)
+    unknown = [row.how for row in rows if row.relative is None and row.refinement in needed]
+    if unknown or not sizes(Refinement.COMBINED):
+        return None, (*unknown, "no refinement was measured")[0]
+    least = max(sizes(Refinement.MOTION, Refinement.WEAR_STEPS), default=0.0)
+    chance = least if sizes(Refinement.MOTION) else 0.0  # then means and steps scatter
+    change = max(*sizes(Refinement.COMBINED), chance)
+    return max(options.total(change, ratio), least) + sum(sizes(Refinement.OTHER_MOTION)), ""
 
 
 def dominating(rows: Sequence[Change]) -> str | None:

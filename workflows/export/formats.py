@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.io import savemat
 
+from tribodyn.fem.system import dense
 from tribodyn.reduction import nastran_matrix
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.export import curves, vtk
@@ -33,11 +33,11 @@ def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:
     """M, K, C (n, n), B (n_contact, n), loads and outputs by name as a harmonic sees them; complex for a wheel."""
     model.require_masters("an export of matrices")
     system, B = model.at_harmonic(harmonic)
-    found = {"M": _dense(system.mass), "K": _dense(system.stiffness), "B": _dense(B)}
+    found = {"M": dense(system.mass), "K": dense(system.stiffness), "B": dense(B)}
     if system.damping is not None:
-        found["C"] = _dense(system.damping)
-    found |= {f"load_{name}": _dense(vector) for name, vector in system.loads.items()}
-    found |= {f"output_{name}": _dense(vector) for name, vector in system.outputs.items()}
+        found["C"] = dense(system.damping)
+    found |= {f"load_{name}": dense(vector) for name, vector in system.loads.items()}
+    found |= {f"output_{name}": dense(vector) for name, vector in system.outputs.items()}
     i = model.interface
     return found | {
         "contact_area": i.area,
@@ -45,10 +45,6 @@ def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:
         "contact_points": i.points,
         "contact_frames": i.frames,
     }
-
-
-def _dense(matrix: Any) -> np.ndarray:
-    return np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix)
 
 
 def write_npz(result: Result, folder: Path) -> list[Path]:
@@ -67,18 +63,6 @@ def _symmetric(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return found | {name: (found[name] + found[name].conj().T) / 2 for name in ("M", "K", "C") if name in found}
 
 
-def _about(model: ReducedModel, folder: Path, **more: Any) -> Path:
-    """reduced.json, which describes the matrices beside it."""
-    path = folder / "reduced.json"
-    about = {
-        "components": model.interface.components,
-        "units": "SI",
-        "contact": "x = B q, row pair * n_component + component",
-    }
-    path.write_text(json.dumps(about | more, indent=2), encoding="utf-8")
-    return path
-
-
 def write_matlab(result: Result, folder: Path) -> list[Path]:
     """reduced.mat with the same variables as reduced.npz, which a scene's [model] reads again."""
     model, path = reduced_model(result), folder / "reduced.mat"
@@ -93,14 +77,16 @@ def write_op4(result: Result, folder: Path) -> list[Path]:
     found = _symmetric(arrays(model))
     held: dict[str, np.ndarray] = {name: found[name] for name in ("M", "K", "C", "B") if name in found}
     held |= {"AREA": found["contact_area"][:, None], "GAP": found["contact_gap"][:, None]}
-    columns = {}
+    about: dict[str, Any] = {"components": model.interface.components, "units": "SI"}
+    about["contact"] = "x = B q, row pair * n_component + component"
     for kind in ("load", "output"):
         names = [name for name in found if name.startswith(f"{kind}_")]
-        columns[f"{kind}s"] = [name.removeprefix(f"{kind}_") for name in names]
+        about[f"{kind}s"] = [name.removeprefix(f"{kind}_") for name in names]
         if names:
             held[f"{kind}s".upper()] = np.column_stack([found[name] for name in names])
     nastran_matrix.write_op4(folder / "reduced.op4", held)
-    return [folder / "reduced.op4", _about(model, folder, **columns)]
+    (folder / "reduced.json").write_text(json.dumps(about, indent=2), encoding="utf-8")
+    return [folder / "reduced.op4", folder / "reduced.json"]
 
 
 def write_abaqus(result: Result, folder: Path) -> list[Path]:

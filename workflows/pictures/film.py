@@ -127,7 +127,7 @@ def encode(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str]) -> 
             raise ValueError(f'no film format "{name}": take {" or ".join(FORMATS)}')
     paths = {name: stem.with_name(f"{stem.name}.{name}") for name in dict.fromkeys(formats)}
     kept, rate = [], LAYOUT.rate
-    flow = _even(images)
+    flow = (image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2] for image in images)  # even, as MP4 needs it
     first = next(flow)
     with ExitStack() as stack:
         send = _encoder(paths["mp4"], first, rate, stack) if "mp4" in paths else None
@@ -143,12 +143,6 @@ def encode(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str]) -> 
             paths["gif"], save_all=True, append_images=pages[1:], duration=10 * max(round(100 / rate), 2), loop=0
         )
     return list(paths.values())
-
-
-def _even(images: Iterable[np.ndarray]) -> Iterator[np.ndarray]:
-    """Images of even width and height, which the encoder needs."""
-    for image in images:
-        yield image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2]
 
 
 def _encoder(path: Path, first: np.ndarray, rate: float, stack: ExitStack) -> Any:

@@ -33,7 +33,6 @@ class Layer:
     limits: tuple[float, float] = (0.0, 1.0)
     edges: bool = True
     flat: bool = False
-    opacity: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -68,14 +67,14 @@ def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720)) -> np.
         if not layer.mesh.n_points:
             continue
         if layer.values is None:
-            plotter.add_mesh(layer.mesh, color=layer.color, lighting=not layer.flat, opacity=layer.opacity, **SHADE)
+            plotter.add_mesh(layer.mesh, color=layer.color, lighting=not layer.flat, **SHADE)
         else:
             mesh = layer.mesh.copy()
             mesh.point_data["shown"] = np.asarray(layer.values, float)
             low, high = layer.limits
             plotter.add_mesh(
                 mesh, scalars="shown", cmap=layer.map, clim=(low, high if high > low else low + 1.0),
-                lighting=False, show_scalar_bar=False, opacity=layer.opacity,
+                lighting=False, show_scalar_bar=False,
             )  # fmt: skip
         if layer.edges:
             sharp = layer.mesh.extract_feature_edges(30, manifold_edges=False, non_manifold_edges=False)

@@ -118,7 +118,8 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
             scene, ReducedModel(first.sector.system, first.sector.interface, info=first.info)
         )
         line = SpeedLine(tuple(alike), tuple(speeds[:count]), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
-        error = line.without_last.error(speed, alike[-1])
+        without_last = replace(line, reduced=line.reduced[:-1], speeds=line.speeds[:-1], made={})
+        error = without_last.error(speed, alike[-1])
         if error <= LIMITS.speeds_apart:
             break
     model = line(2 * np.pi * abs(wheel.engine_order) * wheel.speed)

@@ -94,7 +94,7 @@ def worn_out(
     assert wanted is not None
     problem = _begun(wear_problem(file.scene, file.folder, balance, left, wanted.end_at == "at_rest"), start)
     limit = settings.step_limit(file.scene, references.free_deflection(balance), problem.area)
-    return evolve(problem, wanted, limit, wanted.max_steps)
+    return evolve(problem, wanted, limit, wanted.max_steps, watched=False)
 
 
 def wear_problem(
@@ -161,9 +161,10 @@ def evolve(
     max_steps: int,
     on_row: Callable[[WearRow], None] | None = None,
     resume: WearHistory | None = None,
+    watched: bool = True,
 ) -> WearHistory:
-    """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for hbm.wear.thesis_rule."""
+    """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for that rule."""
     if wear.rule == "thesis":
         return thesis_rule.evolve(problem, limit, max_steps, on_row, resume)
     tolerance = Tolerance(wear.tolerance, limit)
-    return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume, wear.motion)
+    return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume, wear.motion, watched)

@@ -183,10 +183,8 @@ class MeshScene(Scene):
             return data
         loads, several, folder = data.get("loads"), data.get("contacts") or None, folder_of(info)
         contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
-        prefix, static = (
-            "contacts." if several is contacts else "",
-            loads.get("static") if isinstance(loads, dict) else None,
-        )
+        prefix = "contacts." if several is contacts else ""
+        static = loads.get("static") if isinstance(loads, dict) else None
         found = {
             name: with_numbers_when_hot(prefix + name, contact, static)
             for name, contact in contacts.items()
@@ -280,6 +278,8 @@ class MeshScene(Scene):
     @model_validator(mode="after")
     def _whole(self) -> MeshScene:
         several = bool(self.bodies or self.decks)
+        if not several and (self.geometry is None) != (self.material is None):
+            raise ValueError(f"{'geometry' if self.geometry is None else 'material'} is missing")
         if several == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
             raise ValueError("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
         if self.wear is not None and not self.joints:

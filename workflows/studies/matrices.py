@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
+from tribodyn.fem.contact import join
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance, State
@@ -363,26 +364,17 @@ def reduce(
 
 def joined(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     """Interfaces of one model as one, their pairs one after the other; rows that one has not are zero."""
-    if len(interfaces) == 1:
-        return interfaces[0]
     used = {name for interface in interfaces for name in interface.components}
     components = tuple(name for name in COMPONENTS if name in used)
-    rows = []
+    wide = []
     for interface in interfaces:
         place = [components.index(name) for name in interface.components]
         own = sp.coo_matrix(interface.B)
         pair, component = np.divmod(own.row, len(place))
         to = pair * len(components) + np.array(place)[component]
-        rows.append(sp.csr_matrix((own.data, (to, own.col)), (interface.n_pair * len(components), own.shape[1])))
-    return ContactInterface(
-        components=components,
-        points=np.concatenate([i.points for i in interfaces]),
-        frames=np.concatenate([i.frames for i in interfaces]),
-        area=np.concatenate([i.area for i in interfaces]),
-        gap=np.concatenate([i.gap for i in interfaces]),
-        B=sp.vstack(rows, format="csr"),
-        faces=np.zeros((0, 4), int),
-    )
+        rows = sp.csr_matrix((own.data, (to, own.col)), (interface.n_pair * len(components), own.shape[1]))
+        wide.append(replace(interface, components=components, B=rows))
+    return join(wide)
 
 
 def _wide(stiffness: np.ndarray, own: tuple[str, ...], components: tuple[str, ...]) -> np.ndarray:

@@ -175,7 +175,8 @@ class Comparison(StudyResult):
             left.set(xlabel="period", ylabel=f"{name} about its mean / {unit}", title=f"{self.hertz:.6g} Hz")
             left.legend(loc="best")
             pair = int(np.argmax(np.abs(motion.energy)))
-            component = int(np.argmax(np.abs(_loop_areas(motion.force[pair], motion.x[pair]))))
+            step = np.roll(motion.x[pair], -1, axis=1) - np.roll(motion.x[pair], 1, axis=1)
+            component = int(np.argmax(np.abs(np.sum(motion.force[pair] * step, axis=1))))  # of the largest work
             x, force = balance.history(state)
             unit, scale = length_unit(np.ptp(motion.x[pair, component]))
             unit_f, scale_f = force_unit(np.abs(motion.force[pair, component]).max())
@@ -279,8 +280,3 @@ def _walk(
         if solution.converged:
             x = solution.state.x
     return solution if solution.converged else newton.solve_from_rest(balance, target, options)
-
-
-def _loop_areas(force: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(n_component,) work over the closed cycle of samples (n_component, n_sample) [J]."""
-    return np.asarray(np.sum(force * (np.roll(x, -1, axis=1) - np.roll(x, 1, axis=1)), axis=1) / 2)

@@ -20,7 +20,8 @@ def finished(tasks: Sequence[Task], address: str, workers: int) -> Iterator[Row]
     address : of a scheduler, such as tcp://host:8786, or "local" for a cluster of `workers` processes of its own
     Raises  ValueError: no scheduler answers there; SolveFailed: the scheduler was lost on the way
     """
-    distributed = _library()
+    distributed = package("distributed")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told in one sentence
     cluster = None
     if address == LOCAL:
         cluster = distributed.LocalCluster(workers, threads_per_worker=1, dashboard_address=None)
@@ -46,9 +47,3 @@ def _row(future: Any, task: Task, address: str) -> Row:
         error = future.exception()
         return Row(task.number, task.key, "lost", " ".join(f"{type(error).__name__}: {error}".split()))
     raise SolveFailed(f"the scheduler at {address} was lost")
-
-
-def _library() -> Any:
-    distributed = package("distributed")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told in one sentence
-    return distributed

@@ -143,7 +143,9 @@ def _search(study: Study, runner: Runner) -> Optimum:
         )
     front = known.front
     if not len(front):
-        raise SolveFailed(_why_none(study, known))
+        least = known.excess[known.solved].max(axis=1).min()
+        limits = ", ".join(limit.number for limit in wanted.limits)
+        raise SolveFailed(f"no run keeps the limits of {limits}: the nearest passes one by {100 * least:.2g} % of it")
     low, high = ends(known)
     best = int(front[chebyshev(known.aims[front], np.ones(len(wanted.aims)), low, high).argmin()])
     only = {aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in wanted.aims}
@@ -188,12 +190,6 @@ def _known(study: Study, space: Space, table: StudyTable) -> Known:
     numbers, by = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
     m = len(wanted.aims)
     return Known(space.shares(space.points_of(table.columns)), numbers[:, :m], numbers[:, m:], by)
-
-
-def _why_none(study: Study, known: Known) -> str:
-    least = known.excess[known.solved].max(axis=1).min()
-    limits = ", ".join(limit.number for limit in study.optimise.limits)
-    return f"no run keeps the limits of {limits}: the nearest passes one by {100 * least:.2g} % of it"
 
 
 def _short(value: Any) -> str:

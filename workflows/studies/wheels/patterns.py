@@ -115,7 +115,10 @@ class Blades:
     @cached_property
     def alike(self) -> OperatingPoint:
         """The peak of the wheel of sectors alike; raises SolveFailed."""
-        return _converged(settings.peak_of(self.file.scene).first(self.wheel.wave), "sectors alike")
+        point = settings.peak_of(self.file.scene).first(self.wheel.wave)
+        if not point.solution.converged:
+            raise SolveFailed(f"the peak of sectors alike: {point.solution.outcome}")
+        return point
 
     @cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
@@ -205,12 +208,6 @@ def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
     own = np.flatnonzero(np.repeat(nodes, 3)[wheel.part.free])
     basis = reduced.basis[own]
     return np.asarray(basis.T @ (wheel.full.system.stiffness[own][:, own] @ basis))
-
-
-def _converged(point: OperatingPoint, what: str) -> OperatingPoint:
-    if not point.solution.converged:
-        raise SolveFailed(f"the peak of {what}: {point.solution.outcome}")
-    return point
 
 
 def _hertz(omega: float) -> str:
