@@ -17,6 +17,7 @@ Source  modes: Nelson, AIAA Journal 14(9), 1976; by the transpose on one space f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -135,12 +136,14 @@ class Sensitivity:
 
         return SecondOrderSystem((mass + mass.T) / 2, stiffness, None, vectors("loads"), vectors("outputs"))
 
-    def moved(self, way: SecondOrderSystem, share: float) -> ReducedModel:
-        """The model at a share of such a way."""
+    def moved(self, ways: Sequence[tuple[SecondOrderSystem, float]], stiffer: float = 0.0) -> ReducedModel:
+        """The model at shares of such ways; stiffer : that of all stiffness besides, which changes no shapes."""
         own = self.model.system
-        vectors = {
-            kind: {name: v + share * getattr(way, kind)[name] for name, v in getattr(own, kind).items()}
-            for kind in ("loads", "outputs")
-        }
-        matrices = {name: getattr(own, name) + share * getattr(way, name) for name in ("mass", "stiffness")}
-        return replace(self.model, system=replace(own, **matrices, **vectors))
+
+        def there(kind: str, name: str) -> np.ndarray:
+            return np.asarray(sum((share * getattr(way, kind)[name] for way, share in ways), getattr(own, kind)[name]))
+
+        vectors = {kind: {name: there(kind, name) for name in getattr(own, kind)} for kind in ("loads", "outputs")}
+        mass = sum((share * way.mass for way, share in ways), own.mass)
+        stiffness = sum((share * way.stiffness for way, share in ways), (1 + stiffer) * own.stiffness)
+        return replace(self.model, system=replace(own, mass=mass, stiffness=stiffness, **vectors))

@@ -31,6 +31,7 @@ class Kind:
         """The folder of the package's own files; nothing is imported for it but the package."""
         return Path(importlib.import_module(self.package).__path__[0])
 
+    @cache  # noqa: B019
     def names(self) -> list[str]:
         """Names of the files there are."""
         return sorted(m.name for m in pkgutil.iter_modules([str(self.folder)]))

@@ -106,13 +106,13 @@ class Varying:
         touching = None
         if (anew or linear) and not self._settles and _touches(key):
             small = self.step * abs(value)
-            up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
+            scenes = (self.file.changed(f"{key}={value + side!r}").scene for side in (small, -small))
+            up, down = (replace(self.own, contact=self._contact(scene)) for scene in scenes)
             touching = Change(key, small, up, down)
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
 
-    def _contact(self, key: str, value: float) -> Contact:
-        """The contact with another value of a key."""
-        scene = self.file.changed(f"{key}={value!r}").scene
+    def _contact(self, scene: Scene) -> Contact:
+        """The contact of a scene."""
         return Contact.of(self.own.model, joints.make_joints(scene, self.plain))
 
     def posed(self, key: str, value: float) -> Posed:
@@ -127,9 +127,11 @@ class Varying:
             part, plain = self._made(file)
         reduced = self.own.model
         if plain is not self.plain or self._damps(scene, plain):
-            if key == "damping.modal":  # the same modes
-                more = value / keys(self.scene)[key]
-                reduced = self._damped.with_damping(lambda system, _: more * np.asarray(system.damping))
+            more, like = value / keys(self.scene)[key], self._damped
+            if self._scales(key) and scene.damping.modal is not None and scene.damping.state != "stuck":
+                more, like = more**0.5, _scaled(like, key.rpartition(".")[2], more)  # as all frequencies go
+            if key == "damping.modal" or like is not self._damped:  # the same modes
+                reduced = like.with_damping(lambda system, _: more * np.asarray(system.damping))
             else:
                 reduced = modelling.damped(scene, plain)
             if isinstance(scene, MeshScene) and part is not None:
@@ -144,7 +146,7 @@ class Varying:
         if self.follows(key) and np.array_equal(reduced.interface.B, self.own.model.interface.B):
             reduced = replace(reduced, interface=self.own.model.interface)  # the same coordinates
         structural = self.anew(key) or self._scales(key) or self.follows(key)
-        contact = self._contact(key, value) if _touches(key) and not structural else self.own.contact
+        contact = self._contact(scene) if _touches(key) and not structural else self.own.contact
         return Posed(reduced, contact, joints.excite(scene, base), self.own.memory)
 
     @property
@@ -193,23 +195,31 @@ class Varying:
 
     def _followed(self, key: str, value: float) -> ReducedModel:
         """The reduced model with another value of a key that it follows."""
-        own, following = keys(self.scene)[key], self._sensitivity
+        share, following, scene = value / keys(self.scene)[key] - 1, self._sensitivity, self.file.mesh_scene
         assert following is not None
+        if key == "material.young" and _loaded_alike(scene):  # all stiffness but that of the springs
+            springs = [(self._way(f"springs.{name}.stiffness"), -share) for name in scene.springs]
+            return following.moved(springs, share)
+        return following.moved([(self._way(key), share)])
+
+    def _way(self, key: str) -> SecondOrderSystem:
+        """What the reduced model moves by where a key is doubled."""
         if key not in self._ways:
-            change = self._doubled(key, 2 * own)
-            self._ways[key] = following.towards(change.projected(self._relative[1]) if self._relative else change)
-        return following.moved(self._ways[key], value / own - 1)
+            assert self._sensitivity is not None
+            change = self._doubled(key, 2 * keys(self.scene).get(key, 0.0))
+            change = change.projected(self._relative[1]) if self._relative else change
+            self._ways[key] = self._sensitivity.towards(change)
+        return self._ways[key]
 
     def _doubled(self, key: str, value: float) -> SecondOrderSystem:
-        """What the full system moves by where a key is doubled; springs and all that they are not need no assembly."""
+        """What the full system moves by where a key is doubled; springs need no assembly."""
         scene, part, of_spring = self.scene, self.part, key.startswith("springs.")
         assert part is not None
         assert isinstance(scene, MeshScene)
         own = part.system
-        if scene.material is not None and (of_spring or (key == "material.young" and _loaded_alike(scene))):
-            seen = [scene.springs[key.split(".")[1]]] if of_spring else scene.springs.values()
-            added = part.restricted(sum(bodies.spring(one).matrix(part.mesh, part.node_sets) for one in seen))
-            change = added if of_spring else own.stiffness - added
+        if scene.material is not None and of_spring:
+            spring = bodies.spring(scene.springs[key.split(".")[1]])
+            change = part.restricted(spring.matrix(part.mesh, part.node_sets))
             still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
             return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
         twice, mesh, node_sets = self.file.changed(f"{key}={value!r}"), part.mesh, dict(part.node_sets)
