@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import block_diag, csr_matrix, eye_array, issparse, kron, vstack
+from scipy.sparse import csr_matrix, eye_array, kron
 
 from tribodyn.fem.constraints import named
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames, unit
@@ -166,31 +166,6 @@ class ContactFaces:
         frames = contact_frames(face.normals, self.t1)
         B = _map(_rows(frames, components), face.nodes, mesh)
         return ContactInterface(components, face.points, frames, face.area, _gaps(gap, face.area), B, face.faces)
-
-
-def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
-    """Several contacts of one structure as one interface, pairs in the order given; triangles become quadrangles that
-    repeat a corner where there are quadrangles too.
-
-    Raises  ValueError where they differ in components
-    """
-    if len({i.components for i in interfaces}) > 1:
-        raise ValueError("the contacts of a structure must be built with the same components")
-    first = np.cumsum([0] + [i.n_pair for i in interfaces])
-    names = ("points", "frames", "area", "gap")
-    fields: dict[str, Any] = {name: np.concatenate([getattr(i, name) for i in interfaces]) for name in names}
-    if any(i.nodes is not None for i in interfaces):
-        fields["nodes"] = join([i.nodes or i for i in interfaces])
-        means = [eye_array(i.n_pair) if i.mean is None else i.mean for i in interfaces]
-        fields["mean"] = block_diag(means, format="csr")
-    width, maps = max(i.faces.shape[1] for i in interfaces), [i.B for i in interfaces]
-    faces = [np.pad(i.faces, ((0, 0), (0, width - i.faces.shape[1])), mode="edge") for i in interfaces]
-    return ContactInterface(
-        components=interfaces[0].components,
-        **fields,
-        B=vstack(maps, format="csr") if issparse(maps[0]) else np.concatenate(maps),
-        faces=np.concatenate([of + start for of, start in zip(faces, first, strict=False)]),
-    )
 
 
 def no_contact(n_dof: int) -> ContactInterface:

@@ -16,8 +16,8 @@ import numpy as np
 from scipy.sparse import csr_matrix, issparse, kron, vstack
 
 from tribodyn.fem.constraints import named
-from tribodyn.fem.contact import ContactFaces, join
-from tribodyn.fem.interface import ContactInterface, unit
+from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.interface import ContactInterface, join, unit
 from tribodyn.fem.matching import partners
 from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import Prestress

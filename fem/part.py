@@ -10,10 +10,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from tribodyn.fem.constraints import AXES, Clamp, Constraint, NoMeanRotation, free_dofs, named, restriction
-from tribodyn.fem.contact import ContactFaces, join, no_contact
+from tribodyn.fem.contact import ContactFaces, no_contact
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.interface import ContactInterface, join
 from tribodyn.fem.loads import Load
 from tribodyn.fem.springs import Mass
 from tribodyn.fem.system import SecondOrderSystem

@@ -85,10 +85,6 @@ class HeightMap:
         """Sides [m]."""
         return float(np.ptp(self.x)), float(np.ptp(self.y))
 
-    def with_heights(self, z: np.ndarray) -> HeightMap:
-        """The same grid with other heights (nx, ny) [m]."""
-        return replace(self, z=z)
-
 
 @dataclass(frozen=True)
 class Prepared:
@@ -171,7 +167,7 @@ def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
             f"{surface.name}: {count} of {measured.sum()} points are spikes: this is noise, not a face with outliers"
         )
     largest = distance[spikes].max()
-    return surface.with_heights(np.where(spikes, np.nan, surface.z)), [
+    return replace(surface, z=np.where(spikes, np.nan, surface.z)), [
         f"{surface.name}: {count} spikes up to {largest:.3g} m off their surroundings were taken out"
     ]
 
@@ -212,7 +208,7 @@ def fill_holes(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     laplace = sp.coo_matrix((np.concatenate(values), at), shape=(count, count))
     z = surface.z.copy()
     z[holes] = spsolve((laplace + sp.diags(diagonal)).tocsc(), known)
-    return surface.with_heights(z), [
+    return replace(surface, z=z), [
         f"{surface.name}: {count} points without height ({100 * count / holes.size:.2g} %) were filled from their rim"
     ]
 
@@ -224,7 +220,7 @@ def level(surface: HeightMap) -> HeightMap:
     size = max(surface.size)
     terms = np.stack([np.ones_like(x), x / size, y / size], axis=-1)
     plane, *_ = np.linalg.lstsq(terms[measured], surface.z[measured], rcond=None)
-    return surface.with_heights(surface.z - terms @ plane)
+    return replace(surface, z=surface.z - terms @ plane)
 
 
 def split(surface: HeightMap, cutoff: float) -> tuple[HeightMap, HeightMap]:
@@ -246,7 +242,7 @@ def split(surface: HeightMap, cutoff: float) -> tuple[HeightMap, HeightMap]:
     smooth = surface.z
     for axis, step in enumerate(surface.spacing):
         smooth = _local_linear(smooth, axis, step, cutoff)
-    return surface.with_heights(smooth), surface.with_heights(surface.z - smooth)
+    return replace(surface, z=smooth), replace(surface, z=surface.z - smooth)
 
 
 def _local_linear(z: np.ndarray, axis: int, step: float, cutoff: float) -> np.ndarray:
@@ -276,7 +272,7 @@ def mirrored(surface: HeightMap, axis: str) -> HeightMap:
     """The map seen from behind: reversed along "x" or "y", in the same place."""
     if axis not in ("x", "y"):
         raise ValueError(f"cannot mirror along {axis!r}: give x or y")
-    return surface.with_heights(np.flip(surface.z, 0 if axis == "x" else 1))
+    return replace(surface, z=np.flip(surface.z, 0 if axis == "x" else 1))
 
 
 def onto_nodes(surface: HeightMap, nodes: np.ndarray, cells_across: int = 8) -> np.ndarray:

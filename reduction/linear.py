@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags_array, issparse
 
 from tribodyn.fem.modes import modes
-from tribodyn.fem.part import Part
 from tribodyn.reduction.model import ReducedModel
+
+if TYPE_CHECKING:
+    from tribodyn.fem.part import Part
 
 
 def linear_modes(

@@ -13,8 +13,8 @@ from math import gcd
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.fem.contact import join
 from tribodyn.fem.cyclic import of_sector
+from tribodyn.fem.interface import join
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel

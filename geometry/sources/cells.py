@@ -58,13 +58,3 @@ COMMON_NAMES = {
     "wedge": "prisms",
     "pyramid": "pyramids",
 }
-
-
-def common_name(kind: str) -> str:
-    """What a volume element is called in a sentence."""
-    return COMMON_NAMES[kind.rstrip("0123456789")]
-
-
-def is_first_order(kind: str) -> bool:
-    """Whether a volume element has nodes at its corners alone."""
-    return not VOLUMES[kind][1]

@@ -16,7 +16,7 @@ import numpy as np
 from meshio._mesh import topological_dimension
 
 from tribodyn.geometry.sources import abaqus_cards, ansys, cad, msh, nastran, solid
-from tribodyn.geometry.sources.cells import SURFACES, VOLUMES, common_name, is_first_order
+from tribodyn.geometry.sources.cells import COMMON_NAMES, SURFACES, VOLUMES
 from tribodyn.geometry.sources.deck import Deck, in_si
 from tribodyn.geometry.sources.raw import Cells, RawMesh
 from tribodyn.geometry.sources.solid import SolidBody
@@ -195,9 +195,9 @@ def lost(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
 
 def raised(raw: RawMesh) -> tuple[str, ...]:
     """The sentence on elements of first order, where there are some."""
-    low = [cells for cells in raw.cells if is_first_order(cells.kind)]
+    low = [cells for cells in raw.cells if not VOLUMES[cells.kind][1]]
     count = sum(len(cells.nodes) for cells in low)
-    names = " and ".join(sorted({common_name(cells.kind) for cells in low}))
+    names = " and ".join(sorted({COMMON_NAMES[cells.kind] for cells in low}))
     return (f"{count} {names} of first order are computed as second order, with straight edges",) if low else ()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ def test_two_faces_of_caps_that_meet_have_half_the_radius_and_both_heights():
     single, both = td.studies.asperities(first).found, td.studies.asperities(first, first).found
     assert both.radius == pytest.approx(RADIUS / 2, rel=1e-4)
     np.testing.assert_allclose(np.sort(both.gap), 2 * np.sort(single.gap), atol=1e-12)
-    lower = first.with_heights(first.z * (1 - 0.4 * (first.x < first.x.mean()))[:, None])
+    lower = replace(first, z=first.z * (1 - 0.4 * (first.x < first.x.mean()))[:, None])
     turned = td.studies.asperities(lower, lower, mirror="x").found
     assert turned.height.std() < 0.8 * td.studies.asperities(lower, lower).found.height.std()
 
@@ -70,7 +71,7 @@ def test_cut_off_and_noise_filter_leave_the_roughness_between_them():
     face, known = gaussian(400, 1e-6, 40e-6, 16e-6, 0.3e-6, 2)
     form = 1e-6 * np.cos(2 * np.pi * face.x / 400e-6)[:, None] + 1e-2 * face.y
     noise = 6e-9 * np.random.default_rng(4).standard_normal(face.z.shape)
-    measured = face.with_heights(face.z + form + noise)
+    measured = replace(face, z=face.z + form + noise)
     assert identify(measured, cutoff=100e-6).density > 1.2 * known.density
     assert identify(measured).height.std() > 2 * known.deviation
     found = identify(measured, cutoff=100e-6, shortest=5e-6)
@@ -92,7 +93,7 @@ def test_a_table_keeps_the_number_of_summits_and_their_mean_gap(rows):
 
 def stepped() -> HeightMap:
     face = gaussian(200, 1e-6, 60e-6, 16e-6, 0.3e-6, 6)[0]
-    return face.with_heights(np.round(face.z / 30e-9) * 30e-9)
+    return replace(face, z=np.round(face.z / 30e-9) * 30e-9)
 
 
 @pytest.mark.parametrize(

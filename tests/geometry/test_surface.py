@@ -2,6 +2,7 @@
 
 import struct
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -146,7 +147,7 @@ def test_a_real_digital_surf_file(tmp_path):
 def test_levelling_takes_the_plane_and_nothing_else():
     face = surface(rough=0.0)
     x, y = np.meshgrid(face.x, face.y, indexing="ij")
-    levelled = level(face.with_heights(face.z + 5e-3 * x + 7e-3 * y + 1e-4))
+    levelled = level(replace(face, z=face.z + 5e-3 * x + 7e-3 * y + 1e-4))
     np.testing.assert_allclose(levelled.z, level(face).z, atol=1e-18)
     for weight in (np.ones_like(x), x, y):
         assert abs((weight * levelled.z).sum()) < 1e-12 * (abs(weight) * abs(face.z)).sum()
@@ -158,7 +159,7 @@ def test_spikes_are_taken_out_and_reported():
     places = [(3, 4), (30, 50), (31, 50), (59, 89)]
     for k, place in enumerate(places):
         spiked[place] += (-1) ** k * 40e-6
-    cleaned, said = remove_outliers(face.with_heights(spiked))
+    cleaned, said = remove_outliers(replace(face, z=spiked))
     assert sorted(map(tuple, np.argwhere(np.isnan(cleaned.z)))) == places
     assert len(said) == 1
     assert "4 spikes" in said[0]
@@ -172,7 +173,7 @@ def test_holes_are_filled_without_overshoot_and_planes_are_kept():
     holed = plane.copy()
     holed[10:20, 30:45] = np.nan
     holed[40, 60] = np.nan
-    filled, said = fill_holes(face.with_heights(holed))
+    filled, said = fill_holes(replace(face, z=holed))
     np.testing.assert_allclose(filled.z, plane, atol=1e-15)
     assert "151 points" in said[0]
     rim = surface()
@@ -203,7 +204,7 @@ def test_filter_keeps_planes_up_to_the_edges_and_is_direct():
     face = surface((50, 40))
     x, y = np.meshgrid(face.x, face.y, indexing="ij")
     plane = 1e-3 * x + 2e-3 * y + 3 * x * y
-    waviness, _ = split(face.with_heights(plane), 0.3e-3)
+    waviness, _ = split(replace(face, z=plane), 0.3e-3)
     np.testing.assert_allclose(waviness.z, plane, atol=1e-12 * plane.max())
     # one point by weighted least squares in both directions, in a corner where the weights are cut off
     waviness, _ = split(face, 0.3e-3)
@@ -270,7 +271,7 @@ def test_damaged_measurement_comes_out_like_the_sound_one():
     damaged[60:72, 300:330] = np.nan
     damaged[120, 40] = 1e-3
     tilted = damaged + 2e-2 * sound.x[:, None]
-    mended = prepare(sound.with_heights(tilted), 0.8e-3)
+    mended = prepare(replace(sound, z=tilted), 0.8e-3)
     assert len(mended.repairs) == 2
     wanted = prepare(sound, 0.8e-3).waviness
     assert abs(mended.waviness.z - wanted.z).max() < 0.4e-6

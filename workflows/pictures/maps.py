@@ -192,7 +192,7 @@ def _drawn(patch: Patch, rows: Sequence[Row], titles: Sequence[str], title: str)
                 if colors == "status":
                     draw_status(axes, patch, values)
                     continue
-                low, high = _limits(values)
+                low, high = limits(values)
                 draw_field(axes, patch, values, colors, high, low)
                 scale_bar(figure, axes, colors, low, high, label)
         for axes, text in zip(grid[0], titles, strict=True):
@@ -244,7 +244,7 @@ def _name_contacts(columns: np.ndarray, result: Result) -> None:
         axes.set_ylabel("")
 
 
-def _limits(values: np.ndarray) -> tuple[float, float]:
+def limits(values: np.ndarray) -> tuple[float, float]:
     """Lowest and highest value, from zero where the values spread over half of their size."""
     low, high = float(values.min()), float(values.max())
     return (0.0 if 0 < low < 0.5 * high else low), high

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
-from tribodyn.workflows.pictures import exploded, offscreen, opened as book, render_wheel, view as drawing
+from tribodyn.workflows.pictures import exploded, maps, offscreen, opened as book, render_wheel, view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.style import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
@@ -133,8 +133,7 @@ def _painted(contact: book.Opened, state: State, name: str, wear: float) -> tupl
         pressure = np.zeros(len(state.depth)) if state.pressure is None else state.pressure
         unit, factor = pressure_unit(float(pressure.max()))
         values, map_, label = factor * pressure, PRESSURE_MAP, f"mean pressure / {unit}"
-    low, high = float(values.min()), float(values.max())
-    low = 0.0 if low > 0 and low < 0.5 * high else low
+    low, high = maps.limits(values)
     paint = book.Field(values, (low, high), map_)
     return contact.view(state.depth, wear, paint), (map_, low, high, label)
 

@@ -286,11 +286,6 @@ class Result:
         assert self.wear is not None
         return np.asarray(self.wear.depth[row] + self.wear.worn[row])
 
-    def cycles_after(self, row: int) -> float:
-        """Cycles when the step of a row is done."""
-        assert self.wear is not None
-        return float(self.wear.cycles[row] + self.wear.cycles_in_step[row])
-
 
 def peaks(frf: Branch, count: int = PEAKS) -> np.ndarray:
     """Points of the highest local maxima of a curve's first output, by frequency; else the highest point."""

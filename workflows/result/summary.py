@@ -149,7 +149,7 @@ def _wear(result: Result) -> dict[str, Any]:
     wear, patch = result.wear, result.patch
     if wear is None or not len(wear.cycles):
         return dict.fromkeys(names)
-    depth, cycles = result.depth_after(-1), result.cycles_after(-1)
+    depth, cycles = result.depth_after(-1), float(wear.cycles[-1] + wear.cycles_in_step[-1])
     volume, split = float(depth @ patch.area), result.facts.share_of_body_1
     basis = HarmonicBasis(result.harmonics, max(EVENT_SAMPLES, 2 * result.harmonics[-1] + 1))
     when = events(wear, patch.components, patch.gap, basis)

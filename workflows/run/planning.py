@@ -79,15 +79,11 @@ class Plan:
     verdict: bool
     remarks: tuple[str, ...] = ()
 
-    @property
-    def computing_seconds(self) -> float:
-        """Expected time of the run without its errors [s]."""
-        return self.reduction_seconds + (self.response_solves + self.wear_solves) * self.solve_seconds
-
     def lines(self) -> list[tuple[str, str]]:
         """The plan as pairs of a name and a readable value."""
         steps = "as many as it takes" if self.wear_steps is None else f"about {self.wear_steps}"
         response, wear = (_time(count * self.solve_seconds) for count in (self.response_solves, self.wear_solves))
+        whole = _time(self.reduction_seconds + (self.response_solves + self.wear_solves) * self.solve_seconds)
         return [
             ("mesh", f"{self.elements} elements, {self.nodes} nodes" if self.elements else "none: matrices"),
             ("full model", f"{self.full_dofs} DOFs"),
@@ -99,7 +95,7 @@ class Plan:
             ("response", f"{self.response_solves} solves, about {response}"),
             ("wear", f"{steps} steps, about {wear}" if self.wear_solves else "none"),
             ("errors", "measured on a finer model after the run" if self.verdict else "not measured"),
-            ("whole run", f"about {_time(self.computing_seconds)} on one core, to a factor of three, without errors"),
+            ("whole run", f"about {whole} on one core, to a factor of three, without errors"),
             *(("warning", remark) for remark in self.remarks),
         ]
 

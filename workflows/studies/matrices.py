@@ -12,8 +12,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from tribodyn.fem.contact import join
-from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.interface import COMPONENTS, ContactInterface, join
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
