@@ -27,7 +27,8 @@ from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.result.verdict import NAMES, QUANTITIES
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 
 WANTED = 0.01
 FLAT = 1e-6  # area over the mean one of a triangle that is no part of a map

@@ -34,7 +34,8 @@ from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.scene.wear import Place
 from tribodyn.workflows.studies.curves import backbones
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 
 SHOWN = 12  # parameters in the picture
 OF_ROWS = {"peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}

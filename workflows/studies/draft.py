@@ -19,7 +19,7 @@ from tribodyn.geometry.sources import cad, read as sources
 from tribodyn.geometry.sources.picking import outline
 from tribodyn.workflows.scene.json_schema import json_schema
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.files import StudyResult
+from tribodyn.workflows.studies.study_result import StudyResult
 
 SCHEMA = "scene.schema.json"
 

@@ -1,4 +1,4 @@
-"""What a study found, and its tables and pictures in a folder."""
+"""Tables and pictures of a study, written into a folder."""
 
 from __future__ import annotations
 
@@ -13,17 +13,6 @@ if TYPE_CHECKING:
 from tribodyn.workflows.pictures.figures import save
 from tribodyn.workflows.pictures.offscreen import RenderingUnavailable
 from tribodyn.workflows.result.readable import write_columns
-
-
-class StudyResult:
-    """What a study found. Printed, it shows its lines, not its arrays."""
-
-    def lines(self) -> list[str]:
-        """For people."""
-        raise NotImplementedError
-
-    def __repr__(self) -> str:
-        return "\n".join(self.lines())
 
 
 def write_files(

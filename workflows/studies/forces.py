@@ -22,7 +22,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import StudyResult
+from tribodyn.workflows.studies.study_result import StudyResult
 
 TOLERANCE = 1e-12  # of the contact at rest: the balance of forces is to be seen to 1e-8
 

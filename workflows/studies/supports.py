@@ -20,7 +20,8 @@ from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import quantity
 from tribodyn.workflows.scene.schema import MeshScene, Scene
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 
 SAMPLES = 256  # of a cycle, at the least
 

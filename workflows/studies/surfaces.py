@@ -15,7 +15,7 @@ from tribodyn.geometry.asperities import Asperities, identify
 from tribodyn.geometry.surface import HeightMap, mirrored
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
-from tribodyn.workflows.studies.files import StudyResult
+from tribodyn.workflows.studies.study_result import StudyResult
 
 Face = HeightMap | str | PathLike[str]
 

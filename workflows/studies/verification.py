@@ -30,7 +30,8 @@ from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.schema import Scene
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 
 STEPS, STEPS_PER_HARMONIC = 256, 32  # per period; per period of the highest harmonic kept
 TOLERANCE = 1e-6  # drift over a period, far below the differences that are looked for

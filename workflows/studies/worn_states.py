@@ -25,7 +25,8 @@ from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies import verification
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.verification import Comparison
 
 HEADER = (

@@ -26,7 +26,8 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Length
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 
 
 @dataclass(frozen=True)

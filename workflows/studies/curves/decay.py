@@ -28,7 +28,8 @@ from tribodyn.workflows.scene.fields import Length, quantity
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, along
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 
 
 @dataclass(frozen=True, repr=False)

@@ -18,7 +18,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import StudyResult
+from tribodyn.workflows.studies.study_result import StudyResult
 
 
 @dataclass(frozen=True, repr=False)

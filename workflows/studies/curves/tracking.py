@@ -31,7 +31,8 @@ from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 
 LIMIT = 1e-6  # distance, relative, from an end of the response range that is none
 

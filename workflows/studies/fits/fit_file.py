@@ -34,12 +34,12 @@ from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
-from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.fits import posterior as posteriors
 from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
 from tribodyn.workflows.studies.fits.identification import DIFFERENCE, Identification, Measured, Parameter, fit
 from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
+from tribodyn.workflows.studies.study_result import StudyResult
 
 UNITS = ("m", "N", "N/m", "Pa", "kg/m3", "m3/J", "Hz", "rad", "s", "1/s", "")  # of keys of a scene
 MEASURED_IN = {

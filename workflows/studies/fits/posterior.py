@@ -21,10 +21,11 @@ from scipy.stats import qmc
 from tribodyn.extras import package
 from tribodyn.workflows.pictures.style import BLUE, INK, RED, STYLE
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 from tribodyn.workflows.studies.many.distributions import Marginal
 from tribodyn.workflows.studies.many.surrogate import Surrogate
+from tribodyn.workflows.studies.study_result import StudyResult
 
 WALKERS = 96
 STEPS = 500  # of every walker, a third of which is left out

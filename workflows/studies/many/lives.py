@@ -20,7 +20,6 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.many import lives_picture, quantiles, study as studies, study_file
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.quantiles import RARE, Sample
@@ -31,6 +30,7 @@ from tribodyn.workflows.studies.many.study_file import LISTED, Study
 from tribodyn.workflows.studies.many.surrogate import Law, Surrogate
 from tribodyn.workflows.studies.many.table import LIFE, StudyTable
 from tribodyn.workflows.studies.many.task import solve
+from tribodyn.workflows.studies.study_result import StudyResult
 
 COEFFICIENT = "wear.coefficient"
 RATIOS = 64  # equally likely values of a key that scales a life

@@ -15,7 +15,6 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.many import pictures, study as studies, study_file
 from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.space import Space
@@ -24,6 +23,7 @@ from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
 from tribodyn.workflows.studies.many.table import SENTENCE, StudyTable
 from tribodyn.workflows.studies.many.task import RUN
 from tribodyn.workflows.studies.many.trades import Known, chebyshev, ends, propose
+from tribodyn.workflows.studies.study_result import StudyResult
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
 

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from tribodyn.workflows.result.store import replacing
-from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.many import pictures
 from tribodyn.workflows.studies.many.distributions import si
 from tribodyn.workflows.studies.many.task import ENDS, RUN, SINGLE, Row
+from tribodyn.workflows.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
     import pandas as pd

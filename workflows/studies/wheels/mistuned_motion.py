@@ -14,7 +14,7 @@ from tribodyn.workflows.pictures.render_wheel import MistunedWheelFilm, WheelSta
 from tribodyn.workflows.result.facts import Around
 from tribodyn.workflows.run.description import part_mesh
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import StudyResult
+from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels.patterns import OUTPUT, Blades, amplitude
 
 IMAGES = 32  # of a film

@@ -22,7 +22,8 @@ from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import StudyResult, where_it_can_be, write_files
+from tribodyn.workflows.studies.files import where_it_can_be, write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels.mistuned_motion import nodes, write_wheel
 from tribodyn.workflows.studies.wheels.patterns import Blades, asked_of
 

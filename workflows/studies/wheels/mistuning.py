@@ -22,7 +22,8 @@ from tribodyn.workflows.pictures.style import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Number, quantity
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
 TOLERANCE = 3e-3  # of the curves between their points

@@ -15,7 +15,8 @@ from tribodyn.workflows.pictures import wheel_diagrams
 from tribodyn.workflows.pictures.wheel_diagrams import AGAINST
 from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import StudyResult, write_files
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels.wheel import build, campbell, critical_speeds
 
 FAMILIES = 3  # of a Campbell diagram, where more cross each other

@@ -45,10 +45,10 @@ from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
-from tribodyn.workflows.studies.files import StudyResult
 from tribodyn.workflows.studies.many import pool
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.task import Row, Status
+from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
 FURTHEST = 3.0  # standard deviations at which what is drawn is cut off
