@@ -233,29 +233,22 @@ class Gradient:
             """dg/dx^T v."""
             return k * v - transposed(jac, v)
 
-        residual = self.balance.model.residual
-
-        def compliant(v: np.ndarray) -> np.ndarray:
-            """G^T v."""
-            amplitudes = basis.to_complex(v)
-            moved = [side.B @ side.adjoint(side.B.conj().T @ amplitudes[:, i]) for i, side in enumerate(self._sides)]
-            found = basis.to_real(np.stack(moved, axis=-1))
-            return found if residual is None else found + residual.apply(v)
+        point, nearly = self.balance.at(state.omega), self._preconditioner(departed)
 
         # at a fold one row and column make the transpose regular, and its solution that of no right-hand side
         border = np.random.default_rng(0).normal(size=shape) if self.at_fold else none
         border /= max(float(np.linalg.norm(border)), 1.0)
 
         def product(v: np.ndarray) -> np.ndarray:
-            return v - departed(compliant(v)) + np.vdot(border, v) * border
+            return v - departed(point.transposed(v)) + np.vdot(border, v) * border
 
-        found, fields = [], []
+        found, fields, weights = [], [], []
         for q in self.quantities:
             seen = basis.to_complex(q.of_output)
             own = [side.adjoint(side.C.conj().T @ seen[:, i]) for i, side in enumerate(self._sides)]
             through = basis.to_real(np.stack([side.B @ v for side, v in zip(self._sides, own, strict=True)], axis=-1))
             right = q.of_x + transposed(jac, q.of_force) + departed(through)
-            solved = self._transposed_solve(product, right + border)
+            solved = self._transposed_solve(product, right + border, nearly)
             amplitudes = basis.to_complex(solved)
             fields.append(
                 [
@@ -264,14 +257,31 @@ class Gradient:
                 ]
             )
             found.append(solved)
+            weights.append(q.of_force - through - point.transposed(solved))
         w = [np.stack([each[i] for each in fields], axis=1) for i in range(len(self._sides))]
-        at_contact = np.stack([side.B @ v for side, v in zip(self._sides, w, strict=True)], axis=-1)
-        weights = np.stack([q.of_force for q in self.quantities]) - basis.to_real(at_contact.transpose(1, 0, 2))
-        if residual is not None:
-            weights -= np.stack([residual.apply(v) for v in found])
-        return np.reshape(found, (-1, *shape)), w, weights
+        return np.reshape(found, (-1, *shape)), w, np.reshape(weights, (-1, *shape))
 
-    def _transposed_solve(self, product: Callable[[np.ndarray], np.ndarray], right: np.ndarray) -> np.ndarray:
+    def _preconditioner(self, departed: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+        """Nearly the solution of v - dg/dx^T G^T v = b, by the coarse part of G; see `Linearisation.coarse`."""
+        linear = self.balance.linearise(self.state)
+        rows, coarse = linear.rows, linear.coarse if len(linear.rows) else None
+        if coarse is None:
+            return lambda b: b
+        (u, a, inside), full = coarse, np.zeros_like(self.state.flat)
+        core = np.linalg.solve(inside, a).T
+
+        def nearly(b: np.ndarray) -> np.ndarray:
+            full[rows] = u @ (core @ (u.T @ b[rows]).ravel()).reshape(u.shape[1], -1)
+            return b + departed(full)
+
+        return nearly
+
+    def _transposed_solve(
+        self,
+        product: Callable[[np.ndarray], np.ndarray],
+        right: np.ndarray,
+        nearly: Callable[[np.ndarray], np.ndarray] = np.copy,
+    ) -> np.ndarray:
         """l with product(l) = right: by GMRES, refined once."""
         solution, left = np.zeros_like(right), right
         size = float(np.linalg.norm(right))
@@ -284,6 +294,7 @@ class Gradient:
                 left.ravel(),
                 RULES.adjoint / reached,
                 RULES.most_products,
+                lambda v: nearly(v.reshape(right.shape)).ravel(),
             )
             solution = solution + more.reshape(right.shape)
             left = right - product(solution)

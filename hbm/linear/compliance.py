@@ -289,6 +289,16 @@ class CompliancePoint:
             return self._apply_shared_real(g)
         return _moved(self.dense, self.compliance.basis, g)
 
+    def transposed(self, g: np.ndarray) -> np.ndarray:
+        """G^T g; each G_h of one real system is symmetric, so that this is G at the reversed time."""
+        basis = self.compliance.basis
+        if self.compliance.shared_real:
+            back = np.ones(basis.n_coeff)
+            back[int(basis.has_static) + 1 :: 2] = -1.0
+            return back * self.apply(back * g)
+        amplitudes = basis.to_complex(g).conj()
+        return basis.to_real((amplitudes.T[:, None] @ self.dense)[:, 0].T.conj())
+
     @cached_property
     def dense(self) -> np.ndarray:
         """(n_harmonic, n_contact, n_contact) G_h where harmonics share no system: Newton asks for many products."""

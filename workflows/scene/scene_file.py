@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -111,9 +113,12 @@ def _text(path: Path, what: str) -> str:
         raise SceneError(f'the {what} file "{path}" cannot be read as text ({error})') from None
 
 
+_loaded = lru_cache(maxsize=4)(tomllib.loads)  # a study changes one scene many times
+
+
 def _tables(text: str, label: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
+        return deepcopy(_loaded(text))
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{label} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
 
