@@ -242,23 +242,16 @@ class Gradient:
         def product(v: np.ndarray) -> np.ndarray:
             return v - departed(point.transposed(v)) + np.vdot(border, v) * border
 
-        found, fields, weights = [], [], []
-        for q in self.quantities:
-            seen = basis.to_complex(q.of_output)
-            own = [side.adjoint(side.C.conj().T @ seen[:, i]) for i, side in enumerate(self._sides)]
-            through = basis.to_real(np.stack([side.B @ v for side, v in zip(self._sides, own, strict=True)], axis=-1))
+        seen = basis.to_complex(np.stack([q.of_output for q in self.quantities]))
+        own = [side.adjoint(side.C.conj().T @ seen[:, :, i].T) for i, side in enumerate(self._sides)]
+        at_contact = np.stack([side.B @ v for side, v in zip(self._sides, own, strict=True)], axis=-1)
+        found, weights = [], []
+        for q, through in zip(self.quantities, basis.to_real(at_contact.transpose(1, 0, 2)), strict=True):
             right = q.of_x + transposed(jac, q.of_force) + departed(through)
-            solved = self._transposed_solve(product, right + border, nearly)
-            amplitudes = basis.to_complex(solved)
-            fields.append(
-                [
-                    v + side.adjoint(side.B.conj().T @ amplitudes[:, i])
-                    for i, (side, v) in enumerate(zip(self._sides, own, strict=True))
-                ]
-            )
-            found.append(solved)
-            weights.append(q.of_force - through - point.transposed(solved))
-        w = [np.stack([each[i] for each in fields], axis=1) for i in range(len(self._sides))]
+            found.append(self._transposed_solve(product, right + border, nearly))
+            weights.append(q.of_force - through - point.transposed(found[-1]))
+        l = basis.to_complex(np.array(found))
+        w = [v + s.adjoint(s.B.conj().T @ l[:, :, i].T) for i, (s, v) in enumerate(zip(self._sides, own, strict=True))]
         return np.reshape(found, (-1, *shape)), w, np.reshape(weights, (-1, *shape))
 
     def _preconditioner(self, departed: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
@@ -371,7 +364,7 @@ class Gradient:
             changed = self._loads(above, up, h) - self._loads(below, down, h) + side.B.conj().T @ pull
             if up is not down:
                 changed = changed - _difference(up, down, 1j * h * self.state.omega, u)
-            moved.append(side.solve(changed))
+            moved.append(side.solve(changed) if changed.any() else changed)
         x, y = self._real(self._sides, moved)
         return x - slid + (0.0 if own.residual is None else own.residual.apply(pulled)), y
 

@@ -106,10 +106,16 @@ class Varying:
         touching = None
         if (anew or linear) and not self._settles and _touches(key):
             small = self.step * abs(value)
-            scenes = (self.file.changed(f"{key}={value + side!r}").scene for side in (small, -small))
+            scenes = (self._changed(key, value + side).scene for side in (small, -small))
             up, down = (replace(self.own, contact=self._contact(scene)) for scene in scenes)
             touching = Change(key, small, up, down)
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
+
+    def _changed(self, key: str, value: float) -> SceneFile:
+        """The scene with another value of a key; read again only where other numbers follow from it."""
+        if key.startswith("wheel.") or key.endswith(".temperature"):
+            return self.file.changed(f"{key}={value!r}")
+        return replace(self.file, scene=_with(self.scene, key.split("."), value))
 
     def _contact(self, scene: Scene) -> Contact:
         """The contact of a scene."""
@@ -117,7 +123,7 @@ class Varying:
 
     def posed(self, key: str, value: float) -> Posed:
         """The problem with another value of a key; nothing is solved but what the preload comes to rest in."""
-        file = self.file.changed(f"{key}={value!r}")
+        file = self._changed(key, value)
         scene, part, plain = file.scene, self.part, self.plain
         if self._scales(key):
             plain = _scaled(plain, key.rpartition(".")[2], value / keys(self.scene)[key])
@@ -147,7 +153,8 @@ class Varying:
             reduced = replace(reduced, interface=self.own.model.interface)  # the same coordinates
         structural = self.anew(key) or self._scales(key) or self.follows(key)
         contact = self._contact(scene) if _touches(key) and not structural else self.own.contact
-        return Posed(reduced, contact, joints.excite(scene, base), self.own.memory)
+        loads = self.own.excitation if key.startswith("contact") else joints.excite(scene, base)
+        return Posed(reduced, contact, loads, self.own.memory)
 
     @property
     def _settles(self) -> bool:
@@ -222,7 +229,7 @@ class Varying:
             change = part.restricted(spring.matrix(part.mesh, part.node_sets))
             still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
             return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
-        twice, mesh, node_sets = self.file.changed(f"{key}={value!r}"), part.mesh, dict(part.node_sets)
+        twice, mesh, node_sets = self._changed(key, value), part.mesh, dict(part.node_sets)
         if scene.material is None:  # its mesh has the materials
             with TemporaryDirectory() as folder:
                 mesh, node_sets = modelling.make_mesh(twice, Path(folder))
@@ -246,6 +253,14 @@ class Varying:
             return True
         own, springs = (joints.contact_stiffness(one, plain) for one in (self.scene, scene))
         return scene.damping.given and scene.damping.state == "stuck" and not np.array_equal(own, springs)
+
+
+def _with(table: Any, path: Sequence[str], value: float) -> Any:
+    """A table of a scene with another value at the end of a path of keys."""
+    name, *rest = path
+    inside = isinstance(table, dict)
+    new = _with(table[name] if inside else getattr(table, name), rest, value) if rest else value
+    return {**table, name: new} if inside else table.model_copy(update={name: new})
 
 
 def _touches(key: str) -> bool:

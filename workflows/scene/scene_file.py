@@ -103,7 +103,7 @@ def read(name: str, overrides: Sequence[str] = ()) -> SceneFile:
 
 def tables(path: Path, what: str) -> dict[str, Any]:
     """The tables of a TOML file of a study, fit, ...; raises SceneError for one that cannot be read."""
-    return _tables(_text(path, what), path.name)
+    return deepcopy(_tables(_text(path, what), path.name))
 
 
 def _text(path: Path, what: str) -> str:
@@ -113,19 +113,17 @@ def _text(path: Path, what: str) -> str:
         raise SceneError(f'the {what} file "{path}" cannot be read as text ({error})') from None
 
 
-_loaded = lru_cache(maxsize=4)(tomllib.loads)  # a study changes one scene many times
-
-
+@lru_cache(maxsize=4)  # a study changes one scene many times
 def _tables(text: str, label: str) -> dict[str, Any]:
     try:
-        return deepcopy(_loaded(text))
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{label} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
 
 
 def parse(text: str, label: str, overrides: Sequence[str] = (), folder: Path = CASES) -> SceneFile:
     """Check the text of a scene; label names it in errors. Raises SceneError."""
-    data = _tables(text, label)
+    data = dict(_tables(text, label))
     for override in overrides:
         _override(data, override)
     return SceneFile(Path(label).stem, text, tuple(overrides), folder, checked(kind_of(data), data, label, folder))
@@ -160,16 +158,17 @@ def from_json(text: str) -> Scene:
 
 
 def _override(data: dict[str, Any], text: str) -> None:
-    """Put "section.key=value" into the parsed file, making tables on the way; an empty value takes the key out."""
+    """Put "section.key=value" into a parsed file, making tables anew on the way; an empty value takes the key out."""
     key, equals, value = text.partition("=")
     path = key.strip().split(".")
     if not equals or not all(path):
         raise SceneError(f'--set expects section.key=value, got "{text}"')
     table = data
     for name in path[:-1]:
-        table = table.setdefault(name, {})
-        if not isinstance(table, dict):
+        inner = table.get(name, {})
+        if not isinstance(inner, dict):
             raise SceneError(f'--set {text}: "{name}" is not a table of the scene')
+        table[name] = table = dict(inner)
     if not value.strip():
         table.pop(path[-1], None)
         return
