@@ -60,7 +60,7 @@ class Derivatives:
     above, below : (n_quantity, n_parameter) one-sided derivatives at a fixed frequency
     by_frequency : (n_quantity,) dq / d omega at fixed parameters [1/(rad/s)], zero along a peak
     by_gap : (n_quantity, n_pair) dq / d gap of each pair [1/m]
-    state : solved, along a peak beside it; solves : of the balance that were spent
+    state : solved, along a peak beside it
     follows_corner : whether the peak is a corner of the curve, at which a contact transition begins
     """
 
@@ -74,7 +74,6 @@ class Derivatives:
     by_frequency: np.ndarray
     by_gap: np.ndarray
     state: State
-    solves: int
     follows_corner: bool = False
 
 
@@ -124,7 +123,6 @@ def _gathered(
     names: list[str],
     steps: np.ndarray,
     own: _Fixed,
-    solves: int,
     omega: float = 0.0,
     moves: np.ndarray | None = None,
 ) -> Derivatives:
@@ -142,7 +140,7 @@ def _gathered(
     corner = (2 * np.abs(above - below) * steps > RULES.corner * seen).any(axis=0)
     return Derivatives(
         tuple(quantities), values, tuple(names), columns[:, :n], corner, above, below,
-        by_frequency, columns[:, n:], gradient.state, solves,
+        by_frequency, columns[:, n:], gradient.state,
     )  # fmt: skip
 
 
@@ -170,7 +168,7 @@ def at_frequency(
     state = _solved(balance, state.omega, state.x, options)
     gradient = Gradient(balance, state, tuple(quantities(balance, state, output, worn)))
     names, steps, (own,) = _fixed([gradient], changes)
-    return _gathered(gradient, names, steps, own, 1)
+    return _gathered(gradient, names, steps, own)
 
 
 @single
@@ -188,7 +186,7 @@ def at_peak(
     A peak that is a corner of the curve stays where the curve has its corner
     Raises  NoDerivative where no peak lies beside the state, as at a fold
     """
-    ends, width, solves = _peak(balance, state, output, options)
+    ends, width = _peak(balance, state, output, options)
 
     def beside(end: Slope, widths: float) -> Gradient:
         omega = end.omega + widths * width
@@ -199,14 +197,14 @@ def at_peak(
         low, high = (
             [beside(end, side * n**2) for n in (1, 2, 3, 4)] for end, side in zip(ends, RULES.sides, strict=True)
         )
-        return _at_corner(low, high, changes, solves + 8)
+        return _at_corner(low, high, changes)
     gradient, *near = (beside(ends[0], side) for side in (0.0, -RULES.along, RULES.along))
     near = [replace(one, quantities=one.quantities[:1]) for one in near]
     names, steps, (own, *points) = _fixed([gradient, *near], changes)
     curvature, moves = _bend(points, width, float(own.by_frequency[0] / own.values[0]))
     left = -own.by_frequency[0] / own.values[0] / curvature
     own = replace(own, values=own.values + left * own.by_frequency)
-    return _gathered(gradient, names, steps, own, solves + 2, gradient.state.omega + left, moves)
+    return _gathered(gradient, names, steps, own, gradient.state.omega + left, moves)
 
 
 def _bend(points: Sequence[_Fixed], width: float, between: float) -> tuple[float, np.ndarray]:
@@ -230,7 +228,7 @@ def peak_moves(
     """(n_change + n_pair,) d omega of the peak that a state is at, by the changes and by the gap of every pair."""
     here, near = _slope(balance, _solved(balance, state.omega, state.x, options), output), []
     if here.miss > RULES.along:  # one that a run ended at for another reason than a slope that vanishes
-        (here, *other), _, _ = _peak(balance, state, output, options)
+        (here, *other), _ = _peak(balance, state, output, options)
         if other:
             raise NoDerivative("the peak is a corner of the curve, where a contact transition begins")
     for side in (-RULES.along, RULES.along):
@@ -240,9 +238,7 @@ def peak_moves(
     return _bend(_fixed(near, changes)[2], here.width, here.distance / here.width**2)[1]
 
 
-def _at_corner(
-    low: Sequence[Gradient], high: Sequence[Gradient], changes: Iterable[Change], solves: int
-) -> Derivatives:
+def _at_corner(low: Sequence[Gradient], high: Sequence[Gradient], changes: Iterable[Change]) -> Derivatives:
     """Along a corner of the curve, from what tends to it below and above it: both are one curve there."""
     both = set.intersection(*({q.name for q in one.quantities} for one in (*low, *high)))
     gradients = [replace(g, quantities=tuple(q for q in g.quantities if q.name in both)) for g in (*low, *high)]
@@ -254,7 +250,7 @@ def _at_corner(
     if (np.abs(along[1] - along[0]) > RULES.corner * size).any():
         raise NoDerivative("the peak is a corner of the curve where more than one contact transition begins")
     omega = (low[0].state.omega + high[0].state.omega) / 2
-    return replace(_gathered(gradients[0], names, steps, below, solves, omega, moves), follows_corner=True)
+    return replace(_gathered(gradients[0], names, steps, below, omega, moves), follows_corner=True)
 
 
 @single
@@ -267,18 +263,18 @@ def at_fold(
     l . (R_w dw + R_p dp) = 0
     Raises  NoDerivative where no fold lies beside the state
     """
-    state, solves = _fold(balance, state, options)
+    state = _fold(balance, state, options)
     none = np.zeros_like(state.flat)
     hertz = Quantity("frequency", state.omega / (2 * np.pi), none, none, np.zeros_like(balance.outputs(state)))
     gradient = Gradient(balance, state, (hertz,), at_fold=True)
     names, steps, (own,) = _fixed([gradient], changes)
     to_hertz = -1 / (2 * np.pi * own.by_frequency[0])
     sides = (to_hertz * side for side in (own.above, own.below, own.by_gap))
-    return _gathered(gradient, names, steps, _Fixed(own.values, np.zeros(1), *sides), solves)
+    return _gathered(gradient, names, steps, _Fixed(own.values, np.zeros(1), *sides))
 
 
-def _fold(balance: HarmonicBalance, state: State, options: NewtonOptions | None) -> tuple[State, int]:
-    """The fold beside a state, by secants of the share of the frequency in the tangent; solves spent."""
+def _fold(balance: HarmonicBalance, state: State, options: NewtonOptions | None) -> State:
+    """The fold beside a state, by secants of the share of the frequency in the tangent."""
     how, path = replace(options or NewtonOptions(), tolerance=RULES.newton), parameter.of(balance)
     vibration = np.where(balance.basis.order > 0, state.flat, 0.0)
     metric = Metric(float(np.linalg.norm(vibration)), FoldOptions.frequency_scale * state.omega)
@@ -292,15 +288,13 @@ def _fold(balance: HarmonicBalance, state: State, options: NewtonOptions | None)
         step = RULES.along
         there, tangent = at(Direction(here.flat, here.omega) + along * step, along)
         bend = (tangent.p - along.p) / step
-        solves = 2
-        while solves < RULES.most_steps:
+        for _ in range(RULES.most_steps):
             here, along, step = there, tangent, -tangent.p / bend if bend else np.inf
             if not abs(step) <= 1.0 or abs(step) <= RULES.at_fold:
                 break
             there, tangent = at(Direction(here.flat, here.omega) + along * step, along)
-            solves += 1
         if abs(step) <= RULES.at_fold:
-            return here, solves
+            return here
     except bordered.BorderFailed:
         pass
     raise NoDerivative(f"no fold lies beside {state.omega / (2 * np.pi):.6g} Hz")
@@ -350,7 +344,7 @@ def at_mode(
     state = balance.evaluate(point.omega, point.x)
     return Derivatives(
         ("frequency", "damping"), values, tuple(names), slopes, np.zeros(len(names), bool), slopes, slopes, none,
-        np.zeros((2, balance.contact.n_pair)), state, 1,
+        np.zeros((2, balance.contact.n_pair)), state,
     )  # fmt: skip
 
 
@@ -360,8 +354,8 @@ def _slope(balance: HarmonicBalance, state: State, output: str) -> Slope:
 
 def _peak(
     balance: HarmonicBalance, state: State, output: str, options: NewtonOptions | None
-) -> tuple[tuple[Slope, ...], float, int]:
-    """The peak beside a state, by secants of the slope; half width of the resonance, solves spent.
+) -> tuple[tuple[Slope, ...], float]:
+    """The peak beside a state, by secants of the slope; half width of the resonance.
 
     Two points where the slope does not vanish but jumps: those on both sides of the corner
     """
@@ -373,7 +367,7 @@ def _peak(
     first = before = _slope(balance, _solved(balance, state.omega, state.x, options), output)
     longest = RULES.first_step * before.omega
     step = float(np.clip(before.distance, -longest, longest))
-    for solves in range(2, RULES.most_steps):
+    for _ in range(2, RULES.most_steps):
         here = at(before.omega + step, before)
         curvature = (here.slope - before.slope) / step if step else 0.0
         if not curvature < 0:
@@ -381,25 +375,25 @@ def _peak(
         width = float(np.sqrt(-2 / curvature) * amplitude(balance.outputs(here.solution.state))[row])
         before, step = here, float(np.clip(-here.slope / curvature, -width / 2, width / 2))
         if abs(step) <= RULES.at_peak * width:
-            return (here,), width, solves
+            return (here,), width
     low = high = first
     for _ in range(RULES.most_steps):
         if low.slope > 0 > high.slope:
             break
-        solves, longest = solves + 1, 2 * longest
+        longest *= 2
         low, high = (high, at(high.omega + longest, high)) if high.slope > 0 else (at(low.omega - longest, low), low)
     hertz = f"{state.omega / (2 * np.pi):.6g} Hz"
     if not low.slope > 0 > high.slope:
         raise NoDerivative(f"no peak of {output} lies beside {hertz}")
     width = min(low.width, high.width)
     while high.omega - low.omega > RULES.at_corner * width:
-        solves, middle = solves + 1, at((low.omega + high.omega) / 2, low)
+        middle = at((low.omega + high.omega) / 2, low)
         low, high = (middle, high) if middle.slope > 0 else (low, middle)
     if max(low.miss, high.miss) <= RULES.at_peak:
-        return (low,), width, solves
+        return (low,), width
     if balance.basis.transitions != "located":
         raise NoDerivative(
             f"the peak of {output} at {hertz} is a corner of the curve, as forces at samples have many: "
             'harmonics.transitions = "located" has none but where a contact transition begins'
         )
-    return (low, high), width, solves
+    return (low, high), width

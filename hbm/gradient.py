@@ -195,11 +195,7 @@ def _difference(new: SecondOrderSystem, old: SecondOrderSystem, s: complex, u: n
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """The derivatives of some quantities at one solution; at a fold what the balance itself changes by, projected.
-
-    quantities : at the solution; fields : harmonic -> coordinates u (n,) complex; weights : (n_quantity, n_contact,
-    n_coeff), dq / df of the contact forces at fixed x
-    """
+    """The derivatives of some quantities at one solution; at a fold what the balance itself changes by, projected."""
 
     balance: HarmonicBalance
     state: State
@@ -221,7 +217,7 @@ class Gradient:
         basis, state = self.balance.basis, self.state
         jac = state.cycle.jacobian
         assert jac is not None
-        shape, none = state.flat.shape, np.zeros_like(state.flat)
+        shape, none, point = state.flat.shape, np.zeros_like(state.flat), self.balance.at(state.omega)
 
         def transposed(blocks: np.ndarray, v: np.ndarray) -> np.ndarray:
             """df/dx^T v."""
@@ -232,8 +228,6 @@ class Gradient:
         def departed(v: np.ndarray) -> np.ndarray:
             """dg/dx^T v."""
             return k * v - transposed(jac, v)
-
-        point, nearly = self.balance.at(state.omega), self._preconditioner(departed)
 
         # at a fold one row and column make the transpose regular, and its solution that of no right-hand side
         border = np.random.default_rng(0).normal(size=shape) if self.at_fold else none
@@ -248,33 +242,13 @@ class Gradient:
         found, weights = [], []
         for q, through in zip(self.quantities, basis.to_real(at_contact.transpose(1, 0, 2)), strict=True):
             right = q.of_x + transposed(jac, q.of_force) + departed(through)
-            found.append(self._transposed_solve(product, right + border, nearly))
+            found.append(self._transposed_solve(product, right + border))
             weights.append(q.of_force - through - point.transposed(found[-1]))
         l = basis.to_complex(np.array(found))
         w = [v + s.adjoint(s.B.conj().T @ l[:, :, i].T) for i, (s, v) in enumerate(zip(self._sides, own, strict=True))]
         return np.reshape(found, (-1, *shape)), w, np.reshape(weights, (-1, *shape))
 
-    def _preconditioner(self, departed: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
-        """Nearly the solution of v - dg/dx^T G^T v = b, by the coarse part of G; see `Linearisation.coarse`."""
-        linear = self.balance.linearise(self.state)
-        rows, coarse = linear.rows, linear.coarse if len(linear.rows) else None
-        if coarse is None:
-            return lambda b: b
-        (u, a, inside), full = coarse, np.zeros_like(self.state.flat)
-        core = np.linalg.solve(inside, a).T
-
-        def nearly(b: np.ndarray) -> np.ndarray:
-            full[rows] = u @ (core @ (u.T @ b[rows]).ravel()).reshape(u.shape[1], -1)
-            return b + departed(full)
-
-        return nearly
-
-    def _transposed_solve(
-        self,
-        product: Callable[[np.ndarray], np.ndarray],
-        right: np.ndarray,
-        nearly: Callable[[np.ndarray], np.ndarray] = np.copy,
-    ) -> np.ndarray:
+    def _transposed_solve(self, product: Callable[[np.ndarray], np.ndarray], right: np.ndarray) -> np.ndarray:
         """l with product(l) = right: by GMRES, refined once."""
         solution, left = np.zeros_like(right), right
         size = float(np.linalg.norm(right))
@@ -287,7 +261,6 @@ class Gradient:
                 left.ravel(),
                 RULES.adjoint / reached,
                 RULES.most_products,
-                lambda v: nearly(v.reshape(right.shape)).ravel(),
             )
             solution = solution + more.reshape(right.shape)
             left = right - product(solution)

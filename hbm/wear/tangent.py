@@ -94,7 +94,7 @@ def of_life(
     by, values = slopes[:, :last], np.array([life, after.depth[deepest], area @ after.depth])
     return Derivatives(
         ("life", "depth", "volume"), values, (*(change.name for change in changes), *coefficients), by,
-        np.full(last, bool(tangent.corners)), by, by, np.zeros(3), by_gap, first.points[0].state, 2 * len(rows),
+        np.full(last, bool(tangent.corners)), by, by, np.zeros(3), by_gap, first.points[0].state,
     )  # fmt: skip
 
 

@@ -161,3 +161,14 @@ def test_coriolis_forces_in_few_modes_against_a_direct_solve(is_complex):
     ahead, behind = (found.at(1j * (0.5 * OMEGA + d)).apply(force) for d in (step, -step))
     slope = found.at(0.5j * OMEGA).slope(force)
     assert np.abs(slope - (ahead - behind) / (2j * step)).max() < 1e-5 * np.abs(slope).max()
+
+
+@pytest.mark.parametrize("harmonics", [HARMONICS, (0, 5)])  # the last two share one real system
+def test_the_transpose_is_that_of_the_same_product(balance, harmonics):
+    """<a, G b> = <G^T a, b>."""
+    compliance = balance.compliance.restricted(HarmonicBasis(harmonics, 64))
+    assert compliance.shared_real == (harmonics != HARMONICS)
+    point = compliance.at(0.7 * OMEGA)
+    a, b = np.random.default_rng(3).normal(size=(2, 3 * N_PAIR, compliance.basis.n_coeff))
+    size = np.linalg.norm(a) * np.linalg.norm(point.apply(b))
+    assert abs(np.vdot(a, point.apply(b)) - np.vdot(point.transposed(a), b)) < 1e-12 * size
