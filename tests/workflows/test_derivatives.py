@@ -15,7 +15,7 @@ from tribodyn.hbm import derivatives as exact
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.run import references, settings, wear_run
+from tribodyn.workflows.run import references, settings, varying, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.varying import Varying, keys
 from tribodyn.workflows.scene import scene_file
@@ -47,6 +47,14 @@ def test_the_laws_of_scaling_hold(beam):
     stiffer = sum(row for key, row in rows.items() if key.endswith(("_stiffness", "young")))
     softens = {"frequency": 0.5, "amplitude": -1.0, "phase": 0.0, "energy": -1.0, "preload": 0.0, "wear rate": -1.0}
     np.testing.assert_allclose(stiffer, [softens[name] for name in names], atol=1e-5)
+
+
+@pytest.mark.parametrize("name", scene_file.names())
+def test_a_scene_with_another_value_is_the_one_that_would_be_read(name):
+    file = scene_file.read(name)
+    for key, value in keys(file.scene).items():
+        other = 1.01 * value
+        assert varying._with(file.scene, key.split("."), other) == file.changed(f"{key}={other!r}").scene, key
 
 
 @pytest.mark.slow
