@@ -27,7 +27,7 @@ from tribodyn.hbm.contact.joint import Contact
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.krylov import gmres
-from tribodyn.hbm.linear.recovery import stuck_dynamic_stiffness
+from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
 
 

@@ -18,8 +18,8 @@ from tribodyn.hbm.contact.joint import Contact
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.mistuned import Alike, MistunedCompliance
-from tribodyn.hbm.linear.recovery import stuck_dynamic_stiffness
 from tribodyn.reduction.cyclic import ReducedSector, travelling_wave
+from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
 
 Change = Callable[[ContactParameters, np.ndarray], ContactParameters]

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags_array, issparse
 
 from tribodyn.fem.modes import modes
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.model import ReducedModel
 
 if TYPE_CHECKING:
@@ -34,3 +35,11 @@ def stuck_stiffness(K: Any, B: Any, stiffness: np.ndarray) -> Any:
         B = csr_matrix(B)
         return csr_matrix(K + B.conj().T @ diags_array(np.ravel(stiffness)) @ B)
     return K + B.conj().T @ (np.ravel(stiffness)[:, None] * B)
+
+
+def stuck_dynamic_stiffness(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, s: complex) -> np.ndarray:
+    """K + F + B^H k B + s (C + G) + s^2 M (n, n) of a dense system; springs k : (n_contact,) [N/m]; s : i omega h."""
+    dynamic = stuck_stiffness(system.stiffness, B, springs) + s**2 * system.mass
+    if system.velocity_matrix is not None:
+        dynamic = dynamic + s * system.velocity_matrix
+    return np.asarray(dynamic if system.circulatory is None else dynamic + system.circulatory)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -16,6 +16,19 @@ if TYPE_CHECKING:
 
 Damping = Callable[[SecondOrderSystem, np.ndarray], np.ndarray | None]
 """Makes the damping matrix (n, n) [N s/m] of a system whose contact map is (n_contact, n), None for none."""
+
+
+class Along(Protocol):
+    """Models of a wheel whose speed goes with the frequency [rad/s]."""
+
+    def __call__(self, omega: float) -> ReducedModel:
+        """The model at a frequency, and at its speed."""
+
+    def slope(self, omega: float) -> ReducedModel:
+        """Its matrices, loads and outputs by the frequency."""
+
+    def damped(self, make: Damping) -> Along:
+        """The same with another damping."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +85,7 @@ class ReducedModel:
     harmonic_basis : q (n, ...), harmonic -> basis @ q where the coordinates of a harmonic are its own
     per_index : of a travelling wave, index -> (system, B) of any wave of the wheel, real for 0 and N/2; matrices of
         index -j are the conjugates of those of j
-    along : of a wheel whose speed goes with the frequency, frequency [rad/s] -> the model there
+    along : of a wheel whose speed goes with the frequency
     residual : static contact flexibility that the coordinates leave out, None where they hold every contact DOF
     """
 
@@ -84,7 +97,7 @@ class ReducedModel:
     harmonic_basis: Callable[[np.ndarray, int], np.ndarray] | None = None
     per_index: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
     residual: ResidualFlexibility | None = None
-    along: Callable[[float], ReducedModel] | None = None
+    along: Along | None = None
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """System and contact map (n_pair * n_component, n) that harmonic h sees."""
@@ -141,8 +154,8 @@ class ReducedModel:
             system, B = any_wave(index)
             return damped(system, B), B
 
-        whole, along = replace(self, system=first, per_harmonic=per_harmonic, per_index=per_index), self.along
-        return whole if along is None else replace(whole, along=lambda omega: along(omega).with_damping(make))
+        along = None if self.along is None else self.along.damped(make)
+        return replace(self, system=first, per_harmonic=per_harmonic, per_index=per_index, along=along)
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
@@ -68,19 +70,17 @@ class ContactCompliance:
         system, _ = model.at_harmonic(basis.harmonics[-1])
         excitation.check(basis, system.loads)
         self.output_names = tuple(system.outputs)
-        load_names = sorted({name for _, name in excitation.loads})
-        self.n_load = len(load_names)
-        self._load = np.zeros((len(load_names), len(basis.harmonics)), complex)
+        self.load_names = sorted({name for _, name in excitation.loads})
+        self.n_load = len(self.load_names)
+        self._load = np.zeros((self.n_load, len(basis.harmonics)), complex)
         for (h, name), value in excitation.loads.items():
             if h in basis.harmonics:
-                self._load[load_names.index(name), basis.harmonics.index(h)] = value
+                self._load[self.load_names.index(name), basis.harmonics.index(h)] = value
         self.base = excitation.base
         self.groups: list[tuple[Expansion, list[int]]] = []
         for positions, mirrored in _sharing(model, basis.harmonics):
             system, b = model.at_harmonic(basis.harmonics[positions[0]])
-            loads = [np.conj(system.loads[name])[None] for name in load_names]
-            outputs = [system.outputs[name][None] for name in self.output_names]
-            ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
+            ports = self.port_rows(system, np.asarray(b))
             s_max = basis.harmonics[max([*positions, *mirrored])] * omega_max
             if model.residual is not None:
                 ritz = RitzExpansion(system, np.asarray(b), self.k, ports, s_max, model.residual)
@@ -97,6 +97,11 @@ class ContactCompliance:
         self.coarse = self._coarse_modes()
         self._points: dict[float, CompliancePoint] = {}
         self._active: tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+
+    def port_rows(self, system: SecondOrderSystem, b: np.ndarray) -> np.ndarray:
+        """(n_port, n) rows of the contacts b, the loads and the outputs of a system."""
+        loads = [np.conj(system.loads[name])[None] for name in self.load_names]
+        return np.concatenate([b, *loads, *(system.outputs[name][None] for name in self.output_names)])
 
     def stuck_frequencies(self, harmonic: int) -> np.ndarray:
         """(n,) lowest natural frequencies of the structure that a harmonic sees, its contacts stuck, undamped [Hz]."""
@@ -257,10 +262,7 @@ class CompliancePoint:
         self.omega = omega
         basis = compliance.basis
         self._harmonics = np.asarray(basis.harmonics, float)
-        self.ports = [
-            [expansion.at(1j * basis.harmonics[p] * omega) for p in positions]
-            for expansion, positions in compliance.groups
-        ]
+        self.ports = self._solved()
         n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
         if compliance.outside is not None:
             moved = self._from_rows(*compliance.outside.excitation, compliance.groups[0][0].left)
@@ -270,6 +272,11 @@ class CompliancePoint:
             ports = self._through_ports(compliance.port_force(None)[excited], excited)
             x, self.outputs_lin = basis.to_real(ports[:n]), basis.to_real(ports[stop:])
         self.x_lin = x if compliance.base is None else x - compliance.base
+
+    def _solved(self) -> Any:
+        """What gives the displacement of ports, group by group and harmonic by harmonic."""
+        c, s = self.compliance, 1j * self.omega
+        return [[expansion.at(s * c.basis.harmonics[p]) for p in positions] for expansion, positions in c.groups]
 
     def _through_ports(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
         first = self.compliance.groups[0][0]
@@ -397,7 +404,7 @@ class CompliancePoint:
         blocks = np.zeros((size, basis.n_coeff, size, basis.n_coeff))
         for modes, (_, positions), ports in zip(c.coarse_parts, c.groups, self.ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
-                amplitude = modes @ port.through_core(modes.conj().T)  # acts on X_h = a_h - i b_h
+                amplitude = self._in_coarse(modes, port)  # acts on X_h = a_h - i b_h
                 cosine, *sine = np.flatnonzero(basis.order == basis.harmonics[p])
                 blocks[:, cosine, :, cosine] = amplitude.real
                 for column in sine:
@@ -405,6 +412,11 @@ class CompliancePoint:
                     blocks[:, cosine, :, column] = amplitude.imag
                     blocks[:, column, :, cosine] = -amplitude.imag
         return blocks.reshape(size * basis.n_coeff, size * basis.n_coeff)
+
+    def _in_coarse(self, modes: np.ndarray, port: Any) -> np.ndarray:
+        """(r, r) compliance of the `preconditioned` shapes at one harmonic, through the modes of its system."""
+        found: np.ndarray = modes @ port.through_core(modes.conj().T)
+        return found
 
 
 def _moved(dense: np.ndarray, basis: HarmonicBasis, force: np.ndarray) -> np.ndarray:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.reduction.linear import stuck_dynamic_stiffness
 
 
 def coordinates(
@@ -31,14 +31,6 @@ def coordinates(
                 total = total + (balance.load_factor if h else 1.0) * value * system.loads[name]
         found.append(np.linalg.solve(stuck_dynamic_stiffness(system, B, k, 1j * h * omega), total))
     return found
-
-
-def stuck_dynamic_stiffness(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, s: complex) -> np.ndarray:
-    """K + B^H k B + s C + s^2 M (n, n) of a reduced system; springs : (n_contact,) k [N/m]; s : i omega h [rad/s]."""
-    dynamic = system.stiffness + B.conj().T @ (springs[:, None] * B) + s**2 * system.mass
-    if system.velocity_matrix is not None:
-        dynamic = dynamic + s * system.velocity_matrix
-    return np.asarray(dynamic)
 
 
 def full_displacement(

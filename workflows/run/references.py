@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sla
@@ -46,8 +46,8 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
 def highest_linear(balance: HarmonicBalance, output: str, start: float, stop: float) -> float:
     """Largest amplitude of an output between two frequencies [rad/s], free or stuck [m]; infinite if unconstrained."""
     if balance.model.along is not None:  # at each of its speeds: more than on the line itself
-        speeds = [balance.standing(float(omega)) for omega in np.linspace(start, stop, LINEAR.speeds)]
-        return max(highest_linear(one, output, start, stop) for one in speeds)
+        speeds = [balance.model.along(float(omega)) for omega in np.linspace(start, stop, LINEAR.speeds)]
+        return max(highest_linear(replace(balance, model=one), output, start, stop) for one in speeds)
     states = (None, balance.contact.stiffness)
     found = np.concatenate([_resonances(balance, springs) for springs in states])
     if (found < np.sqrt(LINEAR.rigid) * (start + stop) / 2).any():
@@ -89,7 +89,8 @@ def _on_line(balance: HarmonicBalance, springs: np.ndarray | None, output: str, 
     for own in speeds:
         weight = np.maximum(1 - np.abs(omega - own) / (speeds[1] - speeds[0]), 0.0)
         near = weight > 0
-        found[near] += weight[near] * _amplitudes(balance.standing(float(own)), springs, output, omega[near])
+        there = replace(balance, model=balance.model.along(float(own)))
+        found[near] += weight[near] * _amplitudes(there, springs, output, omega[near])
     return found
 
 
