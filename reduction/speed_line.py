@@ -25,8 +25,8 @@ from tribodyn.reduction.model import Damping, ReducedModel
 
 def reduce_alike(
     sectors: Sequence[Sector], n_modes: int | None, cutoff: float | None, attached: Sequence[str] = ()
-) -> list[ReducedSector]:
-    """Sectors of one mesh that differ in stiffness and Coriolis forces, as `reduce_sector`, in the same coordinates.
+) -> ReducedSector:
+    """The first of sectors of one mesh that differ in stiffness, as `reduce_sector`, in coordinates of them all.
 
     Masters stay; all fixed-interface modes, and what the constraint modes differ by, share one basis of the rest
     """
@@ -38,7 +38,13 @@ def reduce_alike(
     own = independent(np.concatenate(columns, axis=1), sectors[0].system.stiffness)
     basis = np.concatenate([first.basis[:, :m], own], axis=1)
     info = replace(first.info, n_modes=own.shape[1])
-    return [in_coordinates(sector, sector.system.projected(basis), basis, info) for sector in sectors]
+    return in_coordinates(sectors[0], sectors[0].system.projected(basis), basis, info)
+
+
+def congruent(K: Any, T: np.ndarray) -> np.ndarray:
+    """T^H K T (m, m) of a stiffness K (n, n), sparse or dense, in coordinates T (n, m)."""
+    small = T.conj().T @ (K @ T)
+    return np.asarray((small + small.conj().T) / 2)
 
 
 def independent(columns: np.ndarray, stiffness: Any) -> np.ndarray:
@@ -56,12 +62,14 @@ Systems = tuple[tuple[SecondOrderSystem, ...], np.ndarray, np.ndarray]
 class SpeedLine:
     """A wave of an engine order whose frequency is that order times the speed: frequency [rad/s] -> its model.
 
-    reduced : at `speeds` [Hz], above 0, as `reduce_alike` gives them; load : name of the one that goes with the square
-        of the speed, which stands for `nominal` [Hz]; springs : (n_pair, n_component) contact springs [N/m]
+    reduced : at the first of `speeds` [Hz], above 0, in coordinates for all; stiffness : (n, n) there, at each
+    load : name of the one that goes with the square of the speed, which stands for `nominal` [Hz]
+    springs : (n_pair, n_component) contact springs [N/m]
     damping : makes that of the systems at `speeds`
     """
 
-    reduced: tuple[ReducedSector, ...]
+    reduced: ReducedSector
+    stiffness: tuple[np.ndarray, ...]
     speeds: tuple[float, ...]
     engine_order: int
     load: str
@@ -72,11 +80,11 @@ class SpeedLine:
 
     def __call__(self, omega: float) -> ReducedModel:
         """The model at the speed that belongs to a frequency [rad/s]."""
-        return wave_of(self.reduced[0], self.engine_order, AtSpeed(self, self.between, self.speed(omega)))
+        return wave_of(self.reduced, self.engine_order, AtSpeed(self, self.between, self.speed(omega)))
 
     def slope(self, omega: float) -> ReducedModel:
         """Matrices, loads and outputs of the model by the frequency [rad/s]."""
-        return wave_of(self.reduced[0], self.engine_order, AtSpeed(self, self.by_frequency, self.speed(omega)))
+        return wave_of(self.reduced, self.engine_order, AtSpeed(self, self.by_frequency, self.speed(omega)))
 
     def damped(self, make: Damping) -> SpeedLine:
         """The same with another damping."""
@@ -118,26 +126,31 @@ class SpeedLine:
     def at_index(self, index: int) -> Systems:
         """Systems at all speeds, contact map and way back of a harmonic index, in few coordinates."""
         if index not in self.made:
-            each = [WaveIndices(one)(index) for one in self.reduced]
-            _, B, T = each[0]
-            systems = tuple(system for system, _, _ in each)
-            if systems[0].n_dof > LIMITS.many_along:
-                shapes = [stuck_ritz(s, B, self.springs, LIMITS.modes_along) for s in (systems[0], systems[-1])]
-                V = independent(np.concatenate(shapes, axis=1), stuck_stiffness(systems[0].stiffness, B, self.springs))
-                systems, B, T = tuple(s.projected(V) for s in systems), B @ V, T @ V
+            first, B, T = WaveIndices(self.reduced)(index)
+            if first.n_dof > LIMITS.many_along:
+                ends = first, replace(first, stiffness=congruent(self.stiffness[-1], T))
+                shapes = [stuck_ritz(one, B, self.springs, LIMITS.modes_along) for one in ends]
+                V = independent(np.concatenate(shapes, axis=1), stuck_stiffness(first.stiffness, B, self.springs))
+                first, B, T = first.projected(V), B @ V, T @ V
+            systems = first, *(replace(first, stiffness=congruent(K, T)) for K in self.stiffness[1:])
             self.made[index] = (systems, B, T) if self.damping is None else _damped((systems, B, T), self.damping)
         return self.made[index]
 
-    def error(self, speed: float, there: ReducedSector, n_modes: int = 6) -> float:
+    def error(self, speed: float, there: np.ndarray, n_modes: int = 6) -> float:
         """Largest relative error of the lowest frequencies of the stuck wave that interpolation makes at a speed.
 
-        there : the sector at this speed in the same coordinates
+        there : (n, n) stiffness at this speed
         """
-        system, B = at_index(there.sector, self.engine_order)
-        nodes = [at_index(one.sector, self.engine_order)[0] for one in self.reduced]
+
+        def wave(stiffness: np.ndarray) -> tuple[SecondOrderSystem, np.ndarray]:
+            sector = self.reduced.sector
+            return at_index(replace(sector, system=replace(sector.system, stiffness=stiffness)), self.engine_order)
+
+        system, B = wave(there)
         omega, phi = modes(stuck_stiffness(system.stiffness, B, self.springs), system.mass, n_modes)
-        missed = self.between(nodes, speed).stiffness - system.stiffness
-        return float(np.abs(np.einsum("ij,ij->j", phi.conj(), missed @ phi) / (2 * omega**2)).max())
+        alike = [replace(self.reduced.sector.system, stiffness=K) for K in self.stiffness]
+        missed, _ = wave(self.between(alike, speed).stiffness - there)
+        return float(np.abs(np.einsum("ij,ij->j", phi.conj(), missed.stiffness @ phi) / (2 * omega**2)).max())
 
 
 def _damped(made: Systems, make: Damping) -> Systems:

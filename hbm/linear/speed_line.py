@@ -16,8 +16,6 @@ from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
 
-KEPT = 12  # speeds at hand: those of a peak and of the slopes about it
-
 
 def compliance_of(
     model: ReducedModel,
@@ -38,7 +36,6 @@ class LineCompliance(ContactCompliance):
     def __init__(self, model: ReducedModel, *made_of: Any):
         super().__init__(model, *made_of)
         self.model, self._made_of = model, made_of
-        self.shared_real = False
 
     def _one_real(self) -> bool:
         """Never: every speed has systems of its own."""
@@ -51,13 +48,8 @@ class LineCompliance(ContactCompliance):
         compliance = ContactCompliance(model, *self._made_of)
         return model, compliance if compliance.basis == self.basis else compliance.restricted(self.basis)
 
-    def at(self, omega: float) -> CompliancePoint:
-        """The compliance at one excitation frequency [rad/s], and at its speed."""
-        if omega not in self._points:
-            self._points[omega] = LinePoint(self, omega)
-            if len(self._points) > KEPT:
-                del self._points[next(iter(self._points))]
-        return self._points[omega]
+    def _make(self, omega: float) -> CompliancePoint:
+        return LinePoint(self, omega)
 
 
 class LinePoint(CompliancePoint):

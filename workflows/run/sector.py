@@ -30,7 +30,7 @@ from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.reduction.residual_flexibility import residual_flexibility
-from tribodyn.reduction.speed_line import SpeedLine, reduce_alike
+from tribodyn.reduction.speed_line import SpeedLine, congruent, reduce_alike
 from tribodyn.workflows.run import joints, part_reduction
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 
@@ -101,27 +101,28 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
     low, high = (end(places) / abs(wheel.engine_order) for end in (min, max))
     squares = low**2 + (high**2 - low**2) * np.array([0.0, 1.0, 0.5, 0.25, 0.75, 0.125, 0.875])
     turning: list[Sector] = []
-    error = np.inf
-    for count, speed in enumerate(speeds := np.sqrt(squares).tolist(), start=1):
+    speeds = np.sqrt(squares).tolist()
+    for speed in speeds:
         own = wheel.model_copy(update={"speed": speed, "sweep": None})
-        there = scene.model_copy(update={"wheel": own})
         try:
-            turning.append(sector(there, part))
-            if count <= 3:
-                continue
-            reduction = scene.reduction
-            alike = reduce_alike(turning, reduction.modes, reduction.cutoff, distributed(scene, turning[0]))
+            turning.append(sector(scene.model_copy(update={"wheel": own}), part))
+            if len(turning) == 2:
+                kept = (scene.reduction.modes, scene.reduction.cutoff, distributed(scene, turning[0]))
+                ends = reduce_alike(turning, *kept)
         except ValueError as trouble:
             raise ValueError(f"at {60 * speed:.6g} rpm of the operating line {trouble}") from None
-        first = alike[0]
-        springs = joints.contact_stiffness(
-            scene, ReducedModel(first.sector.system, first.sector.interface, info=first.info)
-        )
-        line = SpeedLine(tuple(alike), tuple(speeds[:count]), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
-        without_last = replace(line, reduced=line.reduced[:-1], speeds=line.speeds[:-1], made={})
-        error = without_last.error(speed, alike[-1])
-        if error <= LIMITS.speeds_apart:
-            break
+        if len(turning) == 2:
+            springs = joints.contact_stiffness(
+                scene, ReducedModel(ends.sector.system, ends.sector.interface, info=ends.info)
+            )
+            stiffness = (ends.sector.system.stiffness,)
+            line = SpeedLine(ends, stiffness, (speeds[0],), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
+        if len(turning) > 1:
+            there = congruent(turning[-1].system.stiffness, ends.basis)
+            error = line.error(speed, there) if len(turning) > 3 else np.inf
+            line = replace(line, stiffness=(*line.stiffness, there), speeds=(*line.speeds, speed))
+            if error <= LIMITS.speeds_apart:
+                break
     model = line(2 * np.pi * abs(wheel.engine_order) * wheel.speed)
     rest = [one.prestress for one in turning if one.prestress is not None]
     info = replace(
