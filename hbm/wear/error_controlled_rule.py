@@ -299,7 +299,6 @@ def _step_of(
             error, longest = np.inf, stride
         else:
             deviation = (1 - GAMMA) * stride * (first.rate - second.rate)
-            worn = second.depth - state.depth
             error = local_error(tolerance, problem.area, deviation, second.rate, stride, second.cycles)
         if error <= 1.0:
             preload = problem.preload_of(second)

@@ -20,7 +20,7 @@ class Tolerance:
 def local_error(
     tolerance: Tolerance, area: np.ndarray, deviation: np.ndarray, rate: np.ndarray, stride: float, cycles: float
 ) -> float:
-    """Local error over the tolerance: of the deepest deviation, and of the cycles that its volume takes behind the step.
+    """Local error over the tolerance: of the deepest deviation, and of the cycles that its volume takes behind it.
 
     Where wear fades both solutions of a step may wear the same volume while most of a life is still to come, at the
     rate that is left: so that rate counts, and the pairs without their sign. No more than the step's cycles are wrong.

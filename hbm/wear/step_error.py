@@ -26,8 +26,7 @@ def step_error(history: WearHistory, tolerance: float | None = None) -> StepErro
 
     A step of Z cycles at the rate of its beginning is off by half the change of the rate over the step. The changes of
     all pairs count without their sign: rates that go back and forth between neighbours are a sign of steps too long.
-    The error-controlled rule has measured the cycles of each of its steps, see `local_error`. The sum of their squares
-    stands for the whole run, of depth too: their signs vary.
+    The error-controlled rule has measured its own, see `local_error`: the root of the sum of squares, of depth too.
     """
     lost = np.flatnonzero(history.preload < LIFE_SHARE * history.preload[0])
     last = int(lost[0]) if len(lost) else len(history.cycles) - 1  # row where the counted steps end
