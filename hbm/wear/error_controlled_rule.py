@@ -215,7 +215,7 @@ def _step_in_time(
         there, worn, deviation = machine.step(state, there, stride)
         solves += there.solves
         periods += there.means.periods if there.means else 0
-        error = local_error(tolerance, problem.area, deviation, worn, stride, state.cycles + stride)
+        error = local_error(tolerance, problem.area, deviation, there.rate, stride, state.cycles + stride)
         preload = problem.preload_of(there)
         if error <= 1.0 and preload < RULES.event_window[0] * target:
             stride, target = stride * _share_to(target, problem.preload_of(state), preload), 0.0
@@ -299,8 +299,7 @@ def _step_of(
             error, longest = np.inf, stride
         else:
             deviation = (1 - GAMMA) * stride * (first.rate - second.rate)
-            worn = second.depth - state.depth
-            error = local_error(tolerance, problem.area, deviation, worn, stride, second.cycles)
+            error = local_error(tolerance, problem.area, deviation, second.rate, stride, second.cycles)
         if error <= 1.0:
             preload = problem.preload_of(second)
             if preload >= RULES.event_window[0] * target:

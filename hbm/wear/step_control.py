@@ -18,16 +18,18 @@ class Tolerance:
 
 
 def local_error(
-    tolerance: Tolerance, area: np.ndarray, deviation: np.ndarray, worn: np.ndarray, stride: float, cycles: float
+    tolerance: Tolerance, area: np.ndarray, deviation: np.ndarray, rate: np.ndarray, stride: float, cycles: float
 ) -> float:
-    """Local error over the tolerance: of the deepest deviation, and of the cycles that the same volume takes.
+    """Local error over the tolerance: of the deepest deviation, and of the cycles that its volume takes behind it.
 
-    deviation : (n_pair,) of a step from its companion of lower order [m]; worn : (n_pair,) in the step [m]
+    Where wear fades both solutions of a step may wear the same volume while most of a life is still to come, at the
+    rate that is left: so that rate counts, and the pairs without their sign. No more than the step's cycles are wrong.
+    deviation : (n_pair,) of a step from its companion of lower order [m]; rate : (n_pair,) behind it [m/cycle]
     area : (n_pair,) [m2]; stride : cycles of the step; cycles : passed at its end
     """
     on_depth = np.abs(deviation).max() / tolerance.scale
-    volume = float(area @ worn)
-    on_life = abs(float(area @ deviation)) / volume * stride / cycles if volume > 0 else 0.0
+    wrong, left = float(area @ np.abs(deviation)), float(area @ rate)
+    on_life = (wrong / left if wrong < stride * left else stride * (wrong > 0)) / cycles
     return float(max(on_depth, on_life) / tolerance.share)
 
 

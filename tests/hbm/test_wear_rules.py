@@ -22,13 +22,14 @@ from tribodyn.hbm.continuation.operating_point import (
 from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear import error_controlled_rule, machine_motion, thesis_rule
 from tribodyn.hbm.wear.events import events
 from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.step_control import Tolerance, local_error
+from tribodyn.hbm.wear.step_error import step_error
 
 
 @pytest.fixture(scope="module")
@@ -445,3 +446,26 @@ def test_the_jump_to_a_peak_that_overtakes_is_located_and_said(problem: WearProb
     assert worn.ended.lost
     jump = f"jumped from {420 / (2 * np.pi):.5g} to {SECOND / (2 * np.pi):.5g} Hz at {worn.cycles[after]:.3g} cycles"
     assert jump in str(worn.end)
+
+
+def test_a_step_is_held_to_the_cycles_that_its_error_takes_behind_it() -> None:
+    """Two pairs whose errors cancel in volume; one whose rate fades, beside its own exponential."""
+    tolerance, area = Tolerance(1.0, np.inf), np.ones(2)
+    assert local_error(tolerance, area, np.array([1.0, -1.0]), area, 10.0, 10.0) == pytest.approx(0.1)
+    assert local_error(tolerance, area, np.array([1.0, -1.0]), 0.0 * area, 10.0, 20.0) == 0.5  # its own cycles at most
+    assert local_error(tolerance, area, 0.0 * area, 0.0 * area, 10.0, 10.0) == 0.0
+    for length in (0.2, 1.0, 2.0, 4.0):  # cycles over those in which the rate falls to 1/e
+        first = 1 / (1 + machine_motion.GAMMA * length)
+        second = (max(1 - length * first, 0.0) - 2 * first) / (1 + machine_motion.GAMMA * length)
+        worn, deviation = length * (1.5 * first + 0.5 * second), 0.5 * length * (first + second)
+        off = abs(worn - (1 - np.exp(-length))) / np.exp(-length)  # cycles by which the rate is reached early or late
+        told = local_error(tolerance, area[:1], np.array([deviation]), np.array([1 - worn]), length, length) * length
+        assert told >= min(off, length)
+
+
+def test_the_steps_of_a_run_add_up_in_its_estimate(problem: WearProblem, fine: WearHistory) -> None:
+    run = error_controlled_rule.evolve(problem, Tolerance(0.1, 2e-4))
+    estimate = step_error(run, 0.1).cycles
+    assert 0.0 < abs(life(run) / life(fine) - 1) < estimate < 0.2
+    begun = replace(run, step_error=np.where(run.cycles == 0, 10.0, run.step_error))
+    assert step_error(begun, 0.1).cycles < 0.2  # a first step that is far off is so by its own few cycles
