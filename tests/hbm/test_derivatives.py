@@ -49,8 +49,9 @@ def with_number(balance, name, factor):
     """The contact with one of its numbers, or of its springs, times a factor."""
 
     def change(p):
-        if name == "stiffness":
-            return replace(p, stiffness=factor * p.stiffness)
+        if name in ("tangential stiffness", "normal stiffness"):
+            scaled = [(c == "n") == (name == "normal stiffness") for c in balance.contact.components]
+            return replace(p, stiffness=np.where(scaled, factor, 1.0) * p.stiffness)
         return replace(p, numbers={**p.numbers, name: factor * p.numbers[name]})
 
     return balance.contact.with_parameters(change)
@@ -61,7 +62,8 @@ def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again
     balance = balance_of(name, components, "located" if (name, components) in LOCATED else "sampled")
     solved = newton.solve_from_rest(balance, OMEGA, EXACT)
     assert solved.converged
-    names = ["stiffness", *(n.name for n in contact_law.declared(name) if not n.whole)]
+    springs = ["tangential stiffness", "normal stiffness"][: 1 + ("n" in components)]
+    names = [*springs, *(n.name for n in contact_law.declared(name) if not n.whole)]
     step, posed = 1e-6, Posed.of(balance)
     changes = [
         Change(p, step, *(replace(posed, contact=with_number(balance, p, 1 + s)) for s in (step, -step))) for p in names
