@@ -352,25 +352,25 @@ class PortCompliance:
     def slope(self, force: np.ndarray) -> np.ndarray:
         """d (apply) / d s of all ports under forces (n_port, ...)."""
         x, s, ratio = self.expansion, self.s, self.ratio
-        z = _product(x.b.conj().T, force).astype(complex)
+        z = product(x.b.conj().T, force).astype(complex)
         dz = np.zeros_like(z)
         d_core = 2 * s * np.eye(len(x.lam)) + x.c
         for k, (e, t) in enumerate(zip(x.e_in, x.t, strict=True), start=1):
-            part = _product(e.conj().T, force)
+            part = product(e.conj().T, force)
             z -= ratio**k * part
             dz -= k * ratio ** (k - 1) / x.s_unit * part
             d_core = d_core - (k + 1) * s**k * t
         y = self.through_core(z)
         dy = self.through_core(dz - d_core @ y)
-        out = _product(x.b, dy)
+        out = product(x.b, dy)
         for k, e in enumerate(x.e, start=1):
-            out -= _product(e, ratio**k * dy + k * ratio ** (k - 1) / x.s_unit * y)
+            out -= product(e, ratio**k * dy + k * ratio ** (k - 1) / x.s_unit * y)
         for k, w in enumerate(x.higher, start=1):
-            out += x.unit * k * ratio ** (k - 1) / x.s_unit * _product(w, force)
+            out += x.unit * k * ratio ** (k - 1) / x.s_unit * product(w, force)
         return out
 
 
-def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+def product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """matrix @ vector in the precision of the matrix, without widening a real matrix to complex."""
     if np.iscomplexobj(matrix):
         return matrix @ vector.astype(matrix.dtype)

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm.linear.expansion import Expansion, PortCompliance, SingularStuckSystem
+from tribodyn.hbm.linear.expansion import Expansion, PortCompliance, SingularStuckSystem, product
 from tribodyn.reduction.residual_flexibility import ResidualFlexibility
 
 
@@ -67,7 +67,7 @@ class RitzPort(PortCompliance):
         """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
         x = self.expansion
         assert isinstance(x, RitzExpansion)
-        out: np.ndarray = x.b[rows] @ self.through_core((x.b[columns].T @ force).astype(complex))
+        out = product(x.b[rows], self.through_core(product(x.b[columns].T, force).astype(complex)))
         n = x._n_contact
         pushed, moved = (np.arange(x.n_port)[chosen] for chosen in (columns, rows))
         if (pushed < n).any() and (moved < n).any():

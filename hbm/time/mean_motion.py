@@ -44,8 +44,8 @@ class MeanOptions:
     accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
         the mean that is asked for
     contact : of the contact's equations in a step
-    passing : standard error of the mean normal force with which, once it has settled, a motion that does not repeat
-        itself passes from place to place: the scatter of its work averages out over them. 0 where each mean settles
+    passing : whether a motion that does not repeat itself, once it has settled, passes from place to place as soon as
+        its mean normal force is known so well: the scatter of its work averages out over them
     """
 
     steps: int = 256
@@ -54,7 +54,7 @@ class MeanOptions:
     search: int = 60
     accuracy: float = 5e-3
     contact: float = 1e-7
-    passing: float = 0.0
+    passing: bool = False
 
     def __post_init__(self) -> None:
         if self.block < 2 or self.most_blocks < 2:
@@ -139,7 +139,7 @@ class Follower:
                 means = one.energy, _normal(balance, one), see(one), one.amplitude
                 return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
         settled = self._settled(balance, stepper, see)
-        self._passing = settled.settled and self.options.passing > 0
+        self._passing = settled.settled and self.options.passing
         self._regular = settled.settled and settled.spread <= self.options.accuracy and not self._passing
         return replace(settled, periods=settled.periods + spent)
 
@@ -196,7 +196,7 @@ class Follower:
             if same and held:
                 first = len(work) - o.block  # in the block before more of the transient is left
             if self._passing:
-                known = held and _standard_error(np.array([row[1].sum() for row in rows])) <= o.passing
+                known = held and _standard_error(np.array([row[1].sum() for row in rows])) <= o.accuracy
             else:
                 known = first is not None and _standard_error(np.array(work[first:])) <= o.accuracy
             if known:

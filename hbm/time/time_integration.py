@@ -223,11 +223,11 @@ def motion_of(
     """
     record = period.record
     components = stepper.balance.contact.components
-    before = np.roll(record.x, 1, axis=0), np.roll(record.f, 1, axis=0)
-    if start is not None:
-        before[0][0], before[1][0] = start.x, start.f
-    work = 0.5 * ((record.f + before[1]) * (record.x - before[0])).sum(axis=0)
-    work = work[:, stepper.balance.contact.tangential].sum(axis=1)
+    x, f = record.x, record.f
+    x0, f0 = (x[-1], f[-1]) if start is None else (start.x, start.f)
+    work = f[1:] + f[:-1]
+    work *= x[1:] - x[:-1]
+    work = 0.5 * (work.sum(axis=0) + (f[0] + f0) * (x[0] - x0))[:, stepper.balance.contact.tangential].sum(axis=1)
     preload = float(record.f[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0
     n, hold = len(stepper.balance.compliance.output_names), stepper.hold
     off = np.zeros(0) if hold is None else record.y[:, n:].mean(axis=0) - hold.target

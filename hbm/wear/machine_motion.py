@@ -40,14 +40,13 @@ class MotionRules:
     accuracy : standard error of a mean, relative, and difference from the balance's work up to which a periodic motion
         is that of the balance; the errors of many wear steps average out in a life
     most_components : of the contact
-    passing, contact : of a motion that is followed everywhere, see `MeanOptions`
+    contact : of a motion that is followed everywhere, see `MeanOptions`
     """
 
     steps: int = 128
     per_harmonic: int = 16
     accuracy: float = 5e-2
     most_components: int = 600
-    passing: float = 2e-2
     contact: float = 1e-5
 
 
@@ -91,7 +90,7 @@ class MachineMotion:
         self._problem, self.always = problem, always
         self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy)
         if always:
-            self._options = replace(self._options, contact=RULES.contact, passing=RULES.passing)
+            self._options = replace(self._options, contact=RULES.contact, passing=True)
         self._followers: list[Follower] = []
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
         self._serves = fits and not wave_in_time.is_wave(problem.balance)

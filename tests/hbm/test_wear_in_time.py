@@ -180,10 +180,10 @@ def test_a_motion_that_takes_two_periods_is_told() -> None:
 
 def test_a_motion_that_passes_needs_no_more_periods_than_its_normal_force() -> None:
     flips = three_pairs(friction=0.05, static=30.0, shaker=60.0, top=7)
-    follower = Follower(MeanOptions(128, passing=0.02))
+    follower = Follower(MeanOptions(128, accuracy=0.02, passing=True))
     follower.start(flips, newton.solve_from_rest(flips, FLIPS_AT).state)
     settled, passed = (follower.mean(flips, FLIPS_AT, lambda motion: motion.energy) for _ in range(2))
-    again = Follower(MeanOptions(128, passing=0.02))
+    again = Follower(MeanOptions(128, accuracy=0.02, passing=True))
     again.take_up(flips, follower.kept())
     assert settled.periods > 2 * passed.periods == 2 * follower.options.block
     assert passed.energy.sum() == pytest.approx(settled.energy.sum(), rel=0.02)
