@@ -241,7 +241,8 @@ def _settle(step, x, p, phi, s, ds):
 def _unit(n, m):
     """(n, m + n) zeros and behind them the unit matrix."""
     out = np.zeros((n, m + n))
-    out[:, m:] = np.eye(n)
+    for r in range(n):
+        out[r, m + r] = 1.0
     return out
 
 
@@ -252,7 +253,11 @@ def _undrifted(slopes, moved, out):
     Singular values of 1 - M are raised to LEAST_CONTRACTION. Returns the least of them
     """
     n = len(slopes)
-    left, size, right = np.linalg.svd(np.eye(n) - slopes[:, slopes.shape[1] - n :])
+    matrix = np.eye(n)
+    for r in range(n):
+        for q in range(n):
+            matrix[r, q] -= slopes[r, slopes.shape[1] - n + q]
+    left, size, right = np.linalg.svd(matrix)
     for b in range(out.shape[1]):
         for r in range(n):
             out[r, b] = 0.0

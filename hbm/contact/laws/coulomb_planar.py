@@ -179,9 +179,7 @@ def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss):
         grows_x = (share, 0.0, dx * late, 0.0, 0.0, -share, 0.0, dx * early)
         grows_y = (0.0, share, dy * late, 0.0, 0.0, 0.0, -share, dy * early)
     else:
-        slips, where = True, 0.0
-        if before > 0.0:
-            slips, where = _lets_go(ax, ay, dx, dy, before, after)
+        slips, where = _lets_go(ax, ay, dx, dy, before, after) if before > 0.0 else (True, 0.0)
         if not slips:
             for c in range(2):
                 f[c] = k * (x[c] - s[c])
@@ -198,10 +196,8 @@ def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss):
             dfx[0, q], dfx[1, q], dsx[0, q], dsx[1, q] = k * tx, k * ty, -tx, -ty
         else:
             dfs[0, q - 3], dfs[1, q - 3], dss[0, q - 3], dss[1, q - 3] = k * tx, k * ty, -tx, -ty
-    for c in range(2):
-        f[c] = k * (px if c == 0 else py)
-        s[c] = x[c] - f[c] / k
-        dsx[c, c] += 1.0
+    f[0], f[1], s[0], s[1] = k * px, k * py, x[0] - px, x[1] - py
+    dsx[0, 0], dsx[1, 1] = dsx[0, 0] + 1.0, dsx[1, 1] + 1.0
     return bits
 
 
@@ -264,5 +260,4 @@ def _tractrix(ax, ay, dx, dy, before, after, where):
     ex, ey = where * gx - si * rate * share * nx, where * gy - si * rate * share * ny
     if far > 0.0:
         ex, ey = ex - (1.0 - keeps) * ny / far, ey + (1.0 - keeps) * nx / far
-    end = co * nx - si * ny, co * ny + si * nx
-    return end[0], end[1], gx, gy, ex, ey, share * lash_too, where * lash_too - si * by_after
+    return co * nx - si * ny, co * ny + si * nx, gx, gy, ex, ey, share * lash_too, where * lash_too - si * by_after
