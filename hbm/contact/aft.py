@@ -22,8 +22,6 @@ PLOT_SAMPLES = 1024  # that stand for located transitions where a force over tim
 POLISH_DRIFT = 1e-6  # relative drift below which Newton only polishes: one step more reaches PERIODIC_DRIFT
 LEAST_CONTRACTION = 1e-10  # per cycle, of a memory that does not depend on its start: less is rounding
 
-Turn = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
-
 
 def cycle(
     law: ModuleType,
@@ -128,13 +126,15 @@ def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np
 
     Without derivatives there is little to compile, which would take longer than all the marching.
     """
-    s, force = memory.copy(), np.zeros(samples.shape)
-    for _ in range(FIRST_CYCLES):
-        before, size = s.copy(), np.full(len(s), np.finfo(float).tiny)
-        _follow(pointer(law.step), samples, p, s, size, force)
-        if np.all(np.abs(s - before) <= PERIODIC_DRIFT * size[:, None]):
-            return force
-    return None
+    force, phi = np.zeros(samples.shape), np.zeros((samples.shape[2], 0))
+    no_slope, none = np.zeros((0, samples.shape[1], 0)), np.zeros((memory.shape[1], 0))
+    for i, s in enumerate(memory.copy()):
+        for _ in range(FIRST_CYCLES):
+            if _turn(pointer(law.step), samples[i], p[i], phi, s, none, no_slope, force[i])[1] <= PERIODIC_DRIFT:
+                break
+        else:
+            return None
+    return force
 
 
 def _periodic(
@@ -146,21 +146,55 @@ def _periodic(
     weight: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Force at the samples, Jacobian of its coefficients and status of the periodic cycle."""
-    p = parameters.packed()
     n_pair, n_comp, _ = samples.shape
-    s, ds = settle(law, samples, p, memory, phi)
-    force = np.zeros(samples.shape)
+    force, status = np.zeros(samples.shape), np.zeros(n_pair, np.int64)
     jac = np.zeros((n_pair, n_comp * weight.shape[1], n_comp * phi.shape[1]))
-    status = np.zeros(n_pair, np.int64)
     rows, columns = np.ascontiguousarray(weight.T), np.ascontiguousarray(phi)
-    _record(pointer(law.step), samples, p, columns, rows, s, ds, force, jac, status)
+    lost = _cycles(pointer(law.step), samples, parameters.packed(), memory, columns, rows, force, jac, status)
+    if lost >= 0:
+        raise CycleNotPeriodic(f"contact pair {lost} did not settle to a periodic cycle within {MAX_CYCLES} cycles")
     return force, jac, status
 
 
-def settle(
-    law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np.ndarray, phi: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Memory at the start of the periodic cycle, and its derivative.
+@numba.njit(cache=True)
+def _cycles(step, x, p, memory, phi, rows, force, jac, status):
+    """The periodic cycle of every pair: force samples, Jacobian of the force coefficients, status bits.
+
+    x, force : (n_pair, n_component, n_time); rows : (n_coeff, n_time) analysis of the basis; memory : at the start
+    phi : (n_time, n_coeff) basis functions, no columns where no derivative is wanted
+    Returns the first pair that does not settle, -1 where all do
+    """
+    n_pair, n_comp, n_time = x.shape
+    n_state, m = memory.shape[1], n_comp * phi.shape[1]
+    no_slope, no_force = np.zeros((0, n_comp, m + n_state)), np.zeros((n_comp, 0))
+    for i in range(n_pair):
+        s, ds = memory[i].copy(), np.zeros((n_state, m))
+        marched = _settle(step, x[i], p[i], phi, s, ds) if n_state > 0 else 0
+        if marched < 0:
+            return i
+        start, slopes = s.copy(), _unit(n_state, m)
+        slope = np.zeros((n_time, n_comp, m + n_state))
+        status[i] = _turn(step, x[i], p[i], phi, start, slopes, slope, force[i])[0]
+        if m == 0:
+            continue
+        if marched > 0 and _undrifted(slopes, slopes, ds) <= LEAST_CONTRACTION:  # its place depends on its path
+            s[:], ds[:] = memory[i], 0.0
+            for _ in range(marched):
+                _turn(step, x[i], p[i], phi, s, ds, no_slope, no_force)
+        product = rows @ slope.reshape(n_time, n_comp * (m + n_state))
+        for a in range(len(rows)):
+            for c in range(n_comp):
+                own = product[a, c * (m + n_state) : (c + 1) * (m + n_state)]
+                for b in range(m):
+                    jac[i, c * len(rows) + a, b] = own[b]
+                    for r in range(n_state):
+                        jac[i, c * len(rows) + a, b] += own[m + r] * ds[r, b]
+    return -1
+
+
+@numba.njit(cache=True)
+def _settle(step, x, p, phi, s, ds):
+    """Memory s (n_state,) of one pair at the start of its periodic cycle, from that at the start of the load path.
 
     A Jenkins slider settles in one cycle. Planar friction contracts slowly where it slips little, so after a few cycles
     Newton's step for the period map, s = P(s), takes over. P never widens a distance, so its fixed points are a convex
@@ -169,152 +203,116 @@ def settle(
     distance, which Newton cuts by a third a step until rounding hides the contraction. Otherwise the answer depends on
     the path, and the pair, which has come to stick, is marched on.
 
-    samples : (n_pair, n_component, n_samples) displacement [m]; p : packed parameters; memory : (n_pair, n_state)
-    phi : (n_samples, n_coeff) basis functions, no columns where no derivative is wanted
-    Returns (n_pair, n_state), (n_pair, n_state, n_component * n_coeff)
-    Raises  CycleNotPeriodic
+    ds : (n_state, n_component * n_coeff) its derivative, filled where its cycle there does not tell it
+    Returns the cycles marched, 0 where ds is filled, -1 where it does not settle
     """
-    phi = np.ascontiguousarray(phi)
-    s = memory.copy()
-    ds = np.zeros((*s.shape, samples.shape[1] * phi.shape[1]))
-    if s.shape[1] == 0:
-        return s, ds
-
-    def turn(i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """One cycle of the pairs i: memory after it, its two derivatives, and the relative drift."""
-        eye = np.broadcast_to(np.eye(s.shape[1]), (len(i), s.shape[1], s.shape[1]))
-        after, slopes, size = s.copy(), np.concatenate([ds, eye], axis=2), np.full(len(i), np.finfo(float).tiny)
-        _advance(pointer(law.step), samples[i], p[i], phi, after, slopes, size)
-        return after, slopes[..., : ds.shape[2]], slopes[..., ds.shape[2] :], np.abs(after - s).max(axis=1) / size
-
-    open_pairs = _repeat(turn, np.arange(len(s)), s, ds, FIRST_CYCLES)
-    open_pairs = _newton(turn, open_pairs, s, ds)
-    open_pairs = _repeat(turn, open_pairs, s, ds, MAX_CYCLES)
-    if len(open_pairs) > 0:
-        raise CycleNotPeriodic(
-            f"contact pair {open_pairs[0]} did not settle to a periodic cycle within {MAX_CYCLES} cycles"
-        )
-    return s, ds
-
-
-def _repeat(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray, n_cycles: int) -> np.ndarray:
-    """March the pairs i until they are periodic; s and ds are changed in place. Returns the pairs that are not."""
-    for _ in range(n_cycles):
-        if len(i) == 0:
-            break
-        s[i], ds[i], _, drift = turn(i, s[i], ds[i])
-        i = i[drift > PERIODIC_DRIFT]
-    return i
+    (n_state, m), n_comp = ds.shape, len(x)
+    no_slope, no_force, none = np.zeros((0, n_comp, n_state)), np.zeros((n_comp, 0)), np.zeros((n_state, 0))
+    moved, correction = np.zeros((n_state, 1)), np.zeros((n_state, 1))
+    for count in range(1, MAX_CYCLES):
+        if _turn(step, x, p, phi, s, none, no_slope, no_force)[1] <= PERIODIC_DRIFT:
+            return count
+        if count != FIRST_CYCLES:
+            continue
+        trial, firm, closing = s.copy(), s.copy(), False  # closing : a step before, at firm, was small and contracted
+        for _ in range(NEWTON_CYCLES):
+            after, slopes = trial.copy(), _unit(n_state, 0)
+            drift = _turn(step, x, p, phi[:, :0].copy(), after, slopes, no_slope, no_force)[1]
+            moved[:, 0] = after - trial
+            isolated = _undrifted(slopes, moved, correction) > LEAST_CONTRACTION
+            if drift <= PERIODIC_DRIFT or (closing and not isolated and drift < POLISH_DRIFT):
+                if not (isolated or closing):
+                    break
+                s[:] = trial
+                if isolated:
+                    return count
+                slopes = _unit(n_state, m)
+                _turn(step, x, p, phi, firm, slopes, no_slope, no_force)
+                _undrifted(slopes, slopes, ds)
+                return 0
+            if isolated and drift < POLISH_DRIFT:
+                closing = True
+                firm[:] = trial
+            trial += correction[:, 0]
+    return -1
 
 
-def _newton(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> np.ndarray:
-    """Solve s = P(s) for the pairs i, and ds = P' ds + dP/dX; s and ds change where marching would end there too.
+@numba.njit(cache=True)
+def _unit(n, m):
+    """(n, m + n) zeros and behind them the unit matrix."""
+    out = np.zeros((n, m + n))
+    for r in range(n):
+        out[r, m + r] = 1.0
+    return out
 
-    Returns the pairs where it would not, or where Newton does not converge
+
+@numba.njit(cache=True)
+def _undrifted(slopes, moved, out):
+    """Fill out with (1 - M)^-1 moved, M the last columns of slopes; its columns are the first of moved.
+
+    Singular values of 1 - M are raised to LEAST_CONTRACTION. Returns the least of them
     """
-    rejected = []
-    trial, trial_ds = s[i], ds[i]
-    closing = np.zeros(len(i), bool)  # a step before was small and its cycle contracted
-    for _ in range(NEWTON_CYCLES):
-        if len(i) == 0:
-            break
-        after, after_ds, slope, drift = turn(i, trial, trial_ds)
-        left, size, right = np.linalg.svd(np.eye(s.shape[1]) - slope)
-        inverse = right.transpose(0, 2, 1) @ (left.transpose(0, 2, 1) / np.maximum(size, LEAST_CONTRACTION)[..., None])
-        trial_ds = trial_ds + inverse @ (after_ds - trial_ds)
-        isolated = size[:, -1] > LEAST_CONTRACTION
-        done = (drift <= PERIODIC_DRIFT) | (closing & ~isolated & (drift < POLISH_DRIFT))
-        good = done & (isolated | closing)
-        s[i[good]], ds[i[good]] = trial[good], trial_ds[good]
-        rejected.append(i[done & ~good])
-        closing |= isolated & (drift < POLISH_DRIFT)
-        trial = trial + (inverse @ (after - trial)[..., None])[..., 0]
-        i, trial, trial_ds, closing = i[~done], trial[~done], trial_ds[~done], closing[~done]
-    return np.concatenate([i, *rejected])
+    n = len(slopes)
+    matrix = np.eye(n)
+    for r in range(n):
+        for q in range(n):
+            matrix[r, q] -= slopes[r, slopes.shape[1] - n + q]
+    left, size, right = np.linalg.svd(matrix)
+    for b in range(out.shape[1]):
+        for r in range(n):
+            out[r, b] = 0.0
+        for i in range(n):
+            along = 0.0
+            for r in range(n):
+                along += left[r, i] * moved[r, b]
+            for r in range(n):
+                out[r, b] += right[i, r] * along / max(size[i], LEAST_CONTRACTION)
+    return size[n - 1]
 
 
 @numba.njit(cache=True)
-def _follow(step, x, p, s, size, force):
-    """One cycle of every pair: force at its samples, s to its value after it, `size` the largest |s| met."""
-    n_pair, n_comp, n_time = x.shape
-    n_state = s.shape[1]
-    point, f = np.zeros(n_comp), np.zeros(n_comp)
+def _turn(step, x, p, phi, s, ds, slope, force):
+    """One cycle of one pair: s and ds to their values after it.
+
+    ds : (n_state, n) its first columns those of the coefficients of x, those beyond carried along; or no columns
+    slope : (n_time, n_component, n) derivative of the force, force : (n_component, n_time); filled where they have
+        samples
+    Returns status bits and how far s is from where it began, over the largest |s| met
+    """
+    n_comp, n_state, n_column = len(x), len(s), ds.shape[1]
+    n_coeff = phi.shape[1] if n_column > 0 else 0
+    point, f, before = np.zeros(n_comp), np.zeros(n_comp), np.zeros((n_state, n_column))
     dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
     dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
-    for i in range(n_pair):
-        for j in range(n_time):
-            for c in range(n_comp):
-                point[c] = x[i, c, j]
-            step(point, s[i], p[i], f, dfx, dfs, dsx, dss)
-            for c in range(n_comp):
-                force[i, c, j] = f[c]
-            for r in range(n_state):
-                size[i] = max(size[i], abs(s[i, r]))
-
-
-@numba.njit(cache=True)
-def _advance(step, x, p, phi, s, ds, size):
-    """One cycle of every pair: s and ds to their values after it, `size` the largest |s| met."""
-    n_pair, n_comp, n_time = x.shape
-    n_state = s.shape[1]
-    point, f = np.zeros(n_comp), np.zeros(n_comp)
-    dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
-    dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
-    before = np.zeros((n_state, ds.shape[2]))
-    for i in range(n_pair):
-        for j in range(n_time):
-            dsx[:] = 0.0
-            dss[:] = 0.0
-            for c in range(n_comp):
-                point[c] = x[i, c, j]
-            step(point, s[i], p[i], f, dfx, dfs, dsx, dss)
-            for r in range(n_state):
-                size[i] = max(size[i], abs(s[i, r]))
-            _chain(dsx, dss, phi[j], ds[i], before)
-
-
-@numba.njit(cache=True)
-def _record(step, x, p, phi, weight, s, ds, force, jac, status):
-    """The periodic cycle from memory s and its derivative ds: force samples, Jacobian, status bits."""
-    n_pair, n_comp, n_time = x.shape
-    n_coeff = phi.shape[1]
-    n_state = s.shape[1]
-    m = n_comp * n_coeff
-    point, f = np.zeros(n_comp), np.zeros(n_comp)
-    dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
-    dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
-    before = np.zeros((n_state, m))
-    slope = np.zeros((n_time, n_comp * m))  # d f / d X at each sample
-    for i in range(n_pair):
-        memory = s[i].copy()
-        memory_ds = ds[i].copy()
-        slope[:] = 0.0
-        for j in range(n_time):
+    begin, bits, size, drift = s.copy(), 0, np.finfo(np.float64).tiny, 0.0
+    for j in range(x.shape[1]):
+        if n_column > 0:
             dfx[:] = 0.0
             dfs[:] = 0.0
             dsx[:] = 0.0
             dss[:] = 0.0
-            for c in range(n_comp):
-                point[c] = x[i, c, j]
-            status[i] |= step(point, memory, p[i], f, dfx, dfs, dsx, dss)
-            for c in range(n_comp):
-                force[i, c, j] = f[c]
+        for c in range(n_comp):
+            point[c] = x[c, j]
+        bits |= step(point, s, p, f, dfx, dfs, dsx, dss)
+        for r in range(n_state):
+            size = max(size, abs(s[r]))
+        for c in range(n_comp):
+            if force.shape[1] > 0:
+                force[c, j] = f[c]
+            if len(slope) > 0:
                 for d in range(n_comp):
                     if dfx[c, d] != 0.0:
                         for b in range(n_coeff):
-                            slope[j, c * m + d * n_coeff + b] += dfx[c, d] * phi[j, b]
+                            slope[j, c, d * n_coeff + b] += dfx[c, d] * phi[j, b]
                 for r in range(n_state):
                     if dfs[c, r] != 0.0:
-                        for b in range(m):
-                            slope[j, c * m + b] += dfs[c, r] * memory_ds[r, b]
-            _chain(dsx, dss, phi[j], memory_ds, before)
-        if m > 0:
-            product = weight @ slope
-            n = len(weight)  # element by element: an assignment of slices takes numba seconds to compile
-            for c in range(n_comp):
-                for a in range(n):
-                    for b in range(m):
-                        jac[i, c * n + a, b] = product[a, c * m + b]
+                        for b in range(n_column):
+                            slope[j, c, b] += dfs[c, r] * ds[r, b]
+        if n_column > 0:
+            _chain(dsx, dss, phi[j], ds, before)
+    for r in range(n_state):
+        drift = max(drift, abs(s[r] - begin[r]) / size)
+    return bits, drift
 
 
 @numba.njit(cache=True)

@@ -17,6 +17,7 @@ A law is a module `hbm/contact/laws/<name>.py`, or a file of one's own, with
 - optionally `cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle at the samples, faster
 - optionally `located(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples,
   faster than `hbm.contact.events` finds them from `step`
+- optionally `SIMPLER = "jenkins"` : a law with the same components and numbers, from whose solution Newton may begin
 - optionally `BY_SAMPLES = True` : its cycle is that at the samples, as it has no transitions (a smooth law) or its step
   integrates along the path (planar friction); where there is no `located`, none is looked for
 """

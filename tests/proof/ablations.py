@@ -35,7 +35,7 @@ RULES: dict[str, dict[str, Any]] = {
         "least_error_share": 0.0, "jump_error": NEVER, "taken": 1.0, "crawled": 10**9, "rejected_error": 1.0,
     },
     "continuation.methods.natural.Rules": {
-        "least_spacing": 0.0, "max_fold_points": 10**9, "abrupt": NEVER,
+        "least_spacing": 0.0, "max_fold_points": 10**9, "abrupt": NEVER, "max_corner_points": 200,
     },
     "continuation.operating_point.AtPeak": {
         "scan_misses": 0.0, "overtakes": 1.0, "near": NEVER, "reach": 1e9, "tried": 1,

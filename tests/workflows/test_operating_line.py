@@ -40,6 +40,7 @@ def line(sectors: int, order: int, *overrides: str) -> HarmonicBalance:
         (5, -2, (240, 264), "jenkins"),
         pytest.param(6, -1, (110, 150), "jenkins", marks=pytest.mark.slow),
         pytest.param(6, -1, (110, 150), "coulomb_planar", marks=pytest.mark.slow),
+        pytest.param(5, -2, (240, 264), "coulomb_planar", marks=pytest.mark.slow),
     ],
 )
 def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz, law):

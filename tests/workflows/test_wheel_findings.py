@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import tribodyn as td
 from tests.helpers.wheel_scene import WHEEL
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import aft
-from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.continuation.methods import arc_length, natural
 from tribodyn.workflows.run import modelling, sanity_checks
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -58,9 +60,35 @@ def test_the_resultant_of_friction_on_a_shroud(law: str, most: float) -> None:
     assert np.max(np.hypot(force[:, 0], force[:, 1]) / (0.3 * force[:, 2])) == pytest.approx(most, rel=1e-3)
 
 
+def planar() -> HarmonicBalance:
+    asked = ('contact.law="coulomb_planar"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
+    return modelling.build(scene_file.parse(WHEEL, "w.toml", asked, Path()), Progress()).balance
+
+
 @pytest.mark.slow
 def test_planar_friction_passes_the_resonance_where_pairs_can_just_stick() -> None:
     """605 Hz: where a pair neither sticks nor slips for good, its slider comes to rest with the root of the cycles."""
-    asked = ('contact.law="coulomb_planar"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
-    b = modelling.build(scene_file.parse(WHEEL, "w.toml", asked, Path()), Progress()).balance
-    assert arc_length.solve_along_load(b, 2 * np.pi * 602.2727).converged
+    assert arc_length.solve_along_load(planar(), 2 * np.pi * 602.2727).converged
+
+
+def test_planar_friction_behind_a_jump_begins_with_uncoupled_sliders(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its own curve over the load has a corner wherever a pair can just stick: 8467 evaluations, and no end of it."""
+    b, laws = planar(), []
+    evaluate = HarmonicBalance.evaluate
+
+    def counted(self: HarmonicBalance, *arguments: Any, **named: Any) -> State:
+        laws.append(self.contact.joints[0].law)
+        return evaluate(self, *arguments, **named)
+
+    monkeypatch.setattr(HarmonicBalance, "evaluate", counted)
+    assert arc_length.solve_along_load(b, 2 * np.pi * 605.51724).converged
+    assert laws.count("coulomb_planar") < 10
+    assert len(laws) < 2000
+
+
+@pytest.mark.slow
+def test_a_scan_with_planar_friction_solves_every_frequency() -> None:
+    """Through two jumps, at 597.2 and 602 Hz; the second needs springs that stiffen."""
+    branch = natural.follow(planar(), 2 * np.pi * 560, 2 * np.pi * 680, natural.Options(n_points=30))
+    assert branch.arrived
+    assert branch.converged.all()

@@ -34,6 +34,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 COMPONENTS = (("t1", "t2", "n"),)
 BY_SAMPLES = True
 LINEAR_WHERE_STUCK = True
+SIMPLER = "jenkins"
 
 
 @dataclass(frozen=True)
@@ -171,60 +172,33 @@ def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss):
     """One chord that ends in contact, the leash r (v - gap) [m]; arguments as of `chord`."""
     dx, dy, ax, ay = x[0] - s[2], x[1] - s[3], s[2] - s[0], s[3] - s[1]
     before, after = r * (s[4] - gap), r * (x[2] - gap)
-    far = math.hypot(dx, dy)
-    if before <= 0.0:  # touches on the way, without shear
-        share = after / (after - before)
-        slips, where = share * far > after, 1.0 - share
+    share = after / (after - before) if before <= 0.0 else 1.0  # of the chord, in contact
+    if before <= 0.0 and share * math.hypot(dx, dy) <= after:  # touches on the way, without shear, and sticks
+        bits, px, py, turns = STICKS, share * dx, share * dy, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        late, early = r * (1.0 - share) / (after - before), r * share / (after - before)
+        grows_x = (share, 0.0, dx * late, 0.0, 0.0, -share, 0.0, dx * early)
+        grows_y = (0.0, share, dy * late, 0.0, 0.0, 0.0, -share, dy * early)
     else:
-        slips, where = _lets_go(ax, ay, dx, dy, before, after)
-        share = 1.0 - where
-    if before > 0.0 and not slips:
-        for c in range(2):
-            f[c] = k * (x[c] - s[c])
-            dfx[c, c], dfs[c, c], dss[c, c] = k, -k, 1.0
-        return STICKS
-    size = math.hypot(ax + where * dx, ay + where * dy)
+        slips, where = _lets_go(ax, ay, dx, dy, before, after) if before > 0.0 else (True, 0.0)
+        if not slips:
+            for c in range(2):
+                f[c] = k * (x[c] - s[c])
+                dfx[c, c], dfs[c, c], dss[c, c] = k, -k, 1.0
+            return STICKS
+        co, si, gx, gy, ex, ey, early, late = _tractrix(ax, ay, dx, dy, before, after, where)
+        bits, px, py = SLIPS, after * co, after * si
+        turns = (ex, ey, r * late, -gx, -gy, gx - ex, gy - ey, r * early)
+        grows_x = (0.0, 0.0, r * co, 0.0, 0.0, 0.0, 0.0, 0.0)
+        grows_y = (0.0, 0.0, r * si, 0.0, 0.0, 0.0, 0.0, 0.0)
     for q in range(8):  # directions: x, y, v at the end; w and x, y, v at the beginning
-        ex, ey, ev, wx = _unit(q, 0), _unit(q, 1), _unit(q, 2), _unit(q, 3)
-        wy, bx, by, bv = _unit(q, 4), _unit(q, 5), _unit(q, 6), _unit(q, 7)
-        ddx, ddy, dax, day = ex - bx, ey - by, bx - wx, by - wy
-        d_before, d_after = r * bv, r * ev
-        if before <= 0.0:
-            d_share = (d_after - share * (d_after - d_before)) / (after - before)
-            if slips:
-                across = (dx * ddy - dy * ddx) / far**3
-                px, py = after * dx / far, after * dy / far
-                tx = d_after * dx / far - after * across * dy
-                ty = d_after * dy / far + after * across * dx
-            else:
-                px, py = share * dx, share * dy
-                tx, ty = d_share * dx + share * ddx, d_share * dy + share * ddy
-        else:
-            lash = before + where * (after - before)
-            gx, gy = dax + where * ddx, day + where * ddy
-            d_lash, d_where = d_before + where * (d_after - d_before), 0.0
-            hx, hy = (ax + where * dx) / size, (ay + where * dy) / size
-            if where > 0.0:
-                d_where = (d_lash - hx * gx - hy * gy) / (hx * dx + hy * dy - (after - before))
-                gx, gy, d_lash = gx + d_where * dx, gy + d_where * dy, d_lash + d_where * (after - before)
-            turn = (hx * gy - hy * gx) / size
-            px, py, tx, ty = _tractrix(
-                hx, hy, turn, dx, dy, ddx, ddy, far, share, -d_where, lash, d_lash, after, d_after
-            )
+        tx, ty = grows_x[q] - py * turns[q], grows_y[q] + px * turns[q]
         if q < 3:
-            dfx[0, q], dfx[1, q] = k * tx, k * ty
-            dsx[0, q], dsx[1, q] = ex - tx, ey - ty
+            dfx[0, q], dfx[1, q], dsx[0, q], dsx[1, q] = k * tx, k * ty, -tx, -ty
         else:
-            dfs[0, q - 3], dfs[1, q - 3] = k * tx, k * ty
-            dss[0, q - 3], dss[1, q - 3] = -tx, -ty
-    f[0], f[1] = k * px, k * py
-    s[0], s[1] = x[0] - px, x[1] - py
-    return SLIPS if slips else STICKS
-
-
-@numba.njit(cache=True)
-def _unit(q, i):
-    return 1.0 if q == i else 0.0
+            dfs[0, q - 3], dfs[1, q - 3], dss[0, q - 3], dss[1, q - 3] = k * tx, k * ty, -tx, -ty
+    f[0], f[1], s[0], s[1] = k * px, k * py, x[0] - px, x[1] - py
+    dsx[0, 0], dsx[1, 1] = dsx[0, 0] + 1.0, dsx[1, 1] + 1.0
+    return bits
 
 
 @numba.njit(cache=True)
@@ -247,35 +221,43 @@ def _lets_go(ax, ay, dx, dy, before, after):
 
 
 @numba.njit(cache=True)
-def _tractrix(hx, hy, turn, dx, dy, ddx, ddy, far, share, d_share, lash, d_lash, after, d_after):
-    """Stretch at the end of a slip and its derivative in one direction; (hx, hy) : its sense at the beginning.
+def _tractrix(ax, ay, dx, dy, before, after, where):
+    """Direction of the stretch at the end of a chord that slips from the share `where` on, or from where it touches.
 
-    turn : derivative of the angle of that; the leash goes from lash to after while (dx, dy) times share is gone
+    (ax, ay), (dx, dy) : stretch at the beginning and motion; leash from before to after
+    Returns its cosine and sine, and six derivatives of its angle: by that stretch, by the motion, by the leash
     """
-    cosine, sine, drawn, d_drawn, tilt = 1.0, 0.0, 0.0, 0.0, 0.0
-    nx, ny = hx, hy
+    far = math.hypot(dx, dy)
+    if before <= 0.0:
+        nx, ny = dx / far, dy / far
+        return nx, ny, 0.0, 0.0, -ny / far, nx / far, 0.0, 0.0
+    rise = after - before
+    hx, hy, lash, share = ax + where * dx, ay + where * dy, before + where * rise, 1.0 - where
+    size = math.hypot(hx, hy)
+    hx, hy = hx / size, hy / size
+    nx, ny, rate, by_lash, by_after, drawn = hx, hy, 0.0, 0.0, 0.0, 0.0
     if far > 0.0:
         nx, ny = dx / far, dy / far
-        tilt = (nx * ddy - ny * ddx) / far  # derivative of the angle of the motion
         z = (after - lash) / lash
         if abs(z) > 1e-4:
             mean = math.log1p(z) / z
-            slope = (1.0 / (1.0 + z) - mean) / z
+            bend = (1.0 / (1.0 + z) - mean) / z
         else:
-            mean, slope = 1.0 - z / 2 + z * z / 3, -0.5 + 2 * z / 3 - 0.75 * z * z
-        drawn = share * far * mean / lash
-        d_far = nx * ddx + ny * ddy
-        d_drawn = (d_share * far + share * d_far) * mean / lash - drawn * d_lash / lash
-        d_drawn += share * far * slope / lash * (d_after - (1.0 + z) * d_lash) / lash
-        cosine, sine = nx * hx + ny * hy, nx * hy - ny * hx
-        turn -= tilt
-    decay = math.exp(-drawn)
+            mean, bend = 1.0 - z / 2 + z * z / 3, -0.5 + 2 * z / 3 - 0.75 * z * z
+        rate, drawn = mean / lash, share * far * mean / lash  # drawn : motion over the leash, integrated
+        by_after = share * far * bend / (lash * lash)
+        by_lash = -drawn / lash - (1.0 + z) * by_after
+    cosine, sine, decay = nx * hx + ny * hy, nx * hy - ny * hx, math.exp(-drawn)
     low, high = decay * decay * (1.0 - cosine), 1.0 + cosine
-    if low + high == 0.0:
-        co, si, d_angle = cosine, sine, turn
-    else:
-        co, si = (high - low) / (high + low), 2 * decay * sine / (high + low)
-        d_angle = 2 * decay / (high + low) * turn - si * d_drawn
-    d_angle += tilt
-    px, py = co * nx - si * ny, co * ny + si * nx
-    return after * px, after * py, d_after * px - after * d_angle * py, d_after * py + after * d_angle * px
+    co, si, keeps = cosine, sine, 1.0
+    if low + high > 0.0:
+        co, si, keeps = (high - low) / (high + low), 2 * decay * sine / (high + low), 2 * decay / (high + low)
+    late = 0.0  # derivative by `where`, over how fast the stretch outgrows the leash there
+    if where > 0.0:
+        late = keeps * (hx * dy - hy * dx) / size + si * (rate * far - by_lash * rise)
+        late /= hx * dx + hy * dy - rise
+    gx, gy, lash_too = -keeps * hy / size - late * hx, keeps * hx / size - late * hy, late - si * by_lash
+    ex, ey = where * gx - si * rate * share * nx, where * gy - si * rate * share * ny
+    if far > 0.0:
+        ex, ey = ex - (1.0 - keeps) * ny / far, ey + (1.0 - keeps) * nx / far
+    return co * nx - si * ny, co * ny + si * nx, gx, gy, ex, ey, share * lash_too, where * lash_too - si * by_after

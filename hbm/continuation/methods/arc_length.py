@@ -145,14 +145,22 @@ def first_on(path: Parameter, value: float, options: NewtonOptions) -> Solution:
 def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
 
-    Newton from rest and its load ramp are tried first, and where it finds no rest, from that by falling friction; a
-    body that then slides away has no other way. Else the curve of solutions over the load is followed, which leads
-    where a rising load would, or, where it turns back, through no load to the opposite one, whose solution is that of
-    half a period later if all loads have odd harmonics; where that ends too, friction falls from where all closed
-    pairs stick, and then the contact is stiffened from soft springs
+    Where a contact law names a simpler one, Newton from that one's solution and the way from soft springs come first:
+    the curve over the load has corners where a pair can just stick. Then Newton from rest and its load ramp are tried,
+    and where it finds no rest, from that by falling friction; a body that then slides away has no other way. Else the
+    curve of solutions over the load is followed, which leads where a rising load would, or, where it turns back,
+    through no load to the opposite one, whose solution is that of half a period later if all loads have odd harmonics;
+    where that ends too, friction falls from where all closed pairs stick, and then the contact is stiffened from soft
+    springs
     Returns a Solution; its outcome is the one from rest where no way leads to the load
     """
     options = options or NewtonOptions()
+    if (simpler := balance.simpler()) is not None:
+        near = solve_along_load(simpler, omega, options)
+        beside = newton.solve(balance, omega, near.state.x, options)
+        reached = beside if near.converged and beside.converged else solve_along_stiffness(balance, omega, options)
+        if reached:
+            return reached
     first = newton.solve_from_rest(balance, omega, options)
     if first.outcome.kind is SolveEnd.NO_REST and (
         rest := solve_along_friction(balance.with_load(0.0), omega, options)

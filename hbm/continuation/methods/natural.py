@@ -32,6 +32,7 @@ class Rules:
 
     least_spacing : of the points extrapolated from, in steps: closer ones amplify what Newton leaves
     max_fold_points : by arc length on the way round folds, after which the sweep looks from rest
+    max_corner_points : the same where a contact law has a simpler one to begin with, as its curves have corners
     abrupt : miss of the extrapolation, in steps of x, from which on a step is solved backwards: over a jump it does
         not lead back
     same : distance, in steps of x, within which it has led back
@@ -39,6 +40,7 @@ class Rules:
 
     least_spacing: float = 0.5
     max_fold_points: int = 200
+    max_corner_points: int = 5
     abrupt: float = 0.5
     same: float = 1e-2
 
@@ -152,12 +154,12 @@ def _by_arc_length(
     path: Parameter, builder: BranchBuilder, failed: Solution, value: float, stop: float, options: Options
 ) -> Solution:
     """Replace the failed last point by the fold that made it fail, if any, and the solution behind it, at `value`."""
-    here, origin, shape = builder.value[-2], builder.value[0], failed.state.x.shape
+    here, origin, shape, rules = builder.value[-2], builder.value[0], failed.state.x.shape, options.rules
     way = arc_length.Options(
         width=arc_length.Options.width * abs((stop - origin) / (value - here)),
         bounds=(min(origin, value), max(origin, value)),
         guess=builder.x[-2],
-        max_points=options.rules.max_fold_points,
+        max_points=rules.max_fold_points if path.place(value)[0].simpler() is None else rules.max_corner_points,
         newton=options.newton,
     )
     curve = arc_length.follow(path, here, value, way)
