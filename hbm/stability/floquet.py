@@ -18,6 +18,7 @@ from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.push import push
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion, integrate
+from tribodyn.hbm.time.time_step import Record
 
 
 @dataclass(frozen=True)
@@ -46,14 +47,19 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     """
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
-    if _size(stepper) > RULES.max_states:
-        raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
+    check_size(stepper)
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
     if not motion.periodic:
         raise ValueError(f"no periodic motion near this state: {motion.outcome}")
     multipliers = np.linalg.eigvals(monodromy(stepper, motion))
     multipliers = multipliers[np.abs(multipliers) > RULES.least_multiplier]
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
+
+
+def check_size(stepper: TimeStepper) -> None:
+    """Raises ValueError where the monodromy matrix would be too large."""
+    if _size(stepper) > RULES.max_states:
+        raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
 
 
 def largest(balance: HarmonicBalance, state: State, options: Options | None = None) -> float:
@@ -133,16 +139,11 @@ def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray
     raise ValueError(f"the largest multiplier did not converge: {found:.3g}, off by up to {miss:.1g}")
 
 
-def size(balance: HarmonicBalance, omega: float, options: Options | None = None) -> int:
-    """Number of state variables that the multipliers at a frequency [rad/s] are those of."""
-    return _size(TimeStepper(balance, omega, options or Options()))
-
-
 def _size(stepper: TimeStepper) -> int:
     return 2 * len(stepper.lam) + stepper.balance.memory.size + 2 * len(stepper.static)
 
 
-def monodromy(stepper: TimeStepper, motion: PeriodicMotion) -> np.ndarray:
+def monodromy(stepper: TimeStepper, motion: PeriodicMotion | Record) -> np.ndarray:
     """Derivative of the state (z, f, x, memory that moves) after a period with respect to the one before."""
     assert motion.slopes is not None
     linear, A, c = stepper.linear, stepper.contact.A.T, stepper.c
