@@ -127,22 +127,22 @@ def in_time(balance: HarmonicBalance, cycle: LimitCycle, output: str, options: O
     """The limit cycle with what time integration makes of it, on the sectors until its wave repeats itself.
 
     options : max_periods are marched from its own state
-    The multipliers are those of the last period, its motion smaller by INSIDE with the sliders where they are: those
-    that the path of the load left just at their limit rest
+    The multipliers are those of its motion, smaller by INSIDE with the sliders where they are: those that the path of
+    the load left just at their limit rest
     Raises  ValueError for problems with no equation of motion in time or too large for multipliers; IntegrationFailed
     """
     whole, start = time_integration.in_time(replace(balance, load_factor=0.0), cycle.omega, cycle.state, options)
-    stepper = TimeStepper(whole, cycle.omega, options)
-    floquet.check_size(stepper)
-    last = PeriodSearch(stepper, options, False).march(stepper.start_from(start or cycle.state))
-    record = last.record
-    memory, bits = time_step.memory_after(stepper.law, record.x, stepper.contact, last.end.memory)
-    x = (1 - INSIDE) * record.x + INSIDE * record.x.mean(axis=0)
+    stepper, state = TimeStepper(whole, cycle.omega, options), start or cycle.state
+    angle = 2 * np.pi * np.arange(1, options.steps + 1) / options.steps
+    x = np.ascontiguousarray((state.x @ whole.basis.functions(angle).T).transpose(2, 0, 1))
+    memory, bits = time_step.memory_after(stepper.law, x, stepper.contact, whole.memory)
     (n_pair, c), n_state = x.shape[1:], memory.shape[1]
     slopes = np.zeros((len(x), n_pair, c + n_state, 2 * c + n_state))
-    time_step.slopes_of_period(stepper.law, stepper.contact, x, memory, bits, slopes)
-    multipliers = np.linalg.eigvals(floquet.monodromy(stepper, record._replace(slopes=slopes)))
+    less = (1 - INSIDE) * x + INSIDE * x.mean(axis=0)
+    time_step.slopes_of_period(stepper.law, stepper.contact, less, memory, bits, slopes)
+    multipliers = np.linalg.eigvals(floquet.monodromy(stepper, slopes))
     others = np.delete(multipliers, np.abs(multipliers - 1).argmin())  # the phase is free
+    seen = PeriodSearch(stepper, options, False).march(stepper.start_from(state)).record.y
     row = balance.compliance.output_names.index(output)
-    swing = float(np.sqrt(2 * record.y[:, row].var() / (cycle.response[row, 1:] ** 2).sum()))
+    swing = float(np.sqrt(2 * seen[:, row].var() / (cycle.response[row, 1:] ** 2).sum()))
     return replace(cycle, moved=swing - 1, growth=float(np.abs(others).max()) - 1)

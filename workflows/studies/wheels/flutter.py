@@ -135,7 +135,7 @@ def of_scene(file: SceneFile, start: float | None = None, stop: float | None = N
             if start is None or stop is None or value.real <= 0:
                 break
             options = BackboneOptions(points, newton=settings.newton_options(scene))
-            balance, why = in_flow(file, wheel, index), ""
+            balance, why = in_flow(wheel, index), ""
             found: list[LimitCycle] = []
             try:
                 found, why = limit_cycles(balance, start, stop, None, OUTPUT, options)
@@ -153,12 +153,10 @@ def _in_time(cycle: LimitCycle) -> str:
     return f"; in time its amplitude moves by {cycle.moved:+.2%} and {beside}"
 
 
-def in_flow(file: SceneFile, wheel: wheels.Wheel, index: int) -> HarmonicBalance:
+def in_flow(wheel: wheels.Wheel, index: int) -> HarmonicBalance:
     """The balance of the wave of an index with the forces of the flow of its scene."""
-    scene = file.mesh_scene
-    assert scene.wheel is not None
+    scene = wheel.asked(index)
     assert scene.flow is not None
-    there = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"engine_order": index})})
     flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)
-    wave = with_flow(modelling.damped(there, travelling_wave(wheel.reduced, index)), wheel.springs, flow)
-    return modelling.make_model(there, wheel.part, wave).balance
+    wave = with_flow(modelling.damped(scene, travelling_wave(wheel.reduced, index)), wheel.springs, flow)
+    return modelling.make_model(scene, wheel.part, wave).balance
