@@ -1,7 +1,7 @@
 """Reduced model -> response: harmonic balance with friction contact, continuation, wear.
 
 harmonics, excitation                 basis and loads
-balance, newton, krylov, anderson     the balance and how it is solved
+balance, newton, krylov               the balance and how it is solved
 rest                                  the preloaded state that friction begins from
 mistuning                             wheels whose blades differ
 outcome                               how a solve or a run ended

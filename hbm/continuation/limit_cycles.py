@@ -1,8 +1,10 @@
 """Limit cycles: free vibrations whose damping, that of flow and friction together, vanishes.
 
 On the backbone of the least damped mode the damping ratio zeta depends on the amplitude. Where it passes zero nothing
-needs to be added to sustain the motion: it is a limit cycle. It attracts the motions of its own mode beside it where
-zeta grows with the amplitude there. The phase is fixed by the reference mode, as on the backbone.
+needs to be added to sustain the motion: it is a limit cycle. The phase is fixed by the reference mode, as on the
+backbone. Whether a machine stays there is asked of time integration: the amplitude may turn back on the backbone, so
+that the slope of zeta does not tell it, and sliders that just reach their limit make a kink in what Hill's method
+linearises; in time they come to stand inside their limits.
 Source  Krack 2015, section 2 (a nonlinear mode with zero damping is a limit cycle)
 """
 
@@ -17,25 +19,38 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, newton_on, walk
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd
+from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.threads import single
+from tribodyn.hbm.time import time_integration, time_step
+from tribodyn.hbm.time.period_search import PeriodSearch
+from tribodyn.hbm.time.stepper import Options, TimeStepper
+
+INSIDE = 1e-4  # of a motion: growth is the same from 1e-6 to 1e-3, see docs/theory/flutter.md
 
 
 @dataclass(frozen=True)
 class LimitCycle:
     """One limit cycle.
 
-    amplitude : of the output in the reference mode [m]; omega : [rad/s]; attracts : motions of its own mode
-        beside it; whether others leave it is asked of `stability`
+    amplitude : of the output in the reference mode [m]; omega : [rad/s]
     response : (n_output, n_coeff) of the outputs [m]; state : of the balance without harmonic loads
     point : where it lies in the coordinates of its problem
+    moved, growth : of `in_time`, None before: share by which the amplitude of the output changes there, and share per
+        period by which the motion beside it grows that does so fastest, below 0 where all die away
     """
 
     amplitude: float
     omega: float
-    attracts: bool
     response: np.ndarray
     state: State
     point: Point
+    moved: float | None = None
+    growth: float | None = None
+
+    @property
+    def stays(self) -> bool | None:
+        """Whether nothing beside it grows in time, as far as multipliers tell; None where it is not known."""
+        return None if self.growth is None else self.growth < floquet.RULES.growth
 
     @property
     def frequency(self) -> float:
@@ -70,9 +85,8 @@ def limit_cycles(
         if np.sign(before.zeta) != np.sign(after.zeta):
             share = before.zeta / (before.zeta - after.zeta)
             between = before.coordinates + share * (after.coordinates - before.coordinates)
-            rises = (after.zeta - before.zeta) * (after.a - before.a) > 0
             guesses = between, after.coordinates, before.coordinates  # two where friction has a kink between them
-            tried = (_without_damping(problem, guess, rises, options) for guess in guesses)
+            tried = (_without_damping(problem, guess, options) for guess in guesses)
             if (cycle := next((one for one in tried if one is not None), None)) is None:
                 missing.append(f"one near {before.a * problem.per_amplitude:.3g} m was not solved")
             elif not any(np.allclose(cycle.point.coordinates, one.point.coordinates, 1e-4, 1e-4) for one in found):
@@ -90,9 +104,7 @@ def limit_cycles(
     return sorted(found, key=lambda cycle: cycle.amplitude), "; ".join(missing)
 
 
-def _without_damping(
-    problem: FreeVibration, guess: np.ndarray, attracts: bool, options: BackboneOptions
-) -> LimitCycle | None:
+def _without_damping(problem: FreeVibration, guess: np.ndarray, options: BackboneOptions) -> LimitCycle | None:
     """The point of zero damping near a guess, None where Newton's method does not find it."""
     held = np.zeros(len(guess))
     held[-2] = 1.0  # the damping among the coordinates of a point
@@ -105,8 +117,32 @@ def _without_damping(
     return LimitCycle(
         amplitude=point.a * problem.per_amplitude,
         omega=point.omega,
-        attracts=attracts,
         response=problem.outputs(point),
         state=still.evaluate(point.omega, point.x),
         point=point,
     )
+
+
+def in_time(balance: HarmonicBalance, cycle: LimitCycle, output: str, options: Options) -> LimitCycle:
+    """The limit cycle with what time integration makes of it, on the sectors until its wave repeats itself.
+
+    options : max_periods are marched from its own state
+    The multipliers are those of its motion, smaller by INSIDE with the sliders where they are: those that the path of
+    the load left just at their limit rest
+    Raises  ValueError for problems with no equation of motion in time or too large for multipliers; IntegrationFailed
+    """
+    whole, start = time_integration.in_time(replace(balance, load_factor=0.0), cycle.omega, cycle.state, options)
+    stepper, state = TimeStepper(whole, cycle.omega, options), start or cycle.state
+    angle = 2 * np.pi * np.arange(1, options.steps + 1) / options.steps
+    x = np.ascontiguousarray((state.x @ whole.basis.functions(angle).T).transpose(2, 0, 1))
+    memory, bits = time_step.memory_after(stepper.law, x, stepper.contact, whole.memory)
+    (n_pair, c), n_state = x.shape[1:], memory.shape[1]
+    slopes = np.zeros((len(x), n_pair, c + n_state, 2 * c + n_state))
+    less = (1 - INSIDE) * x + INSIDE * x.mean(axis=0)
+    time_step.slopes_of_period(stepper.law, stepper.contact, less, memory, bits, slopes)
+    multipliers = np.linalg.eigvals(floquet.monodromy(stepper, slopes))
+    others = np.delete(multipliers, np.abs(multipliers - 1).argmin())  # the phase is free
+    seen = PeriodSearch(stepper, options, False).march(stepper.start_from(state)).record.y
+    row = balance.compliance.output_names.index(output)
+    swing = float(np.sqrt(2 * seen[:, row].var() / (cycle.response[row, 1:] ** 2).sum()))
+    return replace(cycle, moved=swing - 1, growth=float(np.abs(others).max()) - 1)

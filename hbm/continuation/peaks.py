@@ -58,8 +58,8 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
     """The curve with its highest peaks among its points, in their order.
 
     branch : over the frequency; site : of which output, and how exactly
-    A maximum that no solve makes higher stays the point that it is, marked where the search for its peak has failed and
-    that is foreseen higher than all that is solved
+    A maximum that no solve makes higher stays the point that it is, marked where the search for its peak has failed or
+    ended lower and that is foreseen higher than all that is solved
     """
     found: list[tuple[int, BranchPoint]] = []
     failed: list[_Candidate] = []
@@ -74,7 +74,8 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
             point = None
             with suppress(NoPeak):  # it still rises at the highest frequency that is modelled
                 point = site.within(balance, omega, x, candidate.low, candidate.high)
-        if point is None or not point.solution.converged:
+        same = (1 - site.tolerance) * heights[i]  # lower than that lies on another part of the curve
+        if point is None or not point.solution.converged or point.amplitude < same:
             failed += [candidate]
             continue
         state, inside = point.state, candidate.turns or candidate.low < point.state.omega < candidate.high

@@ -7,17 +7,24 @@ Source  Newton-Krylov shooting and its multipliers: Sanchez, Net, Garcia-Archill
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
-from tribodyn.hbm.time import period_search
+from tribodyn.hbm.stability.exponents import stability
+from tribodyn.hbm.time import period_search, wave_in_time
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.push import push
 from tribodyn.hbm.time.stepper import Options, TimeStepper
-from tribodyn.hbm.time.time_integration import PeriodicMotion, integrate
+from tribodyn.hbm.time.time_integration import integrate
+from tribodyn.hbm.time.verify import Verification
+
+MULTIPLIERS = "its Floquet multipliers in time"
+HILL = "Hill's method"
+SAME = 0.2  # largest difference of the vibration at the contact, relative, up to which both motions are one
 
 
 @dataclass(frozen=True)
@@ -46,12 +53,10 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     """
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
-    if _size(stepper) > RULES.max_states:
-        raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
     if not motion.periodic:
         raise ValueError(f"no periodic motion near this state: {motion.outcome}")
-    multipliers = np.linalg.eigvals(monodromy(stepper, motion))
+    multipliers = np.linalg.eigvals(monodromy(stepper, motion.slopes))
     multipliers = multipliers[np.abs(multipliers) > RULES.least_multiplier]
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
 
@@ -88,6 +93,20 @@ def leaves(balance: HarmonicBalance, state: State, options: Options | None = Non
         return False
     plain = replace(options, accelerate=False, max_periods=RULES.pushed)
     return any(push(PeriodSearch(stepper, plain, False), period, 8, s * direction).away for s in (1.0, -1.0))
+
+
+def stays(balance: HarmonicBalance, state: State, found: Verification | None, options: Options) -> tuple[bool, str]:
+    """Whether no perturbation of the motion near a balance state grows, and the method that says so.
+
+    found : the state beside time integration, which may have come to another motion, or to none; None: not compared
+    Hill's method takes the contact's answer to a perturbation as that to a steady vibration. Where pairs slip and lift
+    in a cycle that may miss what grows, so that it serves only where there are no multipliers
+    """
+    same = found is not None and found.motion.periodic and found.contact <= SAME
+    if same and not wave_in_time.is_wave(balance):
+        with suppress(ValueError):
+            return not leaves(balance, state, options), MULTIPLIERS
+    return stability(balance, state).stable, HILL
 
 
 def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tuple[float, np.ndarray, Period]:
@@ -133,23 +152,23 @@ def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray
     raise ValueError(f"the largest multiplier did not converge: {found:.3g}, off by up to {miss:.1g}")
 
 
-def size(balance: HarmonicBalance, omega: float, options: Options | None = None) -> int:
-    """Number of state variables that the multipliers at a frequency [rad/s] are those of."""
-    return _size(TimeStepper(balance, omega, options or Options()))
-
-
 def _size(stepper: TimeStepper) -> int:
     return 2 * len(stepper.lam) + stepper.balance.memory.size + 2 * len(stepper.static)
 
 
-def monodromy(stepper: TimeStepper, motion: PeriodicMotion) -> np.ndarray:
-    """Derivative of the state (z, f, x, memory that moves) after a period with respect to the one before."""
-    assert motion.slopes is not None
+def monodromy(stepper: TimeStepper, slopes: np.ndarray | None) -> np.ndarray:
+    """Derivative of the state (z, f, x, memory that moves) after a period with respect to the one before.
+
+    slopes : of `time_step.Record`; raises ValueError for models too large
+    """
+    if _size(stepper) > RULES.max_states:
+        raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
+    assert slopes is not None
     linear, A, c = stepper.linear, stepper.contact.A.T, stepper.c
     n, n_contact, n_memory = len(linear.E), len(A), stepper.balance.memory.size
-    n_state = motion.slopes.shape[2] - c
+    n_state = slopes.shape[2] - c
     z, f, x, s = np.split(np.eye(n + 2 * n_contact + n_memory), np.cumsum([n, n_contact, n_contact]))
-    for D in motion.slopes:
+    for D in slopes:
         free = linear.E @ z - 0.5 * linear.Q @ (linear.U.T @ f)
         of_x, of_s, of_x0 = (
             _block_diagonal(part) for part in np.split(D, [c, c + n_state], axis=2)

@@ -35,9 +35,8 @@ from tribodyn.hbm.wear.evolution import (
 )
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
-from tribodyn.hbm.wear.machine_motion import MachineMotion
+from tribodyn.hbm.wear.machine_motion import MachineMotion, with_growth
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
-from tribodyn.hbm.wear.state_stability import with_growth
 from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth, local_error
 
 GAMMA = 1 - 1 / np.sqrt(2)

@@ -117,6 +117,24 @@ def test_a_peak_beside_solves_that_fail_is_found_or_told(failing, monkeypatch: p
         assert solved.no_peak("mass") == ""
 
 
+def test_a_search_that_ends_lower_than_its_point_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on the other side of a jump."""
+    problem, within = StuckOscillator(1e-2), AtPeak.within
+    branch = natural.follow(problem.balance, *RANGE, natural.Options(n_points=30))
+
+    for share, found in ((1e-6, True), (0.1, False)):
+
+        def lower(site: AtPeak, balance: HarmonicBalance, omega: float, *rest: Any, share: float = share) -> Any:
+            height = branch.amplitude("mass")[np.abs(branch.omega - omega).argmin()]
+            return replace(within(site, balance, omega, *rest), amplitude=(1 - share) * height)
+
+        monkeypatch.setattr(AtPeak, "within", lower)
+        solved = with_peaks(problem.balance, branch, AtPeak("mass", *RANGE))
+        assert (solved.peak("mass") is not None) is found
+        assert (solved.no_peak("mass") == "") is found
+        np.testing.assert_array_equal(solved.omega, branch.omega)
+
+
 @pytest.mark.parametrize("way", [(0.3, 4.5), (4.5, 0.3)])
 @pytest.mark.parametrize("steps", [arc_length.Options(), arc_length.Options(step=0.3, max_step=0.6, angle=0.6)])
 @pytest.mark.parametrize(("zeta", "force"), [(0.02, 0.1), (0.005, 0.1), (0.05, 0.05)])

@@ -60,7 +60,7 @@ def test_monodromy_with_friction_is_the_finite_difference_of_the_period_map():
     options = Options(steps=256, tolerance=1e-11)
     stepper = TimeStepper(balance, FLIPS_AT, options)
     motion = time_integration.integrate(balance, FLIPS_AT, state, options, with_slopes=True)
-    exact = np.linalg.eigvals(monodromy(stepper, motion))
+    exact = np.linalg.eigvals(monodromy(stepper, motion.slopes))
     start = stepper.start_from(state)
     for _ in range(300):
         start, record, _, _ = stepper.period(start)

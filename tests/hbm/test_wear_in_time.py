@@ -16,7 +16,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.hbm.stability import floquet
-from tribodyn.hbm.stability.stays import HILL, MULTIPLIERS, stays
+from tribodyn.hbm.stability.floquet import HILL, MULTIPLIERS, stays
 from tribodyn.hbm.time import mean_motion, time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
 from tribodyn.hbm.time.stepper import Options

@@ -14,10 +14,10 @@ from tests.proof.extremes_march import held
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES, STICKS
-from tribodyn.hbm.contact.sampling import sampling_error
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.workflows.errors.measure import sampling_error
 from tribodyn.workflows.errors.options import DEFAULT
 
 CONVERGED, REFUSED, WRONG = "converged", "refused", "wrong"  # what is said of a cell

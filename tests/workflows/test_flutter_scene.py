@@ -43,12 +43,12 @@ def test_waves_of_a_scene_have_the_eigenvalues_of_its_coefficients(scene: Path) 
 
 
 def test_a_limit_cycle_needs_no_load(scene: Path) -> None:
-    """It attracts, and the balance in the flow holds there without harmonic loads and without added damping."""
+    """Time keeps it, and the balance in the flow holds there without harmonic loads and without added damping."""
     found = flutter.flutter(scene, 1e-6, 1e-3, points=20)
     flutters = {index for index, ratio in found.damping.items() if ratio < 0}
     assert set(found.cycles) == flutters
     cycles = [one for cycles, _ in found.cycles.values() for one in cycles]
-    assert any(one.attracts for one in cycles)
+    assert any(one.stays for one in cycles)
     for one in cycles:
         assert 1e-6 < one.amplitude < 1e-3
         moving = np.linalg.norm(one.state.flat[:, 1:])

@@ -39,6 +39,7 @@ def line(sectors: int, order: int, *overrides: str) -> HarmonicBalance:
     [
         (5, -2, (240, 264), "jenkins"),
         pytest.param(6, -1, (110, 150), "jenkins", marks=pytest.mark.slow),
+        pytest.param(5, -2, (240, 261), "coulomb_planar", marks=pytest.mark.slow),
         pytest.param(6, -1, (110, 150), "coulomb_planar", marks=pytest.mark.slow),
         pytest.param(5, -2, (240, 264), "coulomb_planar", marks=pytest.mark.slow),
     ],

@@ -14,10 +14,9 @@ import numpy as np
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import NoMeanRotation
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.equilibrium import unbalanced_load
 from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.loads import BodyForce, Centrifugal, Load, Moment, NodalForce, Pressure, Sum
-from tribodyn.fem.part import Part
+from tribodyn.fem.part import Part, unbalanced_load
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at
 from tribodyn.hbm import rest

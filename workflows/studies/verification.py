@@ -15,7 +15,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.stability.stays import stays
+from tribodyn.hbm.stability.floquet import stays
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time import verify as march
 from tribodyn.hbm.time.stepper import Options

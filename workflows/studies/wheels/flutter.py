@@ -10,9 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.limit_cycles import LimitCycle, limit_cycles
+from tribodyn.hbm.continuation.limit_cycles import LimitCycle, in_time, limit_cycles
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.threads import limited
+from tribodyn.hbm.time.stepper import IntegrationFailed, Options
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic, with_flow
 from tribodyn.workflows.pictures.plots import axes_of
@@ -25,6 +26,8 @@ from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel as wheels
+
+MARCH = Options(steps=128, accelerate=False, max_periods=50)  # of a limit cycle: docs/theory/flutter.md
 
 
 @dataclass(frozen=True, repr=False)
@@ -52,7 +55,7 @@ class Flutter(StudyResult):
                 for j, value in self.eigenvalues.items()
             ],
             "limit_cycles": [
-                {"index": j, "m": one.amplitude, "hz": one.frequency, "attracts": one.attracts}
+                {"index": j, "m": one.amplitude, "hz": one.frequency, "moved": one.moved, "growth": one.growth}
                 for j, (found, _) in self.cycles.items()
                 for one in found
             ],
@@ -68,9 +71,7 @@ class Flutter(StudyResult):
         ]
         for j, (found, why) in self.cycles.items():
             said += [
-                f"limit cycle of wave {j}: {one.amplitude:.4g} m at {one.frequency:.6g} Hz, "
-                + ("attracts" if one.attracts else "repels")
-                + " along its mode"
+                f"limit cycle of wave {j}: {one.amplitude:.4g} m at {one.frequency:.6g} Hz" + _in_time(one)
                 for one in found
             ]
             if why:
@@ -134,19 +135,28 @@ def of_scene(file: SceneFile, start: float | None = None, stop: float | None = N
             if start is None or stop is None or value.real <= 0:
                 break
             options = BackboneOptions(points, newton=settings.newton_options(scene))
+            balance, why = in_flow(wheel, index), ""
+            found: list[LimitCycle] = []
             try:
-                cycles[index] = limit_cycles(in_flow(file, wheel, index), start, stop, None, OUTPUT, options)
-            except ValueError as error:
-                cycles[index] = [], str(error)
+                found, why = limit_cycles(balance, start, stop, None, OUTPUT, options)
+                found = [in_time(balance, one, OUTPUT, MARCH) for one in found]
+            except (ValueError, IntegrationFailed) as error:
+                why = f"{why}; whether time keeps them is not known: {error}" if found else str(error)
+            cycles[index] = found, why
     return Flutter(file.name, eigenvalues, cycles)
 
 
-def in_flow(file: SceneFile, wheel: wheels.Wheel, index: int) -> HarmonicBalance:
+def _in_time(cycle: LimitCycle) -> str:
+    if cycle.stays is None:
+        return ""
+    beside = "what is beside it dies away" if cycle.stays else f"what is beside it grows by {cycle.growth:.2%} a period"
+    return f"; in time its amplitude moves by {cycle.moved:+.2%} and {beside}"
+
+
+def in_flow(wheel: wheels.Wheel, index: int) -> HarmonicBalance:
     """The balance of the wave of an index with the forces of the flow of its scene."""
-    scene = file.mesh_scene
-    assert scene.wheel is not None
+    scene = wheel.asked(index)
     assert scene.flow is not None
-    there = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"engine_order": index})})
     flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)
-    wave = with_flow(modelling.damped(there, travelling_wave(wheel.reduced, index)), wheel.springs, flow)
-    return modelling.make_model(there, wheel.part, wave).balance
+    wave = with_flow(modelling.damped(scene, travelling_wave(wheel.reduced, index)), wheel.springs, flow)
+    return modelling.make_model(scene, wheel.part, wave).balance

@@ -64,12 +64,13 @@ class Wheel:
 
     def wave(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> HarmonicBalance:
         """The balance under a travelling wave; engine order and range of frequencies [Hz] default to the scene's."""
-        scene = self._asked(engine_order, frequency)
+        scene = self.asked(engine_order, frequency)
         assert scene.wheel is not None
         reduced = modelling.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
         return modelling.make_model(scene, self.part, reduced).balance
 
-    def _asked(self, engine_order: int | None, frequency: tuple[float, float] | None) -> MeshScene:
+    def asked(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> MeshScene:
+        """The scene with another engine order or range of frequencies [Hz]; raises SceneError along the speed."""
         wheel, response = self.scene.wheel, self.scene.response
         assert wheel is not None
         if wheel.along_speed:
