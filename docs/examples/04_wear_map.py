@@ -16,7 +16,7 @@ COARSE = {
     "verdict.enabled": False,
 }
 
-result = td.run("beam", overrides=COARSE | {"geometry.n_patch": 5, "wear.tolerance": "5 %", "wear.max_steps": 6})
+result = td.run("beam", overrides=COARSE | {"geometry.n_patch": 5, "wear.tolerance": "5 %", "wear.max_steps": 12})
 wear = result.wear
 row = int(np.searchsorted(wear.cycles, 1e6))
 print(f"after {wear.cycles[row] / 1e6:.2f} million cycles: {1e6 * wear.depth[row].max():.0f} um at most")
