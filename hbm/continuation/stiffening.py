@@ -1,14 +1,14 @@
-"""A first solution by stiffening the contact: from springs so soft that Newton solves them at once to their own ones.
+"""A first solution without a neighbouring one: by stiffening the contact, or by way of more friction.
 
 Contacts far stiffer than the body that lift and slip have forces that change by their own size over displacements far
 below that of the body. Two things then fail: Newton from rest, whose first steps open and close every pair in turn, and
 its directions, whose products are of single precision: what the free structure resists is lost beside the springs.
 Here directions come from the dense Jacobian in double precision, steps are damped by how far the next direction would
-go (which no scaling of the equations changes), and the logarithm of the largest stiffness that a spring may have is
-raised in steps as long as that converges, each start extrapolated from the last two: a spring that is soft already
-keeps its own. The departure from stuck is measured from springs no stiffer than the body. From the contact's own, 1e8
-times stiffer, the motion of a pair that lifts would come with eight digits less. The end is held to the same tolerance
-as any other solution, measured so.
+go (which no scaling of the equations changes), and from springs so soft that Newton solves them at once the logarithm
+of the largest stiffness that a spring may have is raised in steps as long as that converges, each start extrapolated
+from the last two: a spring that is soft already keeps its own. The departure from stuck is measured from springs no
+stiffer than the body. From the contact's own, 1e8 times stiffer, the motion of a pair that lifts would come with eight
+digits less. The end is held to the same tolerance as any other solution, measured so.
 Source  damping by the natural level function: Deuflhard 2004, Newton Methods for Nonlinear Problems, 3.3
 """
 
@@ -21,11 +21,16 @@ import scipy.linalg as sla
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
+
+FRICTION = "friction"  # what laws call their coefficient
+ROUGH = (3.0, 2.5, 2.0, 1.5, 1.0, 0.5)  # decimal logarithms of friction over its own, tried in turn
+SLIDING_STEPS = 400  # of Newton on the whole way to its own friction
 
 
 @dataclass(frozen=True)
@@ -152,3 +157,44 @@ def _damped(
             return None, step
         state = trial
     return None, options.max_steps
+
+
+@single
+def solve_along_friction(balance: HarmonicBalance, omega: float, options: NewtonOptions) -> Solution | None:
+    """A solution at one frequency [rad/s], None where no law has a coefficient of friction or there is no way to it.
+
+    With much friction closed pairs stick, and where they stick is found at once. As friction falls they slide, and the
+    solution moves with it. A wedge that a load presses between two bodies is the example: from the stuck state Newton's
+    method lets go of one of its faces, and nothing holds it any more.
+    """
+    if not any(FRICTION in joint.parameters.numbers for joint in balance.contact.joints):
+        return None
+    x, spent, products = balance.stuck(omega), 0, 0
+    found: Solution | None = None
+
+    def rougher(level: float, _: float = np.nan) -> bool:
+        nonlocal found, x, spent, products
+        if spent >= SLIDING_STEPS:
+            return False
+        found = newton.solve(_with_friction(balance, level), omega, x, options)
+        spent, products = spent + found.steps, products + found.products
+        x = found.state.x if found.converged else x
+        return found.converged
+
+    first = next((level for level in ROUGH if rougher(level)), None)
+    if first is None or lead(first, 0.0, rougher) > 0.0 or found is None:
+        return None
+    return replace(found, steps=spent, products=products)
+
+
+def _with_friction(balance: HarmonicBalance, level: float) -> HarmonicBalance:
+    """The same problem with all coefficients of friction times ten to the level."""
+    if level == 0.0:
+        return balance
+
+    def rougher(p: ContactParameters) -> ContactParameters:
+        if FRICTION not in p.numbers:
+            return p
+        return replace(p, numbers={**p.numbers, FRICTION: p.numbers[FRICTION] * 10.0**level})
+
+    return replace(balance, contact=balance.contact.with_parameters(rougher))

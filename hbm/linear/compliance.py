@@ -369,7 +369,7 @@ class CompliancePoint:
         moved = np.zeros_like(force)
         for (_, positions), ports in zip(c.groups, self.ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
-                moved[:, p] = 1j * self._harmonics[p] * port.slope(force[:, p])
+                moved[:, p] = port.slope(force[:, p], 1j * self._harmonics[p])
         return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

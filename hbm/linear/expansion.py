@@ -349,8 +349,8 @@ class PortCompliance:
             found += x.unit * ratio**k * w[rows, columns]
         return found
 
-    def slope(self, force: np.ndarray) -> np.ndarray:
-        """d (apply) / d s of all ports under forces (n_port, ...)."""
+    def slope(self, force: np.ndarray, by: complex = 1.0) -> np.ndarray:
+        """d (apply) / d s of all ports under forces (n_port, ...), times `by`: d s over that of what is asked for."""
         x, s, ratio = self.expansion, self.s, self.ratio
         z = product(x.b.conj().T, force).astype(complex)
         dz = np.zeros_like(z)
@@ -367,7 +367,7 @@ class PortCompliance:
             out -= product(e, ratio**k * dy + k * ratio ** (k - 1) / x.s_unit * y)
         for k, w in enumerate(x.higher, start=1):
             out += x.unit * k * ratio ** (k - 1) / x.s_unit * product(w, force)
-        return out
+        return by * out
 
 
 def product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:

@@ -61,24 +61,14 @@ class LinePoint(CompliancePoint):
     def _solved(self) -> list[list[LinePorts]]:
         line = self.compliance
         assert line.model.along is not None
-        there, slopes = line.model.along(self.omega), line.model.along.slope(self.omega)
+        there, changes = line.model.along(self.omega), line.model.along.slope(self.omega)
 
         def ports(h: int) -> LinePorts:
-            (system, B), (slope, _) = there.at_harmonic(h), slopes.at_harmonic(h)
-            rows, moved = line.port_rows(system, B), line.port_rows(slope, np.zeros_like(B))
-            return LinePorts(system, slope, B, line.k, rows, moved, 1j * h * self.omega, 1j * h)
+            (system, B), (change, _) = there.at_harmonic(h), changes.at_harmonic(h)
+            rows, moved = line.port_rows(system, B), line.port_rows(change, np.zeros_like(B))
+            return LinePorts(system, change, B, line.k, rows, moved, 1j * h * self.omega)
 
         return [[ports(line.basis.harmonics[p]) for p in positions] for _, positions in line.groups]
-
-    def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """As of any point, with what the speed changes meanwhile."""
-        c = self.compliance
-        force = c.port_force(g)
-        moved = np.zeros_like(force)
-        for (_, positions), ports in zip(c.groups, self.ports, strict=True):
-            for p, port in zip(positions, ports, strict=True):
-                moved[:, p] = port.slopes @ force[:, p]
-        return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
 
     def _in_coarse(self, modes: np.ndarray, port: LinePorts) -> np.ndarray:
         c = self.compliance
@@ -90,43 +80,39 @@ class LinePoint(CompliancePoint):
 class LinePorts:
     """Displacement of ports under forces on ports, both the rows R of few coordinates, by a direct solution.
 
-    system, B, k, rows, s : of D = `stuck_dynamic_stiffness` and R (n_port, n); slope, rows_slope, s_slope : these by
+    system, B, k, rows, s : of D = `stuck_dynamic_stiffness` and R (n_port, n); change, rows_change : system and rows by
     the frequency
     """
 
     system: SecondOrderSystem
-    slope: SecondOrderSystem
+    change: SecondOrderSystem
     B: np.ndarray
     k: np.ndarray
     rows: np.ndarray
-    rows_slope: np.ndarray
+    rows_change: np.ndarray
     s: complex
-    s_slope: complex
 
     @cached_property
     def factor(self) -> Any:
         """D = P L U."""
         return sla.lu_factor(stuck_dynamic_stiffness(self.system, self.B, self.k, self.s), check_finite=False)
 
-    @cached_property
-    def under(self) -> np.ndarray:
-        """D^-1 R^H (n, n_port)."""
-        return np.asarray(sla.lu_solve(self.factor, self.rows.conj().T.astype(complex), check_finite=False))
+    def _under(self, force: np.ndarray) -> np.ndarray:
+        """D^-1 of forces (n, ...)."""
+        return np.asarray(sla.lu_solve(self.factor, force.astype(complex), check_finite=False))
 
     @cached_property
     def moved(self) -> np.ndarray:
         """R D^-1 R^H (n_port, n_port)."""
-        return self.rows @ self.under
+        return self.rows @ self._under(self.rows.conj().T)
 
-    @cached_property
-    def slopes(self) -> np.ndarray:
-        """The same by the frequency: R' D^-1 R^H + R D^-1 R'^H - R D^-1 D' D^-1 R^H."""
-        left = sla.lu_solve(self.factor, self.rows.conj().T.astype(complex), trans=2, check_finite=False).conj().T
-        change = self.slope.stiffness + 2 * self.s * self.s_slope * self.system.mass
-        for of, by in ((self.slope, self.s), (self.system, self.s_slope)):
-            change = change if of.velocity_matrix is None else change + by * of.velocity_matrix
-        found: np.ndarray = self.rows_slope @ self.under + left @ (self.rows_slope.conj().T - change @ self.under)
-        return found
+    def slope(self, force: np.ndarray, by: complex) -> np.ndarray:
+        """Of R D^-1 R^H f: R' D^-1 R^H f + R D^-1 (R'^H f - D' D^-1 R^H f); `by`: d s / d omega."""
+        change = self.change.stiffness + 2 * self.s * by * self.system.mass
+        for of, at in ((self.change, self.s), (self.system, by)):
+            change = change if of.velocity_matrix is None else change + at * of.velocity_matrix
+        q = self._under(self.rows.conj().T @ force)
+        return self.rows_change @ q + self.rows @ self._under(self.rows_change.conj().T @ force - change @ q)
 
     def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
         """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""

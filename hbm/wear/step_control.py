@@ -1,4 +1,4 @@
-"""The length of wear steps from an estimate of their own error."""
+"""The error of a wear step, which its length follows from, and that of a whole run, from its own history."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
+
 STEP_RATIO_LIMITS = (0.2, 3.0)  # limits of the ratio of one step to the one before
+UNKNOWN = 0.5  # estimated relative error from which on a number of cycles is no statement
 
 
 @dataclass(frozen=True)
@@ -36,3 +39,46 @@ def local_error(
 def growth(error: float) -> float:
     """Ratio of the next step to this one by the second order of the error, with a margin."""
     return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *STEP_RATIO_LIMITS))
+
+
+@dataclass(frozen=True)
+class StepError:
+    """Estimated relative errors by the wear steps: of the cycles for the worn volume, and of the largest depth."""
+
+    cycles: float
+    depth: float
+
+
+def step_error(history: WearHistory, tolerance: float | None = None) -> StepError:
+    """Estimate for a whole run, up to where LIFE_SHARE of the preload is left.
+
+    tolerance : of the error-controlled rule; None for steps at the rate of their beginning, as the thesis takes them
+
+    A step of Z cycles at the rate of its beginning is off by half the change of the rate over the step. The changes of
+    all pairs count without their sign: rates that go back and forth between neighbours are a sign of steps too long.
+    The error-controlled rule has measured its own, see `local_error`: the root of the sum of squares, of depth too.
+    """
+    lost = np.flatnonzero(history.preload < LIFE_SHARE * history.preload[0])
+    last = int(lost[0]) if len(lost) else len(history.cycles) - 1  # row where the counted steps end
+    total = history.energy.sum(axis=1)
+    taken = np.flatnonzero((history.cycles_in_step[:last] > 0) & (total[:last] > 0))
+    if not len(taken):
+        return StepError(0.0, 0.0)
+    cycles = history.cycles_in_step[taken]
+    if tolerance is not None:
+        passed = history.cycles[taken] + cycles
+        off = float(tolerance * np.linalg.norm(history.step_error[taken] * passed) / passed[-1])
+        return StepError(off, off)
+    before, after = history.energy[taken], history.energy[taken + 1]
+    change = np.abs(after - before).sum(axis=1) / (total[taken] + total[taken + 1])
+    share, share_after = before / total[taken, None], _shares(after)
+    work = history.work[taken].sum(axis=1)
+    worn = work @ share
+    shift = np.abs(work @ (share_after - share)) / 2
+    return StepError(float(cycles @ change / cycles.sum()), float(shift.max() / worn.max()))
+
+
+def _shares(energy: np.ndarray) -> np.ndarray:
+    """Each pair's share of the work of its row, none where a row has no work."""
+    total = energy.sum(axis=1, keepdims=True)
+    return np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)

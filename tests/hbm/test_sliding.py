@@ -12,7 +12,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.continuation.sliding import solve_along_friction
+from tribodyn.hbm.continuation.stiffening import solve_along_friction
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions

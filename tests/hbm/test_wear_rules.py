@@ -23,13 +23,11 @@ from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, machine_motion, thesis_rule
-from tribodyn.hbm.wear.events import events
 from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
-from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.hbm.wear.history import WearHistory, events
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.step_control import Tolerance, local_error
-from tribodyn.hbm.wear.step_error import step_error
+from tribodyn.hbm.wear.step_control import Tolerance, local_error, step_error
 
 
 @pytest.fixture(scope="module")

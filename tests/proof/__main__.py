@@ -17,8 +17,8 @@ from tests.proof.cases.blade.commands import blade
 from tests.proof.cases.leaf_seal.commands import leaf
 from tests.proof.cases.rig.commands import rig
 from tests.proof.words import PICTURE, aside
-from tribodyn.workflows.command import exits
-from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, quantity
+from tribodyn.workflows.command.main import guard
+from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room, quantity
 
 
 def bench(
@@ -404,7 +404,7 @@ for word in (
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a proof and leave with its exit code."""
-    exits.guard(lambda: app(arguments, exit_on_error=False, print_error=False))
+    guard(lambda: app(arguments, exit_on_error=False, print_error=False))
 
 
 if __name__ == "__main__":

@@ -15,8 +15,7 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.step_control import Tolerance
-from tribodyn.hbm.wear.step_error import UNKNOWN, step_error
+from tribodyn.hbm.wear.step_control import UNKNOWN, Tolerance, step_error
 from tribodyn.workflows.run.references import free_deflection
 
 STEPS = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.2, 0.5, 1.0, 10.0, 1e3, 1e6)  # of delta_max

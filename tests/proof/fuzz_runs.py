@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tests.proof import fuzz_result
-from tribodyn.workflows.command.exits import BAD_INPUT, FAILED_SOLVE
+from tribodyn.workflows.command.main import BAD_INPUT, FAILED_SOLVE
 from tribodyn.workflows.run import progress
 from tribodyn.workflows.studies.many import pool
 

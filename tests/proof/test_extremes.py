@@ -14,7 +14,7 @@ from tests.proof.extremes_judge import judged, sampled_honestly, tried
 from tests.proof.extremes_march import held
 from tests.proof.extremes_models import lattice, rigid
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.wear.step_error import step_error
+from tribodyn.hbm.wear.step_control import step_error
 
 
 def test_no_cell_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ import pytest
 from tests.helpers.command import leave
 from tests.helpers.synthetic_result import result
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
-from tribodyn.workflows.command import exits
+from tribodyn.workflows.command.main import BAD_INPUT, INTERRUPTED, READER_LEFT, guard
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import readable, store, summary
 from tribodyn.workflows.result.facts import Stage
@@ -198,12 +198,12 @@ def test_a_reader_that_has_seen_enough_ends_the_command_in_silence(tmp_path: Pat
         command = [sys.executable, "-m", "tribodyn", *words]
         done = subprocess.run(command, cwd=ROOT, stdout=write_end, stderr=subprocess.PIPE, check=False)
         os.close(write_end)
-        assert (done.returncode, done.stderr) == (exits.READER_LEFT, b"")
+        assert (done.returncode, done.stderr) == (READER_LEFT, b"")
 
 
 CTRL_C_WHILE_AN_OBJECT_IS_FREED = """
 import os, signal, time
-from tribodyn.workflows.command import exits
+from tribodyn.workflows.command.main import guard
 
 class Freed:
     def __del__(self):
@@ -215,7 +215,7 @@ def command():
     while True:
         time.sleep(1)
 
-exits.guard(command)
+guard(command)
 """
 
 
@@ -223,7 +223,7 @@ exits.guard(command)
 def test_ctrl_c_is_not_lost_while_an_object_is_freed() -> None:
     command = [sys.executable, "-c", CTRL_C_WHILE_AN_OBJECT_IS_FREED]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (exits.INTERRUPTED, "tribodyn: stopped.\n")
+    assert (done.returncode, done.stderr) == (INTERRUPTED, "tribodyn: stopped.\n")
 
 
 @pytest.mark.faults
@@ -232,9 +232,9 @@ def test_a_full_disk_is_told_by_name(capsys: pytest.CaptureFixture[str], tmp_pat
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "a.png"))
 
     with pytest.raises(SystemExit) as stop:
-        exits.guard(writes)
+        guard(writes)
     said = capsys.readouterr().err
-    assert stop.value.code == exits.BAD_INPUT
+    assert stop.value.code == BAD_INPUT
     assert said.startswith("tribodyn: the disk is full")
     assert "a.png" in said
     assert said.count("\n") == 1

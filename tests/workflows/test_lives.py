@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from scipy import stats
+from scipy.stats import qmc
 
 import tribodyn as td
 from tests.helpers.command import leave
-from tribodyn.workflows.studies.many import design, pool, quantiles, study as studies, study_file
-from tribodyn.workflows.studies.many.quantiles import Sample
-from tribodyn.workflows.studies.many.sensitivity import influences
+from tribodyn.workflows.studies.many import pool, quantiles, study as studies, study_file
+from tribodyn.workflows.studies.many.quantiles import Sample, influences
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.surrogate import Surrogate, covariance
 from tribodyn.workflows.studies.many.task import Row, Task
@@ -100,7 +100,7 @@ def covered(seeds: range, runs: int) -> tuple[float, float]:
     inside, errors = [], []
     for seed in seeds:
         of, log_life = planted(seed)
-        points = of.values(design.qmc.Sobol(4, seed=np.random.default_rng(seed)).random(runs))
+        points = of.values(qmc.Sobol(4, seed=np.random.default_rng(seed)).random(runs))
         surrogate = Surrogate.fitted(of.coordinates(points), log_life(points))
         sample = Sample.of(of, surrogate)
         many, _ = of.draw(17, seed=99)
@@ -125,7 +125,7 @@ def test_counting_holds_a_quantile_beside_a_jump_that_the_surrogate_smooths() ->
         def jumps(x: np.ndarray, smooth: Any = log_life) -> np.ndarray:
             return np.asarray(smooth(x) + 2.0 * (np.log(x) @ [1.0, 0.5, -0.7, 0.3] > 0))
 
-        points = of.values(design.qmc.Sobol(4, seed=np.random.default_rng(seed)).random(64))
+        points = of.values(qmc.Sobol(4, seed=np.random.default_rng(seed)).random(64))
         surrogate = Surrogate.fitted(of.coordinates(points), jumps(points))
         sample = Sample.of(of, surrogate)
         truth = float(np.quantile(jumps(of.draw(15, seed=99)[0]), 0.5))

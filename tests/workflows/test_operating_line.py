@@ -18,7 +18,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.run.sanity_checks import check_speed
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many import design, study, study_file, task
+from tribodyn.workflows.studies.many import space, study, study_file, task
 from tribodyn.workflows.studies.wheels import wheel
 
 EXACT = newton.NewtonOptions(tolerance=1e-11)
@@ -132,7 +132,7 @@ def test_a_study_follows_each_engine_order_at_its_own_frequencies(tmp_path: Path
         "study": {"scene": "wheel.toml", "design": "list", "set": quick}, "vary": {"wheel.engine_order": [-1, -2, -3]}
     }  # fmt: skip
     asked = study_file.parse(tables, "orders.toml", tmp_path)
-    tasks, refused = study._tasks(asked, design.runs(asked))
+    tasks, refused = study._tasks(asked, space.runs(asked))
     assert not refused
     for order, one in zip((1, 2, 3), tasks, strict=True):
         assert one.scene().scene.response.frequency == pytest.approx((100 * order, 125 * order))

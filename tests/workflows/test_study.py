@@ -21,8 +21,8 @@ import tribodyn as td
 from tests.helpers import dying
 from tests.helpers.command import leave
 from tribodyn.workflows.run import modelling
-from tribodyn.workflows.studies.many import design, pictures, pool, study_file
-from tribodyn.workflows.studies.many.journal import Journal
+from tribodyn.workflows.studies.many import pictures, pool, space, study_file
+from tribodyn.workflows.studies.many.table import Journal
 from tribodyn.workflows.studies.many.task import Row, Task
 
 TINY = [
@@ -43,7 +43,7 @@ TABLES: dict[str, Any] = {
 
 def drawn(kind: str, runs: int, vary: dict[str, Any], **more: Any) -> list[dict[str, Any]]:
     tables = {"study": {"scene": "beam", "design": kind, "runs": runs, "seed": 3}, "vary": vary, **more}
-    return design.runs(study_file.parse(tables, "mine.toml", Path()))
+    return space.runs(study_file.parse(tables, "mine.toml", Path()))
 
 
 @pytest.mark.parametrize("kind", ["sobol", "latin_hypercube"])

@@ -10,8 +10,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from tribodyn.workflows.command.word import QUIET, word
-from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room
+from tribodyn.workflows.command.word import QUIET, Flag, Json, Overrides, make_room, word
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.readable import named_lines

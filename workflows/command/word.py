@@ -19,7 +19,6 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from cyclopts import Parameter
 
-from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, quantity
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress
@@ -29,6 +28,12 @@ from tribodyn.workflows.scene.fields import Quantity
 NAMES = {"start": "--from", "stop": "--to", "overrides": "--set"}
 Into = Literal["results", "beside", "pictures", "here", "asked"]
 SUPPLIED = ("progress", "folder", "overrides")  # parameters that are not given as options of their own names
+Overrides = Annotated[
+    tuple[str, ...],
+    Parameter(name="--set", negative=(), consume_multiple=False, help="Change a key of the scene: section.key=value."),
+]
+Json = Annotated[bool, Parameter(name="--json", negative=(), help="Print JSON for machines.")]
+Flag = Annotated[bool, Parameter(negative=())]
 
 
 @dataclass(frozen=True)
@@ -248,3 +253,31 @@ def _marks(hint: Any) -> Iterator[Any]:
     yield from getattr(hint, "__metadata__", ())
     for inner in get_args(hint):
         yield from _marks(inner)
+
+
+def quantity(name: str, text: str, unit: str) -> float:
+    """The value of an option in SI units; raises ValueError that names the option."""
+    from tribodyn.workflows.scene.units import to_si
+
+    try:
+        return to_si(text, unit)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def make_room(out: Path | None, endings: Sequence[str] = ()) -> None:
+    """Make sure, before long work, that its outcome can be written to --out: to a folder, or a file of these endings.
+
+    Raises  ValueError with one sentence
+    """
+    if out is None:
+        return
+    if endings and out.suffix.lower() not in endings:
+        raise ValueError(f"--out {out}: give a file that ends with {' or '.join(endings)}")
+    if endings and out.is_dir():
+        raise ValueError(f"--out {out}: a folder is there, give a file")
+    folder = out.parent if endings else out
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"--out {out}: no folder can be made at {folder}, {str(error.strerror).lower()}") from None

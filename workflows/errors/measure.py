@@ -18,7 +18,7 @@ from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
 from tribodyn.hbm.wear.machine_motion import left_aside
-from tribodyn.hbm.wear.step_error import step_error
+from tribodyn.hbm.wear.step_control import step_error
 from tribodyn.workflows.errors import refine, states
 from tribodyn.workflows.errors.options import DEFAULT, Options
 from tribodyn.workflows.errors.states import Answers, State, relative

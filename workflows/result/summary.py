@@ -11,8 +11,7 @@ from tribodyn.hbm.continuation.branch import amplitude as vibration
 from tribodyn.hbm.continuation.parameter import FREQUENCY
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.hbm.wear.events import events
-from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share
+from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share, events
 from tribodyn.workflows.result import verdict
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, prestressed, spin_softening
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.sliding import solve_along_friction
+from tribodyn.hbm.continuation.stiffening import solve_along_friction
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement

@@ -23,9 +23,8 @@ from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder, OnPoint
 from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.parameter import Parameter
-from tribodyn.hbm.continuation.sliding import solve_along_friction
 from tribodyn.hbm.continuation.stepper import Stepper
-from tribodyn.hbm.continuation.stiffening import solve_along_stiffness
+from tribodyn.hbm.continuation.stiffening import solve_along_friction, solve_along_stiffness
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single

@@ -20,15 +20,13 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many import lives_picture, quantiles, study as studies, study_file
-from tribodyn.workflows.studies.many.journal import Journal
-from tribodyn.workflows.studies.many.quantiles import RARE, Sample
-from tribodyn.workflows.studies.many.sensitivity import Influence, influences
+from tribodyn.workflows.studies.many import pictures, quantiles, study as studies, study_file
+from tribodyn.workflows.studies.many.quantiles import RARE, Influence, Sample, influences
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study import Runner
 from tribodyn.workflows.studies.many.study_file import LISTED, Study
 from tribodyn.workflows.studies.many.surrogate import Law, Surrogate
-from tribodyn.workflows.studies.many.table import LIFE, StudyTable
+from tribodyn.workflows.studies.many.table import LIFE, Journal, StudyTable
 from tribodyn.workflows.studies.many.task import solve
 from tribodyn.workflows.studies.study_result import StudyResult
 
@@ -136,7 +134,7 @@ class Lives(StudyResult):
 
     def plot(self) -> Figure:
         """The distribution with its quantiles, and what it depends on."""
-        return lives_picture.picture(self)
+        return pictures.picture_of_lives(self)
 
 
 def lives(

@@ -1,7 +1,8 @@
-"""Runs of a study on this machine, each in a process of a pool; a process that dies takes no other run with it."""
+"""Runs of a study in the processes of a pool, where one that dies takes no other run with it, or on many machines."""
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
@@ -10,13 +11,17 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context, parent_process
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from tribodyn.workflows.studies.many.task import Row
+from tribodyn.extras import package
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.studies.many.task import Row, Task, solve
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
+LOCAL = "local"
+WAIT = "20s"  # for a scheduler to answer
 
 
 def cores() -> int:
@@ -101,3 +106,38 @@ def _stop(pool: ProcessPoolExecutor) -> None:
         process.terminate()
     for process in processes:
         process.join()
+
+
+def on_cluster(tasks: Sequence[Task], address: str, workers: int) -> Iterator[Row]:
+    """Rows as they come, by dask.distributed; all that is distributed about a study is its work.
+
+    address : of a scheduler, such as tcp://host:8786, or "local" for a cluster of `workers` processes of its own
+    Raises  ValueError: no scheduler answers there; SolveFailed: the scheduler was lost on the way
+    """
+    distributed = package("distributed")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told in one sentence
+    cluster = None
+    if address == LOCAL:
+        cluster = distributed.LocalCluster(workers, threads_per_worker=1, dashboard_address=None)
+    try:
+        client = distributed.Client(cluster or address, timeout=WAIT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"--scheduler {address}: no scheduler answers there ({error})") from None
+    try:
+        by_future = {client.submit(solve, task, pure=False, priority=-i): task for i, task in enumerate(tasks)}
+        for future in distributed.as_completed(list(by_future), loop=client.loop):
+            yield _row(future, by_future.pop(future), address)
+    finally:
+        client.close()
+        if cluster is not None:
+            cluster.close()
+
+
+def _row(future: Any, task: Task, address: str) -> Row:
+    if future.status == "finished":
+        row: Row = future.result()
+        return row
+    if future.status == "error":  # the run itself raises nothing: its workers died, or cannot run it at all
+        error = future.exception()
+        return Row(task.number, task.key, "lost", " ".join(f"{type(error).__name__}: {error}".split()))
+    raise SolveFailed(f"the scheduler at {address} was lost")

@@ -15,10 +15,9 @@ from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many import cluster, design, pictures, pool, study_file
-from tribodyn.workflows.studies.many.journal import Journal
+from tribodyn.workflows.studies.many import pictures, pool, space, study_file
 from tribodyn.workflows.studies.many.study_file import Study
-from tribodyn.workflows.studies.many.table import StudyTable, table, write
+from tribodyn.workflows.studies.many.table import Journal, StudyTable, table, write
 from tribodyn.workflows.studies.many.task import Row, Task, solve
 
 
@@ -27,7 +26,7 @@ class Runner:
     """How and where the runs of a study are done.
 
     folder : of rows, tables and pictures; workers : processes, as many as there are cores where None
-    scheduler : see cluster.finished, none where empty; resume : take the rows that `folder` holds of the same runs
+    scheduler : see pool.on_cluster, none where empty; resume : take the rows that `folder` holds of the same runs
     retry : but those of failed runs
     """
 
@@ -89,7 +88,7 @@ def run(
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
     folder, progress, scheduler, resume = runner.folder, runner.progress, runner.scheduler, runner.resume
-    varied = [*design.runs(study), *more]
+    varied = [*space.runs(study), *more]
     tasks, refused = _tasks(study, varied)
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
@@ -139,7 +138,7 @@ def _finished(tasks: Sequence[Task], workers: int, scheduler: str, inside: bool)
         return iter(())
     if inside and workers == 1 and not scheduler:
         return _here(tasks)
-    return cluster.finished(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers, solve)
+    return pool.on_cluster(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers, solve)
 
 
 def _here(tasks: Sequence[Task]) -> Iterator[Row]:

@@ -1,9 +1,11 @@
-"""The table of a study: a row a run, in the order of the design."""
+"""The rows of a study as they are finished, each on disk before the next is told of, and its table: a row a run."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
-from tribodyn.workflows.result.store import replacing
+from tribodyn.workflows.result.store import replacing, set_aside
 from tribodyn.workflows.studies.many import pictures
 from tribodyn.workflows.studies.many.distributions import si
 from tribodyn.workflows.studies.many.task import ENDS, RUN, SINGLE, Row
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 STATUS, SENTENCE = "status", "sentence"
 LIFE = "life_cycles"
 FEWEST = 5  # complete runs that a correlation needs
+JOURNAL = "rows.jsonl"
 
 
 @dataclass(frozen=True, repr=False)
@@ -180,3 +183,40 @@ def _cell(value: Any) -> str:
     if isinstance(value, (float, np.floating)):
         return "" if np.isnan(value) else repr(float(value))
     return str(value)
+
+
+class Journal:
+    """Rows in a folder."""
+
+    def __init__(self, folder: Path):
+        self.path = folder / JOURNAL
+
+    def rows(self) -> dict[str, Row]:
+        """Rows by their keys; a last line that was torn when the study was killed is left out."""
+        found: dict[str, Row] = {}
+        if self.path.exists():
+            for line in self.path.read_text(encoding="utf-8").splitlines():
+                try:
+                    row = Row(**json.loads(line))
+                except (ValueError, TypeError):
+                    continue
+                found[row.key] = row
+        return found
+
+    def begin(self, rows: Iterable[Row], resume: bool) -> Path | None:
+        """Begin with rows that are there already; returns where an earlier journal is now, None if none was."""
+        previous = None if resume else set_aside(self.path)
+        fresh = self.path.with_suffix(".new")
+        with fresh.open("w", encoding="utf-8") as file:
+            file.writelines(f"{json.dumps(row.record())}\n" for row in rows)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(fresh, self.path)
+        return previous
+
+    def add(self, row: Row) -> None:
+        """Append a row and wait until the disk has it."""
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(f"{json.dumps(row.record())}\n")
+            file.flush()
+            os.fsync(file.fileno())

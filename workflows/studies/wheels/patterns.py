@@ -46,7 +46,7 @@ from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.studies.many import pool
-from tribodyn.workflows.studies.many.journal import Journal
+from tribodyn.workflows.studies.many.table import Journal
 from tribodyn.workflows.studies.many.task import Row, Status
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel as wheels

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from tests.proof.words import aside
-from tribodyn.workflows.command.words import Overrides, make_room, quantity
+from tribodyn.workflows.command.word import Overrides, make_room, quantity
 
 
 def blade(

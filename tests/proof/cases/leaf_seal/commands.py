@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from tests.proof.words import aside
-from tribodyn.workflows.command.words import Flag, Json, make_room
+from tribodyn.workflows.command.word import Flag, Json, make_room
 
 
 def leaf(

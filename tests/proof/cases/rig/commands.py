@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from tests.proof.words import Changes, aside
-from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room
+from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room
 
 
 def rig(
