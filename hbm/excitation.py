@@ -43,10 +43,10 @@ class Excitation:
             if value != 0 and h not in basis.harmonics:
                 raise ValueError(f"load '{name}' acts in harmonic {h}, which is not kept: keep it in {basis.harmonics}")
 
-    def static_force(self, vectors: Mapping[str, np.ndarray], n: int) -> np.ndarray:
-        """Sum of the static loads (n,) [N]; vectors : unit loads (n,) by name, those that are not there left out."""
-        force = np.zeros(n)
-        for (h, name), value in self.loads.items():
-            if h == 0 and name in vectors:
-                force += np.real(value) * vectors[name]
+    def force(self, h: int, vectors: Mapping[str, np.ndarray], n: int) -> np.ndarray:
+        """Amplitude (n,) of the loads of a harmonic [N]; vectors : unit loads (n,) by name, others are left out."""
+        force = np.zeros(n, complex)
+        for (order, name), value in self.loads.items():
+            if order == h and name in vectors:
+                force += value * vectors[name]
         return force

@@ -343,12 +343,8 @@ class Gradient:
 
     def _loads(self, posed: Posed, system: SecondOrderSystem, h: int) -> np.ndarray:
         """(n,) loads of a harmonic."""
-        factor, loads = self.balance.load_factor if h else 1.0, posed.excitation.loads
-        total = np.zeros(len(system.mass), complex)
-        for (order, name), value in loads.items():
-            if order == h:
-                total += factor * value * system.loads[name]
-        return total
+        factor = self.balance.load_factor if h else 1.0
+        return factor * posed.excitation.force(h, system.loads, system.n_dof)
 
     def _seen(self, posed: Posed, sides: list[_Side]) -> tuple[np.ndarray, np.ndarray]:
         """x and outputs of a problem under this g."""

@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 
 from tribodyn.geometry.placing import rotation
-from tribodyn.geometry.sources.cells import VOLUMES
 from tribodyn.geometry.sources.directions import System, orthogonal
 from tribodyn.geometry.sources.keywords import Card, cards
-from tribodyn.geometry.sources.raw import NOTHING, Cells, RawMesh
+from tribodyn.geometry.sources.raw import NOTHING, VOLUMES, Cells, RawMesh
 
 # first letters and number of nodes of a solid -> meshio's kind
 SOLIDS = {

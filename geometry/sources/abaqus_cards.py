@@ -12,10 +12,9 @@ import numpy as np
 from tribodyn.geometry.sources import abaqus, deck
 from tribodyn.geometry.sources.abaqus import Assembly, Node
 from tribodyn.geometry.sources.card_table import CardTable, Met
-from tribodyn.geometry.sources.cells import VOLUMES
 from tribodyn.geometry.sources.directions import Directions, Listed, System, orthogonal, turned
 from tribodyn.geometry.sources.keywords import Card
-from tribodyn.geometry.sources.raw import RawMesh
+from tribodyn.geometry.sources.raw import VOLUMES, RawMesh
 
 # named supports -> axes that they hold
 NAMED_SUPPORTS = {

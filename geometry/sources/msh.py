@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.geometry.gmsh_session import session
-from tribodyn.geometry.sources.cells import SURFACES
-from tribodyn.geometry.sources.raw import Cells, RawMesh
+from tribodyn.geometry.sources.raw import SURFACES, Cells, RawMesh
 
 _ORDER_19 = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]
 _WEDGE_15 = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]

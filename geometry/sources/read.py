@@ -16,9 +16,8 @@ import numpy as np
 from meshio._mesh import topological_dimension
 
 from tribodyn.geometry.sources import abaqus_cards, ansys, cad, msh, nastran, solid
-from tribodyn.geometry.sources.cells import COMMON_NAMES, SURFACES, VOLUMES
 from tribodyn.geometry.sources.deck import Deck, in_si
-from tribodyn.geometry.sources.raw import Cells, RawMesh
+from tribodyn.geometry.sources.raw import COMMON_NAMES, SURFACES, VOLUMES, Cells, RawMesh
 from tribodyn.geometry.sources.solid import SolidBody
 
 MOST_VALUES = 100  # an array of integers with more different values is a number, not a group

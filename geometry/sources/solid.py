@@ -19,8 +19,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from tribodyn.geometry.numbering import REFERENCE_POINTS, TET_EDGES, permutation
-from tribodyn.geometry.sources.cells import HEXA, PYRAMID, TETRA, VOLUMES, WEDGE, Solid
-from tribodyn.geometry.sources.raw import Cells, RawMesh
+from tribodyn.geometry.sources.raw import HEXA, PYRAMID, TETRA, VOLUMES, WEDGE, Cells, RawMesh, Solid
 
 Groups = dict[str, np.ndarray]
 _REFERENCE_CORNERS = {

@@ -73,8 +73,7 @@ class PhaseResonance(FreeVibration):
     def _load(self) -> np.ndarray:
         """(n,) modal force of the vibrating loads."""
         system, _ = self.balance.model.at_harmonic(1)
-        terms = ((v, system.loads[name]) for (h, name), v in self.balance.excitation.loads.items() if h == 1)
-        force = sum((value * load for value, load in terms), np.zeros(system.n_dof, complex))
+        force = self.balance.excitation.force(1, system.loads, system.n_dof)
         found: np.ndarray = self.modes[self.first].shapes.conj().T @ force
         return found
 

@@ -164,10 +164,7 @@ class FreeVibration:
         self.first = self.basis.harmonics.index(1)
         self.n = len(self.modes[self.first].lam)
         static, b = model.at_harmonic(self.basis.harmonics[0])
-        load = sum(
-            (v * static.loads[name] for (h, name), v in balance.excitation.loads.items() if h == 0),
-            np.zeros(static.n_dof),
-        )
+        load = balance.excitation.force(0, static.loads, static.n_dof)
         base = balance.excitation.base
         self.base = np.zeros(len(b)) if base is None or not self.basis.has_static else base[:, 0]
         still = self.modes[0]

@@ -25,10 +25,8 @@ def coordinates(
     found = []
     for position, h in enumerate(basis.harmonics):
         system, B = balance.model.at_harmonic(h)
-        total = B.conj().T @ g[:, position]
-        for (order, name), value in excitation.loads.items():
-            if order == h:
-                total = total + (balance.load_factor if h else 1.0) * value * system.loads[name]
+        load = (balance.load_factor if h else 1.0) * excitation.force(h, system.loads, system.n_dof)
+        total = B.conj().T @ g[:, position] + load
         found.append(np.linalg.solve(stuck_dynamic_stiffness(system, B, k, 1j * h * omega), total))
     return found
 

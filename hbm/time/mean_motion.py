@@ -56,10 +56,6 @@ class MeanOptions:
     contact: float = 1e-7
     passing: bool = False
 
-    def __post_init__(self) -> None:
-        if self.block < 2 or self.most_blocks < 2:
-            raise ValueError("a mean motion needs at least two blocks of two periods")
-
 
 @dataclass(frozen=True)
 class MeanMotion:

@@ -143,12 +143,8 @@ class TimeStepper:
 
     def _load(self, n: int) -> np.ndarray:
         """(n, n_coeff) coefficients of the loads."""
-        basis = self.balance.basis
-        amplitudes = np.zeros((n, len(basis.harmonics)), complex)
-        for (h, name), value in self.balance.excitation.loads.items():
-            if h in basis.harmonics:
-                amplitudes[:, basis.harmonics.index(h)] += value * self.balance.model.system.loads[name]
-        return basis.to_real(amplitudes)
+        basis, loads = self.balance.basis, self.balance.model.system.loads
+        return basis.to_real(np.stack([self.balance.excitation.force(h, loads, n) for h in basis.harmonics], axis=1))
 
     def start_from(self, state: State, at_rest: bool = False, added: float = 0.0) -> Moving:
         """What moves at t = 0 in a balance state, every coordinate in equilibrium with its contact forces.

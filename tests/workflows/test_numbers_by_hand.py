@@ -109,7 +109,7 @@ def test_the_load_factor_scales_vibration_alone(solved: tuple[HarmonicBalance, S
 
 def test_static_loads_add_up() -> None:
     loads = Excitation({(0, "a"): 2.0, (0, "b"): -3.0, (1, "a"): 5.0})
-    found = loads.static_force({"a": np.array([1.0, 0.0]), "b": np.array([0.0, 1.0])}, 2)
+    found = loads.force(0, {"a": np.array([1.0, 0.0]), "b": np.array([0.0, 1.0])}, 2)
     np.testing.assert_allclose(found, [2.0, -3.0])
 
 

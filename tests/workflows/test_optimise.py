@@ -14,9 +14,9 @@ import tribodyn as td
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import study_file
+from tribodyn.workflows.studies.many.optimum import Known, best_trades, propose
 from tribodyn.workflows.studies.many.table import StudyTable
 from tribodyn.workflows.studies.many.task import numbers_of
-from tribodyn.workflows.studies.many.trades import Known, best_trades, propose
 
 LINEAR = {
     "scene": "beam", "design": "sobol", "runs": 3, "seed": 3,

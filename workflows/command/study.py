@@ -28,8 +28,3 @@ app.command(word(supports, "study supports", into="beside"))
 app.command(word(forces, "study forces"))
 app.command(word(asperities, "study asperities", into="asked"))
 app.command(word(compare, "study compare"))
-
-
-@app.command(name="trade", show=False)
-def _trade(*given: str) -> None:
-    raise ValueError("study trade is study converge now, with the same --setting")

@@ -88,7 +88,7 @@ def build(file: SceneFile, progress: Progress, chosen: tuple[int, ...] = ()) -> 
         except UnbalancedLoad as unbalanced:
             if part is None or reduced.basis is None:
                 raise
-            force = joints.excite(scene, None).static_force(part.system.loads, len(part.free))
+            force = joints.excite(scene, None).force(0, part.system.loads, len(part.free)).real
             raise ValueError(unbalanced_load(force, part, reduced.basis @ unbalanced.shapes)) from None
         except SingularStuckSystem as singular:
             remarks = [] if part is None else check_size(np.ptp(part.points, axis=0), "give its numbers a unit")

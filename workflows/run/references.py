@@ -107,8 +107,7 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         if not h:
             continue  # an amplitude is that of the vibration
         system, B = balance.model.at_harmonic(h)
-        loads = [value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == h]
-        force = np.sum([np.zeros(system.n_dof), *loads], axis=0)
+        force = balance.excitation.force(h, system.loads, system.n_dof)
         if springs is not None and base is not None:
             force = force + B.conj().T @ (springs.ravel() * base[:, position])
         force = balance.load_factor * force
@@ -144,7 +143,7 @@ def free_deflection(balance: HarmonicBalance) -> np.ndarray:
     if "n" not in interface.components or not balance.basis.has_static:
         return missing
     system, B = balance.model.at_harmonic(0)
-    force = balance.excitation.static_force(system.loads, system.n_dof)
+    force = balance.excitation.force(0, system.loads, system.n_dof).real
     try:
         factor = sla.cho_factor(system.stiffness)
     except np.linalg.LinAlgError:

@@ -122,7 +122,7 @@ def of_scene(file: SceneFile, scene: MeshScene) -> Forces:
 def _loads(scene: MeshScene, part: Part, excitation: Excitation, q: np.ndarray) -> np.ndarray:
     """Static loads at the nodes (n_node, 3) [N]; those of a turning frame grow with the static displacement q."""
     full = np.zeros(3 * len(part.points))
-    full[part.free] = excitation.static_force(part.system.loads, len(part.free))
+    full[part.free] = excitation.force(0, part.system.loads, len(part.free)).real
     if scene.wheel is not None and scene.wheel.speed:
         mass, _ = assemble(part.mesh, part_reduction.material(scene, part.mesh))
         moved = part.field(q).ravel()
