@@ -8,15 +8,19 @@ Source  Hughes, The Finite Element Method, 2000, section 2.8
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
-from tribodyn.fem import linear_reduced
 from tribodyn.fem.assembly import materials_of
-from tribodyn.fem.elements import batches, connectivity, scatter
+from tribodyn.fem.elements import batches, connectivity, coordinates, scatter
 from tribodyn.fem.material import AnyMaterial, Material
+
+HOURGLASS = 0.005  # stiffness of hourglass modes over the shear modulus
+SIGNS = np.array(list(product((-1, 1), repeat=3)), float)  # of the corners of an element
+MODES = np.array([SIGNS[:, 1] * SIGNS[:, 2], SIGNS[:, 0] * SIGNS[:, 2], SIGNS[:, 0] * SIGNS[:, 1], SIGNS.prod(axis=1)])
 
 
 def assemble(mesh: Any, material: Any, order: int = 5) -> tuple[csr_matrix, csr_matrix]:
@@ -70,7 +74,7 @@ def _assemble(
 
 
 def _linear_reduced(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> tuple[csr_matrix, csr_matrix]:
-    cells, gradient, volume, hourglass = linear_reduced.elements(mesh)
+    cells, gradient, volume, hourglass = reduced_elements(mesh)
     lam, mu, rho = (np.tile(values, len(cells) // mesh.nelements) for values in per_element(mesh, material))
     stiffness = stiffness_blocks(gradient[:, None], volume[:, None], lam, mu)
     stiffness += (mu[:, None, None] * hourglass)[..., None, None] * np.eye(3)
@@ -84,7 +88,7 @@ def strained(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> It
     """Yield (elements, nodes, N, grad N, weight) as `batches` does, nodes (n_e, n_a) of each element besides, where the
     strain of one mesh is taken: for linear reduced elements, once or eight times in each of the mesh, its mean."""
     if any(isinstance(one, Material) and one.linear_reduced for one in of_elements(mesh, material)[0]):
-        cells, gradient, volume, _ = linear_reduced.elements(mesh)
+        cells, gradient, volume, _ = reduced_elements(mesh)
         parents = np.tile(np.arange(mesh.nelements), len(cells) // mesh.nelements)
         yield parents, cells, np.full((1, 8), 1 / 8), gradient[:, None], volume[:, None]
         return
@@ -179,3 +183,41 @@ def per_element(
     kinds, kind = of_elements(mesh, material)
     values = np.array([[*one.lame, one.rho] for one in kinds if isinstance(one, Material)])
     return values[kind, 0], values[kind, 1], values[kind, 2]
+
+
+def reduced_elements(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes (n, 8), mean gradient (n, 3, 8) [1/m] and volume (n,) [m3] of the linear elements of a mesh; n goes through
+    all 27-node ones eight times, through 8-node ones once.
+
+    They are those of a first-order mesh, or eight on the nodes of each 27-node one. The gradient is the mean over the
+    element and the mass lumped: what explicit programs and many published models have, softer than the 27-node element.
+    The fourth, (n, 8, 8) [m], times the shear modulus and a unit matrix (3, 3), holds hourglass modes
+    Raises  ValueError for a mesh of other elements
+    Source  Flanagan and Belytschko, IJNME 17 (1981) 679
+    """
+    nodes = connectivity(mesh)
+    if nodes.shape[1] == 10:
+        raise ValueError('material: elements = "linear_reduced" needs hexahedra, and the mesh has tetrahedra')
+    reference = np.asarray(mesh.elem().doflocs).reshape(-1, 3)
+    side = 2 if nodes.shape[1] == 27 else 1  # linear elements along an edge of one of the mesh
+    corners = [(np.array(at) + (1 + SIGNS) / 2) / side for at in product(range(side), repeat=3)]
+    own = [[int(np.abs(reference - corner).max(axis=1).argmin()) for corner in eight] for eight in corners]
+    cells = np.concatenate([nodes[:, eight] for eight in own])
+    x = coordinates(mesh)[cells]
+    weighted, volume = np.zeros((len(x), 3, 8)), np.zeros(len(x))
+    for corner in SIGNS:
+        dN = _slopes(corner / np.sqrt(3))
+        J = dN @ x
+        det = np.abs(np.linalg.det(J))
+        weighted += det[:, None, None] * np.linalg.solve(J, np.broadcast_to(dN, weighted.shape))
+        volume += det
+    mean = weighted / volume[:, None, None]
+    shape = (MODES[None] - np.einsum("hI,eIi,eiJ->ehJ", MODES, x, mean)) / 8
+    against = 8 * HOURGLASS * volume * (mean**2).sum(axis=(1, 2))
+    return cells, mean, volume, np.einsum("e,ehI,ehJ->eIJ", against, shape, shape)
+
+
+def _slopes(at: np.ndarray) -> np.ndarray:
+    """(3, 8) derivatives of the trilinear functions at a point of [-1, 1]^3."""
+    v = 1 + SIGNS * at
+    return np.array([SIGNS[:, i] * v[:, (i + 1) % 3] * v[:, (i + 2) % 3] for i in range(3)]) / 8

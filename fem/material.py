@@ -16,7 +16,7 @@ VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 class Material:
     """E : Young's modulus [Pa]; nu : Poisson's ratio, between -1 and 0.5; rho : density [kg/m3];
     expansion : coefficient of thermal expansion [1/K]
-    linear_reduced : whether its elements are linear hexahedra with reduced integration, see `linear_reduced`
+    linear_reduced : whether its elements are linear hexahedra with reduced integration, see `elasticity`
     """
 
     E: float
