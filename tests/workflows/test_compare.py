@@ -15,7 +15,7 @@ from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.export import formats
 from tribodyn.workflows.export.curves import DataKind, Function, function
 from tribodyn.workflows.result.readable import write_columns
-from tribodyn.workflows.studies.measured import measurement, reading, resonance
+from tribodyn.workflows.studies.measured import measurement, reading
 from tribodyn.workflows.studies.measured.measurement import Run
 
 SMALL = (
@@ -86,7 +86,7 @@ def test_units_directions_and_the_phase_are_those_of_the_file(reference: str, tm
     file = td.read_scene("beam_thesis", SMALL)
     np.testing.assert_allclose(found.runs[0].displacement, -x, rtol=1e-12)
     np.testing.assert_allclose(found.on(file.scene).runs[0].displacement, x, rtol=1e-12)
-    point = resonance.resonance(found.on(file.scene).runs[0])
+    point = measurement.resonance(found.on(file.scene).runs[0])
     assert [point.frequency[0], point.damping[0]] == pytest.approx([80.0, 3e-3], rel=1e-9)
     assert point.force[0] == pytest.approx(0.4, rel=0.01)  # 80 Hz is one of the points
 
@@ -102,7 +102,7 @@ def test_a_resonance_bends_with_its_amplitude() -> None:
         x = 0.9 * x + 0.1 / (MODE["mass"] * (w0**2 - w**2 + 2j * zeta * w0 * w))
     run = Run("", "force", hertz, x, np.ones(60), np.full(60, np.nan), np.full((60, 2), np.nan))
     top = np.abs(x).max() / 1e-4
-    point = resonance.resonance(run)
+    point = measurement.resonance(run)
     assert point.frequency[0] == pytest.approx(80.0 - 0.6 * top, rel=1e-6)
     assert point.damping[0] == pytest.approx(5e-3 + 4e-3 * top, rel=1e-6)
 

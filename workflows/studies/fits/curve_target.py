@@ -17,9 +17,8 @@ from tribodyn.workflows.scene.own import folder_of
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.studies.fits.identification import Measured
 from tribodyn.workflows.studies.measured.beside import beside
-from tribodyn.workflows.studies.measured.measurement import Measurement, Run
+from tribodyn.workflows.studies.measured.measurement import Measurement, Run, prepared
 from tribodyn.workflows.studies.measured.reading import read
-from tribodyn.workflows.studies.measured.resonance import prepared
 
 FULL = 0.01  # relative standard deviation whose residual has the weight 1
 

@@ -20,9 +20,8 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.measured.beside import Beside, beside
-from tribodyn.workflows.studies.measured.measurement import Measurement, Run
+from tribodyn.workflows.studies.measured.measurement import Measurement, Run, prepared
 from tribodyn.workflows.studies.measured.reading import read
-from tribodyn.workflows.studies.measured.resonance import prepared
 from tribodyn.workflows.studies.study_result import StudyResult
 
 

@@ -19,8 +19,8 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
 from tribodyn.workflows.studies.measured.beside import beside
+from tribodyn.workflows.studies.measured.measurement import prepared
 from tribodyn.workflows.studies.measured.reading import read
-from tribodyn.workflows.studies.measured.resonance import prepared
 
 SCENE = "brb_half_fitted"
 STEP = 0.04  # beyond it the ends of the laps stand back [m]
