@@ -16,6 +16,7 @@ from tribodyn.hbm.continuation.limit_cycles import limit_cycles
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import leave_alone
@@ -117,6 +118,17 @@ def test_the_limit_cycle_of_a_tuned_wheel_is_what_time_integration_comes_to(cycl
     assert np.sqrt((problem.outputs(start)[0, 1:] ** 2).sum()) < 0.8 * wanted
     assert alone.amplitude[0] == pytest.approx(wanted, rel=0.01)
     assert alone.drift < 0.05
+
+
+def test_the_coordinates_of_a_limit_cycle_are_those_of_its_contact(cycle):
+    """With the circulatory forces: without them they miss the contact by as much as these do."""
+    problem = replace(wave(), load_factor=0.0)
+    x = cycle.state.flat
+    found = coordinates(problem, x, cycle.state.cycle.force.reshape(x.shape), cycle.omega)
+    expected = problem.basis.to_complex(x)
+    for position, h in enumerate(problem.basis.harmonics):
+        _, B = problem.model.at_harmonic(h)
+        np.testing.assert_allclose(B @ found[position], expected[:, position], atol=1e-7 * np.abs(expected).max())
 
 
 def test_a_limit_cycle_has_a_neutral_exponent_and_leaves_its_own_wave_stable(cycle):
