@@ -44,7 +44,7 @@ def elasticity_anew(worn, share, problem_of, guess):
 
     problem_of : factor on the number -> problem; guess : the elasticity of the life, near it
     """
-    end, h = int(np.flatnonzero(worn.preload < share * worn.preload[0])[0]), 1e-4
+    end, h = int(np.flatnonzero(worn.preload < share * worn.preload[0])[0]), 3e-5
     same = problem_of(1.0)
     values, left = again(same, worn, end, 1.0)
     slope = (again(same, worn, end, 1 + h)[1] - left) / h

@@ -201,7 +201,7 @@ def test_derivatives_of_the_blades_life_are_those_of_its_steps_taken_again(site,
         found = tangent.of_life(problem, worn, [own.change(key, 0.5)], {}, share)
         elasticity = found.slopes[:, 0] * 0.5 / found.values
         difference = elasticity_anew(worn, share, problem_of, elasticity[0])
-    np.testing.assert_allclose(elasticity, difference, rtol=5e-5, atol=3e-5)
+    np.testing.assert_allclose(elasticity, difference, rtol=1e-5, atol=5e-6)
 
 
 @pytest.mark.parametrize(
