@@ -227,6 +227,8 @@ def test_a_life_is_off_by_the_mean_of_its_states(steepness: float) -> None:
     assert in_time.missed(elsewhere, result) == pytest.approx((0.0, 1 - 1 / 1.1))
     at_rest = [replace(one, machine=0.0 * share) for one in found]
     assert in_time.missed(at_rest, result)[0] == pytest.approx(1.0)  # no life ends
+    nothing = [replace(one, balance=0.0 * share) for one in at_rest]
+    assert in_time.missed(nothing, result) == (0.0, 0.0)  # both motions rest
     wear.in_time = cycles > 0  # what was worn in time needs no balance
     assert in_time.missed(found, result)[0] < 0.001
 

@@ -88,7 +88,8 @@ def missed(looks: Sequence[Left], result: Result) -> tuple[float, float]:
     counted = slice(0, max(states.later_rows(result), default=0) + 1)
     cycles, deepest = wear.cycles_in_step[counted], int((wear.depth[-1] + wear.worn[-1]).argmax())
     apart = np.subtract.outer(wear.cycles[counted] + cycles / 2, [one.cycles for one in looks])
-    longer = np.array([one.balance.sum() / max(one.machine.sum(), NOTHING * one.balance.sum()) for one in looks])
+    works = [(float(one.balance.sum()), float(one.machine.sum())) for one in looks]
+    longer = np.array([b / max(m, NOTHING * b) if b or m else 1.0 for b, m in works])  # 1 where both motions rest
     deeper = np.array([_share(one.machine, deepest) / (_share(one.balance, deepest) or np.inf) for one in looks])
     chance = np.array([one.error for one in looks])
     nearest, along = np.abs(apart).argmin(axis=1), ~wear.in_time[counted]
