@@ -22,9 +22,8 @@ import numpy as np
 
 from tribodyn.hbm.contact.compiled_law import pointer
 from tribodyn.hbm.contact.law import SEPARATES, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.located import POINTS, WEIGHTS
 from tribodyn.hbm.harmonics import HarmonicBasis
-
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 class CycleNotPeriodic(RuntimeError):

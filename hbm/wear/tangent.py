@@ -12,7 +12,7 @@ the first preload. Its steps keep their shares of it, so that all cycles times c
     d ln Z / dp = (N0_p / N0 - N_p / N) / (N_c / N)
 
 A jump to another resonance, a motion in time, or a step over the end of a branch has no derivative.
-Source  ours; of the step Alexander 1977, see error_controlled_rule
+Source  ours; of the step Alexander 1977, see dirk_stages
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from tribodyn.hbm.derivatives import RULES as EXACT, Derivatives, peak_moves
 from tribodyn.hbm.gradient import Change, Gradient, NoDerivative, Posed
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
-from tribodyn.hbm.wear.error_controlled_rule import GAMMA, Search, begun, depth_per_work, first_stage
+from tribodyn.hbm.wear.dirk_stages import GAMMA, Search, begun, depth_per_work, first_stage
 from tribodyn.hbm.wear.evolution import WearProblem, WearState, assess, state_of
 from tribodyn.hbm.wear.fewer_harmonics import top_harmonic
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, cycles_to_preload

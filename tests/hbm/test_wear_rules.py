@@ -22,7 +22,7 @@ from tribodyn.hbm.continuation.operating_point import (
 from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
-from tribodyn.hbm.wear import error_controlled_rule, machine_motion, thesis_rule
+from tribodyn.hbm.wear import dirk_stages, error_controlled_rule, machine_motion, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
 from tribodyn.hbm.wear.history import WearHistory, events
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
@@ -310,9 +310,9 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
 @pytest.mark.parametrize("steepness", [0.5, 1.0, 10.0, 30.0])
 def test_the_frequency_of_a_peak_is_found_where_its_distance_is_taken_for_far_too_large(steepness: float) -> None:
     """The frequencies that are tried stay beside the peak: further off there may be no solution."""
-    search, peak = error_controlled_rule.Search(error_controlled_rule.RULES.unknown_slope), 1.002
+    search, peak = dirk_stages.Search(dirk_stages.RULES.unknown_slope), 1.002
     tried = [1.0]
-    while abs(tried[-1] - peak) > 1e-5 and len(tried) <= error_controlled_rule.RULES.max_corrections:
+    while abs(tried[-1] - peak) > 1e-5 and len(tried) <= dirk_stages.RULES.max_corrections:
         tried.append(search.next(tried[-1], steepness * (peak - tried[-1])))
     assert abs(tried[-1] - peak) <= 1e-5
     assert max(tried) < peak + 0.002

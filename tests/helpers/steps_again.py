@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.wear.error_controlled_rule import Search, _stages, begun
+from tribodyn.hbm.wear.dirk_stages import Search, begun, stages
 from tribodyn.hbm.wear.evolution import assess, state_of
 
 EXACT = NewtonOptions(tolerance=1e-12)
@@ -31,7 +31,7 @@ def again(problem, worn, end, longer):
         stride = longer * row.cycles_in_step
         if len(row.plan):
             drift, slopes = begun(problem, state_of(problem, row), rows[:i], problem)
-            state = _stages(problem, state, stride, drift / longer, [Search(float(slope)) for slope in slopes])[1]
+            state = stages(problem, state, stride, drift / longer, [Search(float(slope)) for slope in slopes])[1]
         else:
             state = assess(problem, state.depth + stride * state.rate, state.cycles + stride, state)
         assert not state.failure

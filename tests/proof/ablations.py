@@ -41,8 +41,9 @@ RULES: dict[str, dict[str, Any]] = {
         "scan_misses": 0.0, "overtakes": 1.0, "near": NEVER, "reach": 1e9, "tried": 1,
     },
     "wear.error_controlled_rule.StepRules": {
-        "error_trend_power": 0.0, "unexpected": NEVER, "retreats": 0,
+        "error_trend_power": 0.0, "unexpected": NEVER,
     },
+    "wear.dirk_stages.StageRules": {"retreats": 0},
     "time.period_search.SearchRules": {"thrown_off": NEVER, "lost": NEVER, "progress": 1.0},
 }  # fmt: skip
 SCENES = {

@@ -3,7 +3,7 @@
 Every aim and every limit has a Gaussian process of its own, through its values and derivatives at the runs. Of several
 aims one is made by the Chebyshev function with weights: the largest weighted aim, each between its ends along the
 trade, is made small. Least t with all of these at most t, and all limits kept, is a problem of nonlinear programming;
-sequential quadratic programming solves it on the processes, from several starts.
+sequential quadratic programming solves it on the processes, from the best of 256 places.
 Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005.851274; a process for every aim:
     Daulton, Balandat and Bakshy 2020
 """
@@ -37,7 +37,6 @@ from tribodyn.workflows.studies.many.task import RUN
 from tribodyn.workflows.studies.study_result import StudyResult
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
-STARTS = 5  # of a search
 MISSED = 1e3  # what a limit that is passed counts beside the aims
 NEAR = 1e-3  # of the unit cube, within which a proposal is a run that is there already
 
@@ -295,10 +294,8 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
         places = np.vstack([share[known.front], qmc.Sobol(share.shape[1], seed=draw).random_base2(8)])
         aims, excess = expected(places)
         passed = np.maximum(excess, 0).max(axis=1, initial=0.0)
-        order = np.argsort(chebyshev(aims, weights, low, high) + MISSED * passed)
-        ended = [_descended(expected, place, weights, low, high) for place in places[order[:STARTS]]]
-    found = min(ended, key=lambda one: one[1])
-    at, value = found
+        best = int(np.argmin(chebyshev(aims, weights, low, high) + MISSED * passed))
+        at, value = _descended(expected, places[best], weights, low, high)
     if np.abs(share - at).max(axis=1).min() < NEAR:
         return (at, 0.0) if m == 1 else (_emptiest(share, draw), np.inf)
     return at, least - value if m == 1 else np.inf
