@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -189,6 +190,9 @@ def test_the_key_of_a_run_follows_its_files(tmp_path: Path) -> None:
 
 @pytest.mark.faults
 def test_a_process_that_dies_takes_no_other_run_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    forked = get_context("forkserver")  # spawned ones, as in `done`, import the program anew: six of them here
+    forked.set_forkserver_preload(["tests.helpers.dying"])
+    monkeypatch.setattr(pool, "get_context", lambda _: forked)
     good = Task(1, "none", "", (), tmp_path)
     tasks = [replace(good, number=n) for n in (1, 2, 3, 4)]
     rows = {row.run: row for row in pool.finished(tasks, 2, dying.at_two)}

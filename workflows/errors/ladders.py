@@ -19,7 +19,6 @@ TOPS = (1, 3, 5, 7, 9, 13)  # highest harmonic kept
 WORN_TOP = 5  # more harmonics take minutes to wear
 SAMPLES = (32, 64, 256)
 NEWTON = (1e-4, 1e-6, 1e-8)
-KRYLOV = (0.5, 0.1, 1e-6)
 CUTOFFS = (0.25, 0.5, 1, 2)  # over that of the scene
 RANKS = (3, 6, 12, 24)
 WEAR_TOLERANCES = (0.3, 0.1, 0.03, 0.01, 0.003)
@@ -126,7 +125,6 @@ def _of_any(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
             yield "interface_rank", [*_numbers("reduction.interface_modes", RANKS), whole]
     yield from _of_harmonics(scene)
     yield "newton", [Setting(1 / value, (f"solver.tolerance={value:g}",)) for value in NEWTON]
-    yield "krylov", [Setting(1 / value, (f"solver.krylov={value:g}",)) for value in KRYLOV]
     if scene.wears:
         rule = 'wear.rule="error_controlled"'
         yield "wear", [Setting(1 / t, (rule, f"wear.tolerance={t:g}")) for t in WEAR_TOLERANCES]

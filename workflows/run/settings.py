@@ -58,7 +58,7 @@ def highest_frequency(scene: Scene) -> float:
 
 def newton_options(scene: Scene) -> NewtonOptions:
     """How exactly every balance is solved."""
-    return NewtonOptions(tolerance=scene.solver.tolerance, krylov=scene.solver.krylov)
+    return NewtonOptions(tolerance=scene.solver.tolerance)
 
 
 def peak_of(scene: Scene) -> AtPeak:

@@ -313,7 +313,5 @@ class Solver(Table):
 
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
     """Newton's tolerance on the contact displacement, relative to its size."""
-    krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
-    """How exactly each Newton direction is solved, at the least."""
     threads: Annotated[StrictInt, Field(ge=1)] = 1
     """Threads of the linear algebra while the model is made; all that is solved takes one."""
