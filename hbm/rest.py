@@ -18,7 +18,6 @@ from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.threads import single
 
 EXACT = 1e-11  # relative residual of the state at rest
-OPENINGS = 4  # steps in which faces are opened that do not fit
 
 
 @single
@@ -38,13 +37,10 @@ def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None 
 
     solved = solve(still, still.stuck(still.omega_max))
     gap = balance.contact.gap
-    if not solved.converged and np.ptp(gap) > 0:  # far openings: from faces that fit, opened step by step
-        normal = balance.contact.components.index("n")
-        solved = solve(still.with_gap(np.zeros_like(gap)), still.stuck(still.omega_max))
-        for share in np.linspace(0, 1, OPENINGS + 1)[1:]:
-            start = solved.state.x.copy()
-            start[:, normal, 0] += gap / OPENINGS
-            solved = solve(still.with_gap(share * gap), start)
+    if not solved.converged and np.ptp(gap) > 0:  # far openings: from faces that fit, each opened by its gap
+        start = solve(still.with_gap(np.zeros_like(gap)), still.stuck(still.omega_max)).state.x.copy()
+        start[:, balance.contact.components.index("n"), 0] += gap
+        solved = solve(still, start)
     if not solved.converged:
         raise ValueError(f"preload: the contact does not settle without friction ({solved.outcome})")
     return solved.state.x[:, :, 0]
