@@ -27,7 +27,6 @@ class PeakRules:
     nearly: float = 0.9  # of the highest peak foreseen, from which on a peak may be the highest
     # errors of the heights foreseen, as the first peak has it, by which another must be lower to be left out
     sure: float = 3.0
-    too_high: float = 2.0  # height foreseen over that of the point in it, from which on it is not believed
     least_doubt: float = 5e-3  # of a height foreseen
     level: float = 3e-5  # of the height of a peak, by which a parabola may miss it
     closings: int = 5  # parabolas that are tried
@@ -56,7 +55,7 @@ def vertex(points: Sequence[Sample]) -> tuple[float, float]:
     bend, slope, least = np.polyfit(w, ratio**2, 2)
     at = float(np.clip(-0.5 * slope / bend, *sorted((w[0], w[2])))) if bend > 0 else 0.0
     level = least + slope * at + bend * at**2
-    if level < RULES.too_high**-2:  # no such resonance
+    if level <= 0:  # no such resonance
         return middle.omega, middle.height
     return middle.omega + unit * at, middle.height / float(np.sqrt(level))
 
