@@ -45,7 +45,7 @@ class MeanOptions:
         the mean that is asked for
     contact : of the contact's equations in a step
     passing : whether a motion that does not repeat itself, once it has settled, passes from place to place as soon as
-        its mean normal force is known so well: the scatter of its work averages out over them
+        its means are known as well as each of them asks
     """
 
     steps: int = 256
@@ -120,10 +120,17 @@ class Follower:
         n = 2 * stepper.n_dynamic
         self._motion = Moving(z[:n], x.reshape(pairs), f.reshape(pairs), s.reshape(memory), bits.astype(np.int64), p)
 
-    def mean(self, balance: HarmonicBalance, omega: float, see: Callable[[PeriodicMotion], np.ndarray]) -> MeanMotion:
+    def mean(
+        self,
+        balance: HarmonicBalance,
+        omega: float,
+        see: Callable[[PeriodicMotion], np.ndarray],
+        asked: float = np.inf,
+    ) -> MeanMotion:
         """Follow the motion to a place, until it is periodic or has settled.
 
         see : what to average besides, of one period
+        asked : standard error, relative, of the work and of the normal force of a motion that is passing
         Raises  IntegrationFailed
         """
         stepper = self._at(balance, omega)
@@ -134,7 +141,7 @@ class Follower:
                 one = time_integration.motion_of(stepper, found, spent, CONVERGED)
                 means = one.energy, _normal(balance, one), see(one), one.amplitude
                 return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
-        settled = self._settled(balance, stepper, see)
+        settled = self._settled(balance, stepper, see, asked)
         self._passing = settled.settled and self.options.passing
         self._regular = settled.settled and settled.spread <= self.options.accuracy and not self._passing
         return replace(settled, periods=settled.periods + spent)
@@ -169,7 +176,7 @@ class Follower:
         return None, search.periods + plain.periods
 
     def _settled(
-        self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray]
+        self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray], asked: float
     ) -> MeanMotion:
         """Means of a plain march, once two blocks of periods show one motion, or of one that is passing."""
         o, motion = self.options, self._motion
@@ -192,7 +199,8 @@ class Follower:
             if same and held:
                 first = len(work) - o.block  # in the block before more of the transient is left
             if self._passing:
-                known = held and _standard_error(np.array([row[1].sum() for row in rows])) <= o.accuracy
+                normal = np.array([row[1].sum() for row in rows])
+                known = held and max(_standard_error(np.array(work)), _standard_error(normal)) <= asked
             else:
                 known = first is not None and _standard_error(np.array(work[first:])) <= o.accuracy
             if known:

@@ -35,7 +35,7 @@ from tribodyn.hbm.wear.evolution import (
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.machine_motion import MachineMotion, with_growth
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
-from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth, local_error
+from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, expected, growth, local_error, mean_error
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def evolve(
         before = replace(state_of(problem, again), solves=0, growth=again.growth, preload_at_rest=again.preload_at_rest)
         if machine is not None:
             machine.take_up(again)
-            before = machine.of(before)
+            before = machine.of(before, _asked(tolerance, before, rows))
         state = _taken(problem, machine, tolerance, before, rows).after
         rows.append(again)
     else:
@@ -113,7 +113,7 @@ def evolve(
         if motion == "machine" or (watched and motion == "balance"):
             state = with_growth(problem, state, always=machine is not None)
         if machine is not None:
-            state = machine.of(state)
+            state = machine.of(state, _asked(tolerance, state, rows))
         first = (first_preload(problem, rows, state), first_at_rest(rows, state))
         reason = reason_to_stop(problem, state, *first, rows, tolerance.share * tolerance.scale)
         if reason:
@@ -182,6 +182,12 @@ def _taken(
         return _Taken(row, None, WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
 
 
+def _asked(tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> float:
+    """Standard error that the step planned from a state asks of its means."""
+    planned = float(rows[-1].plan[0]) if rows else 0.0
+    return mean_error(tolerance, planned, state.cycles, state.depth) if planned > 0 else np.inf
+
+
 def _step_in_time(
     problem: WearProblem, machine: MachineMotion, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]
 ) -> _Taken:
@@ -198,10 +204,12 @@ def _step_in_time(
         there = replace(state, depth=machine.ahead(state, stride), cycles=state.cycles + stride, solves=0)
         if not given:
             there = assess(problem, there.depth, there.cycles, state)
-        there, worn, deviation = machine.step(state, there, stride)
+        asked = mean_error(tolerance, stride, there.cycles, there.depth)
+        there, worn, deviation = machine.step(state, there, stride, asked)
         solves += there.solves
         periods += there.means.periods if there.means else 0
-        error = local_error(tolerance, problem.area, deviation, there.rate, stride, state.cycles + stride)
+        life = float(expected(tolerance, state.cycles + stride, state.depth + worn))
+        error = local_error(tolerance, problem.area, deviation, there.rate, stride, life)
         preload = problem.preload_of(there)
         if error <= 1.0 and preload < RULES.event_window[0] * target:
             stride, target = stride * _share_to(target, problem.preload_of(state), preload), 0.0

@@ -117,8 +117,11 @@ class MachineMotion:
         for follower, balance, part in zip(self._followers, balances, np.split(row.moving, len(balances)), strict=True):
             follower.take_up(balance, part)
 
-    def of(self, state: WearState) -> WearState:
-        """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own."""
+    def of(self, state: WearState, asked: float) -> WearState:
+        """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own.
+
+        asked : standard error of its means, see `Follower.mean`
+        """
         if not self._serves or state.failure or not (self.always or state.growth > 0):
             self._followers, self._moving = [], np.zeros(0)
             return state
@@ -126,7 +129,7 @@ class MachineMotion:
         if not self._followers and not self._begins(state):
             return state
         try:
-            found = self._along(state, [point.state.omega for point in state.points])
+            found = self._along(state, [point.state.omega for point in state.points], asked)
         except IntegrationFailed as failure:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
         assert found.means is not None
@@ -136,14 +139,16 @@ class MachineMotion:
             return state  # the motion has come back to that of the balance
         return found
 
-    def step(self, state: WearState, there: WearState, stride: float) -> tuple[WearState, np.ndarray, np.ndarray]:
-        """A step from a state, with the balance at the depth that `ahead` foresees.
+    def step(
+        self, state: WearState, there: WearState, stride: float, asked: float
+    ) -> tuple[WearState, np.ndarray, np.ndarray]:
+        """A step from a state, with the balance at the depth that `ahead` foresees; asked as for `of`.
 
         Returns the state there with its rates, the depth that wears (n_pair,) and its deviation from a step of first
         order [m]
         """
         near = state if there.failure else there
-        there = self._along(there, [point.state.omega for point in near.points])
+        there = self._along(there, [point.state.omega for point in near.points], asked)
         matrix, k1 = self._ahead(state, stride)
         k2 = np.linalg.solve(matrix, there.rate - 2 * k1)
         return there, np.maximum(stride * (1.5 * k1 + 0.5 * k2), 0.0), 0.5 * stride * (k1 + k2)
@@ -166,7 +171,7 @@ class MachineMotion:
             self._followers, self._serves = [], False
         return self._serves
 
-    def _along(self, state: WearState, omegas: Sequence[float]) -> WearState:
+    def _along(self, state: WearState, omegas: Sequence[float], asked: float) -> WearState:
         problem, depth, cycles = self._problem, state.depth, state.cycles
         found: list[MeanMotion] = []
         for follower, duty, omega in zip(self._followers, problem.mission, omegas, strict=True):
@@ -175,7 +180,7 @@ class MachineMotion:
             def wears(motion: PeriodicMotion, balance: HarmonicBalance = balance) -> np.ndarray:
                 return _depth_rate(problem, balance, motion, depth, cycles)
 
-            found.append(follower.mean(balance, omega, wears))
+            found.append(follower.mean(balance, omega, wears, asked))
         shares = [duty.share for duty in problem.mission]
         rate, work = (
             np.sum([s * part for s, part in zip(shares, parts, strict=True)], axis=0)
