@@ -44,8 +44,6 @@ class MeanOptions:
     accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
         the mean that is asked for
     contact : of the contact's equations in a step
-    passing : whether a motion that does not repeat itself, once it has settled, passes from place to place as soon as
-        its means are known as well as each of them asks
     """
 
     steps: int = 256
@@ -54,7 +52,6 @@ class MeanOptions:
     search: int = 60
     accuracy: float = 5e-3
     contact: float = 1e-7
-    passing: bool = False
 
 
 @dataclass(frozen=True)
@@ -125,12 +122,13 @@ class Follower:
         balance: HarmonicBalance,
         omega: float,
         see: Callable[[PeriodicMotion], np.ndarray],
-        asked: float = np.inf,
+        asked: float | None = None,
     ) -> MeanMotion:
         """Follow the motion to a place, until it is periodic or has settled.
 
         see : what to average besides, of one period
-        asked : standard error, relative, of the work and of the normal force of a motion that is passing
+        asked : standard error, relative, of the work and of the normal force as soon as which a motion that does not
+            repeat itself, and has settled once, passes to the next place; None: it settles at every place
         Raises  IntegrationFailed
         """
         stepper = self._at(balance, omega)
@@ -141,8 +139,8 @@ class Follower:
                 one = time_integration.motion_of(stepper, found, spent, CONVERGED)
                 means = one.energy, _normal(balance, one), see(one), one.amplitude
                 return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
-        settled = self._settled(balance, stepper, see, asked)
-        self._passing = settled.settled and self.options.passing
+        settled = self._settled(stepper, see, asked)
+        self._passing = settled.settled and asked is not None
         self._regular = settled.settled and settled.spread <= self.options.accuracy and not self._passing
         return replace(settled, periods=settled.periods + spent)
 
@@ -176,7 +174,7 @@ class Follower:
         return None, search.periods + plain.periods
 
     def _settled(
-        self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray], asked: float
+        self, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray], asked: float | None
     ) -> MeanMotion:
         """Means of a plain march, once two blocks of periods show one motion, or of one that is passing."""
         o, motion = self.options, self._motion
@@ -193,12 +191,12 @@ class Follower:
                 motion = found.end
                 work.append(float(one.energy.sum()))
                 off.append(one.off)
-                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
+                rows.append((one.energy, _normal(stepper.balance, one), see(one), one.amplitude))
             same = block > 1 and first is None and self._same(np.array(work[-2 * o.block :]))
             held = self._held(stepper, np.array(off[-o.block :]))
             if same and held:
                 first = len(work) - o.block  # in the block before more of the transient is left
-            if self._passing:
+            if asked is not None and self._passing:
                 normal = np.array([row[1].sum() for row in rows])
                 known = held and max(_standard_error(np.array(work)), _standard_error(normal)) <= asked
             else:

@@ -35,7 +35,7 @@ from tribodyn.hbm.wear.evolution import (
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.machine_motion import MachineMotion, with_growth
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
-from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, expected, growth, local_error, mean_error
+from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, expected, growth, local_error
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def evolve(
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
     problem = replace(problem, lost_below=max(problem.lost_below, RULES.least_preload_share))
-    machine = None if motion == "balance" else MachineMotion(problem, always=motion == "time")
+    machine = None if motion == "balance" else MachineMotion(problem, tolerance, motion == "time")
     rows = rows_to_resume(resume)
     state: WearState | None
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
@@ -101,7 +101,7 @@ def evolve(
         before = replace(state_of(problem, again), solves=0, growth=again.growth, preload_at_rest=again.preload_at_rest)
         if machine is not None:
             machine.take_up(again)
-            before = machine.of(before, _asked(tolerance, before, rows))
+            before = machine.of(before, _planned(rows))
         state = _taken(problem, machine, tolerance, before, rows).after
         rows.append(again)
     else:
@@ -113,7 +113,7 @@ def evolve(
         if motion == "machine" or (watched and motion == "balance"):
             state = with_growth(problem, state, always=machine is not None)
         if machine is not None:
-            state = machine.of(state, _asked(tolerance, state, rows))
+            state = machine.of(state, _planned(rows))
         first = (first_preload(problem, rows, state), first_at_rest(rows, state))
         reason = reason_to_stop(problem, state, *first, rows, tolerance.share * tolerance.scale)
         if reason:
@@ -182,10 +182,9 @@ def _taken(
         return _Taken(row, None, WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
 
 
-def _asked(tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> float:
-    """Standard error that the step planned from a state asks of its means."""
-    planned = float(rows[-1].plan[0]) if rows else 0.0
-    return mean_error(tolerance, planned, state.cycles, state.depth) if planned > 0 else np.inf
+def _planned(rows: Sequence[WearRow]) -> float:
+    """Cycles of the step that the last one has led to expect, 0 where it has not."""
+    return float(rows[-1].plan[0]) if rows else 0.0
 
 
 def _step_in_time(
@@ -193,7 +192,7 @@ def _step_in_time(
 ) -> _Taken:
     """A step along the machine's motion; where another peak overtakes, it ends there."""
     unit = tolerance.share * tolerance.scale / float(state.rate.max())
-    stride = float(rows[-1].plan[0]) if rows and rows[-1].plan[0] > 0 else RULES.first_in_time * unit
+    stride = _planned(rows) or RULES.first_in_time * unit
     stride = min(stride, _until_lost_at_rest(problem, state, rows))
     solves, means = state.solves, state.means
     assert means is not None
@@ -204,8 +203,7 @@ def _step_in_time(
         there = replace(state, depth=machine.ahead(state, stride), cycles=state.cycles + stride, solves=0)
         if not given:
             there = assess(problem, there.depth, there.cycles, state)
-        asked = mean_error(tolerance, stride, there.cycles, there.depth)
-        there, worn, deviation = machine.step(state, there, stride, asked)
+        there, worn, deviation = machine.step(state, there, stride)
         solves += there.solves
         periods += there.means.periods if there.means else 0
         life = float(expected(tolerance, state.cycles + stride, state.depth + worn))
@@ -272,9 +270,7 @@ def _step_of(
     last = fewer_harmonics.with_fewer(problem) is None
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
     shortest = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
-    stride = 10 * shortest
-    if rows and rows[-1].plan[0] > 0:
-        stride = float(rows[-1].plan[0])
+    stride = _planned(rows) or 10 * shortest
     drift, slopes = begun(problem, state, rows, whole)
     stride = min(stride, _until_lost_at_rest(whole, state, rows))
     target = _event(problem, state, rows)

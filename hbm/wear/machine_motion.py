@@ -29,6 +29,7 @@ from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
 from tribodyn.hbm.wear.history import WearHistory, WearRow
+from tribodyn.hbm.wear.step_control import Tolerance, expected
 
 GAMMA = 1 - 1 / np.sqrt(2)
 # Unknowns of a balance, of all sectors of a wave, up to which all states are looked at: Hill's method takes less than a
@@ -86,15 +87,15 @@ class MotionExposure(wear_law.Exposure):
 class MachineMotion:
     """The motions of all duties, each followed while the contact wears and the balance's own motion is left.
 
-    always : whether they are followed where the balance's own is kept, too
+    tolerance : of the steps; always : whether they are followed where the balance's own is kept, too
     Raises  ValueError where they are to be followed always and cannot be
     """
 
-    def __init__(self, problem: WearProblem, always: bool = False):
-        self._problem, self.always = problem, always
+    def __init__(self, problem: WearProblem, tolerance: Tolerance, always: bool = False):
+        self._problem, self._tolerance, self.always = problem, tolerance, always
         self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy)
         if always:
-            self._options = replace(self._options, contact=RULES.contact, passing=True)
+            self._options = replace(self._options, contact=RULES.contact)
         self._followers: list[Follower] = []
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
         self._serves = fits and not wave_in_time.is_wave(problem.balance)
@@ -117,10 +118,10 @@ class MachineMotion:
         for follower, balance, part in zip(self._followers, balances, np.split(row.moving, len(balances)), strict=True):
             follower.take_up(balance, part)
 
-    def of(self, state: WearState, asked: float) -> WearState:
+    def of(self, state: WearState, planned: float) -> WearState:
         """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own.
 
-        asked : standard error of its means, see `Follower.mean`
+        planned : cycles of the step from it, 0 where that is not known
         """
         if not self._serves or state.failure or not (self.always or state.growth > 0):
             self._followers, self._moving = [], np.zeros(0)
@@ -129,7 +130,7 @@ class MachineMotion:
         if not self._followers and not self._begins(state):
             return state
         try:
-            found = self._along(state, [point.state.omega for point in state.points], asked)
+            found = self._along(state, [point.state.omega for point in state.points], planned)
         except IntegrationFailed as failure:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
         assert found.means is not None
@@ -139,16 +140,14 @@ class MachineMotion:
             return state  # the motion has come back to that of the balance
         return found
 
-    def step(
-        self, state: WearState, there: WearState, stride: float, asked: float
-    ) -> tuple[WearState, np.ndarray, np.ndarray]:
-        """A step from a state, with the balance at the depth that `ahead` foresees; asked as for `of`.
+    def step(self, state: WearState, there: WearState, stride: float) -> tuple[WearState, np.ndarray, np.ndarray]:
+        """A step from a state, with the balance at the depth that `ahead` foresees.
 
         Returns the state there with its rates, the depth that wears (n_pair,) and its deviation from a step of first
         order [m]
         """
         near = state if there.failure else there
-        there = self._along(there, [point.state.omega for point in near.points], asked)
+        there = self._along(there, [point.state.omega for point in near.points], stride)
         matrix, k1 = self._ahead(state, stride)
         k2 = np.linalg.solve(matrix, there.rate - 2 * k1)
         return there, np.maximum(stride * (1.5 * k1 + 0.5 * k2), 0.0), 0.5 * stride * (k1 + k2)
@@ -171,8 +170,14 @@ class MachineMotion:
             self._followers, self._serves = [], False
         return self._serves
 
-    def _along(self, state: WearState, omegas: Sequence[float], asked: float) -> WearState:
+    def _along(self, state: WearState, omegas: Sequence[float], stride: float) -> WearState:
+        """The means asked put the life off by the tolerance, over so many cycles that stand for a state."""
         problem, depth, cycles = self._problem, state.depth, state.cycles
+        asked = None
+        if self.always:
+            asked = (
+                self._tolerance.share * float(expected(self._tolerance, cycles, depth)) / stride if stride else np.inf
+            )
         found: list[MeanMotion] = []
         for follower, duty, omega in zip(self._followers, problem.mission, omegas, strict=True):
             balance = problem.in_duty(duty, depth)

@@ -45,14 +45,6 @@ def expected(tolerance: Tolerance, cycles: float | np.ndarray, depth: np.ndarray
     return np.asarray(cycles / np.minimum(depth.max(axis=-1) / tolerance.scale, 1.0))
 
 
-def mean_error(tolerance: Tolerance, stride: float, cycles: float, depth: np.ndarray) -> float:
-    """Standard error, relative, that is asked of the means of a step: it puts the life off by the tolerance at most.
-
-    stride : cycles of the step; cycles, depth : passed, as for `expected`
-    """
-    return tolerance.share * float(expected(tolerance, cycles, depth)) / stride
-
-
 def growth(error: float) -> float:
     """Ratio of the next step to this one by the second order of the error, with a margin."""
     return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *STEP_RATIO_LIMITS))

@@ -194,9 +194,8 @@ def _estimates(file: SceneFile, model: Model, table: Table, result: Result, opti
         table.rows.append(Change(Refinement.SAMPLES, name, None, None, error, "estimate: located transitions"))
     wear = file.scene.wear
     if wear is not None and result.wear is not None and result.wear_steps:
-        scale = result.facts.delta_max_m
-        controlled = wear.rule == "error_controlled" and scale is not None
-        found = step_error(result.wear, Tolerance(wear.tolerance, scale) if controlled else None)
+        told = Tolerance(wear.tolerance, result.facts.delta_max_m or 0.0)  # known where steps are error-controlled
+        found = step_error(result.wear, told if wear.rule == "error_controlled" else None)
         for name, one in (("depth", found.depth), ("life", found.cycles)):
             table.rows.append(Change(Refinement.WEAR_STEPS, name, None, None, float(one), "estimate of the wear rule"))
         if result.wear.in_time.any():  # scatter puts cycles off, not the depth of a contact worn through
