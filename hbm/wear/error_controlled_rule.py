@@ -194,9 +194,7 @@ def _step_in_time(
     unit = tolerance.share * tolerance.scale / float(state.rate.max())
     stride = _planned(rows) or RULES.first_in_time * unit
     stride = min(stride, _until_lost_at_rest(problem, state, rows))
-    solves, means = state.solves, state.means
-    assert means is not None
-    periods = means.periods
+    solves, periods = state.solves, state.means.periods if state.means else 0
     target = _event(problem, state, rows)
     given = all(isinstance(duty.site, AtFrequency) for duty in problem.mission)  # no peak moves with the depth
     while True:
@@ -215,7 +213,7 @@ def _step_in_time(
         if error <= 1.0 or stride <= RULES.shortest_in_time * unit:
             break
         stride = max(stride * growth(error), RULES.shortest_in_time * unit)
-    slopes, look = np.full(len(state.points), OF_STAGES.unknown_slope), _next_look(problem, state, rows)
+    look = _next_look(problem, state, rows)
     # where rates scatter a small error may be chance: two in turn are believed
     stride_after = stride * growth(max(error, rows[-1].step_error) if rows else error)
     after_at = state.depth + worn, state.cycles + stride
@@ -227,8 +225,7 @@ def _step_in_time(
         look = _look_after(found, _share_left(problem, after, rows, state))
         if found.points is not None:
             after, stride_after = worn_state(problem, after.depth, after.cycles, found.points, 0), 0.0
-            slopes = np.zeros_like(slopes)
-    plan = np.array([stride_after, *slopes, look])
+    plan = np.array([stride_after, *np.full(len(state.points), OF_STAGES.unknown_slope), look])
     work = stride * 0.5 * (state.work + there.work)
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(replace(row, periods=periods), replace(after, solves=0))

@@ -13,7 +13,6 @@ Source  ROS2: Verwer, Spee, Blom and Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -58,28 +57,25 @@ class MotionRules:
 RULES = MotionRules()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MotionExposure(wear_law.Exposure):
     """One period of a motion in time as a wear law sees it; `state` is the part of it in the balance's harmonics."""
 
-    motion: PeriodicMotion | None = None
+    motion: PeriodicMotion
 
     @cached_property
     def energy(self) -> np.ndarray:
         """(n_pair,) friction work over the period [J]."""
-        assert self.motion is not None
         return np.maximum(self.motion.energy[self.joint.rows], 0.0)
 
     @property
     def status(self) -> np.ndarray:
         """(n_pair,) bits of what happened in the period."""
-        assert self.motion is not None
         return self.motion.status[self.joint.rows]
 
     @cached_property
     def history(self) -> tuple[np.ndarray, np.ndarray]:
         """Displacement [m] and contact force [N], both (n_pair, n_component, n_step)."""
-        assert self.motion is not None
         at = np.ix_(self.joint.rows, self.balance.contact.columns(self.joint))
         return self.motion.x[at], self.motion.force[at]
 
@@ -130,7 +126,7 @@ class MachineMotion:
         if not self._followers and not self._begins(state):
             return state
         try:
-            found = self._along(state, [point.state.omega for point in state.points], planned)
+            found = self._along(state, state, planned)
         except IntegrationFailed as failure:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
         assert found.means is not None
@@ -146,8 +142,7 @@ class MachineMotion:
         Returns the state there with its rates, the depth that wears (n_pair,) and its deviation from a step of first
         order [m]
         """
-        near = state if there.failure else there
-        there = self._along(there, [point.state.omega for point in near.points], stride)
+        there = self._along(there, state if there.failure else there, stride)
         matrix, k1 = self._ahead(state, stride)
         k2 = np.linalg.solve(matrix, there.rate - 2 * k1)
         return there, np.maximum(stride * (1.5 * k1 + 0.5 * k2), 0.0), 0.5 * stride * (k1 + k2)
@@ -170,8 +165,11 @@ class MachineMotion:
             self._followers, self._serves = [], False
         return self._serves
 
-    def _along(self, state: WearState, omegas: Sequence[float], stride: float) -> WearState:
-        """The means asked put the life off by the tolerance, over so many cycles that stand for a state."""
+    def _along(self, state: WearState, near: WearState, stride: float) -> WearState:
+        """The state with its means at the frequencies of one near by, whose errors put a life off by the tolerance.
+
+        stride : cycles that the means stand for, 0 where that is not known
+        """
         problem, depth, cycles = self._problem, state.depth, state.cycles
         asked = None
         if self.always:
@@ -179,13 +177,13 @@ class MachineMotion:
                 self._tolerance.share * float(expected(self._tolerance, cycles, depth)) / stride if stride else np.inf
             )
         found: list[MeanMotion] = []
-        for follower, duty, omega in zip(self._followers, problem.mission, omegas, strict=True):
+        for follower, duty, point in zip(self._followers, problem.mission, near.points, strict=True):
             balance = problem.in_duty(duty, depth)
 
             def wears(motion: PeriodicMotion, balance: HarmonicBalance = balance) -> np.ndarray:
                 return _depth_rate(problem, balance, motion, depth, cycles)
 
-            found.append(follower.mean(balance, omega, wears, asked))
+            found.append(follower.mean(balance, point.state.omega, wears, asked))
         shares = [duty.share for duty in problem.mission]
         rate, work = (
             np.sum([s * part for s, part in zip(shares, parts, strict=True)], axis=0)
@@ -212,12 +210,10 @@ class MachineMotion:
         force = here.means.normal_force
         touches = force > 0
         fall = np.zeros((len(force), len(force)))
-        if not touches.any():
-            return fall
-        stiffness = self._stiffness[np.ix_(touches, touches)]
+        stiffness, coupled, rest = (
+            self._stiffness[np.ix_(*of)] for of in ((touches, touches), (touches, ~touches), (~touches, ~touches))
+        )
         if not touches.all():
-            coupled = self._stiffness[np.ix_(touches, ~touches)]
-            rest = self._stiffness[np.ix_(~touches, ~touches)]
             stiffness = stiffness - coupled @ np.linalg.lstsq(rest, coupled.T, rcond=None)[0]
         fall[np.ix_(touches, touches)] = (here.rate[touches] / force[touches])[:, None] * stiffness
         return fall
@@ -283,7 +279,7 @@ def _depth_rate(
     for name, wear in problem.wearing.items():
         pairs = balance.contact.joint(name).rows
         of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
-        exposure = MotionExposure(balance, state, *of_joint, cycles, name, motion)
+        exposure = MotionExposure(balance, state, *of_joint, cycles, name, motion=motion)
         rate[pairs] = wear_law.depth_rate(wear.law, exposure)
     return rate
 

@@ -130,8 +130,8 @@ def test_a_law_by_slip_path_sees_a_motion_as_it_sees_a_balance(problem: WearProb
     motion = time_integration.integrate(balance, 420.0, state, Options(256))
     archard = JointWear.of("archard", coefficient=1e-9)
     rates = []
-    for exposure, own in ((wear_law.Exposure, ()), (MotionExposure, (motion,))):
-        seen = exposure(balance, state, problem.area, archard.numbers, np.zeros(N_PAIR), 0.0, "contact", *own)
+    for exposure, own in ((wear_law.Exposure, {}), (MotionExposure, {"motion": motion})):
+        seen = exposure(balance, state, problem.area, archard.numbers, np.zeros(N_PAIR), 0.0, "contact", **own)
         rates.append(wear_law.depth_rate("archard", seen))
     np.testing.assert_allclose(*rates, rtol=0.02)
 
@@ -180,10 +180,10 @@ def test_a_motion_that_takes_two_periods_is_told() -> None:
 
 def test_a_motion_that_passes_needs_no_more_periods_than_its_normal_force() -> None:
     flips = three_pairs(friction=0.05, static=30.0, shaker=60.0, top=7)
-    follower = Follower(MeanOptions(128, accuracy=0.02, passing=True))
+    follower = Follower(MeanOptions(128, accuracy=0.02))
     follower.start(flips, newton.solve_from_rest(flips, FLIPS_AT).state)
     settled, passed = (follower.mean(flips, FLIPS_AT, lambda motion: motion.energy) for _ in range(2))
-    again = Follower(MeanOptions(128, accuracy=0.02, passing=True))
+    again = Follower(MeanOptions(128, accuracy=0.02))
     again.take_up(flips, follower.kept())
     assert settled.periods > 2 * passed.periods == 2 * follower.options.block
     assert passed.energy.sum() == pytest.approx(settled.energy.sum(), rel=0.02)
