@@ -166,10 +166,7 @@ class MachineMotion:
         return self._serves
 
     def _along(self, state: WearState, near: WearState, stride: float) -> WearState:
-        """The state with its means at the frequencies of one near by, whose errors put a life off by the tolerance.
-
-        stride : cycles that the means stand for, 0 where that is not known
-        """
+        """The state with its means at the frequencies of `near`, as exact as `stride` cycles with them ask for."""
         problem, depth, cycles = self._problem, state.depth, state.cycles
         asked = None
         if self.always:

@@ -37,10 +37,9 @@ def local_error(
 
 
 def expected(tolerance: Tolerance, cycles: float | np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """Cycles of a whole life, at the mean rate so far, of which the wear has come to depths (..., n_pair) [m].
+    """Cycles of a whole life that has come to depths (..., n_pair) [m] after `cycles`, at the mean rate so far.
 
     At a depth of the scale a contact is lost, or nearly so; as wear fades most lives are longer.
-    cycles : (...) passed
     """
     return np.asarray(cycles / np.minimum(depth.max(axis=-1) / tolerance.scale, 1.0))
 
