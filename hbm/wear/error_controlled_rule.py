@@ -202,10 +202,12 @@ def _step_in_time(
         if not given:
             there = assess(problem, there.depth, there.cycles, state)
         there, worn, deviation = machine.step(state, there, stride)
-        solves += there.solves
-        periods += there.means.periods if there.means else 0
+        assert state.means is not None
+        assert there.means is not None
+        solves, periods = solves + there.solves, periods + there.means.periods
         life = float(expected(tolerance, state.cycles + stride, state.depth + worn))
-        error = local_error(tolerance, problem.area, deviation, there.rate, stride, life)
+        chance = 0.5 * stride * float(np.hypot(state.means.error, there.means.error)) / (tolerance.share * life)
+        error = max(chance, local_error(tolerance, problem.area, deviation, there.rate, stride, life))
         preload = problem.preload_of(there)
         if error <= 1.0 and preload < RULES.event_window[0] * target:
             stride, target = stride * _share_to(target, problem.preload_of(state), preload), 0.0
@@ -214,8 +216,7 @@ def _step_in_time(
             break
         stride = max(stride * growth(error), RULES.shortest_in_time * unit)
     look = _next_look(problem, state, rows)
-    # where rates scatter a small error may be chance: two in turn are believed
-    stride_after = stride * growth(max(error, rows[-1].step_error) if rows else error)
+    stride_after = stride * growth(error)
     after_at = state.depth + worn, state.cycles + stride
     after = kept_beside(problem, state, *after_at) if given and machine.always else assess(problem, *after_at, state)
     solves += after.solves

@@ -89,9 +89,8 @@ class MachineMotion:
 
     def __init__(self, problem: WearProblem, tolerance: Tolerance, always: bool = False):
         self._problem, self._tolerance, self.always = problem, tolerance, always
-        self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy)
-        if always:
-            self._options = replace(self._options, contact=RULES.contact)
+        contact = RULES.contact if always else MeanOptions.contact
+        self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy, contact=contact)
         self._followers: list[Follower] = []
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
         self._serves = fits and not wave_in_time.is_wave(problem.balance)

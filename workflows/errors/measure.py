@@ -194,7 +194,7 @@ def _estimates(file: SceneFile, model: Model, table: Table, result: Result, opti
         table.rows.append(Change(Refinement.SAMPLES, name, None, None, error, "estimate: located transitions"))
     wear = file.scene.wear
     if wear is not None and result.wear is not None and result.wear_steps:
-        told = Tolerance(wear.tolerance, result.facts.delta_max_m or 0.0)  # known where steps are error-controlled
+        told = Tolerance(wear.tolerance, result.facts.delta_max_m or np.nan)  # known where steps are error-controlled
         found = step_error(result.wear, told if wear.rule == "error_controlled" else None)
         for name, one in (("depth", found.depth), ("life", found.cycles)):
             table.rows.append(Change(Refinement.WEAR_STEPS, name, None, None, float(one), "estimate of the wear rule"))
