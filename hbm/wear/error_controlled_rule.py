@@ -194,7 +194,8 @@ def _step_in_time(
     unit = tolerance.share * tolerance.scale / float(state.rate.max())
     stride = _planned(rows) or RULES.first_in_time * unit
     stride = min(stride, _until_lost_at_rest(problem, state, rows))
-    solves, periods = state.solves, state.means.periods if state.means else 0
+    assert state.means is not None
+    solves, periods = state.solves, state.means.periods
     target = _event(problem, state, rows)
     given = all(isinstance(duty.site, AtFrequency) for duty in problem.mission)  # no peak moves with the depth
     while True:
@@ -202,11 +203,11 @@ def _step_in_time(
         if not given:
             there = assess(problem, there.depth, there.cycles, state)
         there, worn, deviation = machine.step(state, there, stride)
-        assert state.means is not None
         assert there.means is not None
         solves, periods = solves + there.solves, periods + there.means.periods
         life = float(expected(tolerance, state.cycles + stride, state.depth + worn))
         chance = 0.5 * stride * float(np.hypot(state.means.error, there.means.error)) / (tolerance.share * life)
+        # rates that scatter may agree by chance
         error = max(chance, local_error(tolerance, problem.area, deviation, there.rate, stride, life))
         preload = problem.preload_of(there)
         if error <= 1.0 and preload < RULES.event_window[0] * target:

@@ -167,11 +167,8 @@ class MachineMotion:
     def _along(self, state: WearState, near: WearState, stride: float) -> WearState:
         """The state with its means at the frequencies of `near`, as exact as `stride` cycles with them ask for."""
         problem, depth, cycles = self._problem, state.depth, state.cycles
-        asked = None
-        if self.always:
-            asked = (
-                self._tolerance.share * float(expected(self._tolerance, cycles, depth)) / stride if stride else np.inf
-            )
+        life = float(expected(self._tolerance, cycles, depth)) if stride else np.inf
+        asked = self._tolerance.share * life / (stride or 1.0) if self.always else None
         found: list[MeanMotion] = []
         for follower, duty, point in zip(self._followers, problem.mission, near.points, strict=True):
             balance = problem.in_duty(duty, depth)
