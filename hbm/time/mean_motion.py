@@ -15,7 +15,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration, wave_in_time
-from tribodyn.hbm.time.period_search import Period, PeriodSearch
+from tribodyn.hbm.time.period_search import PeriodSearch
 from tribodyn.hbm.time.push import push
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion
@@ -44,8 +44,6 @@ class MeanOptions:
     accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
         the mean that is asked for
     contact : of the contact's equations in a step
-    passing : whether a motion that does not repeat itself, once it has settled, passes from place to place as soon as
-        its mean normal force is known so well: the scatter of its work averages out over them
     """
 
     steps: int = 256
@@ -54,7 +52,6 @@ class MeanOptions:
     search: int = 60
     accuracy: float = 5e-3
     contact: float = 1e-7
-    passing: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,22 +117,29 @@ class Follower:
         n = 2 * stepper.n_dynamic
         self._motion = Moving(z[:n], x.reshape(pairs), f.reshape(pairs), s.reshape(memory), bits.astype(np.int64), p)
 
-    def mean(self, balance: HarmonicBalance, omega: float, see: Callable[[PeriodicMotion], np.ndarray]) -> MeanMotion:
+    def mean(
+        self,
+        balance: HarmonicBalance,
+        omega: float,
+        see: Callable[[PeriodicMotion], np.ndarray],
+        asked: float | None = None,
+    ) -> MeanMotion:
         """Follow the motion to a place, until it is periodic or has settled.
 
         see : what to average besides, of one period
+        asked : standard error, relative, of the work and of the normal force as soon as which a motion that does not
+            repeat itself, and has settled once, passes to the next place; None: it settles at every place
         Raises  IntegrationFailed
         """
         stepper = self._at(balance, omega)
         spent = 0
         if self._regular:
-            found, spent = self._periodic(stepper)
-            if found is not None:
-                one = time_integration.motion_of(stepper, found, spent, CONVERGED)
-                means = one.energy, _normal(balance, one), see(one), one.amplitude
+            one, spent = self._periodic(stepper)
+            if one is not None:
+                means = one.energy, one.normal_force, see(one), one.amplitude
                 return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
-        settled = self._settled(balance, stepper, see)
-        self._passing = settled.settled and self.options.passing
+        settled = self._settled(stepper, see, asked)
+        self._passing = settled.settled and asked is not None
         self._regular = settled.settled and settled.spread <= self.options.accuracy and not self._passing
         return replace(settled, periods=settled.periods + spent)
 
@@ -143,13 +147,12 @@ class Follower:
         """Friction work [J] of a periodic motion beside that of a balance, if a push does not drive it away."""
         try:
             self.start(balance, state)
-            found, spent = self._periodic(stepper := self._at(balance, state.omega))
+            one, _ = self._periodic(self._at(balance, state.omega))
         except IntegrationFailed:
             return None
-        one = None if found is None else time_integration.motion_of(stepper, found, spent, CONVERGED)
         return None if one is None else float(one.energy.sum())
 
-    def _periodic(self, stepper: TimeStepper) -> tuple[Period | None, int]:
+    def _periodic(self, stepper: TimeStepper) -> tuple[PeriodicMotion | None, int]:
         """A periodic motion that a push does not drive away, and the periods marched; else the motion has left it."""
         o = self.options
         assert self._motion is not None
@@ -163,20 +166,20 @@ class Follower:
         self._motion = found.end
         plain = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
         pushed = push(plain, found, o.block)
+        spent = search.periods + plain.periods
         if not pushed.away:
-            return found, search.periods + plain.periods
+            return time_integration.motion_of(stepper, found, spent, CONVERGED), spent
         self._motion = pushed.motion
-        return None, search.periods + plain.periods
+        return None, spent
 
     def _settled(
-        self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray]
+        self, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray], asked: float | None
     ) -> MeanMotion:
         """Means of a plain march, once two blocks of periods show one motion, or of one that is passing."""
         o, motion = self.options, self._motion
         assert motion is not None
         search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
         rows: list[tuple[Any, ...]] = []
-        work: list[float] = []
         off: list[np.ndarray] = []
         first: int | None = 0 if self._passing else None
         for block in range(1, o.most_blocks + 1):
@@ -184,22 +187,22 @@ class Follower:
                 found = search.step(motion)
                 one = time_integration.motion_of(stepper, found, search.periods, CONVERGED, motion)
                 motion = found.end
-                work.append(float(one.energy.sum()))
                 off.append(one.off)
-                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
-            same = block > 1 and first is None and self._same(np.array(work[-2 * o.block :]))
+                rows.append((one.energy, one.normal_force, see(one), one.amplitude))
+            work, normal = np.array([(row[0].sum(), row[1].sum()) for row in rows]).T
+            same = block > 1 and first is None and self._same(work[-2 * o.block :])
             held = self._held(stepper, np.array(off[-o.block :]))
             if same and held:
                 first = len(work) - o.block  # in the block before more of the transient is left
-            if self._passing:
-                known = held and _standard_error(np.array([row[1].sum() for row in rows])) <= o.accuracy
+            if asked is not None and self._passing:
+                known = held and max(_standard_error(work), _standard_error(normal)) <= asked
             else:
-                known = first is not None and _standard_error(np.array(work[first:])) <= o.accuracy
+                known = first is not None and _standard_error(work[first:]) <= o.accuracy
             if known:
                 break
         self._motion = motion
         kept = slice(len(rows) // 2 if first is None else first, None)
-        late = np.array(work[kept])
+        late = work[kept]
         energy, normal, seen, amplitude = (np.mean(column, axis=0) for column in zip(*rows[kept], strict=True))
         whole, error = float(late.mean()), _standard_error(late)
         spread = float(late.std() / whole) if whole > 0 else 0.0
@@ -233,14 +236,6 @@ class Follower:
             self._motion = _carried(self._motion, before, stepper)
         self._stepper = stepper
         return stepper
-
-
-def _normal(balance: HarmonicBalance, motion: PeriodicMotion) -> np.ndarray:
-    components = balance.contact.components
-    if "n" not in components:
-        return np.zeros(balance.contact.n_pair)
-    normal: np.ndarray = motion.force[:, components.index("n")].mean(axis=1)
-    return normal
 
 
 def _standard_error(work: np.ndarray) -> float:

@@ -36,7 +36,7 @@ RULES = SearchRules()
 
 @dataclass(frozen=True)
 class Period:
-    """A period that was marched: state vectors before and after it, what moves after it, its record and cost.
+    """A period that was marched: state vectors before and after it, what moves after it, its record.
 
     size : of the vibration, as the root of an energy like the length of a state vector
     drift : change of the state over the period, relative to that
@@ -46,7 +46,6 @@ class Period:
     image: np.ndarray
     end: Moving
     record: Record
-    rounds: int
     size: float
     drift: float
 
@@ -133,7 +132,7 @@ class PeriodSearch:
         """
         if self.periods >= self.options.max_periods or self.periods - self._best_at >= patience:
             raise GivenUp
-        end, record, rounds, speed = self.stepper.period(motion, self.with_slopes)
+        end, record, _, speed = self.stepper.period(motion, self.with_slopes)
         if self.options.accelerate:
             end = end._replace(memory=self.stepper.memory_of(record.x))
         if self.stepper.hold is not None:
@@ -142,7 +141,7 @@ class PeriodSearch:
         if not self.options.accelerate:
             end = end._replace(hold=motion.hold + RULES.slowly * (end.hold - motion.hold))
         change = float(np.linalg.norm(image - z))
-        self._last = Period(z, image, end, record, rounds, speed, change / speed if speed > 0 else change)
+        self._last = Period(z, image, end, record, speed, change / speed if speed > 0 else change)
         self.periods += 1
         if self.periods == 1 or self._last.drift < RULES.progress * self.best.drift:
             self.best, self._best_at = self._last, self.periods

@@ -33,11 +33,11 @@ class PeriodicMotion:
     x, force : (n_pair, n_component, n_step) relative displacement [m] and contact force [N]
     outputs : (n_output, n_step) observed outputs [m]
     energy : (n_pair,) work of the tangential contact force over the period, integral of f dx [J]
-    preload : mean normal force of the whole contact [N], zero where the law has no normal component
+    normal_force : (n_pair,) mean over the period [N], zero where the law has no normal component
     off : (k,) mean of each coordinate that is prescribed in harmonic 0, less what is prescribed [m]
     status : (n_pair,) bits of what happened: STICKS | SLIPS | SEPARATES
     drift : change of the state over the period, relative to the vibration (both as square roots of energy)
-    periods : periods integrated in all; iterations : contact iterations per step, on average over the last period
+    periods : periods integrated in all
     outcome : CONVERGED, or what went wrong
     slopes : derivatives of the law along the period, see `time_step.Record`, or None if not asked for
     """
@@ -48,12 +48,11 @@ class PeriodicMotion:
     force: np.ndarray
     outputs: np.ndarray
     energy: np.ndarray
-    preload: float
+    normal_force: np.ndarray
     off: np.ndarray
     status: np.ndarray
     drift: float
     periods: int
-    iterations: float
     outcome: Outcome[SolveEnd]
     slopes: np.ndarray | None
 
@@ -63,9 +62,9 @@ class PeriodicMotion:
         return self.outcome.kind is SolveEnd.CONVERGED
 
     @property
-    def frequency(self) -> float:
-        """Frequency [Hz]."""
-        return self.omega / (2 * np.pi)
+    def preload(self) -> float:
+        """Mean normal force of the whole contact [N]."""
+        return float(self.normal_force.sum())
 
     @property
     def amplitude(self) -> np.ndarray:
@@ -174,16 +173,14 @@ def _of_sector(balance: HarmonicBalance, motion: PeriodicMotion) -> PeriodicMoti
     """The motion of the first sector of a wave; any other motion is left as it is."""
     if not wave_in_time.is_wave(balance):
         return motion
-    pairs, components = slice(0, balance.contact.n_pair), balance.contact.components
-    force = motion.force[pairs]
-    normal = force[:, components.index("n")].mean(axis=1).sum() if "n" in components else 0.0
+    pairs = slice(0, balance.contact.n_pair)
     return replace(
         motion,
         x=motion.x[pairs],
-        force=force,
+        force=motion.force[pairs],
         outputs=motion.outputs[: len(balance.compliance.output_names)],
         energy=motion.energy[pairs],
-        preload=float(normal),
+        normal_force=motion.normal_force[pairs],
         status=motion.status[pairs],
     )
 
@@ -228,7 +225,7 @@ def motion_of(
     work = f[1:] + f[:-1]
     work *= x[1:] - x[:-1]
     work = 0.5 * (work.sum(axis=0) + (f[0] + f0) * (x[0] - x0))[:, stepper.balance.contact.tangential].sum(axis=1)
-    preload = float(record.f[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0
+    normal = record.f[:, :, components.index("n")].mean(axis=0) if "n" in components else np.zeros(len(work))
     n, hold = len(stepper.balance.compliance.output_names), stepper.hold
     off = np.zeros(0) if hold is None else record.y[:, n:].mean(axis=0) - hold.target
     return PeriodicMotion(
@@ -238,12 +235,11 @@ def motion_of(
         force=np.moveaxis(record.f, 0, 2),
         outputs=record.y.T[:n],
         energy=work,
-        preload=preload,
+        normal_force=normal,
         off=off,
         status=record.bits,
         drift=period.drift,
         periods=periods,
-        iterations=period.rounds / stepper.options.steps,
         outcome=outcome,
         slopes=record.slopes if len(record.slopes) else None,
     )

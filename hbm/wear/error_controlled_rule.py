@@ -35,7 +35,7 @@ from tribodyn.hbm.wear.evolution import (
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.machine_motion import MachineMotion, with_growth
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
-from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth, local_error
+from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, expected, growth, local_error
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def evolve(
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
     problem = replace(problem, lost_below=max(problem.lost_below, RULES.least_preload_share))
-    machine = None if motion == "balance" else MachineMotion(problem, always=motion == "time")
+    machine = None if motion == "balance" else MachineMotion(problem, tolerance, motion == "time")
     rows = rows_to_resume(resume)
     state: WearState | None
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
@@ -101,7 +101,7 @@ def evolve(
         before = replace(state_of(problem, again), solves=0, growth=again.growth, preload_at_rest=again.preload_at_rest)
         if machine is not None:
             machine.take_up(again)
-            before = machine.of(before)
+            before = machine.of(before, _planned(rows))
         state = _taken(problem, machine, tolerance, before, rows).after
         rows.append(again)
     else:
@@ -113,7 +113,7 @@ def evolve(
         if motion == "machine" or (watched and motion == "balance"):
             state = with_growth(problem, state, always=machine is not None)
         if machine is not None:
-            state = machine.of(state)
+            state = machine.of(state, _planned(rows))
         first = (first_preload(problem, rows, state), first_at_rest(rows, state))
         reason = reason_to_stop(problem, state, *first, rows, tolerance.share * tolerance.scale)
         if reason:
@@ -182,16 +182,20 @@ def _taken(
         return _Taken(row, None, WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
 
 
+def _planned(rows: Sequence[WearRow]) -> float:
+    """Cycles of the step that the last one has led to expect, 0 where it has not."""
+    return float(rows[-1].plan[0]) if rows else 0.0
+
+
 def _step_in_time(
     problem: WearProblem, machine: MachineMotion, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]
 ) -> _Taken:
     """A step along the machine's motion; where another peak overtakes, it ends there."""
     unit = tolerance.share * tolerance.scale / float(state.rate.max())
-    stride = float(rows[-1].plan[0]) if rows and rows[-1].plan[0] > 0 else RULES.first_in_time * unit
+    stride = _planned(rows) or RULES.first_in_time * unit
     stride = min(stride, _until_lost_at_rest(problem, state, rows))
-    solves, means = state.solves, state.means
-    assert means is not None
-    periods = means.periods
+    assert state.means is not None
+    solves, periods = state.solves, state.means.periods
     target = _event(problem, state, rows)
     given = all(isinstance(duty.site, AtFrequency) for duty in problem.mission)  # no peak moves with the depth
     while True:
@@ -199,9 +203,12 @@ def _step_in_time(
         if not given:
             there = assess(problem, there.depth, there.cycles, state)
         there, worn, deviation = machine.step(state, there, stride)
-        solves += there.solves
-        periods += there.means.periods if there.means else 0
-        error = local_error(tolerance, problem.area, deviation, there.rate, stride, state.cycles + stride)
+        assert there.means is not None
+        solves, periods = solves + there.solves, periods + there.means.periods
+        life = float(expected(tolerance, state.cycles + stride, state.depth + worn))
+        chance = 0.5 * stride * float(np.hypot(state.means.error, there.means.error)) / (tolerance.share * life)
+        # rates that scatter may agree by chance
+        error = max(chance, local_error(tolerance, problem.area, deviation, there.rate, stride, life))
         preload = problem.preload_of(there)
         if error <= 1.0 and preload < RULES.event_window[0] * target:
             stride, target = stride * _share_to(target, problem.preload_of(state), preload), 0.0
@@ -209,9 +216,8 @@ def _step_in_time(
         if error <= 1.0 or stride <= RULES.shortest_in_time * unit:
             break
         stride = max(stride * growth(error), RULES.shortest_in_time * unit)
-    slopes, look = np.full(len(state.points), OF_STAGES.unknown_slope), _next_look(problem, state, rows)
-    # where rates scatter a small error may be chance: two in turn are believed
-    stride_after = stride * growth(max(error, rows[-1].step_error) if rows else error)
+    look = _next_look(problem, state, rows)
+    stride_after = stride * growth(error)
     after_at = state.depth + worn, state.cycles + stride
     after = kept_beside(problem, state, *after_at) if given and machine.always else assess(problem, *after_at, state)
     solves += after.solves
@@ -221,8 +227,7 @@ def _step_in_time(
         look = _look_after(found, _share_left(problem, after, rows, state))
         if found.points is not None:
             after, stride_after = worn_state(problem, after.depth, after.cycles, found.points, 0), 0.0
-            slopes = np.zeros_like(slopes)
-    plan = np.array([stride_after, *slopes, look])
+    plan = np.array([stride_after, *np.full(len(state.points), OF_STAGES.unknown_slope), look])
     work = stride * 0.5 * (state.work + there.work)
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(replace(row, periods=periods), replace(after, solves=0))
@@ -264,9 +269,7 @@ def _step_of(
     last = fewer_harmonics.with_fewer(problem) is None
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
     shortest = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
-    stride = 10 * shortest
-    if rows and rows[-1].plan[0] > 0:
-        stride = float(rows[-1].plan[0])
+    stride = _planned(rows) or 10 * shortest
     drift, slopes = begun(problem, state, rows, whole)
     stride = min(stride, _until_lost_at_rest(whole, state, rows))
     target = _event(problem, state, rows)

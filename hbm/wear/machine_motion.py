@@ -13,7 +13,6 @@ Source  ROS2: Verwer, Spee, Blom and Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,6 +28,7 @@ from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
 from tribodyn.hbm.wear.history import WearHistory, WearRow
+from tribodyn.hbm.wear.step_control import Tolerance, expected
 
 GAMMA = 1 - 1 / np.sqrt(2)
 # Unknowns of a balance, of all sectors of a wave, up to which all states are looked at: Hill's method takes less than a
@@ -57,28 +57,25 @@ class MotionRules:
 RULES = MotionRules()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MotionExposure(wear_law.Exposure):
     """One period of a motion in time as a wear law sees it; `state` is the part of it in the balance's harmonics."""
 
-    motion: PeriodicMotion | None = None
+    motion: PeriodicMotion
 
     @cached_property
     def energy(self) -> np.ndarray:
         """(n_pair,) friction work over the period [J]."""
-        assert self.motion is not None
         return np.maximum(self.motion.energy[self.joint.rows], 0.0)
 
     @property
     def status(self) -> np.ndarray:
         """(n_pair,) bits of what happened in the period."""
-        assert self.motion is not None
         return self.motion.status[self.joint.rows]
 
     @cached_property
     def history(self) -> tuple[np.ndarray, np.ndarray]:
         """Displacement [m] and contact force [N], both (n_pair, n_component, n_step)."""
-        assert self.motion is not None
         at = np.ix_(self.joint.rows, self.balance.contact.columns(self.joint))
         return self.motion.x[at], self.motion.force[at]
 
@@ -86,15 +83,14 @@ class MotionExposure(wear_law.Exposure):
 class MachineMotion:
     """The motions of all duties, each followed while the contact wears and the balance's own motion is left.
 
-    always : whether they are followed where the balance's own is kept, too
+    tolerance : of the steps; always : whether they are followed where the balance's own is kept, too
     Raises  ValueError where they are to be followed always and cannot be
     """
 
-    def __init__(self, problem: WearProblem, always: bool = False):
-        self._problem, self.always = problem, always
-        self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy)
-        if always:
-            self._options = replace(self._options, contact=RULES.contact, passing=True)
+    def __init__(self, problem: WearProblem, tolerance: Tolerance, always: bool = False):
+        self._problem, self._tolerance, self.always = problem, tolerance, always
+        contact = RULES.contact if always else MeanOptions.contact
+        self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy, contact=contact)
         self._followers: list[Follower] = []
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
         self._serves = fits and not wave_in_time.is_wave(problem.balance)
@@ -117,8 +113,11 @@ class MachineMotion:
         for follower, balance, part in zip(self._followers, balances, np.split(row.moving, len(balances)), strict=True):
             follower.take_up(balance, part)
 
-    def of(self, state: WearState) -> WearState:
-        """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own."""
+    def of(self, state: WearState, planned: float) -> WearState:
+        """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own.
+
+        planned : cycles of the step from it, 0 where that is not known
+        """
         if not self._serves or state.failure or not (self.always or state.growth > 0):
             self._followers, self._moving = [], np.zeros(0)
             return state
@@ -126,7 +125,7 @@ class MachineMotion:
         if not self._followers and not self._begins(state):
             return state
         try:
-            found = self._along(state, [point.state.omega for point in state.points])
+            found = self._along(state, state, planned)
         except IntegrationFailed as failure:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
         assert found.means is not None
@@ -142,8 +141,7 @@ class MachineMotion:
         Returns the state there with its rates, the depth that wears (n_pair,) and its deviation from a step of first
         order [m]
         """
-        near = state if there.failure else there
-        there = self._along(there, [point.state.omega for point in near.points])
+        there = self._along(there, state if there.failure else there, stride)
         matrix, k1 = self._ahead(state, stride)
         k2 = np.linalg.solve(matrix, there.rate - 2 * k1)
         return there, np.maximum(stride * (1.5 * k1 + 0.5 * k2), 0.0), 0.5 * stride * (k1 + k2)
@@ -166,16 +164,19 @@ class MachineMotion:
             self._followers, self._serves = [], False
         return self._serves
 
-    def _along(self, state: WearState, omegas: Sequence[float]) -> WearState:
+    def _along(self, state: WearState, near: WearState, stride: float) -> WearState:
+        """The state with its means at the frequencies of `near`, as exact as `stride` cycles with them ask for."""
         problem, depth, cycles = self._problem, state.depth, state.cycles
+        life = float(expected(self._tolerance, cycles, depth)) if stride else np.inf
+        asked = self._tolerance.share * life / (stride or 1.0) if self.always else None
         found: list[MeanMotion] = []
-        for follower, duty, omega in zip(self._followers, problem.mission, omegas, strict=True):
+        for follower, duty, point in zip(self._followers, problem.mission, near.points, strict=True):
             balance = problem.in_duty(duty, depth)
 
             def wears(motion: PeriodicMotion, balance: HarmonicBalance = balance) -> np.ndarray:
                 return _depth_rate(problem, balance, motion, depth, cycles)
 
-            found.append(follower.mean(balance, omega, wears))
+            found.append(follower.mean(balance, point.state.omega, wears, asked))
         shares = [duty.share for duty in problem.mission]
         rate, work = (
             np.sum([s * part for s, part in zip(shares, parts, strict=True)], axis=0)
@@ -202,12 +203,10 @@ class MachineMotion:
         force = here.means.normal_force
         touches = force > 0
         fall = np.zeros((len(force), len(force)))
-        if not touches.any():
-            return fall
-        stiffness = self._stiffness[np.ix_(touches, touches)]
+        stiffness, coupled, rest = (
+            self._stiffness[np.ix_(*of)] for of in ((touches, touches), (touches, ~touches), (~touches, ~touches))
+        )
         if not touches.all():
-            coupled = self._stiffness[np.ix_(touches, ~touches)]
-            rest = self._stiffness[np.ix_(~touches, ~touches)]
             stiffness = stiffness - coupled @ np.linalg.lstsq(rest, coupled.T, rcond=None)[0]
         fall[np.ix_(touches, touches)] = (here.rate[touches] / force[touches])[:, None] * stiffness
         return fall
@@ -273,7 +272,7 @@ def _depth_rate(
     for name, wear in problem.wearing.items():
         pairs = balance.contact.joint(name).rows
         of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
-        exposure = MotionExposure(balance, state, *of_joint, cycles, name, motion)
+        exposure = MotionExposure(balance, state, *of_joint, cycles, name, motion=motion)
         rate[pairs] = wear_law.depth_rate(wear.law, exposure)
     return rate
 

@@ -36,6 +36,14 @@ def local_error(
     return float(max(on_depth, on_life) / tolerance.share)
 
 
+def expected(tolerance: Tolerance, cycles: float | np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Cycles of a whole life that has come to depths (..., n_pair) [m] after `cycles`, at the mean rate so far.
+
+    At a depth of the scale a contact is lost, or nearly so; as wear fades most lives are longer.
+    """
+    return np.asarray(cycles / np.minimum(depth.max(axis=-1) / tolerance.scale, 1.0))
+
+
 def growth(error: float) -> float:
     """Ratio of the next step to this one by the second order of the error, with a margin."""
     return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *STEP_RATIO_LIMITS))
@@ -49,7 +57,7 @@ class StepError:
     depth: float
 
 
-def step_error(history: WearHistory, tolerance: float | None = None) -> StepError:
+def step_error(history: WearHistory, tolerance: Tolerance | None = None) -> StepError:
     """Estimate for a whole run, up to where LIFE_SHARE of the preload is left.
 
     tolerance : of the error-controlled rule; None for steps at the rate of their beginning, as the thesis takes them
@@ -67,7 +75,8 @@ def step_error(history: WearHistory, tolerance: float | None = None) -> StepErro
     cycles = history.cycles_in_step[taken]
     if tolerance is not None:
         passed = history.cycles[taken] + cycles
-        off = float(tolerance * np.linalg.norm(history.step_error[taken] * passed) / passed[-1])
+        of = np.where(history.in_time[taken], expected(tolerance, passed, history.depth[taken + 1]), passed)
+        off = float(tolerance.share * np.linalg.norm(history.step_error[taken] * of) / passed[-1])
         return StepError(off, off)
     before, after = history.energy[taken], history.energy[taken + 1]
     change = np.abs(after - before).sum(axis=1) / (total[taken] + total[taken + 1])

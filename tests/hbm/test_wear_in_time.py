@@ -13,12 +13,13 @@ from scipy.signal import lfilter
 from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_problem
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
 from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.floquet import HILL, MULTIPLIERS, stays
 from tribodyn.hbm.time import mean_motion, time_integration
-from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
+from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear import error_controlled_rule, evolution, law as wear_law
@@ -26,7 +27,7 @@ from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.machine_motion import MotionExposure, left_aside
-from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.step_control import Tolerance, step_error
 
 LEFT = 0.5  # share of the preload
 
@@ -50,7 +51,7 @@ def run(problem: WearProblem) -> WearHistory:
 
 
 def test_life_in_time_is_that_of_many_harmonics(problem: WearProblem, run: WearHistory) -> None:
-    found = error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), motion="time")
+    found = error_controlled_rule.evolve(problem, Tolerance(0.02, 2e-4), motion="time")
     assert found.end.kind is WearEnd.PRELOAD_LOST
     assert found.in_time[:-1].all()
     assert found.scatter == 0.0
@@ -130,8 +131,8 @@ def test_a_law_by_slip_path_sees_a_motion_as_it_sees_a_balance(problem: WearProb
     motion = time_integration.integrate(balance, 420.0, state, Options(256))
     archard = JointWear.of("archard", coefficient=1e-9)
     rates = []
-    for exposure, own in ((wear_law.Exposure, ()), (MotionExposure, (motion,))):
-        seen = exposure(balance, state, problem.area, archard.numbers, np.zeros(N_PAIR), 0.0, "contact", *own)
+    for exposure, own in ((wear_law.Exposure, {}), (MotionExposure, {"motion": motion})):
+        seen = exposure(balance, state, problem.area, archard.numbers, np.zeros(N_PAIR), 0.0, "contact", **own)
         rates.append(wear_law.depth_rate("archard", seen))
     np.testing.assert_allclose(*rates, rtol=0.02)
 
@@ -178,17 +179,45 @@ def test_a_motion_that_takes_two_periods_is_told() -> None:
     np.testing.assert_array_equal(found.seen, found.energy)
 
 
-def test_a_motion_that_passes_needs_no_more_periods_than_its_normal_force() -> None:
+def test_a_motion_that_passes_is_marched_as_far_as_each_place_asks() -> None:
     flips = three_pairs(friction=0.05, static=30.0, shaker=60.0, top=7)
-    follower = Follower(MeanOptions(128, accuracy=0.02, passing=True))
+    follower = Follower(MeanOptions(128, accuracy=0.02))
     follower.start(flips, newton.solve_from_rest(flips, FLIPS_AT).state)
-    settled, passed = (follower.mean(flips, FLIPS_AT, lambda motion: motion.energy) for _ in range(2))
-    again = Follower(MeanOptions(128, accuracy=0.02, passing=True))
+    settled, passed, known = (follower.mean(flips, FLIPS_AT, lambda motion: motion.energy, a) for a in (1.0, 1.0, 0.02))
+    again = Follower(MeanOptions(128, accuracy=0.02))
     again.take_up(flips, follower.kept())
     assert settled.periods > 2 * passed.periods == 2 * follower.options.block
+    assert passed.error > 0.02 >= known.error
     assert passed.energy.sum() == pytest.approx(settled.energy.sum(), rel=0.02)
-    later = [one.mean(flips, FLIPS_AT, lambda motion: motion.energy) for one in (follower, again)]
+    later = [one.mean(flips, FLIPS_AT, lambda motion: motion.energy, 1.0) for one in (follower, again)]
     np.testing.assert_array_equal(later[1].energy, later[0].energy)
+
+
+def test_periods_go_to_states_by_the_cycles_that_they_stand_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rates that scatter about a constant: a life of known length, its first hundredth in few of its steps.
+
+    By steps held to the cycles passed, not to those of a life, each tenfold of cycles would take as many.
+    """
+    problem, scale, scatter = flipping(), 1e-6, 0.2
+    rng, gap, all_asked = np.random.default_rng(4), problem.balance.contact.gap, []
+
+    def mean(self: Follower, balance: HarmonicBalance, omega: float, see: object, asked: float) -> MeanMotion:
+        all_asked.append(asked)
+        periods = max(8, int((scatter / asked) ** 2)) if np.isfinite(asked) else 8
+        error = scatter / np.sqrt(periods)
+        rate = np.full(len(gap), 1e-14 * (1 + error * rng.normal()))
+        force = np.maximum(1 - (balance.contact.gap - gap) / scale, 0.0)
+        return MeanMotion(rate, force, rate, np.zeros(1), scatter, error, settled=True, periods=periods)
+
+    monkeypatch.setattr(Follower, "mean", mean)
+    found = error_controlled_rule.evolve(problem, Tolerance(0.02, scale), motion="time")
+    life = found.cycles[-1]
+    assert life == pytest.approx(LEFT * scale / 1e-14, rel=0.05)
+    early = found.cycles < 0.01 * life
+    assert early.sum() < 0.25 * len(early)
+    assert (found.cycles_in_step * found.mean_error).max() < 0.02 * life
+    assert min(all_asked) * found.cycles_in_step.max() == pytest.approx(0.02 * life, rel=1.5)  # of the longest step
+    assert found.scatter < step_error(found, Tolerance(0.02, scale)).cycles < 0.1
 
 
 def test_the_standard_error_of_a_mean_covers_its_deviation() -> None:

@@ -463,7 +463,9 @@ def test_a_step_is_held_to_the_cycles_that_its_error_takes_behind_it() -> None:
 
 def test_the_steps_of_a_run_add_up_in_its_estimate(problem: WearProblem, fine: WearHistory) -> None:
     run = error_controlled_rule.evolve(problem, Tolerance(0.1, 2e-4))
-    estimate = step_error(run, 0.1).cycles
+    estimate = step_error(run, Tolerance(0.1, 2e-4)).cycles
     assert 0.0 < abs(life(run) / life(fine) - 1) < estimate < 0.2
     begun = replace(run, step_error=np.where(run.cycles == 0, 10.0, run.step_error))
-    assert step_error(begun, 0.1).cycles < 0.2  # a first step that is far off is so by its own few cycles
+    assert (
+        step_error(begun, Tolerance(0.1, 2e-4)).cycles < 0.2
+    )  # a first step that is far off is so by its own few cycles

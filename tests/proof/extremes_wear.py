@@ -56,7 +56,7 @@ def _thesis(body: Body, share: float) -> Verdict:
 def _controlled(body: Body, share: float) -> Verdict:
     problem, delta = _problem(body)
     tolerance = Tolerance(share, delta)
-    return _judged(body, problem, error_controlled_rule.evolve(problem, tolerance, MOST_STEPS), tolerance=share)
+    return _judged(body, problem, error_controlled_rule.evolve(problem, tolerance, MOST_STEPS), tolerance=tolerance)
 
 
 def _coefficient(body: Body, value: float) -> Verdict:
@@ -67,7 +67,7 @@ def _coefficient(body: Body, value: float) -> Verdict:
 
 
 def _judged(
-    body: Body, problem: WearProblem, worn: WearHistory, faster: float = 1.0, tolerance: float | None = None
+    body: Body, problem: WearProblem, worn: WearHistory, faster: float = 1.0, tolerance: Tolerance | None = None
 ) -> Verdict:
     """Conservation and monotony, then worn volume beside the reference, within what the run says of its own error."""
     if worn.ended is WearEnd.SOLVE_FAILED:
@@ -92,7 +92,7 @@ def _judged(
     expected = _cycles_for(body, float(volumes[reach]))
     off = abs(cycles[reach] / expected - 1) if expected > 0 else 0.0
     says = f"cycles are off by {off:.1e}, estimated {estimate:.1e}; {worn.end}"
-    allowed = estimate + step_error(_reference(body), TIGHT).cycles
+    allowed = estimate + step_error(_reference(body), Tolerance(TIGHT, np.nan)).cycles
     return Verdict(CONVERGED if off <= allowed else WRONG, says, off)
 
 

@@ -18,7 +18,7 @@ from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
 from tribodyn.hbm.wear.machine_motion import left_aside
-from tribodyn.hbm.wear.step_control import step_error
+from tribodyn.hbm.wear.step_control import Tolerance, step_error
 from tribodyn.workflows.errors import refine, states
 from tribodyn.workflows.errors.options import DEFAULT, Options
 from tribodyn.workflows.errors.states import Answers, State, relative
@@ -194,7 +194,8 @@ def _estimates(file: SceneFile, model: Model, table: Table, result: Result, opti
         table.rows.append(Change(Refinement.SAMPLES, name, None, None, error, "estimate: located transitions"))
     wear = file.scene.wear
     if wear is not None and result.wear is not None and result.wear_steps:
-        found = step_error(result.wear, wear.tolerance if wear.rule == "error_controlled" else None)
+        told = Tolerance(wear.tolerance, result.facts.delta_max_m or np.nan)  # known where steps are error-controlled
+        found = step_error(result.wear, told if wear.rule == "error_controlled" else None)
         for name, one in (("depth", found.depth), ("life", found.cycles)):
             table.rows.append(Change(Refinement.WEAR_STEPS, name, None, None, float(one), "estimate of the wear rule"))
         if result.wear.in_time.any():  # scatter puts cycles off, not the depth of a contact worn through
