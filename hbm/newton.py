@@ -23,6 +23,7 @@ class Rules:
     most_direct: int = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
     most_corrections: int = 8  # of a residual flexibility, and what each leaves of the residual at the most
     corrected: float = 0.5
+    closer: float = 0.1  # residual wanted while the residual flexibility is held, over what is not sure of it
     # of the contact forces, wanted where these stretch their springs far less than x is large
     force_accuracy: float = 1e-4
     least_tolerance: float = 1e-12  # residual over displacement that rounding still lets through
@@ -153,34 +154,43 @@ def solve(
 def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions) -> Solution:
     """The same with a residual flexibility: it is held while Newton solves, then taken anew, until nothing changes.
 
-    Each correction is smaller by about what the modes leave out; one that is not gives way to Newton's method on all.
-    Where the change of the forces is too small to matter, by the largest share left out, nothing is taken anew
+    What it gives is known of forces that were asked for before, and bounded by the largest share left out of what the
+    forces differ from these: where the bound is small enough, nothing is asked for. Each correction is smaller by about
+    what the modes leave out; one that is not gives way to Newton's method on all
     """
     residual = balance.model.residual
     assert residual is not None
     steps = products = 0
     before = np.inf
-    exact = balance.evaluate(omega, start)
     x_lin = balance.x_lin(omega)
+    state = replace(balance, held_rest=np.zeros(())).evaluate(omega, start)
+    known, rest = residual.recalled(state.g)
+    state = replace(state, residual=state.residual - rest)
     history: tuple[float, ...] = ()
-    closer = replace(options, tolerance=0.3 * options.tolerance)
     for _ in range(RULES.most_corrections):
-        error = relative_residual(exact, x_lin)
+        unsure = residual.at_most(state.g - known, state.flat)
+        closer = max(0.3 * options.tolerance, RULES.closer * min(unsure, relative_residual(state, x_lin)))
+        held = replace(balance, held_rest=rest)
+        found = _solve(held, omega, state, replace(options, tolerance=closer))
+        steps, products, state = steps + found.steps, products + found.products, found.state
+        if not found.converged:
+            return replace(found, steps=steps, products=products)
+        goal = wanted(balance, state, x_lin, options)
+        near, moved = residual.recalled(state.g)
+        exact = replace(state, residual=state.residual + rest - moved)
+        most = relative_residual(exact, x_lin) + residual.at_most(state.g - near, state.flat)
+        if most <= goal:
+            return Solved(exact, CONVERGED, steps, products, (*history, most))
+        known, moved = state.g, residual.asked(state.g)
+        state = replace(state, residual=state.residual + rest - moved)
+        rest, error = moved, relative_residual(state, x_lin)
         history += (error,)
-        if error <= wanted(balance, exact, x_lin, options):
-            return Solved(exact, CONVERGED, steps, products, history)
+        if error <= goal:
+            return Solved(state, CONVERGED, steps, products, history)
         if not error < RULES.corrected * before:
             break
-        rest, before = balance.rest(exact), error
-        held = _solve(replace(balance, held_rest=rest), omega, exact, closer)
-        steps, products = steps + held.steps, products + held.products
-        if not held.converged:
-            return replace(held, steps=steps, products=products)
-        most = relative_residual(held.state, x_lin) + residual.at_most(held.state.g - exact.g, held.state.flat)
-        if most <= wanted(balance, held.state, x_lin, options):
-            return Solved(held.state, CONVERGED, steps, products, (*history, most))
-        exact = balance.with_own_rest(held.state, rest)
-    found = _solve(balance, omega, exact, options)
+        before = error
+    found = _solve(balance, omega, state, options)
     return replace(found, steps=steps + found.steps, products=products + found.products)
 
 
