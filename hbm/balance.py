@@ -199,12 +199,6 @@ class HarmonicBalance:
         moved = point.apply(g) if self.held_rest is None else point.nearly(g) + self.held_rest
         return State(omega, x, cycle, g, flat - self.x_lin(omega) - moved)
 
-    @property
-    def corrects_rest(self) -> bool:
-        """Whether residual flexibility is little enough to be held while Newton solves, and taken anew afterwards."""
-        residual = self.model.residual
-        return residual is not None and self.held_rest is None and residual.left_out <= NEARLY_ALL
-
     def linearise(self, state: State) -> Linearisation:
         """d R / d x at a state whose contact derivative was asked for."""
         return Linearisation(self.at(state.omega), self.reference_stiffness, state.x, state.cycle)

@@ -8,10 +8,11 @@ from typing import Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
+from tribodyn.hbm.balance import NEARLY_ALL, HarmonicBalance, Linearisation, State
 from tribodyn.hbm.contact.law import ContactCycle
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
+from tribodyn.reduction.residual_flexibility import ResidualFlexibility
 
 
 @dataclass(frozen=True)
@@ -146,20 +147,22 @@ def solve(
     Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
     """
     options = options or NewtonOptions()
-    if isinstance(balance, HarmonicBalance) and isinstance(omega, float) and balance.corrects_rest:
-        return cast(Solved[Evaluated], _solve_with_rest(balance, omega, start, options))
+    if isinstance(balance, HarmonicBalance) and isinstance(omega, float):
+        residual = balance.model.residual
+        if residual is not None and residual.left_out <= NEARLY_ALL:
+            return cast(Solved[Evaluated], _solve_with_rest(balance, residual, omega, start, options))
     return _solve(balance, omega, balance.evaluate(omega, start), options)
 
 
-def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions) -> Solution:
+def _solve_with_rest(
+    balance: HarmonicBalance, residual: ResidualFlexibility, omega: float, start: np.ndarray, options: NewtonOptions
+) -> Solution:
     """The same with a residual flexibility: it is held while Newton solves, then taken anew, until nothing changes.
 
     What it gives is known of forces that were asked for before, and bounded by the largest share left out of what the
     forces differ from these: where the bound is small enough, nothing is asked for. Each correction is smaller by about
     what the modes leave out; one that is not gives way to Newton's method on all
     """
-    residual = balance.model.residual
-    assert residual is not None
     steps = products = 0
     before = np.inf
     x_lin = balance.x_lin(omega)
@@ -214,7 +217,8 @@ def _solve(
         try:
             with np.errstate(over="raise"):
                 if options.least_motion:
-                    direction, spent, reached = _shortest_direction(linear.dense(), state.residual), 0, 0.0
+                    shortest = np.linalg.lstsq(linear.dense(), -state.residual.ravel(), RULES.unresisted)[0]
+                    direction, spent, reached = shortest.reshape(state.residual.shape), 0, 0.0
                 else:
                     direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
         except FloatingPointError:  # a slope too steep for the single precision of the products
@@ -251,12 +255,6 @@ def _solve(
             f" {far:.1e} m, and its forces are known to {off:.1%} only: nothing holds it"
         )
     return Solved(state, outcome, len(history) - 1, products, tuple(history))
-
-
-def _shortest_direction(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """The shortest solution of jacobian . d = -residual (n_contact, n_coeff), motions that nothing resists left out."""
-    found: np.ndarray = np.linalg.lstsq(jacobian, -residual.ravel(), rcond=RULES.unresisted)[0]
-    return found.reshape(residual.shape)
 
 
 def _leans(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> bool:

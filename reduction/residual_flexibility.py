@@ -77,35 +77,27 @@ class ResidualFlexibility:
 
     def field(self, force: np.ndarray) -> np.ndarray:
         """Displacement (n_full, k) [m] under contact forces (n_contact, k) [N] that the coordinates leave out."""
-        return self.factor.solve(self._push(force)) - self.shapes @ (self.at_contact.T @ force / self.squares[:, None])
+        return self.factor.solve(self.B.T @ force) - self.shapes @ (self.at_contact.T @ force / self.squares[:, None])
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         """R f: displacement of the contact (n_contact, k) [m] under contact forces (n_contact, k) [N]."""
-        moved: np.ndarray = self.B @ solve_few(self.factor, self._push(force))
+        moved: np.ndarray = self.B @ solve_few(self.factor, self.B.T @ force)
         return moved - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
-
-    def _push(self, force: np.ndarray) -> np.ndarray:
-        return np.asfortranarray(self.B.T @ force)
 
     def asked(self, force: np.ndarray) -> np.ndarray:
         """The same, kept for `recalled`."""
-        moved = self.apply(force)
-        alike = [known for known in self._asked if known[0].shape == force.shape]
-        self._asked[:] = [*alike, (force, self._weighted(force), moved)][-LIMITS.recalled :]
-        return moved
+        self._asked.append(np.stack([force, self.apply(force)]))
+        del self._asked[: -LIMITS.recalled]
+        return self._asked[-1][1]
 
     @cached_property
-    def _asked(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def _asked(self) -> list[np.ndarray]:
         return []
 
     def recalled(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A force near this one (n_contact, k) that the last ones `asked` for add up to, and R times it."""
-        known = [each for each in self._asked if each[0].shape == force.shape]
-        near, moved = np.zeros_like(force), np.zeros_like(force)
-        columns = np.array([weighted.ravel() for _, weighted, _ in known]).reshape(len(known), force.size).T
-        shares = np.linalg.lstsq(columns, self._weighted(force).ravel())[0]
-        for share, (f, _, m) in zip(shares, known, strict=True):
-            near, moved = near + share * f, moved + share * m
+        """Forces near these (n_contact, k) that the columns `asked` for last add up to, and R times them."""
+        known = np.concatenate([np.zeros((2, len(force), 0)), *self._asked], axis=2)
+        near, moved = known @ np.linalg.lstsq(self._weighted(known[0]), self._weighted(force))[0]
         return near, moved
 
     def _weighted(self, force: np.ndarray, without: float = 0.0) -> np.ndarray:
@@ -118,8 +110,8 @@ class ResidualFlexibility:
 
         Infinite for a force where there is no spring
         """
-        size = float(np.linalg.norm(np.sqrt(self.stiffness)[:, None] * moved)) or 1.0
-        return self.left_out * float(np.linalg.norm(self._weighted(force, np.inf))) / size
+        size = np.linalg.norm(np.sqrt(self.stiffness)[:, None] * moved) or 1.0
+        return self.left_out * float(np.linalg.norm(self._weighted(force, np.inf)) / size)
 
     @cached_property
     def left_out(self) -> float:
@@ -147,7 +139,7 @@ class ResidualFlexibility:
         field = self.field(force)
         push = omega**2 * (self.mass @ field)
         held = self.at_contact @ (self.shapes.T @ push / self.squares[:, None])
-        more = self.B @ self.factor.solve(np.asfortranarray(push)) - held
+        more = self.B @ self.factor.solve(push) - held
         whole = self.B @ field + self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
         return float(np.max(np.linalg.norm(more, axis=0) / np.linalg.norm(whole, axis=0)))
 
