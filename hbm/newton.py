@@ -172,7 +172,7 @@ def _solve_with_rest(
     history: tuple[float, ...] = ()
     for _ in range(RULES.most_corrections):
         unsure = residual.at_most(state.g - known, state.flat)
-        closer = max(0.3 * options.tolerance, RULES.closer * min(unsure, relative_residual(state, x_lin)))
+        closer = max(0.03 * options.tolerance, RULES.closer * min(unsure, relative_residual(state, x_lin)))
         held = replace(balance, held_rest=rest)
         found = _solve(held, omega, state, replace(options, tolerance=closer))
         steps, products, state = steps + found.steps, products + found.products, found.state
