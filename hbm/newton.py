@@ -166,34 +166,33 @@ def _solve_with_rest(
     steps = products = 0
     before = np.inf
     x_lin = balance.x_lin(omega)
-    state = replace(balance, held_rest=np.zeros(())).evaluate(omega, start)
-    known, rest = residual.recalled(state.g)
-    state = replace(state, residual=state.residual - rest)
     history: tuple[float, ...] = ()
-    for _ in range(RULES.most_corrections):
-        unsure = residual.at_most(state.g - known, state.flat)
-        closer = max(0.03 * options.tolerance, RULES.closer * min(unsure, relative_residual(state, x_lin)))
-        held = replace(balance, held_rest=rest)
-        found = _solve(held, omega, state, replace(options, tolerance=closer))
+    rest = np.zeros(())
+    state = replace(balance, held_rest=rest).evaluate(omega, start)
+    for count in range(RULES.most_corrections):
+        known, moved = residual.recalled(state.g)
+        state, rest = replace(state, residual=state.residual + rest - moved), moved
+        unsure, error = residual.at_most(state.g - known, state.flat), relative_residual(state, x_lin)
+        goal = wanted(balance, state, x_lin, options)
+        if error + unsure <= goal:
+            return Solved(state, CONVERGED, steps, products, (*history, error + unsure))
+        if count > 0:
+            moved = residual.asked(state.g)
+            state, rest = replace(state, residual=state.residual + rest - moved), moved
+            unsure, error = 0.0, relative_residual(state, x_lin)
+            history += (error,)
+            if error <= goal:
+                return Solved(state, CONVERGED, steps, products, history)
+            if not error < RULES.corrected * before:
+                break
+            before = error
+        closer = max(0.03 * options.tolerance, RULES.closer * min(unsure, error))
+        found = _solve(replace(balance, held_rest=rest), omega, state, replace(options, tolerance=closer))
         steps, products, state = steps + found.steps, products + found.products, found.state
         if not found.converged:
             return replace(found, steps=steps, products=products)
-        goal = wanted(balance, state, x_lin, options)
-        near, moved = residual.recalled(state.g)
-        exact = replace(state, residual=state.residual + rest - moved)
-        most = relative_residual(exact, x_lin) + residual.at_most(state.g - near, state.flat)
-        if most <= goal:
-            return Solved(exact, CONVERGED, steps, products, (*history, most))
-        known, moved = state.g, residual.asked(state.g)
-        state = replace(state, residual=state.residual + rest - moved)
-        rest, error = moved, relative_residual(state, x_lin)
-        history += (error,)
-        if error <= goal:
-            return Solved(state, CONVERGED, steps, products, history)
-        if not error < RULES.corrected * before:
-            break
-        before = error
-    found = _solve(balance, omega, state, options)
+    moved = residual.apply(state.g)
+    found = _solve(balance, omega, replace(state, residual=state.residual + rest - moved), options)
     return replace(found, steps=steps + found.steps, products=products + found.products)
 
 
