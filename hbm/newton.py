@@ -247,19 +247,15 @@ def _solve(
     if error > options.tolerance:
         outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
     off = error / _stretched(balance, state, x_lin)
-    doubtful = error <= options.tolerance and off > RULES.force_accuracy and _leans(balance, state, x_lin)
+    stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)  # the contact carries a share of that
+    leans = float(np.linalg.norm(state.cycle.force)) > RULES.held * float(np.linalg.norm(stuck))
+    doubtful = error <= options.tolerance and off > RULES.force_accuracy and leans
     if doubtful and (off > RULES.force_unknown or _unheld(balance, state)):
         far = float(np.abs(state.x).max())
         outcome = SolveEnd.SLIDES_AWAY.say(
             f" {far:.1e} m, and its forces are known to {off:.1%} only: nothing holds it"
         )
     return Solved(state, outcome, len(history) - 1, products, tuple(history))
-
-
-def _leans(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> bool:
-    """Whether the contact carries a share of what the stuck one would."""
-    stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)
-    return float(np.linalg.norm(state.cycle.force)) > RULES.held * float(np.linalg.norm(stuck))
 
 
 def wanted(
