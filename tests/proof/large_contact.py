@@ -3,8 +3,8 @@
 Every size is measured in a process of its own, so that its peak memory is its own; seconds are processor seconds of one
 thread. Craig-Bampton with its dense compliance is measured beside the residual flexibility as far as it fits.
 
-The roofline (see `bench`) is that of the parts of a curve by residual flexibility. Contact rows are eliminated last, so
-that a solution in them reads the lower triangle of their dense factor twice.
+The roofline (see `bench`) is that of the parts of a curve by residual flexibility. Where contact rows are eliminated
+last, a solution in them reads the lower triangle of their dense factor twice.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from threadpoolctl import threadpool_limits
 
 from tests.helpers.reduced import reduce_part
 from tests.proof.bench import Machine, Work
-from tribodyn.fem.factor import factorise
+from tribodyn.fem.factor import Pardiso, factorise
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation
 from tribodyn.hbm.contact.joint import Contact
 from tribodyn.hbm.continuation.branch import Branch
@@ -144,6 +144,7 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
             branch = natural.follow(balance, first, last, options)
         clock.append(time.process_time())
         peak, rest = memory.peak(), reduced.residual
+        parts = () if rest is None else _parts(balance, spent, len(branch.omega))  # before its factor is let go
     row = ContactCost(
         way=way,
         contact_dofs=balance.compliance.n_contact,
@@ -158,7 +159,7 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
         peak_bytes=peak,
         compliance_error=np.nan if rest is None else compliance_error(rest, 2 * np.pi * PROBE_HZ),
         left_out=0.0 if rest is None else rest.left_out,
-        parts=() if rest is None else _parts(balance, spent, len(branch.omega)),
+        parts=parts,
     )
     return row, _forces(balance, branch)
 
@@ -188,7 +189,10 @@ def _parts(balance: HarmonicBalance, spent: dict[str, list[float]], points: int)
     """The parts of a curve of so many points, `rest` and `modes` shared out to factor and modes."""
     n, m, r = balance.compliance.n_contact, balance.basis.n_coeff, balance.compliance.groups[0][0].n_mode
     assert balance.model.residual is not None
-    few = len(np.unique(balance.model.residual.B.indices))
+    rest = balance.model.residual
+    read = 4 * len(np.unique(rest.B.indices)) ** 2  # of the factor, each of two times
+    if isinstance(rest.factor, Pardiso) and not rest.factor._few:
+        read = 1024 * int(rest.factor._solver.get_iparm(Pardiso.SIZE))
     blocks, calls = (
         balance.contact.n_pair * (n // balance.contact.n_pair * m) ** 2,
         {k: c for k, (c, _) in spent.items()},
@@ -202,7 +206,7 @@ def _parts(balance: HarmonicBalance, spent: dict[str, list[float]], points: int)
         "slopes": ("slopes of pairs", 8 * blocks, {8: 2 * blocks}),
         "products": ("products of GMRES", 8 * n * r + core, {4: 4 * n * r * m, 8: core // 2}),
         "modes": ("modes in double", 16 * n * r + core, {8: 4 * n * r * m + core // 2}),
-        "factor": ("solutions with the factor", 8 * few**2, {8: 2 * few**2 * m}),
+        "factor": ("solutions with the factor", 2 * read, {8: read * m // 2}),
     }
     machine = Machine.measured()
     return tuple(
