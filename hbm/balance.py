@@ -199,23 +199,6 @@ class HarmonicBalance:
         moved = point.apply(g) if self.held_rest is None else point.nearly(g) + self.held_rest
         return State(omega, x, cycle, g, flat - self.x_lin(omega) - moved)
 
-    @property
-    def corrects_rest(self) -> bool:
-        """Whether residual flexibility is little enough to be held while Newton solves, and taken anew afterwards."""
-        residual = self.model.residual
-        return residual is not None and self.held_rest is None and residual.left_out <= NEARLY_ALL
-
-    def rest(self, state: State) -> np.ndarray:
-        """(n_contact, n_coeff) what the residual flexibility gives in a state of this balance [m]."""
-        moved: np.ndarray = state.flat - self.x_lin(state.omega) - state.residual
-        return moved - self.at(state.omega).nearly(state.g)
-
-    def with_own_rest(self, state: State, held: np.ndarray) -> State:
-        """A state of the same balance with this `held_rest`, as this one has it: its residual alone differs."""
-        residual = self.model.residual
-        assert residual is not None
-        return replace(state, residual=state.residual + held - residual.apply(state.g))
-
     def linearise(self, state: State) -> Linearisation:
         """d R / d x at a state whose contact derivative was asked for."""
         return Linearisation(self.at(state.omega), self.reference_stiffness, state.x, state.cycle)
@@ -426,7 +409,7 @@ class Linearisation:
 
         b = rhs[self.rows].ravel()
         if self._point.left_out <= NEARLY_ALL:
-            d, spent, reached = nearly(b, max(tolerance, self._point.left_out), max_products)
+            d, spent, reached = nearly(b, tolerance, max_products)
         else:
             # products that leave much out find a direction for one that leaves nothing out
             d, spent, reached = gmres(

@@ -8,10 +8,11 @@ from typing import Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
+from tribodyn.hbm.balance import NEARLY_ALL, HarmonicBalance, Linearisation, State
 from tribodyn.hbm.contact.law import ContactCycle
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
+from tribodyn.reduction.residual_flexibility import ResidualFlexibility
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class Rules:
     most_direct: int = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
     most_corrections: int = 8  # of a residual flexibility, and what each leaves of the residual at the most
     corrected: float = 0.5
+    closer: float = 0.1  # residual wanted while the residual flexibility is held, over what is not sure of it
     # of the contact forces, wanted where these stretch their springs far less than x is large
     force_accuracy: float = 1e-4
     least_tolerance: float = 1e-12  # residual over displacement that rounding still lets through
@@ -145,42 +147,52 @@ def solve(
     Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
     """
     options = options or NewtonOptions()
-    if isinstance(balance, HarmonicBalance) and isinstance(omega, float) and balance.corrects_rest:
-        return cast(Solved[Evaluated], _solve_with_rest(balance, omega, start, options))
+    if isinstance(balance, HarmonicBalance) and isinstance(omega, float):
+        residual = balance.model.residual
+        if residual is not None and residual.left_out <= NEARLY_ALL:
+            return cast(Solved[Evaluated], _solve_with_rest(balance, residual, omega, start, options))
     return _solve(balance, omega, balance.evaluate(omega, start), options)
 
 
-def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions) -> Solution:
+def _solve_with_rest(
+    balance: HarmonicBalance, residual: ResidualFlexibility, omega: float, start: np.ndarray, options: NewtonOptions
+) -> Solution:
     """The same with a residual flexibility: it is held while Newton solves, then taken anew, until nothing changes.
 
-    Each correction is smaller by about what the modes leave out; one that is not gives way to Newton's method on all.
-    Where the change of the forces is too small to matter, by the largest share left out, nothing is taken anew
+    What it gives is known of forces that were asked for before, and bounded by the largest share left out of what the
+    forces differ from these: where the bound is small enough, nothing is asked for. Each correction is smaller by about
+    what the modes leave out; one that is not gives way to Newton's method on all
     """
-    residual = balance.model.residual
-    assert residual is not None
     steps = products = 0
     before = np.inf
-    exact = balance.evaluate(omega, start)
     x_lin = balance.x_lin(omega)
     history: tuple[float, ...] = ()
-    closer = replace(options, tolerance=0.3 * options.tolerance)
-    for _ in range(RULES.most_corrections):
-        error = relative_residual(exact, x_lin)
-        history += (error,)
-        if error <= wanted(balance, exact, x_lin, options):
-            return Solved(exact, CONVERGED, steps, products, history)
-        if not error < RULES.corrected * before:
-            break
-        rest, before = balance.rest(exact), error
-        held = _solve(replace(balance, held_rest=rest), omega, exact, closer)
-        steps, products = steps + held.steps, products + held.products
-        if not held.converged:
-            return replace(held, steps=steps, products=products)
-        most = relative_residual(held.state, x_lin) + residual.at_most(held.state.g - exact.g, held.state.flat)
-        if most <= wanted(balance, held.state, x_lin, options):
-            return Solved(held.state, CONVERGED, steps, products, (*history, most))
-        exact = balance.with_own_rest(held.state, rest)
-    found = _solve(balance, omega, exact, options)
+    rest = np.zeros(())
+    state = replace(balance, held_rest=rest).evaluate(omega, start)
+    for count in range(RULES.most_corrections):
+        known, moved = residual.recalled(state.g)
+        state, rest = replace(state, residual=state.residual + rest - moved), moved
+        unsure, error = residual.at_most(state.g - known, state.flat), relative_residual(state, x_lin)
+        goal = wanted(balance, state, x_lin, options)
+        if error + unsure <= goal:
+            return Solved(state, CONVERGED, steps, products, (*history, error + unsure))
+        if count > 0:
+            moved = residual.asked(state.g)
+            state, rest = replace(state, residual=state.residual + rest - moved), moved
+            unsure, error = 0.0, relative_residual(state, x_lin)
+            history += (error,)
+            if error <= goal:
+                return Solved(state, CONVERGED, steps, products, history)
+            if not error < RULES.corrected * before:
+                break
+            before = error
+        closer = max(0.03 * options.tolerance, RULES.closer * min(unsure, error))
+        found = _solve(replace(balance, held_rest=rest), omega, state, replace(options, tolerance=closer))
+        steps, products, state = steps + found.steps, products + found.products, found.state
+        if not found.converged:
+            return replace(found, steps=steps, products=products)
+    moved = residual.apply(state.g)
+    found = _solve(balance, omega, replace(state, residual=state.residual + rest - moved), options)
     return replace(found, steps=steps + found.steps, products=products + found.products)
 
 
@@ -204,7 +216,8 @@ def _solve(
         try:
             with np.errstate(over="raise"):
                 if options.least_motion:
-                    direction, spent, reached = _shortest_direction(linear.dense(), state.residual), 0, 0.0
+                    shortest = np.linalg.lstsq(linear.dense(), -state.residual.ravel(), RULES.unresisted)[0]
+                    direction, spent, reached = shortest.reshape(state.residual.shape), 0, 0.0
                 else:
                     direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
         except FloatingPointError:  # a slope too steep for the single precision of the products
@@ -234,25 +247,15 @@ def _solve(
     if error > options.tolerance:
         outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
     off = error / _stretched(balance, state, x_lin)
-    doubtful = error <= options.tolerance and off > RULES.force_accuracy and _leans(balance, state, x_lin)
+    stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)  # the contact carries a share of that
+    leans = float(np.linalg.norm(state.cycle.force)) > RULES.held * float(np.linalg.norm(stuck))
+    doubtful = error <= options.tolerance and off > RULES.force_accuracy and leans
     if doubtful and (off > RULES.force_unknown or _unheld(balance, state)):
         far = float(np.abs(state.x).max())
         outcome = SolveEnd.SLIDES_AWAY.say(
             f" {far:.1e} m, and its forces are known to {off:.1%} only: nothing holds it"
         )
     return Solved(state, outcome, len(history) - 1, products, tuple(history))
-
-
-def _shortest_direction(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """The shortest solution of jacobian . d = -residual (n_contact, n_coeff), motions that nothing resists left out."""
-    found: np.ndarray = np.linalg.lstsq(jacobian, -residual.ravel(), rcond=RULES.unresisted)[0]
-    return found.reshape(residual.shape)
-
-
-def _leans(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> bool:
-    """Whether the contact carries a share of what the stuck one would."""
-    stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)
-    return float(np.linalg.norm(state.cycle.force)) > RULES.held * float(np.linalg.norm(stuck))
 
 
 def wanted(

@@ -14,7 +14,6 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.threads import single
 
 EXACT = 1e-11  # relative residual of the state at rest
@@ -29,7 +28,8 @@ def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None 
     if not balance.basis.has_static:
         raise ValueError("a preload without friction needs harmonic 0: keep it in harmonics.kept")
     few = balance if 1 not in balance.basis.harmonics else balance.with_harmonics((0, 1))
-    still = few.with_contact(few.contact.with_parameters(_smooth)).with_load(0.0)
+    smooth = few.contact.with_parameters(lambda p: p.scaled("friction", 0.0) if "friction" in p.numbers else p)
+    still = few.with_contact(smooth).with_load(0.0)
     exact = replace(options or newton.NewtonOptions(), tolerance=EXACT)
 
     def solve(at: HarmonicBalance, start: np.ndarray) -> newton.Solution:
@@ -70,7 +70,3 @@ def tangents(balance: HarmonicBalance, x: np.ndarray) -> dict[str, np.ndarray]:
     assert jac is not None
     each = np.diagonal(jac, axis1=1, axis2=2).reshape(still.shape)[:, :, basis.harmonics.index(1)]
     return {joint.name: np.maximum(each[np.ix_(joint.rows, contact.columns(joint))], 0.0) for joint in own}
-
-
-def _smooth(parameters: ContactParameters) -> ContactParameters:
-    return parameters.scaled("friction", 0.0) if "friction" in parameters.numbers else parameters

@@ -45,8 +45,10 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
         squares, rows, c, g, flow = _modes(*model.per_index(index), highest)
         pair = 0 < 2 * index < N
         lam.append(np.tile(squares, 1 + pair))
-        turned = [rows * np.exp(-2j * np.pi * (index * k % N) / N) for k in range(n)]
-        ports.append(np.stack([_real_row(row, pair) for row in turned]) / np.sqrt(n))
+        turned = np.stack([rows * np.exp(-2j * np.pi * (index * k % N) / N) for k in range(n)])
+        # of amplitudes (u + i v) / sqrt(2) of an index and of their conjugates of its mirror
+        seen = np.sqrt(2) * np.concatenate([turned.real, -turned.imag], axis=-1) if pair else turned.real
+        ports.append(seen / np.sqrt(n))
         damping.append(_real_matrix(c, pair))
         gyroscopic.append(_real_matrix(g, pair))
         circulatory.append(_real_matrix(flow, pair))
@@ -101,11 +103,6 @@ def _modes(
 def _together(blocks: list[np.ndarray]) -> np.ndarray | None:
     """Blocks of all indices as one matrix, None where all vanish."""
     return sla.block_diag(*blocks) if any(block.any() for block in blocks) else None
-
-
-def _real_row(row: np.ndarray, pair: bool) -> np.ndarray:
-    """What a row (..., m) sees of amplitudes (u + i v) / sqrt(2) of an index and of their conjugates of its mirror."""
-    return np.sqrt(2) * np.concatenate([row.real, -row.imag], axis=-1) if pair else row.real
 
 
 def _real_matrix(matrix: np.ndarray, pair: bool) -> np.ndarray:

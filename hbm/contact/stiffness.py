@@ -172,10 +172,10 @@ def flat_rectangle(a: float, b: float, pair: ElasticPair) -> tuple[float, float]
         return _inverse_distance(x, y) / (pi * pair.modulus)
 
     def tangential(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        # Cerruti: u_x = (1 + nu)/(pi E) [(1 - nu)/r + nu x^2/r^3]
+        # Cerruti: u_x = (1 + nu)/(pi E) [(1 - nu)/r + nu x^2/r^3]; the double primitive of x^2/r^3 is y ln(x + r)
         isotropic = sum((1 - nu**2) / (pi * young) for young, nu in pair.bodies)
         directed = sum((1 + nu) * nu / (pi * young) for young, nu in pair.bodies)
-        return isotropic * _inverse_distance(x, y) + directed * _along_shear(x, y)
+        return isotropic * _inverse_distance(x, y) + directed * y * _log_of_sum(x, y)
 
     return _extrapolated(a, b, normal), _extrapolated(a, b, tangential)
 
@@ -183,11 +183,6 @@ def flat_rectangle(a: float, b: float, pair: ElasticPair) -> tuple[float, float]
 def _inverse_distance(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Double primitive of 1/r."""
     return x * _log_of_sum(y, x) + y * _log_of_sum(x, y)
-
-
-def _along_shear(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Double primitive of x^2/r^3."""
-    return y * _log_of_sum(x, y)
 
 
 def _log_of_sum(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -115,11 +115,6 @@ class Segment:
         return self.start.tangent.p * self.end.tangent.p < 0
 
     @property
-    def hides_folds(self) -> bool:
-        """Whether a step over a fold may have passed two more: its tangents lie far apart."""
-        return self.turns and RULES.turn_at_fold < self.angle <= RULES.kink_angle
-
-    @property
     def doubtful(self) -> bool:
         """Whether the ends alone do not tell the curve between: it may leave its branch, or turn back twice."""
         if self.slant > RULES.largest_slant:

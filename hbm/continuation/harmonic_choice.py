@@ -123,7 +123,8 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
         trial = _Trial.of(wide, kept, omega, trial, options)
         history.append((kept, trial.error))
     useful = 0
-    for h in [h for h in trial.by_content() if h not in loaded and h != 1]:
+    least_first = [trial.kept[i] for i in np.argsort(trial.content)]
+    for h in [h for h in least_first if h not in loaded and h != 1]:
         if trial.error > options.tolerance or useful == options.useful_in_a_row:
             break
         fewer = tuple(k for k in kept if k != h)
@@ -268,7 +269,3 @@ class _Trial:
                     wanted[h] = max(wanted.get(h, 0.0), found.shares[h])
         first = sorted(wanted, key=lambda h: -wanted[h])
         return set(first[: max(2, len(self.kept))])  # a rough solution tells little about the rest
-
-    def by_content(self) -> list[int]:
-        """Kept harmonics, the one with the least contact motion first."""
-        return [self.kept[i] for i in np.argsort(self.content)]

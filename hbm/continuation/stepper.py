@@ -228,10 +228,10 @@ class Stepper:
         """
         start, parts = pieces[0].start, []
         for piece in pieces:
-            if careful and piece.hides_folds:
-                return None
             if not piece.turns:
                 continue
+            if careful and curve.RULES.turn_at_fold < piece.angle <= curve.RULES.kink_angle:  # tangents far apart
+                return None
             fold = locate_fold(self._path, piece, self._options.newton, self._options.fold_tolerance)
             if fold is not None:
                 parts.append(Segment(start, fold, piece.metric))

@@ -324,8 +324,13 @@ class CompliancePoint:
         """G g without what a factor would have to be asked for; see `left_out`."""
         if self.compliance.residual is None:
             return self.apply(g)
-        b = self.compliance.groups[0][0].b[: self.compliance.n_contact]
-        found: np.ndarray = (all_harmonics.modal(np.ascontiguousarray(g.T) @ b, 0, *self.core) @ b.T).T
+        return self._by_modes(g, slice(self.compliance.n_contact))
+
+    def _by_modes(self, g: np.ndarray, ports: slice) -> np.ndarray:
+        """Displacement of some ports under contact forces g, of one real system by its modes alone."""
+        b = self.compliance.groups[0][0].b
+        rows = all_harmonics.modal(np.ascontiguousarray(g.T) @ b[: self.compliance.n_contact], 0, *self.core)
+        found: np.ndarray = (rows @ b[ports].T).T
         return found
 
     def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
@@ -360,6 +365,8 @@ class CompliancePoint:
             rows = np.ascontiguousarray(g.T)
             return self._from_rows(rows @ o.columns, c.moving(rows) @ o.single, o.left)
         contacts, outputs = slice(0, c.n_contact), slice(c.n_contact + c.n_load, None)
+        if c.residual is not None:  # which outputs have none of
+            return self._by_modes(g, outputs)
         return c.basis.to_real(self._through_ports(c.basis.to_complex(g), contacts, outputs))
 
     def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

@@ -265,7 +265,8 @@ def _step_of(
     if not state.rate.max() > 0:
         top = problem.balance.basis.harmonics[-1]
         return _Lost(WearEnd.NO_STEP.say(f": no pair slips with harmonics 0 to {top}"), state.solves)
-    searched = fewer_harmonics.searched_with(whole, problem)
+    scans = fewer_harmonics.of_scans(whole)  # for peaks, where a step gets on with fewer
+    searched = max(problem, scans, key=lambda p: len(p.balance.basis.harmonics))
     last = fewer_harmonics.with_fewer(problem) is None
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
     shortest = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())

@@ -67,12 +67,6 @@ def of_scans(whole: WearProblem) -> WearProblem:
     )
 
 
-def searched_with(whole: WearProblem, problem: WearProblem) -> WearProblem:
-    """The problem in which peaks are looked for: with the harmonics of scans where a step got on with fewer."""
-    scans = of_scans(whole)
-    return problem if len(problem.balance.basis.harmonics) >= len(scans.balance.basis.harmonics) else scans
-
-
 def _needed(problem: WearProblem, least: int) -> int:
     """The highest harmonic that loads have, at least some."""
     return max([least, *(h for h, _ in problem.balance.excitation.loads)])

@@ -13,7 +13,7 @@ from scipy.sparse import eye_array, random_array
 
 from tests.helpers.digest import digest
 from tribodyn.fem import factor
-from tribodyn.fem.factor import eigenvalues_below, factorise, solve_few
+from tribodyn.fem.factor import Pardiso, eigenvalues_below, factorise, solve_few
 
 FRESH = """
 import sys
@@ -44,14 +44,16 @@ def test_eigenvalues_are_counted_by_one_factorisation(pardiso: bool, monkeypatch
         assert eigenvalues_below(K, M, 0.5 * (values[place - 1] + values[place])) == place
 
 
-@pytest.mark.parametrize("solver", ["pardiso", "superlu"])
-def test_few_rows_are_those_of_the_whole_solution(solver: str) -> None:
-    """Also where a force on them vanishes, and between solutions in all rows."""
+@pytest.mark.parametrize(("solver", "most"), [("pardiso", 0.5), ("pardiso", 0.0), ("superlu", 0.5)])
+def test_few_rows_are_those_of_the_whole_solution(solver: str, most: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where a force on them vanishes, between solutions in all rows, and where they are too many to pay."""
+    monkeypatch.setattr(Pardiso, "MOST_FEW", most)
     some = random_array((400, 400), density=0.02, rng=1)
     K = some @ some.T + 4 * eye_array(400)
     few = np.array([3, 50, 51, 52, 399])
     made = factorise(K, solver=solver, few=few)
-    force, every = np.zeros((400, 3)), np.random.default_rng(2).normal(size=(400, 2))
+    assert getattr(made, "_few", False) == (solver == "pardiso" and most > 0)
+    force, every = np.zeros((400, 7)), np.random.default_rng(2).normal(size=(400, 2))
     force[few[:4], :2] = np.random.default_rng(3).normal(size=(4, 2))
     for _ in range(2):
         assert np.allclose(

@@ -2,27 +2,37 @@
 
 Every size is measured in a process of its own, so that its peak memory is its own; seconds are processor seconds of one
 thread. Craig-Bampton with its dense compliance is measured beside the residual flexibility as far as it fits.
+
+The roofline (see `bench`) is that of the parts of a curve by residual flexibility. Where contact rows are eliminated
+last, a solution in them reads the lower triangle of their dense factor twice.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tests.helpers.reduced import reduce_part
-from tribodyn.fem.factor import factorise
-from tribodyn.hbm.balance import HarmonicBalance
+from tests.proof.bench import Machine, Work
+from tribodyn.fem.factor import Pardiso, factorise
+from tribodyn.hbm.balance import HarmonicBalance, Linearisation
+from tribodyn.hbm.contact.joint import Contact
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import natural
+from tribodyn.hbm.linear import all_harmonics
+from tribodyn.hbm.linear.compliance import CompliancePoint
+from tribodyn.reduction import residual_flexibility
 from tribodyn.reduction.residual_flexibility import ResidualFlexibility
 from tribodyn.workflows.run import memory, modelling, settings
 from tribodyn.workflows.scene import scene_file
@@ -33,6 +43,26 @@ DENSE = ("500", "1500", "3k")  # sizes at which Craig-Bampton is measured too
 WAYS = {"craig_bampton": 60, "residual_flexibility": 24}  # and its modes
 RANGE, HARMONICS, SAMPLES = 200, [0, 1, 2, 3], 100  # points of the scene's range; fewer are taken about its middle
 PROBE_HZ, PROBES = 3000.0, 3  # the highest harmonic at the upper end of the range
+WATCHED: dict[str, tuple[Any, str]] = {  # what a curve by residual flexibility is made of
+    "contact": (Contact, "cycle"),
+    "slopes": (Linearisation, "g_slope"),
+    "products": (all_harmonics, "nearly_displaced"),
+    "modes": (CompliancePoint, "nearly"),
+    "rest": (ResidualFlexibility, "apply"),
+    "factor": (residual_flexibility, "solve_few"),
+}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a curve, a point: calls, seconds, bytes read, operations, and the least seconds of these."""
+
+    name: str
+    calls: float
+    seconds: float
+    bytes: float
+    flops: float
+    limit: float
 
 
 @dataclass(frozen=True)
@@ -46,6 +76,7 @@ class ContactCost:
         part, relative; nan where it was not made
     left_out : share of the flexibility that Newton's directions do without
     force_difference : of the contact forces at every tenth point from those of the other way, relative; nan for none
+    parts : of the curve by residual flexibility; in the contact law only the bytes are counted
     """
 
     way: str
@@ -62,6 +93,7 @@ class ContactCost:
     compliance_error: float
     left_out: float
     force_difference: float = np.nan
+    parts: tuple[Part, ...] = field(default_factory=tuple)
 
 
 def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[ContactCost]:
@@ -80,7 +112,7 @@ def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[ContactCost]:
                 row, forces = alone.submit(measure, *SIZES[size], way, modes).result()
             if theirs is not None and len(theirs) == len(forces):
                 off = np.abs(forces - theirs).max(axis=(1, 2, 3)) / np.abs(theirs).max(axis=(1, 2, 3))
-                row = ContactCost(**{**asdict(row), "force_difference": float(off.max())})
+                row = replace(row, force_difference=float(off.max()))
             theirs = forces
             rows.append(row)
     return rows
@@ -107,9 +139,12 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
         options = natural.Options(n_points=points, newton=settings.newton_options(scene))
         natural.follow(balance, high, high - 1e-6 * step, natural.Options(n_points=2))  # compiles outside the clock
         clock.append(time.process_time())
-        branch = natural.follow(balance, first, last, options)
+        spent: dict[str, list[float]] = {}
+        with watched(spent):
+            branch = natural.follow(balance, first, last, options)
         clock.append(time.process_time())
         peak, rest = memory.peak(), reduced.residual
+        parts = () if rest is None else _parts(balance, spent, len(branch.omega))  # before its factor is let go
     row = ContactCost(
         way=way,
         contact_dofs=balance.compliance.n_contact,
@@ -124,8 +159,67 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
         peak_bytes=peak,
         compliance_error=np.nan if rest is None else compliance_error(rest, 2 * np.pi * PROBE_HZ),
         left_out=0.0 if rest is None else rest.left_out,
+        parts=parts,
     )
     return row, _forces(balance, branch)
+
+
+@contextmanager
+def watched(spent: dict[str, list[float]]) -> Iterator[None]:
+    """Adds calls and seconds of each of WATCHED."""
+
+    def counting(plain: Callable[..., Any], own: list[float]) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:
+            clock = time.process_time()
+            found = plain(*arguments, **options)
+            own[0] += 1
+            own[1] += time.process_time() - clock
+            return found
+
+        return call
+
+    with ExitStack() as stack:
+        for name, (owner, attribute) in WATCHED.items():
+            plain = getattr(owner, attribute)
+            stack.enter_context(patch.object(owner, attribute, counting(plain, spent.setdefault(name, [0, 0.0]))))
+        yield
+
+
+def _parts(balance: HarmonicBalance, spent: dict[str, list[float]], points: int) -> tuple[Part, ...]:
+    """The parts of a curve of so many points, `rest` and `modes` shared out to factor and modes."""
+    n, m, r = balance.compliance.n_contact, balance.basis.n_coeff, balance.compliance.groups[0][0].n_mode
+    assert balance.model.residual is not None
+    rest = balance.model.residual
+    read = 4 * len(np.unique(rest.B.indices)) ** 2  # of the factor, each of two times
+    if isinstance(rest.factor, Pardiso) and not rest.factor._few:
+        read = 1024 * int(rest.factor._solver.get_iparm(Pardiso.SIZE))
+    blocks, calls = (
+        balance.contact.n_pair * (n // balance.contact.n_pair * m) ** 2,
+        {k: c for k, (c, _) in spent.items()},
+    )
+    core = 16 * len(balance.basis.dynamic) * r**2
+    seconds = {name: took for name, (_, took) in spent.items()}
+    seconds["modes"] += seconds["rest"] - seconds["factor"]
+    calls["modes"] += calls["rest"]
+    works = {
+        "contact": ("contact law", 8 * blocks, {}),
+        "slopes": ("slopes of pairs", 8 * blocks, {8: 2 * blocks}),
+        "products": ("products of GMRES", 8 * n * r + core, {4: 4 * n * r * m, 8: core // 2}),
+        "modes": ("modes in double", 16 * n * r + core, {8: 4 * n * r * m + core // 2}),
+        "factor": ("solutions with the factor", 2 * read, {8: read * m // 2}),
+    }
+    machine = Machine.measured()
+    return tuple(
+        Part(
+            name=name,
+            calls=calls[of] / points,
+            seconds=seconds[of] / points,
+            bytes=calls[of] * read / points,
+            flops=calls[of] * sum(flops.values()) / points,
+            limit=machine.seconds(Work(name, int(calls[of]), read, flops)) / points,
+        )
+        for of, (name, read, flops) in works.items()
+    )
 
 
 def _forces(balance: HarmonicBalance, branch: Branch) -> np.ndarray:
@@ -177,9 +271,23 @@ def as_text(rows: Sequence[ContactCost]) -> str:
             f"{r.converged}/{r.points} points in {r.response_seconds:.1f} s ({each:.2f} s each, "
             f"{r.newton_steps} Newton steps){more}"
         )
+        lines += _roofline(r)
     for way in dict.fromkeys(row.way for row in rows):
         own = [row for row in rows if row.way == way]
         if len({row.contact_dofs for row in own}) > 1:
             told = ", ".join(f"{name} {power:.2f}" for name, power in powers(own).items())
             lines.append(f"{way}: powers of the contact DOFs: {told}")
     return "\n".join(lines)
+
+
+def _roofline(row: ContactCost) -> list[str]:
+    """A line for each part of a point, and how near they are to what the machine lets them take."""
+    lines = [
+        f"  {p.name:25} {p.calls:4.1f} a point, {p.bytes / 1e6:6.0f} MB, {p.flops / 1e6:6.0f} MFlop: "
+        f"{1e3 * p.limit:6.1f} of {1e3 * p.seconds:6.1f} ms at least"
+        for p in row.parts
+    ]
+    if row.parts:
+        each, limit = row.response_seconds / row.points, sum(p.limit for p in row.parts)
+        lines.append(f"  roofline of all: {1e3 * limit:.0f} of {1e3 * each:.0f} ms, {limit / each:.0%}")
+    return lines
