@@ -62,8 +62,9 @@ def _controlled(body: Body, share: float) -> Verdict:
 def _coefficient(body: Body, value: float) -> Verdict:
     """Depth against cycles x coefficient does not depend on the coefficient."""
     problem, delta = _problem(body, value)
-    worn = error_controlled_rule.evolve(problem, Tolerance(0.03, delta), MOST_STEPS)
-    return _judged(body, problem, worn, value / ORDINARY, 0.03)
+    tolerance = Tolerance(0.03, delta)
+    worn = error_controlled_rule.evolve(problem, tolerance, MOST_STEPS)
+    return _judged(body, problem, worn, value / ORDINARY, tolerance)
 
 
 def _judged(
