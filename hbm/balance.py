@@ -66,6 +66,8 @@ class HarmonicBalance:
     at_rest : (n_pair, n_component) displacement under the static loads, where it is known [m]
     held_rest : (n_contact, n_coeff) what the residual flexibility of the model is taken to give, whatever the contact
         forces are [m]; None where it follows them, or there is none
+    asked : forces that the residual flexibility was asked for along the curve that is followed, and what it gave; None
+        where each solution stands for itself
     at_speed : the problem of the same contact at other speeds of rotation [Hz], where a mission asks for them
     """
 
@@ -79,6 +81,7 @@ class HarmonicBalance:
     load_factor: float = 1.0
     at_rest: np.ndarray | None = None
     held_rest: np.ndarray | None = None
+    asked: list[np.ndarray] | None = None
     at_speed: Mapping[float, HarmonicBalance] = field(default_factory=dict)
 
     @classmethod

@@ -167,17 +167,18 @@ def _solve_with_rest(
     before = np.inf
     x_lin = balance.x_lin(omega)
     history: tuple[float, ...] = ()
+    asked = [] if balance.asked is None else balance.asked
     rest = np.zeros(())
     state = replace(balance, held_rest=rest).evaluate(omega, start)
     for count in range(RULES.most_corrections):
-        known, moved = residual.recalled(state.g)
+        known, moved = residual.recalled(state.g, asked)
         state, rest = replace(state, residual=state.residual + rest - moved), moved
         unsure, error = residual.at_most(state.g - known, state.flat), relative_residual(state, x_lin)
         goal = wanted(balance, state, x_lin, options)
         if error + unsure <= goal:
             return Solved(state, CONVERGED, steps, products, (*history, error + unsure))
         if count > 0:
-            moved = residual.asked(state.g)
+            moved = residual.asked(state.g, asked)
             state, rest = replace(state, residual=state.residual + rest - moved), moved
             unsure, error = 0.0, relative_residual(state, x_lin)
             history += (error,)

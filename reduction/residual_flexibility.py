@@ -21,6 +21,7 @@ Source  residual flexibility of free-interface modes: MacNeal 1971, doi 10.1016/
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -68,7 +69,7 @@ class ResidualFlexibility:
         return factorise(self.matrix, solver=self.solver, few=np.unique(self.B.indices))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("factor", "_asked")}
+        return {name: value for name, value in self.__dict__.items() if name != "factor"}
 
     @cached_property
     def at_contact(self) -> np.ndarray:
@@ -84,19 +85,15 @@ class ResidualFlexibility:
         moved: np.ndarray = self.B @ solve_few(self.factor, self.B.T @ force)
         return moved - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
 
-    def asked(self, force: np.ndarray) -> np.ndarray:
-        """The same, kept for `recalled`."""
-        self._asked.append(np.stack([force, self.apply(force)]))
-        del self._asked[: -LIMITS.recalled]
-        return self._asked[-1][1]
+    def asked(self, force: np.ndarray, known: list[np.ndarray]) -> np.ndarray:
+        """The same, which is added to the last that are known, for `recalled`."""
+        known.append(np.stack([force, self.apply(force)]))
+        del known[: -LIMITS.recalled]
+        return known[-1][1]
 
-    @cached_property
-    def _asked(self) -> list[np.ndarray]:
-        return []
-
-    def recalled(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def recalled(self, force: np.ndarray, asked: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Forces near these (n_contact, k) that the columns `asked` for last add up to, and R times them."""
-        known = np.concatenate([np.zeros((2, len(force), 0)), *self._asked], axis=2)
+        known = np.concatenate([np.zeros((2, len(force), 0)), *asked], axis=2)
         near, moved = known @ np.linalg.lstsq(self._weighted(known[0]), self._weighted(force))[0]
         return near, moved
 

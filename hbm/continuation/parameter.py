@@ -55,10 +55,11 @@ class Parameter:
 
 
 def of(problem: HarmonicBalance | Parameter) -> Parameter:
-    """The parameter itself, or the frequency where a balance is given."""
+    """The parameter itself, or the frequency of a balance, whose curve recalls what its points asked for."""
     if isinstance(problem, Parameter):
         return problem
-    return Parameter(FREQUENCY, lambda _: problem, None)
+    along = replace(problem, asked=[])
+    return Parameter(FREQUENCY, lambda _: along, None)
 
 
 def load(balance: HarmonicBalance, omega: float) -> Parameter:

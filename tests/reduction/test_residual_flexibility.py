@@ -14,6 +14,8 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import NEARLY_ALL, HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.hbm.newton import NewtonOptions
@@ -148,10 +150,10 @@ def test_what_a_solve_does_not_ask_for_is_below_its_tolerance(beam, monkeypatch:
     plain = type(rest).apply
     monkeypatch.setattr(type(rest), "apply", lambda self, f: (asked.append(1), plain(self, f))[1])
     start = newton.solve_from_rest(balance, OMEGA, NewtonOptions(tolerance=1e-8)).state.x
-    bounded = 0
+    bounded, along = 0, parameter.of(balance).make(OMEGA)
     for omega in OMEGA * np.linspace(1.0, 1.005, 6):
         before = len(asked)
-        found = newton.solve(balance, omega, start, NewtonOptions(tolerance=1e-8))
+        found = newton.solve(along, omega, start, NewtonOptions(tolerance=1e-8))
         spent = len(asked) - before
         exact = newton.relative_residual(balance.evaluate(omega, found.state.x), balance.x_lin(omega))
         assert found.converged
@@ -170,22 +172,34 @@ def test_what_was_asked_for_is_known_of_all_that_adds_up_to_it(beam) -> None:
     assert rest is not None
     root = np.sqrt(springs.ravel())[:, None]
     asked, other = (root * rng.normal(size=(75, n)) for n in (5, 3))
-    nothing, still = rest.recalled(asked)
+    known: list[np.ndarray] = []
+    nothing, still = rest.recalled(asked, known)
     assert not nothing.any()
     assert not still.any()
-    assert np.array_equal(rest.asked(asked), rest.apply(asked))
+    assert np.array_equal(rest.asked(asked, known), rest.apply(asked))
     for force in (asked @ rng.normal(size=(5, 2)), other):
-        near, moved = rest.recalled(force)
+        near, moved = rest.recalled(force, known)
         assert np.allclose(moved, rest.apply(near), rtol=0, atol=1e-12 * np.abs(moved).max())
         assert np.abs((asked / root).T @ ((force - near) / root)).max() < 1e-10 * np.abs(force / root).max()
     assert np.abs(force - near).max() > 0.1 * np.abs(force).max()
-    found = newton.solve_from_rest(balance, OMEGA)
-    asks = len(rest._asked)
-    rest.asked(0.1 * found.state.g)  # a fourth one or more: the first is forgotten
-    assert len(rest._asked) == min(asks + 1, 4)
-    again = newton.solve(balance, OMEGA, found.state.x)
+    for _ in range(4):  # the first is forgotten
+        rest.asked(other, known)
+    assert len(known) == 4
+    assert np.array_equal(known[0][0], other)
+
+
+def test_a_curve_recalls_what_its_points_asked_for_and_a_solution_by_itself_nothing(beam) -> None:
+    """What was solved before changes no bit of it: a run that goes on after a stop has not solved that."""
+    file, part, springs = beam
+    balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
+    alone = newton.solve_from_rest(balance, OMEGA)
+    curve = parameter.of(balance).make(OMEGA)
+    found = newton.solve(curve, OMEGA, alone.state.x)
+    again = newton.solve(curve, OMEGA, found.state.x)
     assert (again.steps, again.products) == (0, 0)
-    assert not pickle.loads(pickle.dumps(rest)).recalled(asked)[1].any()
+    assert np.array_equal(newton.solve_from_rest(balance, OMEGA).state.x, alone.state.x)
+    whole = [natural.follow(balance, 0.9 * OMEGA, OMEGA, natural.Options(n_points=3)).contact for _ in range(2)]
+    assert np.array_equal(*whole)
 
 
 def test_matrices_of_velocity_are_projected(beam) -> None:
