@@ -23,6 +23,7 @@ from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.style import CYCLE, GREY
+from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, pipeline, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
@@ -38,12 +39,13 @@ from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
 SHOWN = 12  # parameters in the picture
-OF_ROWS = {"peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
+OF_ROWS = {
+    "peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload", "life_cycles": "life"
+}  # fmt: skip
 PLOTTED = ("frequency", "amplitude", "damping", "energy", "preload", "life", "depth", "volume")
 # step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
 OF_MODE = 1e-4
 DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
-Slopes = dict[tuple[str, str], float]
 UNITS = {
     "frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3", "damping": "",
     "life": "cycles", "depth": "m", "volume": "m3",
@@ -274,7 +276,8 @@ def _of_mode(
 def _share(scene: Scene) -> float:
     """Of the first preload, where the life that a result states ends."""
     assert scene.wear is not None
-    return (scene.wear.lost_below if scene.wear.end_at == "at_rest" else 0.0) or LIFE_SHARE
+    told = scene.wear.end_at == "at_rest" or scene.wear.lost_of == "any"
+    return (scene.wear.lost_below if told else 0.0) or LIFE_SHARE
 
 
 def _of_life(varying: Varying, worn: WearHistory, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
@@ -309,27 +312,37 @@ def _found(
     return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), options)
 
 
-def of_summary(varying: Varying, response: Branch, numbers: Mapping[str, float], wanted: Sequence[str]) -> Slopes:
+def of_summary(
+    varying: Varying, result: Result, numbers: Mapping[str, float], wanted: Sequence[str]
+) -> dict[tuple[str, str], float]:
     """Derivatives of the numbers of a finished run by some keys of its scene, as far as these are exact.
 
-    numbers : of the row of a study; those of its first state have derivatives
-    Returns (number, key) -> d number / d key, SI units; empty where the first state has no derivatives
+    numbers : of the row of a study; those of its first state, and its life, have derivatives
+    Returns (number, key) -> d number / d key, SI units; of what has no derivatives there are none
     """
-    scene, known = varying.scene, keys(varying.scene)
-    slopes: dict[tuple[str, str], float] = {}
+    scene, response, worn = varying.scene, result.response, result.wear
+    known = keys(scene) | {key: value for key, (value, _) in wear_run.coefficient_keys(scene).items()}
     of_gap = {("contact.gap" if name == "contact" else f"contacts.{name}.gap"): name for name in scene.joints}
-    places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
     own = {key: known[key] for key in wanted if key in known}
-    if len(places) > 1 or places[0].peak not in (None, 1.0) or not (own or of_gap.keys() & set(wanted)):
-        return slopes
-    try:
-        found = _found(varying, response, places[0].frequency, own, lambda *_: None)
-    except NoDerivative:
-        return slopes
-    by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}
+    if not (own or of_gap.keys() & set(wanted)):
+        return {}
+    places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
+    each: list[Callable[[], Derivatives]] = []
+    if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
+        unworn = {key: value for key, value in own.items() if key in keys(scene)}
+        each.append(lambda: _found(varying, response, places[0].frequency, unworn, lambda *_: None))
+    if worn is not None and "life_cycles" in numbers:
+        each.append(lambda: _of_life(varying, worn, own, lambda *_: None))
+    slopes: dict[tuple[str, str], float] = {}
     rows = {joint.name: joint.rows for joint in varying.model.balance.contact.joints}
-    by |= {key: found.by_gap[:, rows[name]].sum(axis=1) for key, name in of_gap.items() if key in wanted}
-    for number, name in OF_ROWS.items():
-        if number in numbers and name in found.names:
-            slopes |= {(number, key): float(column[found.names.index(name)]) for key, column in by.items()}
+    for find in each:
+        try:
+            found = find()
+        except NoDerivative:
+            continue
+        by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}
+        by |= {key: found.by_gap[:, rows[name]].sum(axis=1) for key, name in of_gap.items() if key in wanted}
+        for number, name in OF_ROWS.items():
+            if number in numbers and name in found.names:
+                slopes |= {(number, key): float(column[found.names.index(name)]) for key, column in by.items()}
     return slopes

@@ -95,9 +95,8 @@ def solve(task: Task) -> Row:
             file = task.scene()
             result = pipeline.run(file, None, Progress(), row_only=True, judge=with_verdict)
             numbers = numbers_of(result)
-            if task.slopes and result.response is not None and not numbers.get("peak_at_end"):
-                varying = Varying(file, Progress())
-                slopes = derivatives.of_summary(varying, result.response, numbers, task.slopes)
+            if task.slopes and not numbers["peak_at_end"]:
+                slopes = derivatives.of_summary(Varying(file, Progress()), result, numbers, task.slopes)
                 numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
         except np.linalg.LinAlgError as error:
             return ended("failed", error)
