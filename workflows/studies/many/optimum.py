@@ -31,13 +31,14 @@ from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study import Runner
 from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
-from tribodyn.workflows.studies.many.surrogate import FEWEST, Surrogate
+from tribodyn.workflows.studies.many.surrogate import Surrogate
 from tribodyn.workflows.studies.many.table import SENTENCE, StudyTable
 from tribodyn.workflows.studies.many.task import RUN
 from tribodyn.workflows.studies.study_result import StudyResult
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
 MISSED = 1e3  # what a limit that is passed counts beside the aims
+AUGMENTED = 0.05  # share of the sum of aims beside the largest: Knowles 2006
 NEAR = 1e-3  # of the unit cube, within which a proposal is a run that is there already
 
 
@@ -250,10 +251,13 @@ def best_trades(aims: np.ndarray, allowed: np.ndarray) -> np.ndarray:
 
 
 def chebyshev(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Largest of those aims (..., m) that have a weight, times it, between low (m,), 0, and high (m,), 1."""
+    """Largest of those aims (..., m) that have a weight, times it, between low (m,), 0, and high (m,), 1.
+
+    A small share of their sum is added: of places that are as good in the worst aim, the one that is better in others
+    """
     counted = weights > 0
-    scaled = weights * (aims - low) / np.where(high > low, high - low, 1.0)
-    found: np.ndarray = scaled[..., counted].max(axis=-1)
+    scaled = (weights * (aims - low) / np.where(high > low, high - low, 1.0))[..., counted]
+    found: np.ndarray = scaled.max(axis=-1) + AUGMENTED * scaled.sum(axis=-1)
     return found
 
 
@@ -268,13 +272,13 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
     """A place (k,) in the unit cube for the run that promises most; the same runs and seed propose the same.
 
     scale : places (n, k) -> coordinates (n, k) that surrogates are fitted in
-    Returns the place and what is expected there beyond the best run so far, in what is made small, inf where there are
-        too few runs to say: then it lies far from all others. A second aim is weighed anew for every run
+    Returns the place and what is expected there beyond the best run so far, in what is made small, inf where no run is
+        solved: then it lies far from all others. A second aim is weighed anew for every run
     """
     share, m = known.share, known.aims.shape[1]
     draw = np.random.default_rng([seed, len(share)])
     columns, solved = np.concatenate([known.aims, known.excess], axis=1), known.solved
-    if int(solved.sum()) + int(np.isfinite(known.slopes[solved, 0]).sum()) < FEWEST:
+    if not solved.any():
         return _emptiest(share, draw), np.inf
     surrogates = [_fitted(scale(share), column, known.slopes[:, i], solved) for i, column in enumerate(columns.T)]
     low, high = ends(known)
@@ -314,7 +318,8 @@ def _descended(
 
     def margins(z: np.ndarray) -> np.ndarray:
         aims, excess = (each[0] for each in expected(z[None, 1:]))
-        return np.concatenate([z[0] - scale * (aims - low)[counted], -excess])
+        scaled = scale * (aims - low)[counted]
+        return np.concatenate([z[0] - scaled - AUGMENTED * scaled.sum(), -excess])
 
     first = float(chebyshev(expected(start[None])[0], weights, low, high)[0])
     found = minimize(
@@ -332,7 +337,7 @@ def _fitted(points: np.ndarray, column: np.ndarray, slopes: np.ndarray, solved: 
 
     Source  Forrester, Sobester and Keane 2006, doi 10.1098/rspa.2005.1608
     """
-    found = Surrogate.fitted(points[solved], column[solved], slopes[solved])
+    found = Surrogate.fitted(points[solved], column[solved], slopes[solved], few=True)
     for point in points[~solved]:
         mean, deviation = found.mean_and_deviation(point[None])
         found = found.with_run(point, float(mean[0] + deviation[0]))

@@ -91,17 +91,19 @@ class Surrogate:
         values: np.ndarray,
         slopes: np.ndarray | None = None,
         laws: tuple[Law, ...] = (),
+        few: bool = False,
     ) -> Surrogate:
         """The most likely process: coordinates (n, k) of order 1, values (n,), derivatives (n, k) or nan.
 
         Of a number that has laws no derivatives are taken.
 
-        Raises  ValueError where fewer than FEWEST numbers are known
+        few : where fewer than FEWEST numbers are known, the process that the search for the most likely one begins at
+        Raises  ValueError where fewer are known, and `few` is not asked for
         Source  Rasmussen and Williams 2006, eq. 2.30
         """
         slopes = np.full(points.shape, np.nan) if slopes is None else slopes
         known = len(values) + int(np.isfinite(slopes).sum())
-        if known < FEWEST:
+        if known < FEWEST and not few:
             raise ValueError(f"{known} numbers of runs are known, a surrogate needs {FEWEST} at least")
         left = values - sum(law.known(points) for law in laws)
         middle, width = float(np.mean(left)), float(np.std(left)) or 1.0
@@ -116,14 +118,14 @@ class Surrogate:
                 return 1e6
             return float(0.5 * tried._given @ alpha + np.log(np.diag(root)).sum())
 
-        # derivatives leave little doubt of the lengths
-        lengths = STARTS[:1] if np.isfinite(slopes).any() else STARTS
-        climbs = (
-            minimize(unlikely, [0.0, -3.0, -9.0, *[length] * k], method="L-BFGS-B", bounds=bounds, tol=LIKELY)
-            for length in lengths
-        )
-        found = min(climbs, key=lambda one: one.fun)
-        fitted = cls(found.x, points, values, slopes, laws, middle, width)
+        starts = [np.array([0.0, -3.0, -9.0, *[length] * k]) for length in STARTS]
+        likely = starts[0]
+        if known >= FEWEST:
+            if np.isfinite(slopes).any():
+                starts = starts[:1]  # derivatives leave little doubt of the lengths
+            climbs = (minimize(unlikely, start, method="L-BFGS-B", bounds=bounds, tol=LIKELY) for start in starts)
+            likely = min(climbs, key=lambda one: one.fun).x
+        fitted = cls(likely, points, values, slopes, laws, middle, width)
         spread, missed = fitted._leaving_out
         return replace(fitted, stretch=max(1.0, float(np.sqrt(np.mean(missed**2 / spread)))))
 
