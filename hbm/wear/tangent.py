@@ -34,7 +34,7 @@ from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.dirk_stages import GAMMA, Search, begun, depth_per_work, first_stage
 from tribodyn.hbm.wear.evolution import WearProblem, WearState, assess, state_of
 from tribodyn.hbm.wear.fewer_harmonics import top_harmonic
-from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, cycles_to_share
+from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, cycles_to_preload
 from tribodyn.hbm.wear.implicit_stage import work_slope
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 
@@ -53,9 +53,10 @@ def of_life(
     share : of the first preload, where the life ends. The gaps of a joint open together: each pair has the same part
     Raises  NoDerivative where there is no life, or no derivative along it
     """
-    life, preload, pairs = _ended(problem, worn, share)
+    life = cycles_to_preload(worn, share)
     if life is None:
         raise NoDerivative(f"the contact has no life: {worn.end}")
+    preload = worn.preload if worn.preload_at_rest is None else worn.preload_at_rest
     end = int(np.flatnonzero(preload < share * preload[0])[0])
     end -= int(preload[end] <= 0)  # all apart: the row before is the last that tells of the parameters
     if end == 0:
@@ -71,7 +72,7 @@ def of_life(
             grows[problem.balance.contact.joint(name).rows, i] = 1 / value
     for i, joint in enumerate(joints, last + 1):
         opens[joint.rows, i] = 1.0
-    tangent, depth = _Tangent(problem, changes, grows, opens, pairs), np.zeros_like(opens)
+    tangent, depth = _Tangent(problem, changes, grows, opens), np.zeros_like(opens)
     after = first = state_of(problem, rows[0])
     for i, row in enumerate(rows[:-1]):
         before, after = after, state_of(problem, rows[i + 1])
@@ -82,7 +83,7 @@ def of_life(
         rests = assess(quiet, first.depth, 0.0, None)
         tangent, ends = replace(tangent, problem=quiet), [rests, assess(quiet, after.depth, 0.0, rests)]
     had, left = (
-        tangent.moved(state, base, 0.0).preload / tangent.force_of(state)
+        tangent.moved(state, base, 0.0).preload / problem.preload_of(state)
         for state, base in zip(ends, (np.zeros_like(depth), depth), strict=True)
     )
     longer = (had - left) / left[last]
@@ -97,26 +98,14 @@ def of_life(
     )  # fmt: skip
 
 
-def _ended(problem: WearProblem, worn: WearHistory, share: float) -> tuple[float | None, np.ndarray, np.ndarray]:
-    """The life [cycles], None for none, the preload (n_row,) [N] that it ends by, and the pairs that carry that."""
-    at_rest, each = worn.preload_at_rest is not None, [(worn.preload, problem.pairs)]
-    if worn.preload_at_rest is not None:
-        each = [(worn.preload_at_rest, problem.pairs)]
-    elif problem.any_joint:
-        rows = [problem.balance.contact.joint(name).rows for name in problem.wearing]
-        each = [(worn.normal_force[:, pairs].sum(axis=1), pairs) for pairs in rows]
-    lives = [(cycles_to_share(worn.cycles, preload, share, at_rest), preload, pairs) for preload, pairs in each]
-    return min(lives, key=lambda one: one[0] or np.inf)
-
-
 def _check(problem: WearProblem, rows: Sequence[WearRow]) -> None:
     """Raise NoDerivative where there is none along the rows of a run."""
     basis, (duty, *more) = problem.balance.basis, problem.mission
     laws = sorted({wear.law for wear in problem.wearing.values()} - {"energy"})
     if laws:
         raise NoDerivative(f"the depth by wear law {laws[0]} does not go with the friction work alone")
-    if more or duty.balance is not None or isinstance(duty.site, BesidePeak):
-        raise NoDerivative("cycles at several places or beside a peak")
+    if more or duty.balance is not None or isinstance(duty.site, BesidePeak) or problem.any_joint:
+        raise NoDerivative("cycles at several places, beside a peak, or until any joint is lost")
     for row, following in pairwise(rows):
         where, moved = f"at {following.cycles:.4g} cycles", following.omega / row.omega - 1
         if row.periods:
@@ -132,7 +121,7 @@ def _check(problem: WearProblem, rows: Sequence[WearRow]) -> None:
 
 @dataclass(frozen=True)
 class _Moved:
-    """Derivatives of a state: depth (n_pair, n), depth per cycle (n_pair, n), and preload of the pairs that count."""
+    """Derivatives of a state: depth (n_pair, n), depth per cycle (n_pair, n), and preload of the joints that wear."""
 
     depth: np.ndarray
     rate: np.ndarray
@@ -144,7 +133,6 @@ class _Tangent:
     """The columns of a tangent, the changes first.
 
     grows : (n_pair, n) d ln depth per work; opens : (n_pair, n) d gap besides the wear
-    pairs : whose preload ends the life
     corners : cycles of the states where a pair is at a corner of its force, and the tangent that of one side
     """
 
@@ -152,13 +140,7 @@ class _Tangent:
     changes: tuple[Change, ...]
     grows: np.ndarray
     opens: np.ndarray
-    pairs: np.ndarray
     corners: list[float] = field(default_factory=list)
-
-    def force_of(self, state: WearState) -> float:
-        """The preload that ends the life [N]."""
-        normal = self.problem.balance.contact.components.index("n")
-        return float(state.points[0].state.cycle.force[self.pairs, normal, 0].sum())
 
     def along(
         self, row: WearRow, past: Sequence[WearRow], before: WearState, after: WearState, depth: np.ndarray
@@ -225,7 +207,7 @@ class _Tangent:
             depth, dx = depth + turn * omega, dx + by_omega * omega
         moved = force + np.einsum("pcd,pdn->pcn", jac, dx) + gap[..., None] * (depth + self.opens)[:, None]
         rate = grows + by_work * (at_x - falls * depth + np.einsum("pc,pcn->pn", along, dx))
-        return _Moved(depth, rate, moved[self.pairs, normal].sum(axis=0))
+        return _Moved(depth, rate, moved[problem.pairs, normal].sum(axis=0))
 
 
 def _work(balance: HarmonicBalance, force: np.ndarray, x: np.ndarray) -> np.ndarray:

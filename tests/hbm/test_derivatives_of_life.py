@@ -82,31 +82,6 @@ def test_derivatives_of_a_life_are_those_of_its_steps_taken_again(rule, site, na
     np.testing.assert_allclose(found.slopes[:, -1] / found.values, [-1.0, 0.0, 0.0], atol=1e-12)
 
 
-def test_a_life_that_any_joint_ends_goes_by_the_preload_of_that_joint():
-    halves = {"left": np.array([0, 1]), "right": np.array([2, 3])}
-
-    def split(factor):
-        problem = problem_of(AT, "friction", factor, any_joint=True)
-        balance = problem.balance
-        (whole,) = balance.contact.joints
-        joints = [
-            replace(whole, name=name, parameters=whole.parameters.taken(pairs), pairs=pairs)
-            for name, pairs in halves.items()
-        ]
-        balance = HarmonicBalance.of(balance.model, joints, balance.basis, balance.excitation, 1500.0)
-        return replace(problem, balance=balance)
-
-    problem = split(1.0)
-    worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
-    change = Change("friction", STEP, *(Posed.of(split(1 + side).balance) for side in (STEP, -STEP)))
-    found = tangent.of_life(problem, worn, [change], {}, SHARE)
-    first = str(worn.end).rpartition(" ")[2]
-    assert first in halves
-    elasticity = found.slopes[:, 0] / found.values
-    wanted = elasticity_anew(worn, SHARE, split, elasticity[0], halves[first])
-    np.testing.assert_allclose(elasticity, wanted, rtol=1e-5, atol=1e-6)
-
-
 @pytest.mark.parametrize("at_rest", [False, True])
 def test_all_loads_times_c_wear_c_times_as_deep_in_a_life_over_c(at_rest):
     """Contacts without gap are homogeneous: displacements go with c, work with its square."""

@@ -19,19 +19,14 @@ def exactly(problem, **site):
     return replace(problem, mission=(replace(duty, site=replace(duty.site, newton=EXACT, **site)),))
 
 
-def again(problem, worn, end, longer, pairs):
+def again(problem, worn, end, longer):
     """Cycles, largest depth and volume behind the steps of a run of another problem, and ln of the preload left.
 
-    longer : factor on all steps; pairs : whose preload it is
+    longer : factor on all steps
     """
-
-    def preload(state):
-        normal = problem.balance.contact.components.index("n")
-        return state.points[0].state.cycle.force[pairs, normal, 0].sum()
-
     rows = worn.rows()
     state = assess(problem, np.zeros_like(problem.area), 0.0, state_of(problem, rows[0]))
-    first = preload(state)
+    first = problem.preload_of(state)
     for i, row in enumerate(rows[:end]):
         stride = longer * row.cycles_in_step
         if len(row.plan):
@@ -40,24 +35,22 @@ def again(problem, worn, end, longer, pairs):
         else:
             state = assess(problem, state.depth + stride * state.rate, state.cycles + stride, state)
         assert not state.failure
-    left = np.log(preload(state) / first)
+    left = np.log(problem.preload_of(state) / first)
     return np.array([state.cycles, state.depth.max(), problem.area @ state.depth]), left
 
 
-def elasticity_anew(worn, share, problem_of, guess, pairs=slice(None)):
+def elasticity_anew(worn, share, problem_of, guess):
     """Central difference of runs whose steps keep their shares of a life that ends at the same share of the preload.
 
     problem_of : factor on the number -> problem; guess : the elasticity of the life, near it
-    pairs : whose preload ends the life
     """
-    preload, h = worn.normal_force[:, pairs].sum(axis=1), 3e-5
-    end = int(np.flatnonzero(preload < share * preload[0])[0])
+    end, h = int(np.flatnonzero(worn.preload < share * worn.preload[0])[0]), 3e-5
     same = problem_of(1.0)
-    values, left = again(same, worn, end, 1.0, pairs)
-    slope = (again(same, worn, end, 1 + h, pairs)[1] - left) / h
+    values, left = again(same, worn, end, 1.0)
+    slope = (again(same, worn, end, 1 + h)[1] - left) / h
     sides = []
     for factor in (1 + h, 1 - h):
         longer, problem = 1 + guess * (factor - 1), problem_of(factor)
-        longer -= (again(problem, worn, end, longer, pairs)[1] - left) / slope
-        sides.append(again(problem, worn, end, longer, pairs)[0])
+        longer -= (again(problem, worn, end, longer)[1] - left) / slope
+        sides.append(again(problem, worn, end, longer)[0])
     return (sides[0] - sides[1]) / (2 * h) / values

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
@@ -39,9 +40,7 @@ from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
 SHOWN = 12  # parameters in the picture
-OF_ROWS = {
-    "peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload", "life_cycles": "life"
-}  # fmt: skip
+OF_ROWS = {"peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
 PLOTTED = ("frequency", "amplitude", "damping", "energy", "preload", "life", "depth", "volume")
 # step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
 OF_MODE = 1e-4
@@ -276,8 +275,7 @@ def _of_mode(
 def _share(scene: Scene) -> float:
     """Of the first preload, where the life that a result states ends."""
     assert scene.wear is not None
-    told = scene.wear.end_at == "at_rest" or scene.wear.lost_of == "any"
-    return (scene.wear.lost_below if told else 0.0) or LIFE_SHARE
+    return (scene.wear.lost_below if scene.wear.end_at == "at_rest" else 0.0) or LIFE_SHARE
 
 
 def _of_life(varying: Varying, worn: WearHistory, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
@@ -312,37 +310,31 @@ def _found(
     return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), options)
 
 
-def of_summary(
-    varying: Varying, result: Result, numbers: Mapping[str, float], wanted: Sequence[str]
-) -> dict[tuple[str, str], float]:
-    """Derivatives of the numbers of a finished run by some keys of its scene, as far as these are exact.
+def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[tuple[str, str], float]:
+    """Derivatives of numbers of a finished run, of its first state and its life, by some keys of its scene.
 
-    numbers : of the row of a study; those of its first state, and its life, have derivatives
-    Returns (number, key) -> d number / d key, SI units; of what has no derivatives there are none
+    Returns (number, key) -> d number / d key, SI units, as far as these are exact
     """
-    scene, response, worn = varying.scene, result.response, result.wear
-    known = keys(scene) | {key: value for key, (value, _) in wear_run.coefficient_keys(scene).items()}
-    of_gap = {("contact.gap" if name == "contact" else f"contacts.{name}.gap"): name for name in scene.joints}
-    own = {key: known[key] for key in wanted if key in known}
-    if not (own or of_gap.keys() & set(wanted)):
-        return {}
-    places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
-    each: list[Callable[[], Derivatives]] = []
-    if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
-        unworn = {key: value for key, value in own.items() if key in keys(scene)}
-        each.append(lambda: _found(varying, response, places[0].frequency, unworn, lambda *_: None))
-    if worn is not None and "life_cycles" in numbers:
-        each.append(lambda: _of_life(varying, worn, own, lambda *_: None))
-    slopes: dict[tuple[str, str], float] = {}
-    rows = {joint.name: joint.rows for joint in varying.model.balance.contact.joints}
-    for find in each:
-        try:
+    scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
+    known, in_wear = keys(scene), {key: value for key, (value, _) in wear_run.coefficient_keys(scene).items()}
+    own, more = ({key: of[key] for key in wanted if key in of} for of in (known, in_wear))
+    joints = varying.model.balance.contact.joints
+    gaps = {"contact.gap" if one.name == "contact" else f"contacts.{one.name}.gap": one.rows for one in joints}
+    gaps = {key: rows for key, rows in gaps.items() if key in wanted}
+    if not (own or more or gaps):
+        return slopes
+
+    def add(find: Callable[[], Derivatives], names: Mapping[str, str]) -> None:
+        with suppress(NoDerivative):
             found = find()
-        except NoDerivative:
-            continue
-        by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}
-        by |= {key: found.by_gap[:, rows[name]].sum(axis=1) for key, name in of_gap.items() if key in wanted}
-        for number, name in OF_ROWS.items():
-            if number in numbers and name in found.names:
-                slopes |= {(number, key): float(column[found.names.index(name)]) for key, column in by.items()}
+            by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}
+            by |= {key: found.by_gap[:, rows].sum(axis=1) for key, rows in gaps.items()}
+            for number, at in ((number, found.names.index(n)) for number, n in names.items() if n in found.names):
+                slopes.update({(number, key): float(column[at]) for key, column in by.items()})
+
+    places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
+    if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
+        add(lambda: _found(varying, response, places[0].frequency, own, lambda *_: None), OF_ROWS)
+    if worn is not None:
+        add(lambda: _of_life(varying, worn, own | more, lambda *_: None), {"life_cycles": "life"})
     return slopes

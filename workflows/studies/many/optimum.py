@@ -278,8 +278,12 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
     share, m = known.share, known.aims.shape[1]
     draw = np.random.default_rng([seed, len(share)])
     columns, solved = np.concatenate([known.aims, known.excess], axis=1), known.solved
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Sobol points whose number is no power of two
+        places = qmc.Sobol(share.shape[1], seed=draw).random_base2(8)
+    emptiest = places[np.abs(places[:, None] - share).max(axis=2).min(axis=1).argmax()]
     if not solved.any():
-        return _emptiest(share, draw), np.inf
+        return emptiest, np.inf
     surrogates = [_fitted(scale(share), column, known.slopes[:, i], solved) for i, column in enumerate(columns.T)]
     low, high = ends(known)
     turn = len(share) % (3 * m)  # the ends of the trade in their turns
@@ -294,14 +298,14 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
         return np.stack([one.mean(at) for one in surrogates[:m]], axis=1), excess
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Sobol points whose number is no power of two; steps beyond the bounds
-        places = np.vstack([share[known.front], qmc.Sobol(share.shape[1], seed=draw).random_base2(8)])
+        warnings.simplefilter("ignore")  # steps beyond the bounds
+        places = np.vstack([share[known.front], places])
         aims, excess = expected(places)
         passed = np.maximum(excess, 0).max(axis=1, initial=0.0)
         best = int(np.argmin(chebyshev(aims, weights, low, high) + MISSED * passed))
         at, value = _descended(expected, places[best], weights, low, high)
     if np.abs(share - at).max(axis=1).min() < NEAR:
-        return (at, 0.0) if m == 1 else (_emptiest(share, draw), np.inf)
+        return (at, 0.0) if m == 1 else (emptiest, np.inf)
     return at, least - value if m == 1 else np.inf
 
 
@@ -341,14 +345,4 @@ def _fitted(points: np.ndarray, column: np.ndarray, slopes: np.ndarray, solved: 
     for point in points[~solved]:
         mean, deviation = found.mean_and_deviation(point[None])
         found = found.with_run(point, float(mean[0] + deviation[0]))
-    return found
-
-
-def _emptiest(share: np.ndarray, draw: np.random.Generator) -> np.ndarray:
-    """A place (k,) far from all runs (n, k)."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        places = qmc.Sobol(share.shape[1], seed=draw).random_base2(8)
-    far = np.abs(places[:, None] - share).max(axis=2).min(axis=1)
-    found: np.ndarray = places[int(far.argmax())]
     return found

@@ -96,7 +96,7 @@ def solve(task: Task) -> Row:
             result = pipeline.run(file, None, Progress(), row_only=True, judge=with_verdict)
             numbers = numbers_of(result)
             if task.slopes and not numbers.get("peak_at_end"):
-                slopes = derivatives.of_summary(Varying(file, Progress()), result, numbers, task.slopes)
+                slopes = derivatives.of_summary(Varying(file, Progress()), result, task.slopes)
                 numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
         except np.linalg.LinAlgError as error:
             return ended("failed", error)
