@@ -1,9 +1,10 @@
 """The best designs of a scene: runs of a study where they promise most, and the best trades between aims under limits.
 
 Every aim and every limit has a Gaussian process of its own, through its values and derivatives at the runs. Of several
-aims one is made by the Chebyshev function with weights: the largest weighted aim, each between its ends along the
-trade, is made small. Least t with all of these at most t, and all limits kept, is a problem of nonlinear programming;
-sequential quadratic programming solves it on the processes, from the best of 256 places.
+aims one is made by the augmented Chebyshev function with weights: the largest weighted aim, each between its ends
+along the trade, and a small share of their sum, are made small. Least t with all of these at most t, and all limits
+kept, is a problem of nonlinear programming; sequential quadratic programming solves it on the processes, from the best
+of 256 places.
 Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005.851274; a process for every aim:
     Daulton, Balandat and Bakshy 2020
 """
@@ -31,7 +32,7 @@ from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.study import Runner
 from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
-from tribodyn.workflows.studies.many.surrogate import Surrogate
+from tribodyn.workflows.studies.many.surrogate import FEWEST, Surrogate
 from tribodyn.workflows.studies.many.table import SENTENCE, StudyTable
 from tribodyn.workflows.studies.many.task import RUN
 from tribodyn.workflows.studies.study_result import StudyResult
@@ -251,10 +252,7 @@ def best_trades(aims: np.ndarray, allowed: np.ndarray) -> np.ndarray:
 
 
 def chebyshev(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Largest of those aims (..., m) that have a weight, times it, between low (m,), 0, and high (m,), 1.
-
-    A small share of their sum is added: of places that are as good in the worst aim, the one that is better in others
-    """
+    """Largest of those aims (..., m) that have a weight, times it, between low (m,), 0, and high (m,), 1; see above."""
     counted = weights > 0
     scaled = (weights * (aims - low) / np.where(high > low, high - low, 1.0))[..., counted]
     found: np.ndarray = scaled.max(axis=-1) + AUGMENTED * scaled.sum(axis=-1)
@@ -272,17 +270,15 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
     """A place (k,) in the unit cube for the run that promises most; the same runs and seed propose the same.
 
     scale : places (n, k) -> coordinates (n, k) that surrogates are fitted in
-    Returns the place and what is expected there beyond the best run so far, in what is made small, inf where no run is
-        solved: then it lies far from all others. A second aim is weighed anew for every run
+    Returns the place and what is expected there beyond the best run so far, in what is made small, inf where few runs
+        without derivatives are solved: then it lies far from all others. A second aim is weighed anew for every run
     """
     share, m = known.share, known.aims.shape[1]
     draw = np.random.default_rng([seed, len(share)])
     columns, solved = np.concatenate([known.aims, known.excess], axis=1), known.solved
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Sobol points whose number is no power of two
-        places = qmc.Sobol(share.shape[1], seed=draw).random_base2(8)
+    places = qmc.Sobol(share.shape[1], seed=draw).random_base2(8)
     emptiest = places[np.abs(places[:, None] - share).max(axis=2).min(axis=1).argmax()]
-    if not solved.any():
+    if not solved.any() or (solved.sum() < FEWEST and not np.isfinite(known.slopes[solved]).any()):
         return emptiest, np.inf
     surrogates = [_fitted(scale(share), column, known.slopes[:, i], solved) for i, column in enumerate(columns.T)]
     low, high = ends(known)

@@ -7,7 +7,7 @@ coordinate, a linear trend, and noise.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg as sla
@@ -97,7 +97,7 @@ class Surrogate:
 
         Of a number that has laws no derivatives are taken.
 
-        few : where fewer than FEWEST numbers are known, the process that the search for the most likely one begins at
+        few : where fewer than FEWEST numbers are known, a process that is nearly linear
         Raises  ValueError where fewer are known, and `few` is not asked for
         Source  Rasmussen and Williams 2006, eq. 2.30
         """
@@ -118,13 +118,11 @@ class Surrogate:
                 return 1e6
             return float(0.5 * tried._given @ alpha + np.log(np.diag(root)).sum())
 
-        starts = [np.array([0.0, -3.0, -9.0, *[length] * k]) for length in STARTS]
-        likely = starts[0]
-        if known >= FEWEST:
-            if np.isfinite(slopes).any():
-                starts = starts[:1]  # derivatives leave little doubt of the lengths
-            climbs = (minimize(unlikely, start, method="L-BFGS-B", bounds=bounds, tol=LIKELY) for start in starts)
-            likely = min(climbs, key=lambda one: one.fun).x
+        # derivatives leave little doubt of lengths; where little is known they are long, and the process nearly linear
+        lengths = STARTS[2:] if known < FEWEST else STARTS[:1] if np.isfinite(slopes).any() else STARTS
+        starts = [np.array([0.0, -3.0, -9.0, *[length] * k]) for length in lengths]
+        climb = partial(minimize, unlikely, method="L-BFGS-B", bounds=bounds, tol=LIKELY)
+        likely = min(map(climb, starts), key=lambda one: one.fun).x if known >= FEWEST else starts[0]
         fitted = cls(likely, points, values, slopes, laws, middle, width)
         spread, missed = fitted._leaving_out
         return replace(fitted, stretch=max(1.0, float(np.sqrt(np.mean(missed**2 / spread)))))
