@@ -33,6 +33,7 @@ from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import Place
 from tribodyn.workflows.studies.curves import backbones
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange
@@ -192,7 +193,8 @@ def derivatives(
     only : keys of the scene to look at, such as contact.friction; all by default
     Raises  SceneError for a key that is no such number; SolveFailed where there is no derivative, as at a fold
     """
-    file = read_scene(scene, overrides)
+    file, at = read_scene(scene, overrides), None if at is None else to_si(at, "Hz")
+    amplitude = None if amplitude is None else to_si(amplitude, "m")
     known = keys(file.scene)
     if of == "life":
         if file.scene.wear is None:

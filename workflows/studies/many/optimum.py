@@ -255,8 +255,7 @@ def chebyshev(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.n
     """Largest of those aims (..., m) that have a weight, times it, between low (m,), 0, and high (m,), 1; see above."""
     counted = weights > 0
     scaled = (weights * (aims - low) / np.where(high > low, high - low, 1.0))[..., counted]
-    found: np.ndarray = scaled.max(axis=-1) + AUGMENTED * scaled.sum(axis=-1)
-    return found
+    return np.asarray(scaled.max(axis=-1) + AUGMENTED * scaled.sum(axis=-1))
 
 
 def ends(known: Known) -> tuple[np.ndarray, np.ndarray]:
