@@ -224,3 +224,10 @@ def test_an_unknown_key_is_one_sentence(capsys):
         cli.main(["study", "derivatives", "beam", "--only", "contact.color"])
     assert end.value.code == 2
     assert "contact.color is no number that a response depends on" in capsys.readouterr().err
+
+
+def test_quantities_of_a_call_have_units_as_on_the_command_line():
+    with pytest.raises(td.SceneError, match="--amplitude is that of --of mode"):
+        td.studies.derivatives("beam", amplitude="20um")
+    with pytest.raises(ValueError, match="expected a frequency"):
+        td.studies.derivatives("beam", at="20 um")

@@ -17,11 +17,12 @@ from scipy.stats import qmc
 
 import tribodyn as td
 from tests.helpers.command import leave
+from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.many import pool, quantiles, study as studies, study_file
 from tribodyn.workflows.studies.many.quantiles import Sample, influences
 from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.surrogate import Surrogate, covariance
-from tribodyn.workflows.studies.many.task import Row, Task
+from tribodyn.workflows.studies.many.task import Row, Task, slope_column, solve
 
 PRESS, FRICTION, DAMPING = "loads.static.press.value", "contact.friction", "damping.modal"
 VARY = {
@@ -358,3 +359,24 @@ def test_the_command_tells_the_verdict_with_the_distribution(
     first = record["quantiles"][0]
     assert first["low_in_all"] < first["low"] <= first["value"] <= first["high"] < first["high_in_all"]
     assert record["influences"][0]["first"] == pytest.approx(1, abs=0.01)
+
+
+@pytest.mark.slow
+def test_a_life_by_controlled_errors_is_smooth_and_its_row_has_its_derivatives() -> None:
+    """Lives of the coarse blade beside each other; by the thesis's steps of 30 % they scatter by a fifth."""
+    cheap = (
+        "geometry.n_along=3", "geometry.n_up=2", "geometry.n_span=4", "geometry.n_side=1", "geometry.n_root=1",
+        "reduction.modes=4", "reduction.cutoff=", "harmonics.kept=[0, 1]", "response.points=10",
+        'response.frequency=["290 Hz", "310 Hz"]', "wear.rule=error_controlled", "wear.tolerance=20 %",
+        "wear.at=300 Hz", "verdict.enabled=false",
+    )  # fmt: skip
+    keys, lives = ("contact.friction", "wear.coefficient"), []
+    for friction in (0.495, 0.5, 0.505):
+        file = scene_file.read("blade", (*cheap, f"contact.friction={friction}"))
+        row = solve(Task(1, "blade", file.text, file.overrides, file.folder, keys if friction == 0.5 else ()))
+        lives.append(row.numbers["life_cycles"])
+        if friction == 0.5:
+            by_friction, by_coefficient = (row.numbers[slope_column("life_cycles", key)] for key in keys)
+    assert abs(np.diff(np.log(lives), 2)[0]) < 2e-3
+    assert by_coefficient == pytest.approx(-lives[1] / file.scene.wear.numbers["coefficient"], rel=1e-9)
+    assert by_friction == pytest.approx((lives[2] - lives[0]) / 0.01, rel=0.05)  # whose steps are not the same

@@ -92,6 +92,16 @@ def test_a_limit_is_kept_and_failed_runs_are_not_followed() -> None:
         assert len(found.share) <= most
 
 
+def test_few_runs_with_derivatives_of_one_aim_say_where_the_next_goes() -> None:
+    """Of two aims the other is known by its values alone, which are the same."""
+    share, slopes = np.array([[0.5, 0.5], [0.55, 0.5]]), np.full((2, 2, 2), np.nan)
+    slopes[:, 0] = [1.0, -1.0]
+    known = Known(share, np.array([[0.0, 0.0], [0.2, 0.0]]), np.zeros((2, 0)), slopes)
+    for seed in range(5):
+        place, _ = propose(known, lambda s: 4 * (s - 0.5), seed)
+        np.testing.assert_allclose(place, [0.0, 1.0], atol=1e-3)
+
+
 def tables(**more):
     vary = {FORCE: {"distribution": "uniform", "low": "10 N", "high": "20 N"},
             DAMPING: {"distribution": "loguniform", "low": "0.5 %", "high": "2 %"}}  # fmt: skip

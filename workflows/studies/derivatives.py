@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
@@ -23,6 +24,7 @@ from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.style import CYCLE, GREY
+from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, pipeline, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
@@ -31,6 +33,7 @@ from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import Place
 from tribodyn.workflows.studies.curves import backbones
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange
@@ -43,7 +46,6 @@ PLOTTED = ("frequency", "amplitude", "damping", "energy", "preload", "life", "de
 # step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
 OF_MODE = 1e-4
 DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
-Slopes = dict[tuple[str, str], float]
 UNITS = {
     "frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3", "damping": "",
     "life": "cycles", "depth": "m", "volume": "m3",
@@ -191,7 +193,8 @@ def derivatives(
     only : keys of the scene to look at, such as contact.friction; all by default
     Raises  SceneError for a key that is no such number; SolveFailed where there is no derivative, as at a fold
     """
-    file = read_scene(scene, overrides)
+    file, at = read_scene(scene, overrides), None if at is None else to_si(at, "Hz")
+    amplitude = None if amplitude is None else to_si(amplitude, "m")
     known = keys(file.scene)
     if of == "life":
         if file.scene.wear is None:
@@ -309,27 +312,31 @@ def _found(
     return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), options)
 
 
-def of_summary(varying: Varying, response: Branch, numbers: Mapping[str, float], wanted: Sequence[str]) -> Slopes:
-    """Derivatives of the numbers of a finished run by some keys of its scene, as far as these are exact.
+def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[tuple[str, str], float]:
+    """Derivatives of numbers of a finished run, of its first state and its life, by some keys of its scene.
 
-    numbers : of the row of a study; those of its first state have derivatives
-    Returns (number, key) -> d number / d key, SI units; empty where the first state has no derivatives
+    Returns (number, key) -> d number / d key, SI units, as far as these are exact
     """
-    scene, known = varying.scene, keys(varying.scene)
-    slopes: dict[tuple[str, str], float] = {}
-    of_gap = {("contact.gap" if name == "contact" else f"contacts.{name}.gap"): name for name in scene.joints}
+    scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
+    known, in_wear = keys(scene), {key: value for key, (value, _) in wear_run.coefficient_keys(scene).items()}
+    own, more = ({key: of[key] for key in wanted if key in of} for of in (known, in_wear))
+    joints = varying.model.balance.contact.joints
+    gaps = {"contact.gap" if one.name == "contact" else f"contacts.{one.name}.gap": one.rows for one in joints}
+    gaps = {key: rows for key, rows in gaps.items() if key in wanted}
+    if not (own or more or gaps):
+        return slopes
+
+    def add(find: Callable[[], Derivatives], names: Mapping[str, str]) -> None:
+        with suppress(NoDerivative):
+            found = find()
+            by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}
+            by |= {key: found.by_gap[:, rows].sum(axis=1) for key, rows in gaps.items()}
+            for number, at in ((number, found.names.index(n)) for number, n in names.items() if n in found.names):
+                slopes.update({(number, key): float(column[at]) for key, column in by.items()})
+
     places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
-    own = {key: known[key] for key in wanted if key in known}
-    if len(places) > 1 or places[0].peak not in (None, 1.0) or not (own or of_gap.keys() & set(wanted)):
-        return slopes
-    try:
-        found = _found(varying, response, places[0].frequency, own, lambda *_: None)
-    except NoDerivative:
-        return slopes
-    by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}
-    rows = {joint.name: joint.rows for joint in varying.model.balance.contact.joints}
-    by |= {key: found.by_gap[:, rows[name]].sum(axis=1) for key, name in of_gap.items() if key in wanted}
-    for number, name in OF_ROWS.items():
-        if number in numbers and name in found.names:
-            slopes |= {(number, key): float(column[found.names.index(name)]) for key, column in by.items()}
+    if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
+        add(lambda: _found(varying, response, places[0].frequency, own, lambda *_: None), OF_ROWS)
+    if worn is not None:
+        add(lambda: _of_life(varying, worn, own | more, lambda *_: None), {"life_cycles": "life"})
     return slopes

@@ -1,9 +1,10 @@
 """The best designs of a scene: runs of a study where they promise most, and the best trades between aims under limits.
 
 Every aim and every limit has a Gaussian process of its own, through its values and derivatives at the runs. Of several
-aims one is made by the Chebyshev function with weights: the largest weighted aim, each between its ends along the
-trade, is made small. Least t with all of these at most t, and all limits kept, is a problem of nonlinear programming;
-sequential quadratic programming solves it on the processes, from the best of 256 places.
+aims one is made by the augmented Chebyshev function with weights: the largest weighted aim, each between its ends
+along the trade, and a small share of their sum, are made small. Least t with all of these at most t, and all limits
+kept, is a problem of nonlinear programming; sequential quadratic programming solves it on the processes, from the best
+of 256 places.
 Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005.851274; a process for every aim:
     Daulton, Balandat and Bakshy 2020
 """
@@ -38,6 +39,7 @@ from tribodyn.workflows.studies.study_result import StudyResult
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
 MISSED = 1e3  # what a limit that is passed counts beside the aims
+AUGMENTED = 0.05  # share of the sum of aims beside the largest: Knowles 2006
 NEAR = 1e-3  # of the unit cube, within which a proposal is a run that is there already
 
 
@@ -250,11 +252,10 @@ def best_trades(aims: np.ndarray, allowed: np.ndarray) -> np.ndarray:
 
 
 def chebyshev(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Largest of those aims (..., m) that have a weight, times it, between low (m,), 0, and high (m,), 1."""
+    """Largest of those aims (..., m) that have a weight, times it, between low (m,), 0, and high (m,), 1; see above."""
     counted = weights > 0
-    scaled = weights * (aims - low) / np.where(high > low, high - low, 1.0)
-    found: np.ndarray = scaled[..., counted].max(axis=-1)
-    return found
+    scaled = (weights * (aims - low) / np.where(high > low, high - low, 1.0))[..., counted]
+    return np.asarray(scaled.max(axis=-1) + AUGMENTED * scaled.sum(axis=-1))
 
 
 def ends(known: Known) -> tuple[np.ndarray, np.ndarray]:
@@ -268,14 +269,16 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
     """A place (k,) in the unit cube for the run that promises most; the same runs and seed propose the same.
 
     scale : places (n, k) -> coordinates (n, k) that surrogates are fitted in
-    Returns the place and what is expected there beyond the best run so far, in what is made small, inf where there are
-        too few runs to say: then it lies far from all others. A second aim is weighed anew for every run
+    Returns the place and what is expected there beyond the best run so far, in what is made small, inf where few runs
+        without derivatives are solved: then it lies far from all others. A second aim is weighed anew for every run
     """
     share, m = known.share, known.aims.shape[1]
     draw = np.random.default_rng([seed, len(share)])
     columns, solved = np.concatenate([known.aims, known.excess], axis=1), known.solved
-    if int(solved.sum()) + int(np.isfinite(known.slopes[solved, 0]).sum()) < FEWEST:
-        return _emptiest(share, draw), np.inf
+    places = qmc.Sobol(share.shape[1], seed=draw).random_base2(8)
+    emptiest = places[np.abs(places[:, None] - share).max(axis=2).min(axis=1).argmax()]
+    if not solved.any() or (solved.sum() < FEWEST and not np.isfinite(known.slopes[solved]).any()):
+        return emptiest, np.inf
     surrogates = [_fitted(scale(share), column, known.slopes[:, i], solved) for i, column in enumerate(columns.T)]
     low, high = ends(known)
     turn = len(share) % (3 * m)  # the ends of the trade in their turns
@@ -290,14 +293,14 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
         return np.stack([one.mean(at) for one in surrogates[:m]], axis=1), excess
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Sobol points whose number is no power of two; steps beyond the bounds
-        places = np.vstack([share[known.front], qmc.Sobol(share.shape[1], seed=draw).random_base2(8)])
+        warnings.simplefilter("ignore")  # steps beyond the bounds
+        places = np.vstack([share[known.front], places])
         aims, excess = expected(places)
         passed = np.maximum(excess, 0).max(axis=1, initial=0.0)
         best = int(np.argmin(chebyshev(aims, weights, low, high) + MISSED * passed))
         at, value = _descended(expected, places[best], weights, low, high)
     if np.abs(share - at).max(axis=1).min() < NEAR:
-        return (at, 0.0) if m == 1 else (_emptiest(share, draw), np.inf)
+        return (at, 0.0) if m == 1 else (emptiest, np.inf)
     return at, least - value if m == 1 else np.inf
 
 
@@ -314,7 +317,8 @@ def _descended(
 
     def margins(z: np.ndarray) -> np.ndarray:
         aims, excess = (each[0] for each in expected(z[None, 1:]))
-        return np.concatenate([z[0] - scale * (aims - low)[counted], -excess])
+        scaled = scale * (aims - low)[counted]
+        return np.concatenate([z[0] - scaled - AUGMENTED * scaled.sum(), -excess])
 
     first = float(chebyshev(expected(start[None])[0], weights, low, high)[0])
     found = minimize(
@@ -332,18 +336,8 @@ def _fitted(points: np.ndarray, column: np.ndarray, slopes: np.ndarray, solved: 
 
     Source  Forrester, Sobester and Keane 2006, doi 10.1098/rspa.2005.1608
     """
-    found = Surrogate.fitted(points[solved], column[solved], slopes[solved])
+    found = Surrogate.fitted(points[solved], column[solved], slopes[solved], few=True)
     for point in points[~solved]:
         mean, deviation = found.mean_and_deviation(point[None])
         found = found.with_run(point, float(mean[0] + deviation[0]))
-    return found
-
-
-def _emptiest(share: np.ndarray, draw: np.random.Generator) -> np.ndarray:
-    """A place (k,) far from all runs (n, k)."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        places = qmc.Sobol(share.shape[1], seed=draw).random_base2(8)
-    far = np.abs(places[:, None] - share).max(axis=2).min(axis=1)
-    found: np.ndarray = places[int(far.argmax())]
     return found

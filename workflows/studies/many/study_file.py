@@ -33,7 +33,7 @@ class Settings(Table):
     verdict: StrictBool = False
     """Measure the errors of every run, which costs more than most runs do."""
     derivatives: StrictBool = False
-    """Add the exact derivatives of every run's first peak by the keys, as columns "d NUMBER / d KEY"."""
+    """Add the exact derivatives of every run's first peak and life by the keys, as columns "d NUMBER / d KEY"."""
     set: tuple[str, ...] = ()
     """Keys that every run changes, as "section.key=value"."""
     same: dict[str, str] = Field(default_factory=dict)

@@ -7,7 +7,7 @@ coordinate, a linear trend, and noise.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg as sla
@@ -91,17 +91,19 @@ class Surrogate:
         values: np.ndarray,
         slopes: np.ndarray | None = None,
         laws: tuple[Law, ...] = (),
+        few: bool = False,
     ) -> Surrogate:
         """The most likely process: coordinates (n, k) of order 1, values (n,), derivatives (n, k) or nan.
 
         Of a number that has laws no derivatives are taken.
 
-        Raises  ValueError where fewer than FEWEST numbers are known
+        few : where fewer than FEWEST numbers are known, a process that is nearly linear
+        Raises  ValueError where fewer are known, and `few` is not asked for
         Source  Rasmussen and Williams 2006, eq. 2.30
         """
         slopes = np.full(points.shape, np.nan) if slopes is None else slopes
         known = len(values) + int(np.isfinite(slopes).sum())
-        if known < FEWEST:
+        if known < FEWEST and not few:
             raise ValueError(f"{known} numbers of runs are known, a surrogate needs {FEWEST} at least")
         left = values - sum(law.known(points) for law in laws)
         middle, width = float(np.mean(left)), float(np.std(left)) or 1.0
@@ -116,14 +118,12 @@ class Surrogate:
                 return 1e6
             return float(0.5 * tried._given @ alpha + np.log(np.diag(root)).sum())
 
-        # derivatives leave little doubt of the lengths
-        lengths = STARTS[:1] if np.isfinite(slopes).any() else STARTS
-        climbs = (
-            minimize(unlikely, [0.0, -3.0, -9.0, *[length] * k], method="L-BFGS-B", bounds=bounds, tol=LIKELY)
-            for length in lengths
-        )
-        found = min(climbs, key=lambda one: one.fun)
-        fitted = cls(found.x, points, values, slopes, laws, middle, width)
+        # derivatives leave little doubt of lengths; where little is known they are long, and the process nearly linear
+        lengths = STARTS[2:] if known < FEWEST else STARTS[:1] if np.isfinite(slopes).any() else STARTS
+        starts = [np.array([0.0, -3.0, -9.0, *[length] * k]) for length in lengths]
+        climb = partial(minimize, unlikely, method="L-BFGS-B", bounds=bounds, tol=LIKELY)
+        likely = min(map(climb, starts), key=lambda one: one.fun).x if known >= FEWEST else starts[0]
+        fitted = cls(likely, points, values, slopes, laws, middle, width)
         spread, missed = fitted._leaving_out
         return replace(fitted, stretch=max(1.0, float(np.sqrt(np.mean(missed**2 / spread)))))
 

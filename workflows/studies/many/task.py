@@ -36,7 +36,7 @@ class Task:
     """One run: a scene by its text, so that another process or machine needs no file of it.
 
     number : of the run, from 1; overrides : of the scene, those of the run last; folder : of the files it names
-    slopes : keys by which the numbers of its first state have derivatives too, as far as these are exact
+    slopes : keys by which the numbers of its first state and its life have derivatives too, as far as these are exact
     """
 
     number: int
@@ -95,9 +95,8 @@ def solve(task: Task) -> Row:
             file = task.scene()
             result = pipeline.run(file, None, Progress(), row_only=True, judge=with_verdict)
             numbers = numbers_of(result)
-            if task.slopes and result.response is not None and not numbers.get("peak_at_end"):
-                varying = Varying(file, Progress())
-                slopes = derivatives.of_summary(varying, result.response, numbers, task.slopes)
+            if task.slopes and not numbers.get("peak_at_end"):
+                slopes = derivatives.of_summary(Varying(file, Progress()), result, task.slopes)
                 numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
         except np.linalg.LinAlgError as error:
             return ended("failed", error)
