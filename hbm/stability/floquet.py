@@ -16,8 +16,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time import period_search, wave_in_time
-from tribodyn.hbm.time.period_search import Period, PeriodSearch
-from tribodyn.hbm.time.push import push
+from tribodyn.hbm.time.period_search import Period, PeriodSearch, push
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import integrate
 from tribodyn.hbm.time.verify import Verification

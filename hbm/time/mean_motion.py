@@ -15,8 +15,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration, wave_in_time
-from tribodyn.hbm.time.period_search import PeriodSearch
-from tribodyn.hbm.time.push import push
+from tribodyn.hbm.time.period_search import Period, PeriodSearch, Pushed, push
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.time.time_step import Moving
@@ -153,24 +152,39 @@ class Follower:
         return None if one is None else float(one.energy.sum())
 
     def _periodic(self, stepper: TimeStepper) -> tuple[PeriodicMotion | None, int]:
-        """A periodic motion that a push does not drive away, and the periods marched; else the motion has left it."""
-        o = self.options
+        """A periodic motion that a push does not drive away, and the periods marched; else the motion has left it.
+
+        A push that grows slowly must grow with twice the time steps, too: growth by few steps alone is no motion's own.
+        """
         assert self._motion is not None
+        found, pushed, search, after = self._pushed(stepper, self._motion)
+        spent = search + after
+        if found is None:
+            return None, spent
+        self._motion = found.end
+        away = pushed.away
+        if away and after > self.options.search:
+            options = replace(stepper.options, steps=2 * stepper.options.steps)
+            finer = TimeStepper(stepper.balance, stepper.omega, options, stepper.modes)
+            again, later, search, after = self._pushed(finer, _carried(found.end, stepper, finer))
+            away, spent = again is None or later.away, spent + search + after
+        if not away:
+            return time_integration.motion_of(stepper, found, spent, CONVERGED), spent
+        self._motion = pushed.motion
+        return None, spent
+
+    def _pushed(self, stepper: TimeStepper, motion: Moving) -> tuple[Period | None, Pushed, int, int]:
+        """A periodic motion, None without one; whether a push drives it away; periods before the push and behind it."""
+        o = self.options
         options = replace(
             stepper.options, tolerance=RULES.periodic, max_periods=o.search, patience=o.search // 2, accelerate=True
         )
         search = PeriodSearch(stepper, options, False)
-        found = search.mix(self._motion)
+        found = search.mix(motion)
         if found.drift > RULES.periodic:
-            return None, search.periods
-        self._motion = found.end
+            return None, Pushed(True, motion), search.periods, 0
         plain = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
-        pushed = push(plain, found, o.block)
-        spent = search.periods + plain.periods
-        if not pushed.away:
-            return time_integration.motion_of(stepper, found, spent, CONVERGED), spent
-        self._motion = pushed.motion
-        return None, spent
+        return found, push(plain, found, o.block), search.periods, plain.periods
 
     def _settled(
         self, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray], asked: float | None

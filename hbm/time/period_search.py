@@ -8,6 +8,7 @@ Source  Newton-Krylov shooting: Sanchez, Net, Garcia-Archilla and Simo 2004
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
@@ -29,6 +30,12 @@ class SearchRules:
     krylov: int = 60  # products at most and relative residual of a linear solve
     forcing: float = 0.05
     shortest: float = 1 / 64  # share of a Newton step
+    # push of a periodic motion, relative to its vibration; share of it down to which it must die away; times of it
+    # that tell growth at the end; distance, relative to the vibration, at which the motion has left
+    push: float = 1e-3
+    decayed: float = 0.3
+    grown: float = 3.0
+    left: float = 0.1
 
 
 RULES = SearchRules()
@@ -208,3 +215,30 @@ class StateVector:
         z, memory = np.split(vector[:n] / self._weight, [len(near.z)])
         hold = np.linalg.solve(self._root.T, vector[n:])
         return self._stepper.moving(z, memory.reshape(self._shape), near.x, near.f, hold)
+
+
+class Pushed(NamedTuple):
+    """away : whether the motion has left; motion : after the last period that was marched."""
+
+    away: bool
+    motion: Moving
+
+
+def push(plain: PeriodSearch, found: Period, every: int, along: np.ndarray | None = None) -> Pushed:
+    """March on from a periodic motion that is pushed, until it has come back or left, or no more periods are allowed.
+
+    plain : of plain periods; found : the periodic motion; every : periods after which to see whether it came back
+    along : direction of the push as a state vector, by default all modes alike
+    Sliders that come to rest elsewhere leave a part of the push, which does not count as away
+    Raises  IntegrationFailed
+    """
+    away, motion = 0.0, plain.vector.unpack(plain.vector.pushed(found.image, RULES.push * found.size, along), found.end)
+    while plain.periods < plain.options.max_periods:
+        later = plain.step(motion)
+        motion = later.end
+        away = plain.vector.apart(later.image, found.image) / found.size
+        if away >= RULES.left:
+            return Pushed(True, motion)
+        if plain.periods % every == 0 and away <= RULES.decayed * RULES.push:
+            break
+    return Pushed(away > RULES.grown * RULES.push, motion)

@@ -20,6 +20,7 @@ from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.floquet import HILL, MULTIPLIERS, stays
 from tribodyn.hbm.time import mean_motion, time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
+from tribodyn.hbm.time.period_search import Period, PeriodSearch, Pushed, push
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear import error_controlled_rule, evolution, law as wear_law
@@ -158,6 +159,31 @@ def test_a_periodic_motion_is_followed_and_one_that_a_push_drives_away_is_left()
     assert abs(left.amplitude[0] / np.sqrt(2 * periodic.outputs[0].var()) - 1) > 1e-3
     assert stays(flips, state, verify(flips, state, Options(128)), Options(128)) == (False, MULTIPLIERS)
     assert stays(flips, state, None, Options(128)) == (False, HILL)
+
+
+@pytest.mark.parametrize(("finest", "after", "left"), [(128, 64, False), (256, 64, True), (128, 8, True)])
+def test_a_slow_push_drives_a_motion_away_only_if_it_grows_in_finer_steps(
+    finest: int, after: int, left: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """finest : steps a period up to which it grows; after : periods in which it has left"""
+    seen = []
+
+    def grows(plain: PeriodSearch, found: Period, every: int) -> Pushed:
+        seen.append(plain.options.steps)
+        if plain.options.steps > finest:
+            return push(plain, found, every)
+        motion = found.end
+        while plain.periods < after:
+            motion = plain.step(motion).end
+        return Pushed(True, motion)
+
+    monkeypatch.setattr(mean_motion, "push", grows)
+    balance = balance_of(pressed_body(), (0, 1, 2, 3))
+    follower = Follower(MeanOptions(128))
+    follower.start(balance, newton.solve_from_rest(balance, 420.0).state)
+    follower.mean(balance, 420.0, lambda motion: motion.energy, 0.05)
+    assert bool(follower.kept()[2]) is left  # whether it passes on as a motion that does not repeat itself
+    assert seen == [128, 256][: 1 + (after > follower.options.search)]
 
 
 def test_a_motion_that_takes_two_periods_is_told() -> None:
