@@ -170,32 +170,6 @@ def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
     assert left.unstable_share == pytest.approx(left.cycles_in_step[:2].sum() / left.cycles_in_step.sum())
 
 
-def test_a_run_in_time_is_worn_on_a_finer_mesh_with_its_own_steps_before_a_coarser_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    file = scene_file.read("beam", (*TINY[:-2], "wear.motion=time", "wear.at=700 Hz", "wear.tolerance=30 %"))
-    result = td.run(file, overrides=["verdict.enabled=false"])
-    assert result.wear is not None
-    model, tolerances = td.build(file), []
-
-    def worn(other: scene_file.SceneFile, *of: object) -> tuple[float, float]:
-        assert other.scene.wear is not None
-        tolerances.append(other.scene.wear.tolerance)
-        return 1.0, 1.0
-
-    monkeypatch.setattr(measure, "worn_through", worn)
-    first = states.first_state(file, model.balance, result)
-    finer, ratio, why = measure.refined(file, first, result, DEFAULT)
-    work = first.balance.contact.stiffness.size * (result.wear.solves.sum() * 11 + result.wear.periods.sum())
-    found = []
-    for most in (4.0, 2.7, 2.0):
-        table = measure.Table(first=first, ratio=ratio)
-        measure._worn(file, finer, why, table, result, replace(DEFAULT, max_wear=0.0, max_marched=most * work))
-        found.append(table.worn_ratio)
-    assert found == [pytest.approx(refine.mesh(file, one)[1]) for one in (2.0, 1.5, 1 / 1.5)]
-    assert tolerances == [0.3, 0.3, 0.3]
-
-
 def test_a_refined_run_begins_at_the_peak_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     file = scene_file.read("beam", (*TINY, "wear.rule=thesis", "wear.step=1 um", "wear.max_steps=1"))
     model = td.build(file)

@@ -93,31 +93,21 @@ def refined(file: SceneFile, first: State, result: Result, options: Options) -> 
     """
     contact = first.balance.contact.stiffness.size
     coefficients = 2 * first.top(options) + 1
-
-    def above(ratio: float) -> str:
-        dofs, unknowns = ratio**3 * result.facts.full_dofs, ratio**2 * contact * coefficients
-        if dofs > options.max_dofs:
-            return f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {options.max_dofs:g}"
-        if unknowns > options.max_unknowns:
-            return f"the refined balance has some {unknowns:.2g} unknowns, above the limit of {options.max_unknowns:g}"
-        return ""
-
-    return _within(file, above, options)
-
-
-def _within(file: SceneFile, above: Callable[[float], str], options: Options) -> tuple[SceneFile | None, float, str]:
-    """The finest mesh, with more modes, and its ratio, not above a limit as `above` tells; why there is none."""
     why = ""
-    for wanted in (*options.ratios, 1 / options.coarser):
+    for ratio in (*options.ratios, 1 / options.coarser):
         try:
-            mesh, ratio = refine.mesh(file, wanted)
+            finer, actual = refine.mesh(file, ratio)
         except refine.NoMesh as refusal:
             return None, 1.0, str(refusal)
-        if wanted < 1 <= ratio:
+        if ratio < 1 <= actual:
             break  # a given mesh can only be cut
-        if not (found := above(ratio)):
-            return refine.modes(mesh, options.modes) or mesh, ratio, ""
-        why = found
+        dofs, unknowns = actual**3 * result.facts.full_dofs, actual**2 * contact * coefficients
+        if dofs > options.max_dofs:
+            why = f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {options.max_dofs:g}"
+        elif unknowns > options.max_unknowns:
+            why = f"the refined balance has some {unknowns:.2g} unknowns, above the limit of {options.max_unknowns:g}"
+        else:
+            return refine.modes(finer, options.modes) or finer, actual, ""
     return None, 1.0, why
 
 
@@ -165,7 +155,7 @@ def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> St
     say("more modes")
     try:
         model = modelling.build(other, Progress(), own.balance.basis.harmonics)
-        balance = model.balance.with_load(1.0 if file.scene.wear is None else file.scene.wear.duties[0].load)
+        balance = model.balance.with_load(_load(file))
         point = own.site.next(balance, own.here.state.omega, own.here.state.x)
         if not point.solution.converged:
             raise RuntimeError(str(point.solution.outcome))
@@ -175,6 +165,11 @@ def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> St
     found = State(own.cycles, balance, own.site, point)
     table.add(Refinement.MODES, own.answers, found.answers, f"{DEFAULT.modes} times as many modes")
     return found
+
+
+def _load(file: SceneFile) -> float:
+    wear = file.scene.wear
+    return 1.0 if wear is None else wear.duties[0].load
 
 
 def _more_harmonics(state: State, table: Table, say: Callable[[str], None]) -> State | None:
@@ -215,9 +210,8 @@ def _estimates(file: SceneFile, model: Model, table: Table, result: Result, opti
 def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, result: Result, options: Options) -> None:
     """Depth and life of the whole run on another mesh, with more modes, harmonics and wear steps.
 
-    The refined mesh is taken where the work allows it, for a run in time failing that with the scene's own wear steps;
-    else one coarser than the scene's own, whose run takes about as much work as the scene's. Matrices, which have no
-    mesh, are worn as they are.
+    The refined mesh is taken where the work allows it, else one coarser than the scene's own, whose run takes about as
+    much work as the scene's. Matrices, which have no mesh, are worn as they are.
     """
     own, wear = table.first, result.wear
     assert own is not None
@@ -231,17 +225,18 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     work = float(wear.solves.sum() * (2 * top + 1) + periods) * own.balance.contact.stiffness.size
     bare = isinstance(file.scene, MatrixScene)
     ratio = 1.0 if bare else table.ratio or options.ratios[0]
-    steps = options.wear_steps if ratio >= 1 else 1.0
-    if bare:
-        finer = refine.modes(file, options.modes) or file if work <= options.max_wear else None
-        why = f"finer wear takes work above the limit of {options.max_wear:g}"
-    elif finer is None or (ratio > 1 and work * ratio**2 > options.max_wear):
-        most = 1.0 if finer is None or not wear.in_time.all() else max(1.0, float(np.sqrt(options.max_marched / work)))
-        finer, ratio, _ = _within(file, lambda other: "too much work" if other > most else "", options)
-        steps = 1.0
-    if finer is None:
-        table.refuse(Refinement.COMBINED, why or "the mesh is given and can only be cut", OF_WEAR)
+    if bare and work > options.max_wear:
+        table.refuse(Refinement.COMBINED, f"finer wear takes work above the limit of {options.max_wear:g}", OF_WEAR)
         return
+    if bare:
+        finer = refine.modes(file, options.modes) or file
+    elif finer is None or (ratio > 1 and work * ratio**2 > options.max_wear):
+        finer, ratio = refine.mesh(file, 1 / options.coarser)
+        if ratio >= 1:
+            table.refuse(Refinement.COMBINED, why or "the mesh is given and can only be cut", OF_WEAR)
+            return
+        finer = refine.modes(finer, options.modes) or finer
+    steps = options.wear_steps if ratio >= 1 else 1.0
     other = refine.wear(refine.harmonics(finer, top), steps)
     how = "" if bare else f"{ratio:.3g} times the elements along every edge, "
     how += f"more modes, harmonics 0 to {top}" + (f", {steps:g} times the wear steps" if steps > 1 else "")

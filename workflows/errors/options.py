@@ -15,8 +15,7 @@ class Options:
     max_dofs : of the refined mesh; some 20 s to reduce on one core
     max_unknowns : of the refined balance; some 10 s to find its peak on one core
     max_wear : unknowns of the refined balance times solves of the scene's own wear, and components of its contact times
-        periods in time, up to which that is worn; max_marched : the same of runs in time with the scene's own wear
-        steps; above it a coarser mesh is
+        periods in time, up to which that is worn; above it a coarser mesh is
     coarser : elements along every edge of the scene over those of the coarser mesh
     wear_steps : on the refined mesh over those of the scene
     max_time_components : of a contact whose motions are integrated in time
@@ -33,7 +32,6 @@ class Options:
     max_dofs: int = 100_000
     max_unknowns: int = 5000
     max_wear: float = 4e5
-    max_marched: float = 1e6
     coarser: float = 1.5
     wear_steps: float = 2.0
     max_time_components: int = 30
