@@ -28,7 +28,7 @@ def local_error(
     Where wear fades both solutions of a step may wear the same volume while most of a life is still to come, at the
     rate that is left: so that rate counts, and the pairs without their sign. No more than the step's cycles are wrong.
     deviation : (n_pair,) of a step from its companion of lower order [m]; rate : (n_pair,) behind it [m/cycle]
-    area : (n_pair,) [m2]; stride : cycles of the step; cycles : what its error is a share of, those passed or `expected`
+    area : (n_pair,) [m2]; stride : cycles of the step; cycles : that its error is held to
     """
     on_depth = np.abs(deviation).max() / tolerance.scale
     wrong, left = float(area @ np.abs(deviation)), float(area @ rate)
