@@ -62,6 +62,11 @@ class PeriodicMotion:
         return self.outcome.kind is SolveEnd.CONVERGED
 
     @property
+    def frequency(self) -> float:
+        """Frequency [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
     def preload(self) -> float:
         """Mean normal force of the whole contact [N]."""
         return float(self.normal_force.sum())
