@@ -270,14 +270,14 @@ class _Looking:
                 if not isinstance(known, CurveTarget):
                     rows.append(here.slopes(known, sides))
                     continue
-            beside = [[there.nearby(here).all_to({name: known}) for there in both] for _, _, *both in sides]
+            beside = [[there.all_to({name: known}) for there in both] for _, _, *both in sides]
             rows += list(np.transpose([(up - down) / (2 * s[1]) for (up, down), s in zip(beside, sides, strict=True)]))
         return np.array(rows)
 
     def _beside(self, values: Mapping[str, float]) -> Answers:
-        """The scene with other values, of which nothing is solved yet."""
+        """The scene with values near those of the last trial, of which nothing is solved yet."""
         file = self.file.changed(*self.changes(values))
-        return Answers(file, modelling.build(file, Progress()))
+        return Answers(file, modelling.build(file, Progress()), self._last)
 
     @staticmethod
     def prior(name: str, table: Distribution) -> Marginal:
@@ -354,10 +354,6 @@ class Answers:
             for name, one in asked.items()
         )
         return np.concatenate([np.asarray(part, float) for part in found])
-
-    def nearby(self, other: Answers) -> Answers:
-        """The same, its cycles found from those of a scene that differs little."""
-        return Answers(self.file, self.model, other)
 
     def slopes(self, known: Asked, sides: Sequence[Side]) -> Sequence[float]:
         """Derivatives of a number by parameters.

@@ -85,7 +85,7 @@ class Identification:
     @property
     def rms(self) -> float:
         """Root mean square of the relative errors that are left."""
-        return float(np.sqrt(np.mean(np.log(self.after / _values(self.measured)) ** 2)))
+        return float(np.sqrt(np.mean(np.log(self.after / [m.value for m in self.measured]) ** 2)))
 
     def named(self) -> dict[str, float]:
         """The parameters found."""
@@ -162,10 +162,10 @@ def fit(
         predictions by default
     before : the parameters as they were, for the report; the first starts by default
     Raises  ValueError where a prediction at a start is not a positive number, or a measured number is not
-    Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
+    Source  dogleg in a rectangular trust region: Voglis and Lagaris 2004, as in scipy.optimize.least_squares
     """
     parameters, measured = tuple(parameters), tuple(measured)
-    target, weight = _values(measured), np.array([m.weight for m in measured])
+    target, weight = np.array([[m.value, m.weight] for m in measured]).T
     if not (target > 0).all():
         raise ValueError("an identification needs measured numbers above 0")
     count = 0
@@ -183,7 +183,10 @@ def fit(
             )
         return found
 
-    last: tuple[np.ndarray, np.ndarray] = (np.array([]), np.array([]))  # where, and what was predicted there
+    first_values = {p.name: p.starts[0] for p in parameters} if before is None else before
+    origin = np.array([p.scaled(first_values[p.name]) for p in parameters])
+    there = predicted(origin)
+    last = origin, there  # where, and what was predicted there
 
     def residual(unknowns: np.ndarray) -> np.ndarray:
         nonlocal last
@@ -192,41 +195,29 @@ def fit(
         return weight * np.log(last[1] / target)
 
     def slope(unknowns: np.ndarray) -> np.ndarray:
-        """d ln(predicted) / d unknown (n_measured, n_parameter)."""
+        """(n_measured, n_parameter) derivatives of the residuals by the unknowns."""
         if slopes is None:
-            return _slope(predicted, unknowns, low, high)
+            return weight[:, None] * _slope(predicted, unknowns, low, high)
         residual(unknowns)
-        scale = [
-            value if p.ratio else p.high - p.low for p, value in zip(parameters, named(unknowns).values(), strict=True)
-        ]
-        return np.asarray(slopes(named(unknowns)) * scale / last[1][:, None])
+        values = named(unknowns)
+        scale = [values[p.name] if p.ratio else p.high - p.low for p in parameters]
+        return np.asarray(slopes(values) * scale * (weight / last[1])[:, None])
 
     low, high = np.array([p.scaled(p.low) for p in parameters]), np.array([p.scaled(p.high) for p in parameters])
-    best = None
-    for start in product(*(p.starts for p in parameters)):
-        first = np.array([p.scaled(v) for p, v in zip(parameters, start, strict=True)])
-        inside = np.clip(first, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
-        found = least_squares(residual, inside, jac=lambda u: weight[:, None] * slope(u), bounds=(low, high), xtol=1e-6)
-        if best is None or found.cost < best.cost:
-            best = found
-    assert best is not None
-    first_values = {p.name: p.starts[0] for p in parameters} if before is None else before
-    origin = np.array([p.scaled(first_values[p.name]) for p in parameters])
+    starts = product(*([p.scaled(value) for value in p.starts] for p in parameters))
+    ends = (least_squares(residual, x, slope, (low, high), "dogbox", xtol=1e-6, gtol=1e-10) for x in starts)
+    best = min(ends, key=lambda one: float(one.cost))
     return Identification(
         parameters,
         measured,
         np.array(list(named(best.x).values())),
-        predicted(origin),
+        there,
         target * np.exp(best.fun / weight),
         best.jac / weight[:, None],
         _deviation(best.jac, float(np.sum(best.fun**2))),
         count,
         np.array([first_values[p.name] for p in parameters]),
     )
-
-
-def _values(measured: Sequence[Measured]) -> np.ndarray:
-    return np.array([m.value for m in measured])
 
 
 def _slope(

@@ -2,9 +2,9 @@
 
 Every aim and every limit has a Gaussian process of its own, through its values and derivatives at the runs. Of several
 aims one is made by the augmented Chebyshev function with weights: the largest weighted aim, each between its ends
-along the trade, and a small share of their sum, are made small. Least t with all of these at most t, and all limits
-kept, is a problem of nonlinear programming; sequential quadratic programming solves it on the processes, from the best
-of 256 places.
+along the trade, and a small share of their sum, are made small. A run promises what of this it is expected to improve
+on the best allowed one. Most of it, for a t that none of these passes, with all limits kept, is a problem of nonlinear
+programming; sequential quadratic programming solves it on the processes, from the best of 256 places.
 Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005.851274; a process for every aim:
     Daulton, Balandat and Bakshy 2020
 """
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import minimize
+from scipy.special import erfcx
 from scipy.stats import qmc
 
 from tribodyn.workflows.run.failure import SolveFailed
@@ -37,7 +38,7 @@ from tribodyn.workflows.studies.many.table import SENTENCE, StudyTable
 from tribodyn.workflows.studies.many.task import RUN
 from tribodyn.workflows.studies.study_result import StudyResult
 
-GAIN = 1e-3  # of an aim, of its logarithm where it is positive, that one run more is worth
+GAIN = 1e-3  # of an aim, of its logarithm where it is positive and of its range else, that one run more is worth
 MISSED = 1e3  # what a limit that is passed counts beside the aims
 AUGMENTED = 0.05  # share of the sum of aims beside the largest: Knowles 2006
 NEAR = 1e-3  # of the unit cube, within which a proposal is a run that is there already
@@ -192,6 +193,9 @@ def _known(study: Study, space: Space, table: StudyTable) -> Known:
         good = np.isfinite(values)
         if good.any() and (values[good] > 0).all():
             values, slopes = np.log(values), slopes / values[:, None]
+        elif good.any():
+            size = float(np.ptp(values[good])) or 1.0
+            values, slopes = values / size, slopes / size
         sign = 1.0 if aim.want == "low" else -1.0
         columns.append((sign * values, sign * slopes))
     for limit in wanted.limits:
@@ -251,26 +255,32 @@ def best_trades(aims: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     return found[np.lexsort(aims[found].T[::-1])]
 
 
+def weighed(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Weighted aims (..., m), between low (m,), 0, and high (m,), 1, and a share of their sum; none without weight."""
+    scaled = (weights * (aims - low) / (high - low))[..., weights > 0]
+    return np.asarray(scaled + AUGMENTED * scaled.sum(axis=-1, keepdims=True))
+
+
 def chebyshev(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Largest of those aims (..., m) that have a weight, times it, between low (m,), 0, and high (m,), 1; see above."""
-    counted = weights > 0
-    scaled = (weights * (aims - low) / np.where(high > low, high - low, 1.0))[..., counted]
-    return np.asarray(scaled.max(axis=-1) + AUGMENTED * scaled.sum(axis=-1))
+    """The augmented Chebyshev function (...) of aims, see above."""
+    return np.asarray(weighed(aims, weights, low, high).max(axis=-1))
 
 
 def ends(known: Known) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest values (m,) of the aims along the best trades, of all runs where these are fewer than two."""
     front = known.front
     aims = known.aims[front if len(front) > 1 else known.solved]
-    return aims.min(axis=0), aims.max(axis=0)
+    low, high = aims.min(axis=0), aims.max(axis=0)
+    return low, np.where(high > low, high, low + 1.0)
 
 
 def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) -> tuple[np.ndarray, float]:
     """A place (k,) in the unit cube for the run that promises most; the same runs and seed propose the same.
 
     scale : places (n, k) -> coordinates (n, k) that surrogates are fitted in
-    Returns the place and what is expected there beyond the best run so far, in what is made small, inf where few runs
-        without derivatives are solved: then it lies far from all others. A second aim is weighed anew for every run
+    Returns the place and the improvement of the one aim expected there, inf of several aims, where no run is allowed,
+        and where few runs without derivatives are solved: then it lies far from all others. A second aim is weighed
+        anew for every run
     """
     share, m = known.share, known.aims.shape[1]
     draw = np.random.default_rng([seed, len(share)])
@@ -285,50 +295,54 @@ def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) 
     weights = np.eye(m)[turn] if turn < m and m > 1 else draw.dirichlet(np.ones(m))
     least = float(chebyshev(known.aims[known.allowed], weights, low, high).min()) if known.allowed.any() else np.inf
 
-    def expected(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Aims (n, m) at places (n, k), and excess (n, q), a standard deviation above what is expected."""
+    def expected(places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Aims (n, m) at places (n, k), deviation (n,) of what is made of them, excess (n, q) a deviation higher."""
         at = scale(np.clip(places, 0.0, 1.0))
-        above = [mean + deviation for mean, deviation in (one.mean_and_deviation(at) for one in surrogates[m:])]
-        excess = np.stack(above, axis=1) if above else np.zeros((len(at), 0))
-        return np.stack([one.mean(at) for one in surrogates[:m]], axis=1), excess
+        mean, deviation = np.stack([one.mean_and_deviation(at) for one in surrogates], axis=-1)
+        return mean[:, :m], chebyshev(deviation[:, :m], weights, np.zeros(m), high - low), (mean + deviation)[:, m:]
+
+    def worth(places: np.ndarray, least: float) -> np.ndarray:
+        aims, deviation, excess = expected(places)
+        passed = np.maximum(excess, 0).max(axis=1, initial=0.0)
+        return promised(least, chebyshev(aims, weights, low, high), deviation) - MISSED * passed
+
+    def margins(z: np.ndarray) -> np.ndarray:
+        aims, _, excess = (each[0] for each in expected(z[None, 1:]))
+        return np.concatenate([z[0] - weighed(aims, weights, low, high), -excess])
+
+    def climbed(start: np.ndarray) -> np.ndarray:
+        found = minimize(
+            lambda z: -promised(least, z[0], expected(z[None, 1:])[1])[0],
+            [chebyshev(expected(start[None])[0], weights, low, high)[0], *start], method="SLSQP",
+            bounds=[(None, None), *[(0.0, 1.0)] * len(start)], constraints={"type": "ineq", "fun": margins},
+        )  # fmt: skip
+        return np.clip(found.x[1:], 0.0, 1.0)
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # steps beyond the bounds
         places = np.vstack([share[known.front], places])
-        aims, excess = expected(places)
-        passed = np.maximum(excess, 0).max(axis=1, initial=0.0)
-        best = int(np.argmin(chebyshev(aims, weights, low, high) + MISSED * passed))
-        at, value = _descended(expected, places[best], weights, low, high)
+        starts = [places[worth(places, beyond).argmax()] for beyond in (least, np.inf)]
+        places = np.vstack([*starts, *map(climbed, starts)])
+        promise = worth(places, least)
+    at, gain = places[promise.argmax()], float(np.exp(promise.max()) * (high - low)[0] / (1 + AUGMENTED))
     if np.abs(share - at).max(axis=1).min() < NEAR:
         return (at, 0.0) if m == 1 else (emptiest, np.inf)
-    return at, least - value if m == 1 else np.inf
+    return at, gain if m == 1 and np.isfinite(least) else np.inf
 
 
-def _descended(
-    expected: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-    start: np.ndarray,
-    weights: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-) -> tuple[np.ndarray, float]:
-    """The place where one search ends, and the Chebyshev function there with what limits are passed by."""
-    counted = weights > 0
-    scale = weights[counted] / np.where(high > low, high - low, 1.0)[counted]
+def promised(least: float, value: np.ndarray | float, deviation: np.ndarray) -> np.ndarray:
+    """Logarithm of what a normal number lies below `least` by, 0 where it does not, on average; -value without least.
 
-    def margins(z: np.ndarray) -> np.ndarray:
-        aims, excess = (each[0] for each in expected(z[None, 1:]))
-        scaled = scale * (aims - low)[counted]
-        return np.concatenate([z[0] - scaled - AUGMENTED * scaled.sum(), -excess])
-
-    first = float(chebyshev(expected(start[None])[0], weights, low, high)[0])
-    found = minimize(
-        lambda z: z[0], np.array([first, *start]), jac=lambda z: np.eye(len(z))[0], method="SLSQP",
-        bounds=[(None, None), *[(0.0, 1.0)] * len(start)], constraints={"type": "ineq", "fun": margins},
-    )  # fmt: skip
-    place = np.clip(found.x[1:], 0.0, 1.0)
-    aims, excess = expected(place[None])
-    passed = float(np.maximum(excess, 0).max(initial=0.0))
-    return place, float(chebyshev(aims, weights, low, high)[0]) + MISSED * passed
+    Source  expected improvement: Jones, Schonlau and Welch 1998, doi 10.1023/A:1008306431147, eq. 15; its logarithm
+        far below: Ament et al. 2023
+    """
+    if not np.isfinite(least):
+        return -np.broadcast_to(value, deviation.shape)
+    deviation = np.maximum(deviation, np.finfo(float).tiny)
+    z = (least - value) / deviation
+    below = -np.minimum(np.abs(z), 1e6)  # beyond it all is rounding
+    tail = -(below**2) / 2 - np.log(2 * np.pi) / 2 + np.log1p(below * np.sqrt(np.pi / 2) * erfcx(-below / np.sqrt(2)))
+    return np.asarray(np.log(deviation) + np.where(z > 0, np.log(np.where(z > 0, z, 1.0) + np.exp(tail)), tail))
 
 
 def _fitted(points: np.ndarray, column: np.ndarray, slopes: np.ndarray, solved: np.ndarray) -> Surrogate:

@@ -192,8 +192,7 @@ class Surrogate:
 
     def mean(self, points: np.ndarray) -> np.ndarray:
         """Expected values (n,)."""
-        each = [self._seen(part) @ self._conditioned[1] for part in _blocks(points)]
-        return self.known(points) + self.middle + self.width * np.concatenate(each)
+        return self.mean_and_deviation(points)[0]
 
     def mean_and_deviation(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Expected values (n,) and their standard deviations (n,), of what is computed without its noise."""
