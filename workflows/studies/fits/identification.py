@@ -162,7 +162,7 @@ def fit(
         predictions by default
     before : the parameters as they were, for the report; the first starts by default
     Raises  ValueError where a prediction at a start is not a positive number, or a measured number is not
-    Source  dogleg in a rectangular trust region: Voglis and Lagaris 2004, as in scipy.optimize.least_squares
+    Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
     """
     parameters, measured = tuple(parameters), tuple(measured)
     target, weight = np.array([[m.value, m.weight] for m in measured]).T
@@ -205,7 +205,8 @@ def fit(
 
     low, high = np.array([p.scaled(p.low) for p in parameters]), np.array([p.scaled(p.high) for p in parameters])
     starts = product(*([p.scaled(value) for value in p.starts] for p in parameters))
-    ends = (least_squares(residual, x, slope, (low, high), "dogbox", xtol=1e-6, gtol=1e-10) for x in starts)
+    within = low + 1e-6 * (high - low), high - 1e-6 * (high - low)
+    ends = (least_squares(residual, np.clip(x, *within), slope, (low, high), xtol=1e-6) for x in starts)
     best = min(ends, key=lambda one: float(one.cost))
     return Identification(
         parameters,
