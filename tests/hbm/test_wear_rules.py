@@ -466,6 +466,5 @@ def test_the_steps_of_a_run_add_up_in_its_estimate(problem: WearProblem, fine: W
     estimate = step_error(run, Tolerance(0.1, 2e-4)).cycles
     assert 0.0 < abs(life(run) / life(fine) - 1) < estimate < 0.2
     begun = replace(run, step_error=np.where(run.cycles == 0, 10.0, run.step_error))
-    assert (
-        step_error(begun, Tolerance(0.1, 2e-4)).cycles < 0.2
-    )  # a first step that is far off is so by its own few cycles
+    # a first step that is far off is so by its own few cycles
+    assert step_error(begun, Tolerance(0.1, 2e-4)).cycles < 0.2
