@@ -66,7 +66,11 @@ def of_life(
     changes = tuple(changes)  # all at once: each state asks for all of them
     joints, columns = problem.balance.contact.joints, [*coefficients.values(), (1.0, tuple(problem.wearing))]
     last, n = len(changes) + len(coefficients), len(changes) + len(columns) + len(joints)
-    grows, opens = np.zeros((len(problem.area), n)), np.zeros((len(problem.area), n))
+    area, spread = problem.area, np.zeros((len(problem.area), n))
+    for i, change in enumerate(changes):  # lengths move the areas that wear
+        up, down = (one.model.interface.area for one in (change.above, change.below))
+        spread[:, i] = (up - down) / (2 * change.step)
+    grows, opens = -spread / area[:, None], np.zeros((len(area), n))
     for i, (value, names) in enumerate(columns, len(changes)):  # the last of them: all steps, by all joints
         for name in names:
             grows[problem.balance.contact.joint(name).rows, i] = 1 / value
@@ -77,7 +81,7 @@ def of_life(
     for i, row in enumerate(rows[:-1]):
         before, after = after, state_of(problem, rows[i + 1])
         depth = tangent.along(row, rows[:i], before, after, depth)
-    ends, deepest, area = [first, after], int(after.depth.argmax()), problem.area
+    ends, deepest = [first, after], int(after.depth.argmax())
     if worn.preload_at_rest is not None:
         quiet = PreloadAtRest(problem).quiet(first)
         rests = assess(quiet, first.depth, 0.0, None)
@@ -88,7 +92,8 @@ def of_life(
     )
     longer = (had - left) / left[last]
     ended = depth + np.outer(depth[:, last], longer)
-    slopes, by_gap = np.stack([life * longer, ended[deepest], area @ ended]), np.zeros((3, len(area)))
+    slopes = np.stack([life * longer, ended[deepest], area @ ended + after.depth @ spread])
+    by_gap = np.zeros((3, len(area)))
     for i, joint in enumerate(joints, last + 1):
         by_gap[:, joint.rows] = slopes[:, i, None] / len(joint.rows)
     by, values = slopes[:, :last], np.array([life, after.depth[deepest], area @ after.depth])
