@@ -64,7 +64,7 @@ def _run(arguments: Sequence[str] | None) -> None:
     if not gc.isenabled():
         gc.freeze()  # what is imported now is looked through no more
         gc.enable()
-    command(*bound.args, **bound.kwargs)
+    sys.exit(command(*bound.args, **bound.kwargs) or 0)
 
 
 def guard(command: Callable[[], object]) -> None:
