@@ -21,6 +21,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.varying import Varying, geometry_keys, keys
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.derivatives import of_summary
 
 LOCATED = "harmonics.transitions=located"
 COARSE = {
@@ -69,6 +70,25 @@ def test_the_law_of_similarity_holds_of_lengths():
     wanted = {"frequency": -1.0, "amplitude": 1.0, "phase": 0.0, "energy": 3.0, "preload": 2.0, "wear rate": 3.0}
     total = similar(found.elasticities, LENGTHS, {})
     np.testing.assert_allclose(total, [wanted[name] for name in found.found.names], atol=2e-6)
+
+
+@pytest.mark.slow
+def test_rows_of_studies_go_by_lengths_whose_mesh_stays_the_same(monkeypatch):
+    """One that the mesh does not follow takes nothing from the others."""
+    without = (*COARSE["beam"], "wear=", "verdict.enabled=false")
+    file, moved = scene_file.read("beam", without), Varying.nodes_moved
+
+    def refused(self, key):
+        if key == "geometry.height":
+            raise NoDerivative("another mesh")
+        return moved(self, key)
+
+    monkeypatch.setattr(Varying, "nodes_moved", refused)
+    wanted = ["geometry.length", "geometry.height", "contact.friction"]
+    found = of_summary(Varying(file, Progress()), td.run("beam", overrides=without), wanted)
+    assert {key for _, key in found} == {"geometry.length", "contact.friction"}
+    along = td.studies.derivatives(file, only=("geometry.length",)).found
+    assert found["peak_hz_first", "geometry.length"] == pytest.approx(along.slopes[0, 0], rel=1e-6)
 
 
 @pytest.mark.slow
