@@ -56,7 +56,7 @@ def modes(
     size = K.shape[0]
     if not 1 <= n <= size:
         raise ValueError(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
-    if size <= EIGEN.dense_below or 2 * n >= size or not issparse(K):
+    if isinstance(K, np.ndarray) or (issparse(K) and (size <= EIGEN.dense_below or 2 * n >= size)):
         values, phi = eigh(dense(K), dense(M), subset_by_index=[0, n - 1])
     else:
         if factor is None:
