@@ -6,9 +6,9 @@ product, turns these into stresses, and goes back the same way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numba import njit
@@ -19,7 +19,6 @@ from skfem import ElementHex1, ElementTetP1
 from tribodyn.fem.assembly import materials_of
 from tribodyn.fem.elasticity import at_elements, densities, of_elements, tensor_blocks
 from tribodyn.fem.elements import connectivity, mapped, scatter
-from tribodyn.fem.material import AnyMaterial
 
 AT_ONCE = 32  # elements; memory and speed only
 VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  # place of a component of strain or stress
@@ -27,70 +26,82 @@ VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  # place of a component of s
 
 @dataclass(frozen=True)
 class Elements:
-    """The elements of one body, for products.
+    """Elements of one body and their mass, for products.
 
-    nodes : (n_a, n_e) of the whole; linear : (n_a, n_corner) linear functions of the corners, its first nodes, at all
-    basis : (n_q, n_a) shape functions, or (n_q * 3, n_a) their reference gradients; weight : (n_q, n_e) |J| w [m3],
-        times the density for a mass
-    inverse : (n_q, 3, 3, n_e) d X_i / d x_j at [j, i] [1/m]; law : (6, 6, n_e) [Pa], in Voigt's order; None for a mass
+    nodes : (n_a, n_e) of the whole, first those at corners; basis : (n_q, n_a) shape functions
+    weight : (n_q, n_e) |J| w [m3], for a mass times the density
     """
 
     nodes: np.ndarray
-    linear: np.ndarray
-    basis: np.ndarray
     weight: np.ndarray
-    inverse: np.ndarray | None = None
-    law: np.ndarray | None = None
+    basis: np.ndarray
 
-    def astype(self, kind: Any) -> Elements:
+    def astype(self, kind: Any) -> Self:
         """The same in another precision."""
-        numbers = {name: of for name, of in vars(self).items() if name != "nodes" and of is not None}
-        return replace(self, **{name: of.astype(kind) for name, of in numbers.items()})
+        return replace(self, **{name: of.astype(kind) for name, of in vars(self).items() if name != "nodes"})
+
+    def batches(self) -> Iterator[slice]:
+        """Some elements at a time."""
+        return (slice(at, at + AT_ONCE) for at in range(0, self.nodes.shape[1], AT_ONCE))
 
     def add_product(self, x: np.ndarray, total: np.ndarray) -> None:
         """Add forces under displacements x to a total, both (n_node, 3, k)."""
-        k = x.shape[2]
-        for start in range(0, self.nodes.shape[1], AT_ONCE):
-            own = slice(start, start + AT_ONCE)
+        for own in self.batches():
             nodes = self.nodes[:, own]
-            moved = np.empty((len(nodes), 3, k, nodes.shape[1]), x.dtype)
+            moved = np.empty((len(nodes), 3, x.shape[2], nodes.shape[1]), x.dtype)
             _gather(x, nodes, moved)
             at_points = self.basis @ moved.reshape(len(nodes), -1)
-            if self.inverse is None:
-                at_points.reshape(len(self.weight), -1, nodes.shape[1])[:] *= self.weight[:, None, own]
-            else:
-                shape = (len(self.weight), 3, 3, k, nodes.shape[1])
-                _stresses(at_points.reshape(shape), self.inverse[..., own], self.weight[:, own], self.law[..., own])
+            self.respond(at_points.reshape(len(self.weight), -1, 3, *moved.shape[2:]), own)
             _scatter((self.basis.T @ at_points).reshape(moved.shape), nodes, total)
+
+    def respond(self, at_points: np.ndarray, own: slice) -> None:
+        """From displacements at points (n_q, 1, 3, k, n_e) of some elements to forces, in place."""
+        at_points *= self.weight[:, None, None, None, own]
+
+    def sizes(self, own: slice) -> np.ndarray:
+        """Diagonal (n_a, n_e, 3) of the matrices of some elements."""
+        return np.repeat((self.basis.T**2 @ self.weight[:, own])[..., None], 3, axis=2)
+
+
+@dataclass(frozen=True)
+class Elastic(Elements):
+    """Elements of one body and their stiffness.
+
+    basis : (n_q * 3, n_a) gradients of shape functions in the reference element
+    inverse : (n_q, 3, 3, n_e) d X_i / d x_j at [j, i] [1/m]; law : (6, 6, n_e) [Pa], in Voigt's order
+    linear : (n_a, n_corner) linear functions of the corners, at the nodes
+    """
+
+    inverse: np.ndarray
+    law: np.ndarray
+    linear: np.ndarray
+
+    def respond(self, at_points: np.ndarray, own: slice) -> None:
+        """From reference gradients at points (n_q, 3, 3, k, n_e) of some elements to weighted stresses, in place."""
+        _stresses(at_points, self.inverse[..., own], self.weight[:, own], self.law[..., own])
 
     def gradients(self, own: slice) -> np.ndarray:
         """(n_e, n_q, 3, n_a) of the shape functions of some elements [1/m]."""
         slopes = self.basis.reshape(len(self.weight), 3, -1)
-        return np.einsum("qjie,qia->eqja", self.inverse[..., own], slopes, optimize=True)
+        return np.asarray(np.einsum("qjie,qia->eqja", self.inverse[..., own], slopes, optimize=True))
 
-    def diagonal(self, n_node: int) -> np.ndarray:
-        """(n_node, 3)."""
-        found = np.zeros((n_node, 3))
-        for start in range(0, self.nodes.shape[1], AT_ONCE):
-            own = slice(start, start + AT_ONCE)
-            if self.inverse is None:
-                size = np.repeat((self.basis.T**2 @ self.weight[:, own])[:, None], 3, axis=1)
-            else:
-                g = self.gradients(own)
-                size = np.stack([np.einsum("eqja,jle,eqla,qe->ae", g, self.law[VOIGT[c][:, None], VOIGT[c]][..., own], g,
-                                           self.weight[:, own], optimize=True) for c in range(3)], axis=1)
-            np.add.at(found, self.nodes[:, own], size.transpose(0, 2, 1))
-        return found
+    def tensor(self, own: slice) -> np.ndarray:
+        """Elasticity tensors (n_e, 3, 3, 3, 3) of some elements [Pa]."""
+        return self.law[..., own].transpose(2, 0, 1)[:, VOIGT[:, :, None, None], VOIGT]
 
-    def linear_stiffness(self, n_node: int) -> csr_matrix:
+    def sizes(self, own: slice) -> np.ndarray:
+        """Diagonal (n_a, n_e, 3) of the matrices of some elements."""
+        g, C = self.gradients(own), self.tensor(own)
+        return np.asarray(np.einsum("eijil,eqja,eqla,qe->aei", C, g, g, self.weight[:, own], optimize=True))
+
+    def of_corners(self, n_node: int) -> csr_matrix:
         """Stiffness (3 n_node, 3 n_node) of linear elements in place of these."""
-        n, corners = self.nodes.shape[1], self.nodes[: self.linear.shape[1]].T
-        blocks = np.empty((n, *(corners.shape[1],) * 2, 3, 3))
-        for start in range(0, n, AT_ONCE):
-            own = slice(start, start + AT_ONCE)
-            law = self.law[..., own].transpose(2, 0, 1)[:, VOIGT[:, :, None, None], VOIGT]
-            blocks[own] = tensor_blocks(self.gradients(own) @ self.linear, self.weight[:, own].T, law)
-        return scatter(corners, n_node, blocks)
+        corners = self.nodes[: self.linear.shape[1]].T
+        blocks = [
+            tensor_blocks(self.gradients(own) @ self.linear, self.weight[:, own].T, self.tensor(own))
+            for own in self.batches()
+        ]
+        return scatter(corners, n_node, np.concatenate(blocks))
 
 
 @njit(cache=True)
@@ -136,7 +147,8 @@ def _stresses(slopes: np.ndarray, inverse: np.ndarray, weight: np.ndarray, law: 
                 for e in range(AT_ONCE):
                     shear = C[a, 3, e] * (h[1, 2, e] + h[2, 1, e]) + C[a, 4, e] * (h[0, 2, e] + h[2, 0, e])
                     shear += C[a, 5, e] * (h[0, 1, e] + h[1, 0, e])
-                    t[a, e] = w[e] * (C[a, 0, e] * h[0, 0, e] + C[a, 1, e] * h[1, 1, e] + C[a, 2, e] * h[2, 2, e] + shear)
+                    long = C[a, 0, e] * h[0, 0, e] + C[a, 1, e] * h[1, 1, e] + C[a, 2, e] * h[2, 2, e]
+                    t[a, e] = w[e] * (long + shear)
             for i in range(3):
                 for j in range(3):
                     x, y, z = VOIGT[j]
@@ -152,7 +164,7 @@ class Elementwise(LinearOperator):
     elements : of all bodies; n_node : of the mesh; free : (n,) DOFs, node * 3 + component; rest : (n, n) sparse
     """
 
-    def __init__(self, elements: Sequence[Elements], n_node: int, free: np.ndarray, rest: csr_matrix) -> None:
+    def __init__(self, elements: Sequence[Any], n_node: int, free: np.ndarray, rest: csr_matrix) -> None:
         super().__init__(rest.dtype, (len(free),) * 2)
         self.elements, self.n_node, self.free, self.rest = tuple(elements), n_node, free, rest
 
@@ -170,17 +182,20 @@ class Elementwise(LinearOperator):
 
     def diagonal(self) -> np.ndarray:
         """(n,)."""
-        whole = sum(one.diagonal(self.n_node) for one in self.elements)
-        return np.asarray(whole).ravel()[self.free] + self.rest.diagonal()
+        found = np.zeros((self.n_node, 3))
+        for one in self.elements:
+            for own in one.batches():
+                np.add.at(found, one.nodes[:, own], one.sizes(own))
+        return found.ravel()[self.free] + self.rest.diagonal()
 
     def linear(self) -> tuple[csr_matrix, csr_matrix]:
-        """The same of linear elements on the corners: displacements (n, m) by those of corners, and stiffness (m, m)."""
+        """What linear elements on the corners have: displacements (n, m) by those of corners, and stiffness (m, m)."""
         corner, entries = np.ones(self.n_node, bool), []
         for one in self.elements:
             found, first = np.unique(one.nodes, return_index=True)
             place, element = np.divmod(first, one.nodes.shape[1])
-            corner[found] = place < one.linear.shape[1]
             corners = one.nodes[: one.linear.shape[1], element].T
+            corner[found] = place < corners.shape[1]
             entries.append((one.linear[place].ravel(), np.repeat(found, corners.shape[1]), corners.ravel()))
         alone = np.setdiff1d(np.arange(self.n_node), np.concatenate([rows for _, rows, _ in entries]))
         entries.append((np.ones(len(alone)), alone, alone))
@@ -189,7 +204,7 @@ class Elementwise(LinearOperator):
         by.eliminate_zeros()
         own = self.free[corner[self.free // 3]]
         by = kron(by, identity(3), format="csr")[self.free][:, own]
-        stiffness = sum(one.linear_stiffness(self.n_node) for one in self.elements)[own][:, own]
+        stiffness = sum(one.of_corners(self.n_node) for one in self.elements)[own][:, own]
         return by, csr_matrix(stiffness + by.T @ self.rest @ by)
 
     def _matmat(self, x: np.ndarray) -> np.ndarray:
@@ -204,28 +219,28 @@ class Elementwise(LinearOperator):
         return self._matmat(x.reshape(-1, 1)).ravel()
 
 
-def matrices(mesh: Any, material: Any, order: int = 5) -> tuple[Elementwise, Elementwise]:
-    """Mass and stiffness as `elasticity.assemble` has them, of elements of second order."""
+def matrices(mesh: Any, material: Any) -> tuple[Elementwise, Elementwise]:
+    """Mass and stiffness as `elasticity.assemble` has them.
+
+    Raises  ValueError where elements are linear, or as `assemble` does
+    """
     mass, stiffness = [], []
+    first, second = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])  # as VOIGT counts
     for piece, own in materials_of(mesh, material):
-        one = piece.mesh
-        hexahedra = connectivity(one).shape[1] == 27
-        if connectivity(one).shape[1] == 8 or any(getattr(of, "linear_reduced", False) for of in of_elements(one, own)[0]):
+        one, nodes = piece.mesh, connectivity(piece.mesh)
+        if nodes.shape[1] == 8 or any(getattr(of, "linear_reduced", False) for of in of_elements(one, own)[0]):
             raise ValueError('reduction.solver: "multigrid" needs elements of second order, and these are linear ones')
-        corner = ElementHex1() if hexahedra else ElementTetP1()
+        corner = ElementHex1() if nodes.shape[1] == 27 else ElementTetP1()
         places = np.asarray(one.elem().doflocs).T
         linear = np.stack([corner.lbasis(places, i)[0] for i in range(len(corner.doflocs))], axis=1)
-        parts = [*mapped(one, order)]
-        N, slopes = parts[0][1], parts[0][2]
-        weight = np.concatenate([of[4] for of in parts]).T
-        inverse = np.concatenate([np.linalg.inv(of[3]) for of in parts]).transpose(1, 2, 3, 0)
-        first, second = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
-        law = at_elements(one, own, "tensor")[:, first, second][:, :, first, second].transpose(1, 2, 0)
-        nodes = np.ascontiguousarray((piece.node + connectivity(one)).T)
-        mass.append(Elements(nodes, linear, N, np.ascontiguousarray(weight * densities(one, own))))
-        stiffness.append(
-            Elements(nodes, linear, slopes.reshape(-1, len(nodes)), *map(np.ascontiguousarray, (weight, inverse, law)))
+        _, (N, *_), (slopes, *_), J, weight = zip(*mapped(one), strict=True)
+        law = at_elements(one, own, "tensor")[:, first, second][:, :, first, second]
+        nodes, law, inverse, weight = (
+            np.ascontiguousarray(np.moveaxis(of, 0, -1))
+            for of in (piece.node + nodes, law, np.linalg.inv(np.concatenate(J)), np.concatenate(weight))
         )
+        mass.append(Elements(nodes, weight * densities(one, own), N))
+        stiffness.append(Elastic(nodes, weight, slopes.reshape(-1, len(nodes)), inverse, law, linear))
     n_node = mesh.doflocs.shape[1]
     free, nothing = np.arange(3 * n_node), csr_matrix((3 * n_node,) * 2)
     return Elementwise(mass, n_node, free, nothing), Elementwise(stiffness, n_node, free, nothing)

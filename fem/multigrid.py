@@ -1,4 +1,4 @@
-"""Solutions of a stiffness that is never assembled: conjugate gradients with two levels, where no factor fits the memory.
+"""Solutions and modes of a stiffness that is never assembled, by two levels, where no factor fits the memory.
 
 The coarse level is the stiffness of linear elements on the same corners, an eighth of the DOFs, and is factorised.
 """
@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, lobpcg
 
 from tribodyn.fem.elementwise import Elementwise
 
@@ -16,7 +18,7 @@ from tribodyn.fem.elementwise import Elementwise
 class Multigrid:
     """Conjugate gradients, preconditioned in single precision by Chebyshev smoothing and linear elements.
 
-    K : positive definite; coarse : (m, m) the linear elements' stiffness as `Elementwise.linear` has it -> its factor
+    K : positive definite; coarse : stiffness of linear elements, see `Elementwise.linear` -> its factor
     iterations : of all solves so far, each for up to `at_once` right-hand sides
     Raises  what `coarse` does; RuntimeError, as `solve`, where it does not converge
     Source  smoother: Lottes 2023, doi 10.1002/nla.2518, Chebyshev polynomials of the fourth kind
@@ -26,7 +28,8 @@ class Multigrid:
     most = 500  # iterations
     at_once = 8  # right-hand sides; memory only
     degree = 4  # of the polynomial
-    tolerance = 1e-9  # that eigenvalues from its solutions can have
+    loose = 1e-5  # residual of what energy is taken of, whose error is about its square
+    more = 4  # modes that are iterated besides, so that the wanted ones converge soon
 
     def __init__(self, K: Elementwise, coarse: Callable[[Any], Any]) -> None:
         self.iterations = 0
@@ -40,22 +43,44 @@ class Multigrid:
             x = self._inverse * (self._single @ (x / np.linalg.norm(x)))
         self._largest = own(1.1 * np.linalg.norm(x))
 
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
+    def solve(self, rhs: np.ndarray, residual: float = residual) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""
         columns = np.asarray(rhs, float).reshape(len(rhs), -1)
         found = np.empty_like(columns)
         for start in range(0, columns.shape[1], self.at_once):
             own = slice(start, start + self.at_once)
-            found[:, own] = self._some(columns[:, own])
+            found[:, own] = self._some(columns[:, own], residual)
         return found.reshape(np.shape(rhs))
 
-    def _some(self, rhs: np.ndarray) -> np.ndarray:
+    def lowest(self, M: Elementwise, n: int) -> tuple[np.ndarray, np.ndarray]:
+        """The n lowest eigenvalues (n,) of K phi = lambda M phi, and phi (N, n), by preconditioned conjugate gradients.
+
+        Source  Knyazev 2001, doi 10.1137/S1064827500366124
+        """
+
+        def about(r: np.ndarray) -> np.ndarray:
+            r = r.reshape(len(r), -1)
+            return self._cycle(r, np.linalg.norm(r, axis=0))
+
+        near = LinearOperator(M.shape, matvec=about, matmat=about, dtype=float)
+        found = about(np.random.default_rng(0).standard_normal((M.shape[0], n + self.more)))
+        for _ in range(self.most // 10):
+            with catch_warnings():
+                simplefilter("ignore", UserWarning)  # that it is not below its tolerance, an absolute one
+                values, found = lobpcg(self._K, found, M, near, largest=False, maxiter=8, tol=1e-300)
+            pushed = (M @ found[:, :n]) * values[:n]
+            missed = np.linalg.norm(self._K @ found[:, :n] - pushed, axis=0)
+            if (missed <= self.loose * np.linalg.norm(pushed, axis=0)).all():
+                return values[:n], found[:, :n]
+        raise RuntimeError
+
+    def _some(self, rhs: np.ndarray, residual: float) -> np.ndarray:
         size = np.linalg.norm(rhs, axis=0)
         r, x = rhs / np.where(size > 0, size, 1.0), np.zeros(rhs.shape)
         along, before = np.zeros(rhs.shape), np.ones(rhs.shape[1])
         for _ in range(self.most):
             left = np.linalg.norm(r, axis=0)
-            if left.max() <= self.residual:
+            if left.max() <= residual:
                 return np.asarray(x * size)
             z = self._cycle(r, left)
             now = np.einsum("ij,ij->j", r, z)
