@@ -28,7 +28,7 @@ class Multigrid:
     most = 500  # iterations
     at_once = 8  # right-hand sides; memory only
     degree = 4  # of the polynomial
-    loose = 1e-5  # residual of what energy is taken of, whose error is about its square
+    of_modes = 1e-5  # residual beside omega^2 M phi; an eigenvalue has about its square
     more = 4  # modes that are iterated besides, so that the wanted ones converge soon
 
     def __init__(self, K: Elementwise, coarse: Callable[[Any], Any]) -> None:
@@ -43,13 +43,13 @@ class Multigrid:
             x = self._inverse * (self._single @ (x / np.linalg.norm(x)))
         self._largest = own(1.1 * np.linalg.norm(x))
 
-    def solve(self, rhs: np.ndarray, residual: float = residual) -> np.ndarray:
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""
         columns = np.asarray(rhs, float).reshape(len(rhs), -1)
         found = np.empty_like(columns)
         for start in range(0, columns.shape[1], self.at_once):
             own = slice(start, start + self.at_once)
-            found[:, own] = self._some(columns[:, own], residual)
+            found[:, own] = self._some(columns[:, own])
         return found.reshape(np.shape(rhs))
 
     def lowest(self, M: Elementwise, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -70,17 +70,17 @@ class Multigrid:
                 values, found = lobpcg(self._K, found, M, near, largest=False, maxiter=8, tol=1e-300)
             pushed = (M @ found[:, :n]) * values[:n]
             missed = np.linalg.norm(self._K @ found[:, :n] - pushed, axis=0)
-            if (missed <= self.loose * np.linalg.norm(pushed, axis=0)).all():
+            if (missed <= self.of_modes * np.linalg.norm(pushed, axis=0)).all():
                 return values[:n], found[:, :n]
-        raise RuntimeError
+        raise RuntimeError(f"{n} modes do not converge: take a direct solver")
 
-    def _some(self, rhs: np.ndarray, residual: float) -> np.ndarray:
+    def _some(self, rhs: np.ndarray) -> np.ndarray:
         size = np.linalg.norm(rhs, axis=0)
         r, x = rhs / np.where(size > 0, size, 1.0), np.zeros(rhs.shape)
         along, before = np.zeros(rhs.shape), np.ones(rhs.shape[1])
         for _ in range(self.most):
             left = np.linalg.norm(r, axis=0)
-            if left.max() <= residual:
+            if left.max() <= self.residual:
                 return np.asarray(x * size)
             z = self._cycle(r, left)
             now = np.einsum("ij,ij->j", r, z)

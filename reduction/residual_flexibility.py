@@ -34,7 +34,6 @@ from threadpoolctl import threadpool_limits
 from tribodyn.fem.factor import Factor, factorise, solve_few
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.modes import StaticDivergence
-from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import fixed_interface_modes
 from tribodyn.reduction.limits import LIMITS
@@ -168,11 +167,11 @@ def residual_flexibility(
     M, B = system.mass, csr_matrix(interface.B)
     factor = factorise(K_s, solver=solver, few=np.unique(csr_matrix(interface.B).indices))
     omega, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
-    K_s = K_s if isinstance(factor, Multigrid) else None  # a sparse one leaves its memory to the shapes
+    del K_s
     forces = [np.asarray(v, float) for v in (*system.loads.values(), *system.outputs.values())]
     tractions = B.T @ clustered(interface, k, clusters)
     pushed = csc_matrix(hstack([*(csc_matrix(f[:, None]) for f in forces if f.any()), tractions]))
-    V, squares = _ritz(omega, phi, pushed, factor, M, K_s)
+    V, squares = _ritz(omega, phi, pushed, factor, M)
     at_contact = np.asarray(B @ V)
     free = np.diag(squares) - at_contact.T @ (k[:, None] * at_contact)
     reduced = SecondOrderSystem(
@@ -228,13 +227,12 @@ def _bisected(points: np.ndarray, clusters: int) -> np.ndarray:
 
 
 def _ritz(
-    omega: np.ndarray, phi: np.ndarray, forces: csc_matrix, factor: Factor, M: Any, K_s: Any
+    omega: np.ndarray, phi: np.ndarray, forces: csc_matrix, factor: Factor, M: Any
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ritz vectors (n_full, n) of unit modal mass and squared frequencies (n,) of modes and of statics under forces.
 
-    omega (k,), phi (n_full, k) : modes of K_s, M; forces : (n_full, j), those of loads and outputs first; factor : of K_s
-    K_s times a static shape is its force, and times a mode M phi omega^2: K_s itself is not asked for, but where it is
-    given: then shapes of tractions need not be exact, as what they leave out is in R
+    omega (k,), phi (n_full, k) : modes of K_s, M; forces : (n_full, j); factor : of K_s
+    K_s times a static shape is its force, and times a mode M phi omega^2: K_s itself is not asked for
     """
     k, n, step = len(omega), len(omega) + forces.shape[1], LIMITS.static_at_once
     shapes = np.empty((len(phi), n), order="F")
@@ -242,16 +240,14 @@ def _ritz(
     with threadpool_limits(1):
         for at in range(0, n - k, step):
             block = forces[:, at : at + step].toarray(order="F")
-            loose = (Multigrid.loose,) if K_s is not None and at else ()
-            shapes[:, k + at : k + at + step] = factor.solve(block, *loose)
+            shapes[:, k + at : k + at + step] = factor.solve(block)
     energy = np.diag(np.concatenate([omega**2, np.zeros(n - k)]))
     energy[k:] = forces.T @ shapes
     energy[:k, k:] = energy[k:, :k].T
-    products = [
-        np.concatenate([shapes.T @ (of @ shapes[:, at : at + step]) for at in range(0, n, step)], axis=1)
-        for of in ((M,) if K_s is None else (M, K_s))
-    ]
-    inertia, energy = products[0], energy if K_s is None else products[1]
+    inertia = np.concatenate(
+        [shapes.T @ (M @ shapes[:, at : at + step]) for at in range(0, n, step)],
+        axis=1,
+    )
     scale = np.sqrt(np.diag(energy))
     size, turn = sla.eigh(0.5 * (energy + energy.T) / np.outer(scale, scale))
     kept = size > LIMITS.dependent * size[-1]
