@@ -42,7 +42,7 @@ ASSEMBLIES = {"assembly": (52, 14, 9, 30)}
 PRODUCTS = {  # ways of the product -> how the scene asks for it
     "product": (),
     "flexibility": ("reduction.method=residual_flexibility",),
-    "multigrid": ("reduction.solver=multigrid",),
+    "multigrid": ("reduction.method=residual_flexibility", "reduction.solver=multigrid"),
 }
 WAYS = ("product", "by hand")
 OTHERS = {"1M": ("flexibility",), "5M-cubes": ("multigrid",)}  # constraint modes do not fit 24 GB, nor a factor
