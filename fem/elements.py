@@ -35,12 +35,19 @@ def connectivity(mesh: Any) -> np.ndarray:
 def batches(
     mesh: Any, order: int = 5, size: int = 256
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield (elements, N, grad N, weight) for some elements at a time.
+    """Yield elements (n_e,), N (n_q, n_a) [-], grad N (n_e, n_q, 3, n_a) [1/m], weight, as `mapped` does."""
+    for elements, N, dN, J, weight in mapped(mesh, order, size):
+        yield elements, N, np.linalg.solve(J, dN[None]), weight
+
+
+def mapped(mesh: Any, order: int = 5, size: int = 256) -> Iterator[tuple[np.ndarray, ...]]:
+    """Yield (elements, N, dN, J, weight) for some elements at a time.
 
     order : polynomial order of the quadrature rule; 5 is exact for the mass of straight-sided elements, with 27 Gauss
         points in a hexahedron and 14 points in a tetrahedron
     size : elements at a time; memory only
-    Yields elements (n_e,), N (n_q, n_a) [-], gradient (n_e, n_q, 3, n_a) [1/m], weight |J| w (n_e, n_q) [m3]
+    Yields elements (n_e,), N (n_q, n_a) [-], dN (n_q, 3, n_a) in the reference element [-], J (n_e, n_q, 3, 3) [m] with
+        d x_j / d X_i at [i, j], weight |J| w (n_e, n_q) [m3]
     Raises  ValueError where an element is folded
     """
     nodes, points = connectivity(mesh), coordinates(mesh)
@@ -51,13 +58,13 @@ def batches(
     dN = np.stack([np.stack(np.broadcast_arrays(*s)) for s in slopes]).transpose(2, 1, 0)  # n_q, 3 local, n_a
     for start in range(0, len(nodes), size):
         elements = np.arange(start, min(start + size, len(nodes)))
-        J = dN @ points[nodes[elements]][:, None]  # J[e, q, i, j] = d x_j / d X_i
+        J = dN @ points[nodes[elements]][:, None]
         det = np.linalg.det(J)
         folded = (np.sign(det) != np.sign(det[:, :1])).any(axis=1) | (det[:, 0] == 0)
         if folded.any():
             where = points[nodes[elements[folded.argmax()]]].mean(axis=0)
             raise ValueError(f"the mesh has a folded element near ({where[0]:.4g}, {where[1]:.4g}, {where[2]:.4g}) m")
-        yield elements, N, np.linalg.solve(J, dN[None]), np.abs(det) * w
+        yield elements, N, dN, J, np.abs(det) * w
 
 
 def scatter(nodes: np.ndarray, n_node: int, blocks: np.ndarray) -> csr_matrix:

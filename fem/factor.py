@@ -13,13 +13,14 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
+from tribodyn.fem.elementwise import Elementwise
 from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.mumps import Mumps
 
 # Relative residual of the softest direction that still counts as regular. Measured: a plate 2000 times longer than
 # thick reaches 0.05, a body that can move rigidly 6 to 1000.
 SINGULAR = 0.5
-SOLVERS = ("pardiso", "superlu", "mumps", "multigrid")
+SOLVERS = ("pardiso", "superlu", "mumps")
 
 
 class SingularStiffness(ValueError):
@@ -38,17 +39,18 @@ def factorise(
     K: Any,
     definite: bool = True,
     solver: str | None = None,
-    shapes: np.ndarray | None = None,
     few: np.ndarray | None = None,
 ) -> Factor:
     """Factorise a sparse symmetric real matrix once, for many right-hand sides.
 
-    K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
-    solver : "pardiso" or "superlu", the best available by default; "mumps" in MPI processes of another Python;
-        "multigrid" has no factor and iterates, for a definite K
-    shapes : (n, k) motions that K hardly resists, for multigrid; few : rows that `solve_few` is to be fast for
+    K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix). An Elementwise
+        one has no factor, see `multigrid`
+    solver : "pardiso" or "superlu", the best available by default; "mumps" in MPI processes of another Python
+    few : rows that `solve_few` is to be fast for
     Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
+    if isinstance(K, Elementwise):
+        return Multigrid(K, factorise)
     K = csr_matrix(K)
     if solver is None:
         solver = "pardiso" if pardiso_available() else "superlu"
@@ -56,9 +58,7 @@ def factorise(
         raise ValueError(f"no solver '{solver}': there are {', '.join(SOLVERS)}")
     try:
         factor: Factor
-        if solver == "multigrid":
-            factor = Multigrid(K, shapes)
-        elif solver == "mumps":
+        if solver == "mumps":
             factor = Mumps(K, definite)
         else:
             factor = Pardiso(K, definite, few=few) if solver == "pardiso" else SuperLU(K, definite)

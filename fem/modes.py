@@ -12,6 +12,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.factor import Factor, factorise
+from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.system import dense
 
 
@@ -56,11 +57,14 @@ def modes(
     size = K.shape[0]
     if not 1 <= n <= size:
         raise ValueError(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
-    if size <= EIGEN.dense_below or 2 * n >= size or not issparse(K):
+    if isinstance(K, np.ndarray) or (issparse(K) and (size <= EIGEN.dense_below or 2 * n >= size)):
         values, phi = eigh(dense(K), dense(M), subset_by_index=[0, n - 1])
     else:
         if factor is None:
             factor, sigma = _factorise_shifted(K, M, sigma)
+        if isinstance(factor, Multigrid):
+            values, phi = factor.lowest(M, n)
+            return frequencies(values, K, M), phi * _signs(phi)
         with threadpool_limits(1):  # two BLAS pools that wait for each other make this many times slower
             try:
                 values, phi = eigsh(
@@ -71,7 +75,6 @@ def modes(
                     OPinv=LinearOperator(K.shape, matvec=factor.solve, dtype=K.dtype),
                     v0=np.random.default_rng(0).standard_normal(size).astype(K.dtype),
                     maxiter=EIGEN.restarts,
-                    tol=getattr(factor, "tolerance", 0.0),  # of solutions by iteration
                 )
             except ArpackNoConvergence as trouble:
                 raise ValueError(

@@ -31,7 +31,6 @@ def craig_bampton(
     extra_masters: Sequence[int] | np.ndarray = (),
     solver: str | None = None,
     attached: Sequence[str] = (),
-    shapes: np.ndarray | None = None,
 ) -> ReducedModel:
     """Reduce a full system to its contact DOFs, accessory DOFs and fixed-interface modes.
 
@@ -40,7 +39,6 @@ def craig_bampton(
     extra_masters : DOFs of the system to keep besides those of the contact and of point loads and outputs
     solver : see fem.factor
     attached : loads whose static response with the masters held joins the modes, so that statics under them are exact
-    shapes : (n_full, k) motions that the system hardly resists, for the solver multigrid
     Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
         info: masters (DOFs of the system), n_full, n_masters, n_modes, factorisation, first_omitted_frequency [Hz],
         free_frequency [Hz] of the first ten modes
@@ -52,7 +50,7 @@ def craig_bampton(
     if not len(s):
         raise ValueError("Craig-Bampton: every DOF is a master, nothing is left to reduce: use the matrices")
     K_ss, M_ss = K[s][:, s], M[s][:, s]
-    factor = factorise(K_ss, solver=solver, shapes=None if shapes is None else shapes[s])
+    factor = factorise(K_ss, solver=solver)
     omega, phi, omitted = fixed_interface_modes(K_ss, M_ss, factor, n_modes, cutoff)
     omega, phi = with_static_shapes([system.loads[name][s] for name in attached], K_ss, M_ss, factor, omega, phi)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags_array, issparse
+from scipy.sparse import csr_matrix, diags_array
 
 from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem
@@ -30,10 +30,10 @@ def linear_modes(
 
 
 def stuck_stiffness(K: Any, B: Any, stiffness: np.ndarray) -> Any:
-    """K + B^H k B (n, n) [N/m], sparse or dense like K; stiffness k : (n_pair, n_component) [N/m]."""
-    if issparse(K):
+    """K + B^H k B (n, n) [N/m], sparse, elementwise or dense like K; stiffness k : (n_pair, n_component) [N/m]."""
+    if not isinstance(K, np.ndarray):
         B = csr_matrix(B)
-        return csr_matrix(K + B.conj().T @ diags_array(np.ravel(stiffness)) @ B)
+        return K + csr_matrix(B.conj().T @ diags_array(np.ravel(stiffness)) @ B)
     return K + B.conj().T @ (np.ravel(stiffness)[:, None] * B)
 
 

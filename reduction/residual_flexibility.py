@@ -45,23 +45,24 @@ from tribodyn.reduction.model import ModelInfo, ReducedModel
 class ResidualFlexibility:
     """Static contact flexibility that the coordinates of a reduced model leave out.
 
-    stiffness : (n_contact,) contact springs that are part of K_s [N/m]; free : (n_full, n_full) sparse, K without them
+    stiffness : (n_contact,) contact springs that are part of K_s [N/m]; free : (n_full, n_full) K without them, sparse
+        or elementwise, as mass
     B : (n_contact, n_full) sparse contact map; shapes : (n_full, n) V; squares : (n,) Lambda [rad2/s2]
-    mass : (n_full, n_full) sparse; solver : see fem.factor
+    mass : (n_full, n_full); solver : see fem.factor
     """
 
     stiffness: np.ndarray
-    free: csr_matrix
+    free: Any
     B: csr_matrix
     shapes: np.ndarray
     squares: np.ndarray
-    mass: csr_matrix
+    mass: Any
     solver: str | None = None
 
     @property
-    def matrix(self) -> csr_matrix:
+    def matrix(self) -> Any:
         """(n_full, n_full) K_s, made anew: it is as large as K, and only its factor is needed often."""
-        return csr_matrix(stuck_stiffness(self.free, self.B, self.stiffness))
+        return stuck_stiffness(self.free, self.B, self.stiffness)
 
     @cached_property
     def factor(self) -> Factor:
@@ -152,7 +153,7 @@ def residual_flexibility(
 ) -> ReducedModel:
     """Reduce a full system to modes of its stuck state and Ritz vectors, with the flexibility these leave out.
 
-    system : sparse, n_full DOFs; interface : B over the same DOFs
+    system : sparse or elementwise, n_full DOFs; interface : B over the same DOFs
     stiffness : (n_pair, n_component) contact springs [N/m]; n_modes : of the stuck structure
         kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     clusters : of pairs, whose tractions give Ritz vectors; solver : see fem.factor
@@ -161,9 +162,9 @@ def residual_flexibility(
     Raises  ValueError where the structure can move rigidly with all contacts stuck
     """
     k = np.ravel(np.asarray(stiffness, float))
-    K = csr_matrix(system.stiffness)
+    K = system.stiffness
     K_s = stuck_stiffness(K, interface.B, k)
-    M, B = csr_matrix(system.mass), csr_matrix(interface.B)
+    M, B = system.mass, csr_matrix(interface.B)
     factor = factorise(K_s, solver=solver, few=np.unique(csr_matrix(interface.B).indices))
     omega, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
     del K_s
@@ -226,7 +227,7 @@ def _bisected(points: np.ndarray, clusters: int) -> np.ndarray:
 
 
 def _ritz(
-    omega: np.ndarray, phi: np.ndarray, forces: csc_matrix, factor: Factor, M: csr_matrix
+    omega: np.ndarray, phi: np.ndarray, forces: csc_matrix, factor: Factor, M: Any
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ritz vectors (n_full, n) of unit modal mass and squared frequencies (n,) of modes and of statics under forces.
 

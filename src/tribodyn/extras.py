@@ -12,7 +12,6 @@ EXTRA = {
     "plotly": "pictures",
     "pyvista": "pictures",
     "pyuff": "exports",
-    "pyamg": "multigrid",
     "pypardiso": "mkl",
     "surfalize": "surfaces",
 }

@@ -1,5 +1,4 @@
-"""How the cost of a reduction grows with the mesh: the product in three ways, plain statements of the same library,
-and multigrid.
+"""How the cost of a reduction grows with the mesh: the product in four ways, and plain statements of the same library.
 
 Everything is measured in a process of its own, so that its peak memory is its own; seconds are processor seconds of one
 thread.
@@ -24,7 +23,6 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.factor import factorise
-from tribodyn.fem.multigrid import rigid_motions
 from tribodyn.fem.part import Part
 from tribodyn.geometry import parts
 from tribodyn.reduction import craig_bampton, residual_flexibility
@@ -32,8 +30,11 @@ from tribodyn.reduction.craig_bampton import master_dofs
 from tribodyn.workflows.run import memory, modelling, part_reduction
 from tribodyn.workflows.scene import scene_file
 
-SIZES = {  # of the beam, name -> elements along it and through its height; 13 x 13 contact nodes in all of them
+SIZES: dict[str, tuple[int, ...]] = {  # of the beam, name -> elements along it and upwards
+    # 13 x 13 contact nodes
     "30k": (24, 6), "100k": (44, 12), "300k": (88, 18), "1M": (170, 36),
+    # elements that are cubes, with so many contact nodes along a side
+    "36k-cubes": (45, 5, 11), "140k-cubes": (72, 8, 17), "1M-cubes": (144, 16, 33), "5M-cubes": (252, 27, 55),
 }  # fmt: skip
 # three posts on a plate, each on a joint of faces that do not match, from four mesh files: elements of the plate along
 # its three axes, and of a post upwards
@@ -41,14 +42,16 @@ ASSEMBLIES = {"assembly": (52, 14, 9, 30)}
 PRODUCTS = {  # ways of the product -> how the scene asks for it
     "product": (),
     "flexibility": ("reduction.method=residual_flexibility",),
+    "multigrid": ("reduction.method=residual_flexibility", "reduction.solver=multigrid"),
 }
-WAYS = ("product", "by hand", "multigrid")
-OTHERS = {"1M": ("flexibility",)}  # constraint modes do not fit 24 GB
+WAYS = ("product", "by hand")
+OTHERS = {"1M": ("flexibility",), "5M-cubes": ("multigrid",)}  # constraint modes do not fit 24 GB, nor a factor
+OTHERS |= dict.fromkeys(("36k-cubes", "140k-cubes", "1M-cubes"), ("flexibility", "multigrid"))
 STAGES = {  # function of a reduction -> what its seconds are told as
     "factorise": "factor", "fixed_interface_modes": "modes", "constraint_modes": "constraint modes",
     "_congruent": "projection", "_ritz": "static shapes",
 }  # fmt: skip
-MODES, COLUMNS = 15, 3  # columns : constraint modes that multigrid is measured on
+MODES = 15
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,6 @@ class FeCost:
 
     way : of WAYS or PRODUCTS; dofs, masters; seconds : stage -> processor seconds; peak_bytes : memory
     first_hz : lowest frequency of the reduced model without contact, nan where none was made
-    error : of constraint modes by conjugate gradients against a factor's, relative; iterations : of one of them
     """
 
     way: str
@@ -65,13 +67,11 @@ class FeCost:
     masters: int
     seconds: dict[str, float]
     peak_bytes: float
-    error: float = 0.0
-    iterations: float = 0.0
     first_hz: float = np.nan
 
 
 def run(sizes: Sequence[str], say: Callable[[str], None], ways: Sequence[str] = ()) -> list[FeCost]:
-    """Measure sizes by name, each way in a process of its own; an assembly without multigrid.
+    """Measure sizes by name, each way in a process of its own; an assembly by the ways of WAYS.
 
     ways : those that fit the size by default
     Raises  ValueError for a size or a way that is not known
@@ -84,7 +84,7 @@ def run(sizes: Sequence[str], say: Callable[[str], None], ways: Sequence[str] = 
     for size in sizes:
         if size not in SIZES | ASSEMBLIES:
             raise ValueError(f'no size "{size}": there are {", ".join(SIZES | ASSEMBLIES)}')
-        for way in ways or (OTHERS.get(size, WAYS) if size in SIZES else WAYS[:2]):
+        for way in ways or OTHERS.get(size, WAYS):
             say(f"{size}{' DOFs' if size in SIZES else ''}, {way}")
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
                 job = alone.submit(measure, SIZES[size], way) if size in SIZES else None
@@ -92,9 +92,14 @@ def run(sizes: Sequence[str], say: Callable[[str], None], ways: Sequence[str] = 
     return rows
 
 
-def measure(size: tuple[int, int], way: str, n_patch: int = 13) -> FeCost:
+def measure(size: tuple[int, ...], way: str, n_patch: int = 13) -> FeCost:
     """One size of the beam by one way, on one thread."""
-    changes = [f"geometry.n_length={size[0]}", f"geometry.n_height={size[1]}", f"geometry.n_patch={n_patch}"]
+    changes = [
+        f"geometry.n_length={size[0]}",
+        f"geometry.n_height={size[1]}",
+        f"geometry.n_patch={(*size, n_patch)[2]}",
+    ]
+    changes += ["geometry.length_grading=1", "geometry.grading=1"] if len(size) > 2 else []
     changes += [f"reduction.modes={MODES}", *PRODUCTS.get(way, ())]
     return _measured(lambda folder: scene_file.read("beam_thesis", changes), way)
 
@@ -131,10 +136,8 @@ def _measured(scene_of: Callable[[Path], scene_file.SceneFile], way: str, files:
                 way, part.system.n_dof, masters, clock.seconds | of_stages, memory.peak(),
                 first_hz=float(frequency[0]),
             )  # fmt: skip
-        elif way == "by hand":
-            found = _by_hand(part, clock)
         else:
-            found = _multigrid(part, clock)
+            found = _by_hand(part, clock)
     return found
 
 
@@ -219,26 +222,6 @@ def _by_hand(part: Part, clock: _Clock) -> FeCost:
     return FeCost("by hand", part.system.n_dof, len(m), clock.seconds, memory.peak())
 
 
-def _multigrid(part: Part, clock: _Clock) -> FeCost:
-    """Some constraint modes by conjugate gradients; the factor that they are compared with comes last."""
-    s, m = _split(part)
-    K = csr_matrix(part.system.stiffness)
-    K_ss, some = K[s][:, s], np.linspace(0, len(m) - 1, COLUMNS).astype(int)
-    rhs = -K[s][:, m[some]].toarray()
-    clock("split")
-    solver: Any = factorise(K_ss, solver="multigrid", shapes=rigid_motions(part.points)[part.free][s])
-    clock("set-up")
-    before = solver.iterations
-    found = solver.solve(rhs)
-    clock("constraint modes")
-    clock.seconds["constraint modes"] /= COLUMNS  # of one
-    peak = memory.peak()
-    exact = factorise(K_ss).solve(rhs)
-    error = float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
-    iterations = (solver.iterations - before) / COLUMNS
-    return FeCost("multigrid", part.system.n_dof, len(m), clock.seconds, peak, error, iterations)
-
-
 def as_records(rows: Sequence[FeCost]) -> list[dict[str, Any]]:
     """The rows for JSON."""
     return [asdict(row) for row in rows]
@@ -249,8 +232,7 @@ def as_text(rows: Sequence[FeCost]) -> str:
     lines = []
     for row in rows:
         told = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in row.seconds.items())
-        more = f", {row.iterations:.0f} iterations, error {row.error:.1e}" if row.way == "multigrid" else ""
-        more += "" if np.isnan(row.first_hz) else f"; first frequency {row.first_hz:.9g} Hz"
+        more = "" if np.isnan(row.first_hz) else f"; first frequency {row.first_hz:.9g} Hz"
         lines.append(
             f"{row.dofs:9d} DOFs, {row.masters} masters, {row.way:16} {row.peak_bytes / 1e9:6.2f} GB: {told}{more}"
         )

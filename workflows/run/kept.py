@@ -36,7 +36,7 @@ from tribodyn.workflows.scene.schema import MeshScene
 
 FOLDER = "TRIBODYN_CACHE"  # variable of the environment: another folder, or "off"
 ROOM = 4e9  # bytes of all entries: ten of the Brake-Reuss beam, the largest scene that comes along
-PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "pypardiso", "mkl", "pymetis", "pyamg")
+PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "pypardiso", "mkl", "pymetis")
 CODE = code()  # of what this process has loaded: sources may change before it makes anything
 INCLUDES = re.compile(rb"^[ \t]*\*?[ \t]*(include|merge)\b|shapefromfile", re.IGNORECASE | re.MULTILINE)
 LATE: Any = {
@@ -83,7 +83,7 @@ def at_hand() -> Iterator[None]:
 def part(file: SceneFile, make: Callable[[], Part]) -> Part:
     """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
     early = json.loads(early_of(file.mesh_scene))
-    del early["reduction"]
+    early["reduction"] = file.mesh_scene.reduction.solver == "multigrid"  # elementwise, all that a part needs of it
     return _kept(file, "part", (early,), make)
 
 

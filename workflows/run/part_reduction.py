@@ -12,7 +12,6 @@ from tribodyn.fem.assembly import pieces
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.factor import SingularStiffness
 from tribodyn.fem.interface import COMPONENTS
-from tribodyn.fem.multigrid import rigid_motions
 from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.reduction.craig_bampton import craig_bampton
@@ -60,7 +59,7 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     wanted, system, interface, back = scene.reduction, part.system, part.interface, None
     if without_masters(scene, interface.B.shape[0], len(part.held) > 0):
         springs = joints.contact_stiffness(scene, joints.unreduced(part))
-        own = None if wanted.solver == "direct" else wanted.solver
+        own = "mumps" if wanted.solver == "mumps" else None
         return residual_flexibility(system, interface, springs, wanted.modes, wanted.cutoff, solver=own)
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
     if held and len(part.held):
@@ -73,8 +72,6 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     shanks = [np.flatnonzero(row) for name, row in part.system.outputs.items() if name.startswith(BOLTS)]
     extra = np.concatenate([[], *held, *shanks]).astype(int)
     how: dict[str, Any] = {} if wanted.solver == "direct" else {"solver": wanted.solver}
-    if wanted.solver == "multigrid":
-        how["shapes"] = rigid_motions(part.points)[part.free]
     try:
         reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra, **how)
     except SingularStiffness:  # a body that no support, joint or load has a master on
@@ -97,7 +94,7 @@ def without_masters(scene: MeshScene, contact_dofs: int, held: bool) -> bool:
     held : whether motions are held besides the clamps
     Raises  ValueError where the scene asks for it and has what needs them
     """
-    method = scene.reduction.method
+    method = "residual_flexibility" if scene.reduction.solver == "multigrid" else scene.reduction.method
     needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": held}
     needed = [name for name, there in needs.items() if there]
     if method == "residual_flexibility" and needed:

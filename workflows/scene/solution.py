@@ -180,7 +180,7 @@ class Reduction(Table):
     """Frequency up to which modes are kept, instead of their number."""
     solver: Literal["direct", "mumps", "multigrid"] = "direct"
     """How the part's equations are solved: by a factor, or by one of MUMPS in MPI processes; where none fits, by
-    conjugate gradients with algebraic multigrid, which takes far longer."""
+    conjugate gradients with two levels, which take far longer and less memory; mass and stiffness are not assembled."""
     interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
     """Replace the masters by this number of characteristic constraint modes."""
     interface_keep: tuple[str, ...] | None = None
@@ -191,20 +191,20 @@ class Reduction(Table):
     def _whole(self) -> Reduction:
         if self.interface_modes is None and self.interface_keep is not None:
             raise ValueError("expected interface_keep only with interface_modes")
-        if self.solver == "multigrid" and self.relative:
-            raise ValueError('expected solver = "direct" with relative = true')
+        if self.solver == "multigrid" and (self.needs_masters or self.method == "craig_bampton"):
+            raise ValueError(
+                'expected solver = "direct" with relative = true, interface_modes or method = "craig_bampton"'
+            )
         if (self.modes is None) == (self.cutoff is None):
             raise ValueError("expected either modes = number or cutoff = frequency, and not both")
         if self.method == "residual_flexibility" and self.needs_masters:
-            raise ValueError(
-                'expected method = "craig_bampton" with relative = true, interface_modes or solver = "multigrid"'
-            )
+            raise ValueError('expected method = "craig_bampton" with relative = true or interface_modes')
         return self
 
     @property
     def needs_masters(self) -> bool:
         """Whether another key makes sense with contact DOFs as masters alone."""
-        return self.relative or self.interface_modes is not None or self.solver == "multigrid"
+        return self.relative or self.interface_modes is not None
 
 
 def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]:
