@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -202,14 +202,26 @@ def worn_state(
     """The wear law applied to solved duties."""
     rate, work = np.zeros_like(depth), np.zeros_like(depth)
     for duty, point in zip(problem.mission, points, strict=True):
-        balance = problem.in_duty(duty, depth)
-        for name, wear in problem.wearing.items():
-            pairs = balance.contact.joint(name).rows
-            of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
-            exposure = wear_law.Exposure(balance, point.state, *of_joint, cycles, name)
-            rate[pairs] += duty.share * wear_law.depth_rate(wear.law, exposure)
-            work[pairs] += duty.share * exposure.energy
+        of_duty = wear_of(problem, problem.in_duty(duty, depth), point.state, depth, cycles)
+        rate, work = rate + duty.share * of_duty[0], work + duty.share * of_duty[1]
     return WearState(depth, cycles, tuple(points), rate, work, solves, problem.pairs)
+
+
+def wear_of(
+    problem: WearProblem,
+    balance: HarmonicBalance,
+    solved: State | Callable[[], State],
+    depth: np.ndarray,
+    cycles: float,
+    seen: Callable[..., wear_law.Exposure] = wear_law.Exposure,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n_pair,) depth [m] and friction work [J] of a cycle of a worn contact, by laws that see it as `seen`."""
+    rate, work = np.zeros_like(depth), np.zeros_like(depth)
+    for name, wear in problem.wearing.items():
+        pairs = balance.contact.joint(name).rows
+        exposure = seen(balance, solved, problem.area[pairs], problem.numbers(name), depth[pairs], cycles, name)
+        rate[pairs], work[pairs] = wear_law.depth_rate(wear.law, exposure), exposure.energy
+    return rate, work
 
 
 def _neighbour(
@@ -335,11 +347,33 @@ def row_of(
     step_error: float = 0.0,
     plan: np.ndarray | None = None,
 ) -> WearRow:
-    """The history row of a state, with what its step wears [m] and dissipates [J]."""
-    balance = problem.in_duty(problem.mission[0], state.depth)
-    taken = (cycles_in_step, worn, work, state.solves, step_error, plan, state.preload_at_rest)
-    preload = problem.preload_of(state)
-    row = replace(WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken), growth=state.growth)
+    """The history row of a state, with what its step wears [m] and dissipates [J]; the first duty is what it shows."""
+    balance, point = problem.in_duty(problem.mission[0], state.depth), state.points[0]
+    solved, normal, shape = point.state, np.zeros(len(state.depth)), (-1, point.state.x.shape[2])
+    if "n" in balance.contact.components and balance.basis.has_static:
+        normal = solved.cycle.force[:, balance.contact.components.index("n"), 0]
+    row = WearRow(
+        cycles=state.cycles,
+        cycles_in_step=cycles_in_step,
+        depth=state.depth,
+        worn=worn,
+        energy=np.maximum(balance.energy(solved), 0.0),
+        preload=problem.preload_of(state),
+        normal_force=normal,
+        status=solved.cycle.status,
+        omega=solved.omega,
+        amplitude=point.amplitude,
+        force=solved.cycle.force.reshape(shape),
+        response=point.response,
+        solves=state.solves,
+        step_error=step_error,
+        plan=np.zeros(0) if plan is None else plan,
+        work=work,
+        duty_omega=np.array([p.state.omega for p in state.points]),
+        duty_displacement=np.stack([p.state.x.reshape(shape) for p in state.points]),
+        preload_at_rest=state.preload_at_rest,
+        growth=state.growth,
+    )
     means = state.means
     if means is None:
         return row

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import Outcome, WearEnd
-
-if TYPE_CHECKING:
-    from tribodyn.hbm.balance import HarmonicBalance
-    from tribodyn.hbm.continuation.operating_point import OperatingPoint
 
 LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
 LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends
@@ -57,51 +51,6 @@ class WearRow:
     def displacement(self) -> np.ndarray:
         """(n_contact, n_coeff) of the first duty [m]."""
         return self.duty_displacement[0]
-
-    @classmethod
-    def of(
-        cls,
-        balance: HarmonicBalance,
-        points: Sequence[OperatingPoint],
-        depth: np.ndarray,
-        cycles: float,
-        preload: float,
-        cycles_in_step: float,
-        worn: np.ndarray,
-        work: np.ndarray,
-        solves: int,
-        step_error: float = 0.0,
-        plan: np.ndarray | None = None,
-        preload_at_rest: float = float("nan"),
-    ) -> WearRow:
-        """The row of solved operating points, one per duty; the first one is what the row shows."""
-        point = points[0]
-        state = point.state
-        shape = (-1, state.x.shape[2])
-        normal = np.zeros(len(depth))
-        if "n" in balance.contact.components and balance.basis.has_static:
-            normal = state.cycle.force[:, balance.contact.components.index("n"), 0]
-        return cls(
-            cycles=cycles,
-            cycles_in_step=cycles_in_step,
-            depth=depth,
-            worn=worn,
-            energy=np.maximum(balance.energy(state), 0.0),
-            preload=preload,
-            normal_force=normal,
-            status=state.cycle.status,
-            omega=state.omega,
-            amplitude=point.amplitude,
-            force=state.cycle.force.reshape(shape),
-            response=point.response,
-            solves=solves,
-            step_error=step_error,
-            plan=np.zeros(0) if plan is None else plan,
-            work=work,
-            duty_omega=np.array([p.state.omega for p in points]),
-            duty_displacement=np.stack([p.state.x.reshape(shape) for p in points]),
-            preload_at_rest=preload_at_rest,
-        )
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ Source  ROS2: Verwer, Spee, Blom and Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
-from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
+from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState, wear_of
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.hbm.wear.step_control import Tolerance, expected
 
@@ -268,13 +268,7 @@ def _depth_rate(
     def state() -> State:
         return balance.evaluate(motion.omega, motion.coefficients(motion.x, balance.basis), jacobian=False)
 
-    rate = np.zeros_like(depth)
-    for name, wear in problem.wearing.items():
-        pairs = balance.contact.joint(name).rows
-        of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
-        exposure = MotionExposure(balance, state, *of_joint, cycles, name, motion=motion)
-        rate[pairs] = wear_law.depth_rate(wear.law, exposure)
-    return rate
+    return wear_of(problem, balance, state, depth, cycles, partial(MotionExposure, motion=motion))[0]
 
 
 def static_stiffness(balance: HarmonicBalance) -> np.ndarray:

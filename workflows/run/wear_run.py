@@ -117,22 +117,29 @@ def wear_problem(
 
 def coefficients(scene: Scene) -> dict[str, float]:
     """Wear coefficient [m3/J] of every joint whose volume goes with the friction work; none where a scene wears not."""
-    return {name: value for value, joints in coefficient_keys(scene).values() for name in joints}
+    energy = (one for one in _tables(scene) if one[1].law == "energy")
+    return {name: table.numbers["coefficient"] for _, table, joints in energy for name in joints}
 
 
-def coefficient_keys(scene: Scene) -> dict[str, tuple[float, tuple[str, ...]]]:
-    """The same by the keys of the scene: coefficient, and the joints that wear by it."""
+def law_numbers(scene: Scene) -> dict[str, tuple[float, str, tuple[str, ...]]]:
+    """Numbers of the wear laws by the keys of the scene: value, name of the law's own, joints that wear by it."""
+    return {
+        f"{key}.{name}": (value, name, joints)
+        for key, table, joints in _tables(scene)
+        for name, value in table.numbers.items()
+        if isinstance(value, float) and value
+    }
+
+
+def _tables(scene: Scene) -> list[tuple[str, JointWearTable, tuple[str, ...]]]:
+    """Tables of wear laws with their keys and the joints that wear by them."""
     if scene.wear is None:
-        return {}
+        return []
     own = {name: c.wear for name, c in scene.joints.items() if isinstance(c, NamedContact) and c.wear is not None}
     rest = tuple(name for name in scene.joints if name not in own)
     tables: list[tuple[str, JointWearTable, tuple[str, ...]]] = [("wear", scene.wear, rest)]
     tables += [(f"contacts.{name}.wear", table, (name,)) for name, table in own.items()]
-    return {
-        f"{key}.coefficient": (table.numbers["coefficient"], joints)
-        for key, table, joints in tables
-        if table.law == "energy" and joints and table.numbers["coefficient"]
-    }
+    return [one for one in tables if one[2]]
 
 
 def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
