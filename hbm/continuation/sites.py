@@ -57,7 +57,7 @@ class BesidePeak:
         at_peak = self.at_peak(balance, state.omega, state.x)
         distance = self.ratio * at_peak.state.omega - state.omega
         accuracy = self.ratio * self.peak.correct(balance, at_peak.state).accuracy
-        return Correction(distance, np.zeros_like(state.x), at_peak.solves, accuracy)
+        return Correction(distance, at_peak.solves, accuracy)
 
     def at_peak(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """The peak itself, from an x at the ratio to it."""

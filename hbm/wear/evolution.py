@@ -15,6 +15,7 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.sites import Site
 from tribodyn.hbm.newton import lead
 from tribodyn.hbm.outcome import CONVERGED, Outcome, WearEnd
+from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.law import JointWear
@@ -105,16 +106,11 @@ class WearProblem:
 
     def preload_of(self, state: WearState) -> float:
         """Mean normal force of the joints that wear in the first duty of a state [N]."""
-        if state.means is not None:
-            return float(state.means.normal_force[self.pairs].sum())
-        return self.preload(state.points[0].state)
+        return float(self.normal_force(state)[self.pairs].sum())
 
-    def preload(self, state: State) -> float:
-        """Static normal force of the joints that wear [N]."""
-        if len(self.wearing) == len(self.balance.contact.joints):
-            return self.balance.preload(state)
-        preload = self.balance.preload_by_joint(state)
-        return float(sum(preload[name] for name in self.wearing))
+    def normal_force(self, state: WearState) -> np.ndarray:
+        """(n_pair,) mean normal force in the first duty of a state [N]."""
+        return self.balance.normal_force(state.points[0].state) if state.means is None else state.means.normal_force
 
     def in_duty(self, duty: Duty, depth: np.ndarray | None = None) -> HarmonicBalance:
         """The problem of a duty with its loads, worn by a depth (n_pair,) [m]; unworn by default."""
@@ -213,13 +209,14 @@ def wear_of(
     solved: State | Callable[[], State],
     depth: np.ndarray,
     cycles: float,
-    seen: Callable[..., wear_law.Exposure] = wear_law.Exposure,
+    motion: PeriodicMotion | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n_pair,) depth [m] and friction work [J] of a cycle of a worn contact, by laws that see it as `seen`."""
+    """(n_pair,) depth [m] and friction work [J] of a cycle of a worn contact, or of a motion in time."""
     rate, work = np.zeros_like(depth), np.zeros_like(depth)
     for name, wear in problem.wearing.items():
         pairs = balance.contact.joint(name).rows
-        exposure = seen(balance, solved, problem.area[pairs], problem.numbers(name), depth[pairs], cycles, name)
+        of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
+        exposure = wear_law.Exposure(balance, solved, *of_joint, cycles, name, motion)
         rate[pairs], work[pairs] = wear_law.depth_rate(wear.law, exposure), exposure.energy
     return rate, work
 
@@ -324,8 +321,7 @@ def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) 
     """The first joint whose preload has fallen below the share that the problem asks for; None for none."""
     if not rows or "n" not in problem.balance.contact.components or not problem.balance.basis.has_static:
         return None
-    contact, now = problem.balance.contact, state.points[0].state.cycle.force
-    normal = now[:, contact.components.index("n"), 0] if state.means is None else state.means.normal_force
+    contact, normal = problem.balance.contact, problem.normal_force(state)
     size = contact.n_pair // problem.copies
     for name in problem.wearing:
         pairs = contact.joint(name).rows
@@ -349,9 +345,7 @@ def row_of(
 ) -> WearRow:
     """The history row of a state, with what its step wears [m] and dissipates [J]; the first duty is what it shows."""
     balance, point = problem.in_duty(problem.mission[0], state.depth), state.points[0]
-    solved, normal, shape = point.state, np.zeros(len(state.depth)), (-1, point.state.x.shape[2])
-    if "n" in balance.contact.components and balance.basis.has_static:
-        normal = solved.cycle.force[:, balance.contact.components.index("n"), 0]
+    solved, shape = point.state, (-1, point.state.x.shape[2])
     row = WearRow(
         cycles=state.cycles,
         cycles_in_step=cycles_in_step,
@@ -359,7 +353,7 @@ def row_of(
         worn=worn,
         energy=np.maximum(balance.energy(solved), 0.0),
         preload=problem.preload_of(state),
-        normal_force=normal,
+        normal_force=balance.normal_force(solved),
         status=solved.cycle.status,
         omega=solved.omega,
         amplitude=point.amplitude,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -14,31 +15,41 @@ LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends
 OF_MOTION = ("spread", "mean_error", "settled", "periods", "moving")  # of a row whose motion was marched in time
 
 
+Number = TypeVar("Number")
+Count = TypeVar("Count")
+
+
 @dataclass(frozen=True)
-class WearRow:
+class _State(Generic[Number, Count]):
+    """What one row, or all rows, of a wear run have; see WearHistory."""
+
+    cycles: Number
+    cycles_in_step: Number
+    depth: np.ndarray
+    worn: np.ndarray
+    energy: np.ndarray
+    preload: Number
+    normal_force: np.ndarray
+    status: np.ndarray
+    omega: Number
+    amplitude: Number
+    force: np.ndarray
+    response: np.ndarray
+    solves: Count
+    step_error: Number
+    plan: np.ndarray
+    work: np.ndarray
+    duty_omega: np.ndarray
+    duty_displacement: np.ndarray
+
+
+@dataclass(frozen=True)
+class WearRow(_State[float, int]):
     """One wear step; the fields are those of WearHistory, without the row axis.
 
     worn : (n_pair,) depth that the step wears after this state [m]
     """
 
-    cycles: float
-    cycles_in_step: float
-    depth: np.ndarray
-    worn: np.ndarray
-    energy: np.ndarray
-    preload: float
-    normal_force: np.ndarray
-    status: np.ndarray
-    omega: float
-    amplitude: float
-    force: np.ndarray
-    response: np.ndarray
-    solves: int
-    step_error: float
-    plan: np.ndarray
-    work: np.ndarray
-    duty_omega: np.ndarray
-    duty_displacement: np.ndarray
     preload_at_rest: float = float("nan")
     growth: float = float("nan")
     spread: float = 0.0
@@ -54,7 +65,7 @@ class WearRow:
 
 
 @dataclass(frozen=True)
-class WearHistory:
+class WearHistory(_State[np.ndarray, np.ndarray]):
     """Evolution of a contact under wear; row i is the state solved at the start of wear step i.
 
     cycles : (n_row,) vibration cycles passed before the row's state
@@ -91,24 +102,6 @@ class WearHistory:
         in the balance
     """
 
-    cycles: np.ndarray
-    cycles_in_step: np.ndarray
-    depth: np.ndarray
-    worn: np.ndarray
-    energy: np.ndarray
-    preload: np.ndarray
-    normal_force: np.ndarray
-    status: np.ndarray
-    omega: np.ndarray
-    amplitude: np.ndarray
-    force: np.ndarray
-    response: np.ndarray
-    solves: np.ndarray
-    step_error: np.ndarray
-    plan: np.ndarray
-    work: np.ndarray
-    duty_omega: np.ndarray
-    duty_displacement: np.ndarray
     end: Outcome[WearEnd]
     preload_at_rest: np.ndarray | None = None
     growth: np.ndarray | None = None

@@ -99,7 +99,7 @@ def of_life(
         rests = assess(quiet, first.depth, 0.0, None)
         tangent, ends = replace(tangent, problem=quiet), [rests, assess(quiet, after.depth, 0.0, rests)]
     had, left = (
-        tangent.moved(state, base, 0.0).preload / problem.preload_of(state)
+        tangent.moved(state, base, 0.0)[2] / problem.preload_of(state)
         for state, base in zip(ends, (np.zeros_like(depth), depth), strict=True)
     )
     longer = (had - left) / left[last]
@@ -134,15 +134,6 @@ def _check(problem: WearProblem, rows: Sequence[WearRow]) -> None:
 
 
 @dataclass(frozen=True)
-class _Moved:
-    """Derivatives of a state: depth (n_pair, n), depth per cycle (n_pair, n), and preload of the joints that wear."""
-
-    depth: np.ndarray
-    rate: np.ndarray
-    preload: np.ndarray
-
-
-@dataclass(frozen=True)
 class _Tangent:
     """The columns of a tangent, the changes first.
 
@@ -164,13 +155,13 @@ class _Tangent:
         self._check_status(before, after)
         stride = row.cycles_in_step
         if not len(row.plan):  # of the thesis's rule
-            return depth + stride * self.moved(before, depth, 0.0).rate
+            return depth + stride * self.moved(before, depth, 0.0)[1]
         reach, middle = GAMMA * stride, self._between(row, past, before)
         rate = (row.worn / stride - GAMMA * after.rate) / (1 - GAMMA)
         if middle.failure or np.abs(middle.rate - rate).max() > 1e-2 * rate.max():
             raise NoDerivative(f"at {middle.cycles:.4g} cycles the response passes to another motion within a step")
-        between = self.moved(middle, depth, reach).depth
-        return self.moved(after, depth + (1 - GAMMA) / GAMMA * (between - depth), reach).depth
+        between = self.moved(middle, depth, reach)[0]
+        return self.moved(after, depth + (1 - GAMMA) / GAMMA * (between - depth), reach)[0]
 
     def _check_status(self, before: WearState, after: WearState) -> None:
         """Raise NoDerivative where a wear law jumps with what a pair does, as one of impacts where it lifts."""
@@ -191,8 +182,11 @@ class _Tangent:
         searches = [Search(float(slope)) for slope in slopes]
         return first_stage(self.problem, before, row.cycles_in_step, drift, searches)
 
-    def moved(self, state: WearState, base: np.ndarray, stretch: float) -> _Moved:
-        """Derivatives of a state whose depth is `base` + stretch * rate, base (n_pair, n) by its columns."""
+    def moved(self, state: WearState, base: np.ndarray, stretch: float) -> tuple[np.ndarray, ...]:
+        """Derivatives of a state whose depth is `base` + stretch * rate, base (n_pair, n) by its columns.
+
+        Returns those of depth [m], depth per cycle, both (n_pair, n), and preload of the joints that wear (n,)
+        """
         problem, n, n_change = self.problem, base.shape[1], len(self.changes)
         cycles = [_Cycle(self, duty, at.state, state) for duty, at in zip(problem.mission, state.points, strict=True)]
         force, x, along, *rates = zip(*(cycle.slopes(n) for cycle in cycles), strict=True)
@@ -229,7 +223,7 @@ class _Tangent:
             depth, dx = depth + turn @ omega, dx + by_omega @ omega
         moved = force + jac @ dx + gap[..., None] * (depth + self.opens)[:, None]
         rate = rate + by_depth[:, None] * depth + np.einsum("pc,pcn->pn", along, dx)
-        return _Moved(depth, rate, moved[problem.pairs, cycles[0].normal].sum(axis=0))
+        return depth, rate, moved[problem.pairs, cycles[0].normal].sum(axis=0)
 
 
 @dataclass(frozen=True)
@@ -341,17 +335,20 @@ def _by_numbers(
 ) -> tuple[tuple[WearProblem, WearProblem, float], ...]:
     """The problem a step above and a step below each number of the joints' wear laws."""
 
-    def changed(name: str, joints: Sequence[str], step: float) -> WearProblem:
-        wear = {
-            joint: replace(law, numbers={**law.numbers, name: law.numbers[name] + step * (joint in joints)})
-            for joint, law in problem.wearing.items()
-        }
-        return replace(problem, wear=wear)
-
     found = []
     for name, joints in numbers.values():
-        step = RULES.of_number * float(np.max(problem.wearing[joints[0]].numbers[name]))
-        found.append((changed(name, joints, step), changed(name, joints, -step), step))
+        value = problem.wearing[joints[0]].numbers[name]
+        step = RULES.of_number * float(np.max(value))
+        laws = [
+            {
+                of: replace(law, numbers={**law.numbers, name: value + s})
+                for of, law in problem.wearing.items()
+                if of in joints
+            }
+            for s in (step, -step)
+        ]
+        up, down = (replace(problem, wear={**problem.wearing, **changed}) for changed in laws)
+        found.append((up, down, step))
     return tuple(found)
 
 

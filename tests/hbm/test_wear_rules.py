@@ -183,7 +183,7 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
 
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
             ended = not over and (balance.contact.gap - gap).max() > end
-            return Correction(state.omega if ended else 0.0, np.zeros_like(state.x), 0)
+            return Correction(state.omega if ended else 0.0, 0)
 
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Ending("tip", 420.0)),)), tolerance)
     leaps = np.flatnonzero(worn.plan[:-1, 0] == 0.0)
@@ -213,7 +213,7 @@ def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None
             return replace(found, solution=replace(found.solution, outcome="gone")) if gone(balance) else found
 
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-            return Correction(state.omega if gone(balance) else 0.0, np.zeros_like(state.x), 0)
+            return Correction(state.omega if gone(balance) else 0.0, 0)
 
     lacking = replace(whole, mission=(Duty(Missing("tip", 420.0)),))
     worn = error_controlled_rule.evolve(lacking, tolerance)
@@ -249,7 +249,7 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
 
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
             ended = not over and (balance.contact.gap - gap).max() > end
-            return Correction(state.omega if ended else 0.0, np.zeros_like(state.x), 0)
+            return Correction(state.omega if ended else 0.0, 0)
 
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Blind("tip", 420.0)),)), tolerance)
     assert missed
@@ -264,7 +264,7 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
 def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(problem: WearProblem) -> None:
     class Never(AtFrequency):
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-            return Correction(state.omega, np.zeros_like(state.x), 0)
+            return Correction(state.omega, 0)
 
     tolerance = Tolerance(0.1, 2e-4)
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance)
@@ -286,7 +286,7 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
             return super().first(balance)
 
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-            return Correction(state.omega, np.zeros_like(state.x), 0)
+            return Correction(state.omega, 0)
 
     tolerance = Tolerance(0.1, 2e-4)
     never = replace(whole, mission=(Duty(Never("tip", 420.0)),))
@@ -429,7 +429,7 @@ class TwoPlaces(AtFrequency):
         return Overtaking(found, found.solves, depth / LEAP_DEPTH)
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-        return Correction(0.0, np.zeros_like(state.x), 0)
+        return Correction(0.0, 0)
 
 
 def test_the_jump_to_a_peak_that_overtakes_is_located_and_said(problem: WearProblem) -> None:

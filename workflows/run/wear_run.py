@@ -117,29 +117,24 @@ def wear_problem(
 
 def coefficients(scene: Scene) -> dict[str, float]:
     """Wear coefficient [m3/J] of every joint whose volume goes with the friction work; none where a scene wears not."""
-    energy = (one for one in _tables(scene) if one[1].law == "energy")
-    return {name: table.numbers["coefficient"] for _, table, joints in energy for name in joints}
+    own = law_numbers(scene).values()
+    return {joint: value for value, _, joints, law in own if law == "energy" for joint in joints}
 
 
-def law_numbers(scene: Scene) -> dict[str, tuple[float, str, tuple[str, ...]]]:
-    """Numbers of the wear laws by the keys of the scene: value, name of the law's own, joints that wear by it."""
-    return {
-        f"{key}.{name}": (value, name, joints)
-        for key, table, joints in _tables(scene)
-        for name, value in table.numbers.items()
-        if isinstance(value, float) and value
-    }
-
-
-def _tables(scene: Scene) -> list[tuple[str, JointWearTable, tuple[str, ...]]]:
-    """Tables of wear laws with their keys and the joints that wear by them."""
+def law_numbers(scene: Scene) -> dict[str, tuple[float, str, tuple[str, ...], str]]:
+    """Numbers of wear laws by the keys of the scene: value, name in its law, joints that wear by it, and the law."""
     if scene.wear is None:
-        return []
+        return {}
     own = {name: c.wear for name, c in scene.joints.items() if isinstance(c, NamedContact) and c.wear is not None}
     rest = tuple(name for name in scene.joints if name not in own)
     tables: list[tuple[str, JointWearTable, tuple[str, ...]]] = [("wear", scene.wear, rest)]
     tables += [(f"contacts.{name}.wear", table, (name,)) for name, table in own.items()]
-    return [one for one in tables if one[2]]
+    return {
+        f"{key}.{name}": (value, name, joints, table.law)
+        for key, table, joints in tables
+        for name, value in table.numbers.items()
+        if joints and isinstance(value, float) and value
+    }
 
 
 def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:

@@ -283,7 +283,7 @@ def _share(scene: Scene) -> float:
 def _of_life(varying: Varying, worn: WearHistory, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
     scene, by_key = varying.scene, wear_run.law_numbers(varying.scene)
     problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
-    numbers = {key: by_key[key][1:] for key in wanted if key in by_key}
+    numbers = {key: by_key[key][1:3] for key in wanted if key in by_key}
     own = {key: value for key, value in wanted.items() if key not in by_key}
     return tangent.of_life(problem, worn, _changes(varying, own, advance), numbers, _share(scene))
 
