@@ -32,7 +32,7 @@ from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.derivatives import RULES as EXACT, Derivatives, peak_moves
-from tribodyn.hbm.gradient import Change, Gradient, NoDerivative, Posed
+from tribodyn.hbm.gradient import RULES as GRADIENT, Change, Gradient, NoDerivative, Posed
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.dirk_stages import GAMMA, Search, begun, depth_per_work, first_stage
@@ -41,21 +41,6 @@ from tribodyn.hbm.wear.fewer_harmonics import top_harmonic
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, cycles_to_preload
 from tribodyn.hbm.wear.implicit_stage import WearingBalance, work_slope
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
-
-
-@dataclass(frozen=True)
-class Rules:
-    """Steps of the differences of a wear law, over its number or the largest displacement of a pair.
-
-    rough : a step along the gap whose slope is another one where the law counts samples of a force with jumps
-    """
-
-    step: float = 1e-6
-    of_number: float = 2.0**-13
-    rough: float = 1e-3
-
-
-RULES = Rules()
 
 
 @single
@@ -156,7 +141,9 @@ class _Tangent:
         stride = row.cycles_in_step
         if not len(row.plan):  # of the thesis's rule
             return depth + stride * self.moved(before, depth, 0.0)[1]
-        reach, middle = GAMMA * stride, self._between(row, past, before)
+        drift, slopes = begun(self.problem, before, past, self.problem)  # the first stage again, as the run came to it
+        searches = [Search(float(slope)) for slope in slopes]
+        reach, middle = GAMMA * stride, first_stage(self.problem, before, stride, drift, searches)
         rate = (row.worn / stride - GAMMA * after.rate) / (1 - GAMMA)
         if middle.failure or np.abs(middle.rate - rate).max() > 1e-2 * rate.max():
             raise NoDerivative(f"at {middle.cycles:.4g} cycles the response passes to another motion within a step")
@@ -171,16 +158,7 @@ class _Tangent:
             status = replace(there, cycle=replace(there.cycle, status=old.state.cycle.status))
             rate, other = (wear_of(problem, balance, s, after.depth, after.cycles)[0] for s in (there, status))
             if np.abs(other - rate).max() > EXACT.corner * np.abs(rate).max():
-                raise NoDerivative(
-                    f"before {after.cycles:.4g} cycles a pair begins or ceases to slip or to lift, with which the rate "
-                    "of its wear law jumps"
-                )
-
-    def _between(self, row: WearRow, past: Sequence[WearRow], before: WearState) -> WearState:
-        """The first stage of a step again, as the run came to it."""
-        drift, slopes = begun(self.problem, before, past, self.problem)
-        searches = [Search(float(slope)) for slope in slopes]
-        return first_stage(self.problem, before, row.cycles_in_step, drift, searches)
+                raise NoDerivative(f"before {after.cycles:.4g} cycles a wear law jumps as a pair lifts, slips or stops")
 
     def moved(self, state: WearState, base: np.ndarray, stretch: float) -> tuple[np.ndarray, ...]:
         """Derivatives of a state whose depth is `base` + stretch * rate, base (n_pair, n) by its columns.
@@ -261,20 +239,19 @@ class _Cycle:
             gain = self.duty.share * depth_per_work(problem, self.state)
             along = gain[:, None] * work_slope(self.balance, self.solved.x, self.solved.cycle)
         else:
-            both.append((self._by_depth(0.0, RULES.rough) - by_gap, by_gap))
+            both.append((self._by_depth(0.0, EXACT.of_law) - by_gap, by_gap))
             along = self._by_x()
         if any(np.abs(differ).max() > EXACT.corner * np.abs(size).max() for differ, size in both):
             self.tangent.corners.append(self.state.cycles)
         force, x, rate = (np.zeros((*shape, n)) for shape in (along.shape, along.shape, (len(along),)))
         for i, change in enumerate(self.changes):
-            force[..., i], x[..., i] = np.mean(gradient.effects(change), axis=0)[: 2 * along.size].reshape(
-                2, *along.shape
-            )
+            effect = np.mean(gradient.effects(change), axis=0)
+            force[..., i], x[..., i] = effect[: 2 * along.size].reshape(2, *along.shape)
             rate[:, i] = self._by(change)
         for i, (up, down, step) in enumerate(self.tangent.by_law, len(self.changes)):
             rate[:, i] = (self._rate(problem=up) - self._rate(problem=down)) / (2 * step)
-        later = RULES.step * self.state.cycles  # steps that are longer begin later, too
-        aged = (self._rate(later=later) - self._rate(later=-later)) / (2 * RULES.step)
+        later = EXACT.of_law * self.state.cycles  # steps that are longer begin later, too
+        aged = (self._rate(later=later) - self._rate(later=-later)) / (2 * EXACT.of_law)
         rate[:, len(self.changes) + len(self.tangent.by_law)] = aged
         return force, x, along, rate, by_gap, by_depth
 
@@ -301,23 +278,22 @@ class _Cycle:
             found = (up - down) / (2 * change.step)
         return found if change.touching is None else found + self._by(change.touching)
 
-    def _by_depth(self, worn: float, reach: float | None = None) -> np.ndarray:
+    def _by_depth(self, worn: float, reach: float = GRADIENT.of_gap) -> np.ndarray:
         """(n_pair,) d rate by the gap at the same x, which a depth opens that a law may ask for (worn = 1)."""
-        step = self._step(reach or RULES.step)
-        up, down = (
-            self._rate(self.balance.with_gap(self.balance.contact.gap + s), deeper=worn * s) for s in (step, -step)
-        )
+        own, gap, step = self.balance, self.balance.contact.gap, reach * self._size
+        up, down = (self._rate(own.with_gap(gap + s), deeper=worn * s) for s in (step, -step))
         return (up - down) / (2 * step)
 
     def _by_x(self) -> np.ndarray:
         """(n_pair, n_component * n_coeff) d rate of each pair by its own x, one coefficient of all pairs at a time."""
-        x, step = self.solved.x, self._step(RULES.step)
+        x, step = self.solved.x, GRADIENT.of_gap * self._size
         moves = (step[:, None, None] * unit for unit in np.eye(x[0].size).reshape(-1, *x[0].shape))
         return np.stack([(self._rate(x=x + d) - self._rate(x=x - d)) / (2 * step) for d in moves], axis=1)
 
-    def _step(self, reach: float) -> np.ndarray:
-        """(n_pair,) [m]"""
-        return np.asarray(reach * np.abs(self.solved.x).max(axis=(1, 2), initial=1e-12))
+    @property
+    def _size(self) -> np.ndarray:
+        """(n_pair,) largest displacement [m]."""
+        return np.asarray(np.abs(self.solved.x).max(axis=(1, 2), initial=1e-12))
 
     def moves(self) -> np.ndarray:
         """(n_change + n_pair,) d omega of a place that moves with a peak, see `peak_moves`."""
@@ -338,7 +314,7 @@ def _by_numbers(
     found = []
     for name, joints in numbers.values():
         value = problem.wearing[joints[0]].numbers[name]
-        step = RULES.of_number * float(np.max(value))
+        step = EXACT.of_law * float(np.max(value))
         laws = [
             {
                 of: replace(law, numbers={**law.numbers, name: value + s})
