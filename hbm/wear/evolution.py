@@ -282,26 +282,23 @@ def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.nda
 def reason_to_stop(
     problem: WearProblem,
     state: WearState,
-    first_preload: float,
-    first_at_rest: float = float("nan"),
     rows: Sequence[WearRow] = (),
     step_depth: float = 0.0,
 ) -> Outcome[WearEnd] | None:
     """Why a run ends at a state; None where it continues.
 
-    first_preload, first_at_rest : of the unworn contact, vibrating and at rest [N]
     rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
         more than ENDLESS cycles for it
     """
     if state.failure:
         return state.failure
     share = problem.lost_below_at_rest
-    if share is not None and state.preload_at_rest <= share * first_at_rest:
+    if share is not None and state.preload_at_rest <= share * (rows[0] if rows else state).preload_at_rest:
         return WearEnd.LOST_AT_REST.say(f" {share:.3g} of its first value")
     if state.separated:
         return WearEnd.LOST.say()
     preload = problem.preload_of(state)
-    if preload < problem.lost_below * first_preload:
+    if preload < problem.lost_below * first_preload(problem, rows, state):
         return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value")
     lost = lost_joint(problem, state, rows) if problem.any_joint else None
     if lost is not None:
@@ -337,9 +334,9 @@ def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) 
 def row_of(
     problem: WearProblem,
     state: WearState,
-    cycles_in_step: float,
-    worn: np.ndarray,
-    work: np.ndarray,
+    cycles_in_step: float = 0.0,
+    worn: np.ndarray | float = 0.0,
+    work: np.ndarray | float = 0.0,
     step_error: float = 0.0,
     plan: np.ndarray | None = None,
 ) -> WearRow:
@@ -350,7 +347,7 @@ def row_of(
         cycles=state.cycles,
         cycles_in_step=cycles_in_step,
         depth=state.depth,
-        worn=worn,
+        worn=np.broadcast_to(worn, state.depth.shape),
         energy=np.maximum(balance.energy(solved), 0.0),
         preload=problem.preload_of(state),
         normal_force=balance.normal_force(solved),
@@ -362,7 +359,7 @@ def row_of(
         solves=state.solves,
         step_error=step_error,
         plan=np.zeros(0) if plan is None else plan,
-        work=work,
+        work=np.broadcast_to(work, state.depth.shape),
         duty_omega=np.array([p.state.omega for p in state.points]),
         duty_displacement=np.stack([p.state.x.reshape(shape) for p in state.points]),
         preload_at_rest=state.preload_at_rest,
@@ -390,8 +387,3 @@ def state_of(problem: WearProblem, row: WearRow) -> WearState:
 def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:
     """Preload of the unworn contact [N]."""
     return rows[0].preload if rows else problem.preload_of(state)
-
-
-def first_at_rest(rows: Sequence[WearRow], state: WearState) -> float:
-    """Preload of the unworn contact at rest [N]; nan where it was not asked for."""
-    return rows[0].preload_at_rest if rows else state.preload_at_rest

@@ -213,41 +213,20 @@ def history(rows: list[WearRow], end: Outcome[WearEnd]) -> WearHistory:
     return WearHistory(**columns, end=end)
 
 
-@dataclass(frozen=True)
-class WearEvents:
-    """Cycles at which contact changes for good, nan where it has not.
-
-    lifts : (n_pair,) from then on the pair opens in a part of the cycle; lost : (n_pair,) it touches no more
-    """
-
-    lifts: np.ndarray
-    lost: np.ndarray
-
-    @property
-    def first_lift(self) -> float | None:
-        """Cycles until a pair that was closed all the time opens for the first time."""
-        return _first(self.lifts)
-
-    @property
-    def first_loss(self) -> float | None:
-        """Cycles until the first pair loses contact."""
-        return _first(self.lost)
-
-
 def events(
     history: WearHistory, components: tuple[str, ...], gap: np.ndarray, basis: HarmonicBasis
-) -> WearEvents | None:
-    """Locate the events between rows by a straight line through the penetration of each pair.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cycles (n_pair,) from which on a pair opens in a part of the cycle, and touches no more; nan where that is never.
 
+    Located between rows by a straight line through the penetration of each pair; none without a normal component.
     components : of the contact; gap : (n_pair,) of the unworn contact [m]
-    Returns None for a contact without a normal component
     """
     if "n" not in components or not len(history.cycles):
-        return None
+        return np.zeros(0), np.zeros(0)
     normal = history.displacement[:, components.index("n") :: len(components)]  # (n_row, n_pair, n_coeff)
     penetration = basis.to_time(normal) - (gap + history.depth)[..., None]
     deepest, shallowest = penetration.max(axis=-1), penetration.min(axis=-1)
-    return WearEvents(_crossings(history.cycles, shallowest), _crossings(history.cycles, deepest))
+    return _crossings(history.cycles, shallowest), _crossings(history.cycles, deepest)
 
 
 def _crossings(cycles: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -265,6 +244,7 @@ def _crossings(cycles: np.ndarray, value: np.ndarray) -> np.ndarray:
     return found
 
 
-def _first(cycles: np.ndarray) -> float | None:
+def first(cycles: np.ndarray) -> float | None:
+    """The first of some events that was not there from the start."""
     later = cycles[cycles > 0]
     return float(later.min()) if len(later) else None

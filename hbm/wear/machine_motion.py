@@ -172,10 +172,8 @@ class MachineMotion:
 
             found.append(follower.mean(balance, point.state.omega, wears, asked))
         shares = [duty.share for duty in problem.mission]
-        rate, work = (
-            np.sum([s * part for s, part in zip(shares, parts, strict=True)], axis=0)
-            for parts in ([m.seen for m in found], [m.energy for m in found])
-        )
+        rate = np.sum([s * m.seen for s, m in zip(shares, found, strict=True)], axis=0)
+        work = np.sum([s * m.energy for s, m in zip(shares, found, strict=True)], axis=0)
         works = np.array([s * float(m.energy.sum()) for s, m in zip(shares, found, strict=True)])
         weight = works / works.sum() if works.sum() > 0 else works
         first = found[0]

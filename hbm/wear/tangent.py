@@ -174,13 +174,15 @@ class _Tangent:
         rate[:, n_change + len(self.by_law)] += state.rate
         slope = stretch * along / (1 - stretch * by_depth)[:, None]
         depth = (base + stretch * rate) / (1 - stretch * by_depth)[:, None]
-        duties, still = [problem.in_duty(duty) for duty in problem.mission], np.zeros_like(state.depth)
-        stage = WearingBalance(duties, [1.0] * len(duties), state.depth, 0.0, still, state.depth)  # of a given depth
+        duties = [problem.in_duty(duty) for duty in problem.mission]
+        given = (state.depth, 0.0, np.zeros_like(state.depth), state.depth)
+        stage = WearingBalance(duties, [duty.share for duty in problem.mission], *given)
         omegas = tuple(cycle.solved.omega for cycle in cycles)
         solved, side = stage.evaluate(omegas, np.concatenate([c.solved.x for c in cycles], axis=1)), stage.at(omegas)
-        jac, n_coeff = solved.cycle.jacobian, solved.x.shape[2]
+        jac, n_coeff, components = solved.cycle.jacobian, solved.x.shape[2], problem.balance.contact.components
+        normal = components.index("n") * n_coeff
         assert jac is not None
-        gap = -jac[:, :, cycles[0].normal :: jac.shape[2] // len(cycles)].sum(axis=2)
+        gap = -jac[:, :, normal :: len(components) * n_coeff].sum(axis=2)
         opened = force + gap[..., None] * (depth + self.opens)[:, None]
         right = [
             own.reshape(-1, n_coeff) - side.apply(f.reshape(-1, n_coeff))
@@ -201,7 +203,7 @@ class _Tangent:
             depth, dx = depth + turn @ omega, dx + by_omega @ omega
         moved = force + jac @ dx + gap[..., None] * (depth + self.opens)[:, None]
         rate = rate + by_depth[:, None] * depth + np.einsum("pc,pcn->pn", along, dx)
-        return depth, rate, moved[problem.pairs, cycles[0].normal].sum(axis=0)
+        return depth, rate, moved[problem.pairs, normal].sum(axis=0)
 
 
 @dataclass(frozen=True)
@@ -222,11 +224,6 @@ class _Cycle:
     def changes(self) -> list[Change]:
         """Of the worn contact."""
         return [_worn(change, self.tangent.problem.balance, self.balance) for change in self.tangent.changes]
-
-    @property
-    def normal(self) -> int:
-        """Row of the mean normal force."""
-        return self.balance.contact.components.index("n") * self.balance.basis.n_coeff
 
     def slopes(self, n: int) -> tuple[np.ndarray, ...]:
         """Changes of force and x (n_pair, n_component * n_coeff, n) at the same x and forces by n columns, d rate / d x
