@@ -230,12 +230,17 @@ class _Cycle:
         (n_pair, n_component * n_coeff), d rate (n_pair, n), and d rate (n_pair,) by gap and by depth."""
         gradient, problem = Gradient(self.balance, self.solved, ()), self.tangent.problem
         above, below = gradient.of_gap()
-        by_gap, by_depth = self._by_depth(0.0), self._by_depth(1.0)
         both, by_work = [(2 * (above - below), above + below)], {w.law for w in problem.wearing.values()} == {"energy"}
-        if by_work:  # in closed form, which is faster
+        if by_work:  # in closed form by x and gap, which is faster; at a corner both are of the same side
+            solved, basis, contact = self.solved, self.balance.basis, self.balance.contact
             gain = self.duty.share * depth_per_work(problem, self.state)
-            along = gain[:, None] * work_slope(self.balance, self.solved.x, self.solved.cycle)
+            along = gain[:, None] * work_slope(self.balance, solved.x, solved.cycle)
+            assert solved.cycle.jacobian is not None
+            column = -solved.cycle.jacobian[:, :, contact.components.index("n") * basis.n_coeff]
+            work = basis.work_per_cycle(column.reshape(solved.x.shape), solved.x)[:, contact.tangential]
+            by_gap = by_depth = gain * work.sum(axis=1)
         else:
+            by_gap, by_depth = self._by_depth(0.0), self._by_depth(1.0)
             both.append((self._by_depth(0.0, EXACT.of_law) - by_gap, by_gap))
             along = self._by_x()
         if any(np.abs(differ).max() > EXACT.corner * np.abs(size).max() for differ, size in both):
