@@ -208,10 +208,8 @@ class HarmonicBalance:
 
     def frequency_slope(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega at fixed x of R (n_contact, n_coeff) and of the outputs (n_output, n_coeff)."""
-        point = self.at(state.omega)
-        x_load, y_load = point.slope(None)
-        x_contact, y_contact = point.slope(state.g)
-        return -self.loaded(x_load) - x_contact, self.loaded(y_load) + y_contact
+        moved, outputs = self.at(state.omega).slope(state.g, self.load_factor)
+        return -moved, outputs
 
     def gap_response(self, state: State, opening: np.ndarray) -> np.ndarray:
         """First-order change of x (n_pair, n_component, n_coeff) when each gap opens by (n_pair,) [m].

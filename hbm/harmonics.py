@@ -35,12 +35,12 @@ class HarmonicBasis:
         if self.transitions not in ("sampled", "located"):
             raise ValueError(f"transitions must be 'sampled' or 'located', not '{self.transitions}'")
 
-    @property
+    @cached_property
     def has_static(self) -> bool:
         """Whether harmonic 0 is kept."""
         return self.harmonics[0] == 0
 
-    @property
+    @cached_property
     def dynamic(self) -> tuple[int, ...]:
         """Kept harmonics >= 1."""
         return self.harmonics[1:] if self.has_static else self.harmonics
@@ -121,6 +121,16 @@ class HarmonicBasis:
         out[..., s::2] = amplitudes[..., s:].real
         out[..., s + 1 :: 2] = -amplitudes[..., s:].imag
         return out
+
+    def real_matrices(self, matrices: np.ndarray) -> np.ndarray:
+        """(..., n n_coeff, m n_coeff) on coefficients, of (n_harmonic, ..., n, m) on complex amplitudes."""
+        *several, n, m = matrices.shape[1:]
+        s, out = int(self.has_static), np.zeros((*several, n, self.n_coeff, m, self.n_coeff))
+        a, b, dynamic = np.arange(s, self.n_coeff, 2), np.arange(s + 1, self.n_coeff, 2), matrices[s:]
+        out[..., 0, :, 0] = matrices[0].real
+        out[..., a, :, a] = out[..., b, :, b] = dynamic.real
+        out[..., a, :, b], out[..., b, :, a] = dynamic.imag, -dynamic.imag
+        return out.reshape(*several, n * self.n_coeff, m * self.n_coeff)
 
     def transfer(self, coefficients: np.ndarray, to: HarmonicBasis) -> np.ndarray:
         """Coefficients (..., n_coeff) in another basis: harmonics that it lacks are dropped, new ones are zero."""

@@ -42,7 +42,7 @@ class Sensitivity:
     """
 
     def __init__(self, system: SecondOrderSystem, model: ReducedModel, shapes: np.ndarray):
-        self.model, self._T, self.system = model, shapes, system
+        self.model, self.shapes, self.system = model, shapes, system
         masters = model.info.master_dofs
         self._s, _ = partition(system.n_dof, masters, "master")
         self._n = len(masters)
@@ -58,7 +58,7 @@ class Sensitivity:
 
     def _full(self, slaves: np.ndarray) -> np.ndarray:
         """Values at the slaves, zero at the masters."""
-        found = np.zeros((len(self._T), slaves.shape[1]))
+        found = np.zeros((len(self.shapes), slaves.shape[1]))
         found[self._s] = slaves
         return found
 
@@ -71,7 +71,7 @@ class Sensitivity:
             for name, v in getattr(self.system, kind).items()
             if v[self._s].any()
         }
-        masses = np.asarray((self._M @ self._T[:, : self._n])[self._s])
+        masses = np.asarray((self._M @ self.shapes[:, : self._n])[self._s])
         return np.column_stack([masses, *vectors.values()]), list(vectors)
 
     @cached_property
@@ -85,7 +85,7 @@ class Sensitivity:
 
         They are orthogonal to the kept modes and span what is seen after 1, 2, ... solutions
         """
-        phi, M = self._T[self._s, self._n :], self._M_ss
+        phi, M = self.shapes[self._s, self._n :], self._M_ss
         basis, block = phi, self._following
         for count in range(BLOCKS):
             for _ in range(2):
@@ -107,7 +107,7 @@ class Sensitivity:
 
         To first order; without damping, which a reduced model gets after this
         """
-        T, n = self._T, self._n
+        T, n = self.shapes, self._n
         dK, dM = csr_matrix(change.stiffness), csr_matrix(change.mass)
         rows = np.flatnonzero(np.diff(dK.indptr))
         pushed = np.asarray(dK[rows] @ T)

@@ -111,7 +111,7 @@ def _check(path: Path) -> None:
     text = path.read_bytes()
     if not any(line.strip() == b"$MeshFormat" for line in text[:4096].split(b"\n")[:-1]):
         raise ValueError(_cannot(path, "it does not begin with $MeshFormat"))
-    for section in re.findall(rb"(?m)^\$(?!End)([A-Za-z]+)\s*$", text):
+    for section in re.findall(rb"(?m)^\$(?!End)([A-Za-z]{5,})\s*$", text):  # binary numbers may look like a shorter one
         if b"$End" + section not in text:
             raise ValueError(_cannot(path, f"it ends inside ${section.decode()}, so it is not complete"))
 

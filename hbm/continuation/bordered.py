@@ -122,10 +122,11 @@ def _coarse_inverse(
         found: np.ndarray = a @ (u.T @ linear.g_slope(d.reshape(shape))).ravel()
         return found
 
-    edge = (u.T @ row[:-1].reshape(shape)).ravel()
-    corner = row[-1] - row[:-1] @ column
+    bordered = np.empty((len(matrix) + 1, len(matrix) + 1))
+    bordered[:-1, :-1], bordered[:-1, -1] = matrix, inner(column)
+    bordered[-1, :-1], bordered[-1, -1] = (u.T @ row[:-1].reshape(shape)).ravel(), row[-1] - row[:-1] @ column
     try:
-        inverse = np.linalg.inv(np.block([[matrix, inner(column)[:, None]], [edge, corner]]))
+        inverse = np.linalg.inv(bordered)
     except np.linalg.LinAlgError:
         return None
 

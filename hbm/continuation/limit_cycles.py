@@ -139,7 +139,7 @@ def in_time(balance: HarmonicBalance, cycle: LimitCycle, output: str, options: O
     (n_pair, c), n_state = x.shape[1:], memory.shape[1]
     slopes = np.zeros((len(x), n_pair, c + n_state, 2 * c + n_state))
     less = (1 - INSIDE) * x + INSIDE * x.mean(axis=0)
-    time_step.slopes_of_period(stepper.law, stepper.contact, less, memory, bits, slopes)
+    time_step.along(stepper.law, stepper.contact, less[-1], less, memory, bits, less[:0], slopes)
     multipliers = np.linalg.eigvals(floquet.monodromy(stepper, slopes))
     others = np.delete(multipliers, np.abs(multipliers - 1).argmin())  # the phase is free
     seen = PeriodSearch(stepper, options, False).march(stepper.start_from(state)).record.y

@@ -22,7 +22,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
 from tribodyn.hbm.linear.all_harmonics import few_rows
-from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
+from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad, slopes
 from tribodyn.hbm.linear.ritz_expansion import RitzExpansion
 from tribodyn.reduction.model import ReducedModel
 
@@ -130,7 +130,7 @@ class ContactCompliance:
         other.__dict__.update(self.__dict__)
         other.basis = basis
         other._active, other._points = None, {}
-        for made in ("outside", "coarse_parts"):
+        for made in ("outside", "coarse_parts", "excited"):
             other.__dict__.pop(made, None)
         other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
         other.base = None if self.base is None else self.basis.transfer(self.base, basis)
@@ -198,7 +198,7 @@ class ContactCompliance:
             return None
         x, basis, n = self.groups[0][0], self.basis, self.n_contact
         stop, p = n + self.n_load, x.n_port
-        rows = np.ascontiguousarray(basis.to_real(self.port_force(None)[:stop]).T)
+        rows = np.ascontiguousarray(basis.to_real(self.excited[:stop]).T)
         outputs = [w[:n, stop:] for w in (x.w0, *x.higher)]
         return Outside(
             (rows @ x.columns[:stop], self.moving(rows) @ x.single[:stop]),
@@ -207,14 +207,19 @@ class ContactCompliance:
             np.ascontiguousarray(x.left[:, stop:]),
         )
 
-    def port_force(self, g: np.ndarray | None) -> np.ndarray:
-        """(n_port, n_harmonic) complex port forces: g [N] at the contacts alone, or the excitation where g is None."""
-        if g is not None:
-            contact, load = self.basis.to_complex(g), np.zeros_like(self._load)
-        else:
-            base = np.zeros((self.n_contact, self.basis.n_coeff)) if self.base is None else self.base
-            contact, load = self.basis.to_complex(self.k[:, None] * base), self._load
-        return np.concatenate([contact, load, np.zeros((len(self.output_names), load.shape[1]))])
+    @cached_property
+    def excited(self) -> np.ndarray:
+        """(n_port, n_harmonic) complex port forces of the excitation."""
+        base = np.zeros((self.n_contact, self.basis.n_coeff)) if self.base is None else self.base
+        found = self.pushed(self.k[:, None] * base)
+        found[self.n_contact : self.n_contact + self.n_load] = self._load
+        return found
+
+    def pushed(self, g: np.ndarray) -> np.ndarray:
+        """(n_port, n_harmonic) complex port forces of contact forces g (n_contact, n_coeff) [N]."""
+        found = np.zeros((self.n_contact + self.n_load + len(self.output_names), len(self.basis.harmonics)), complex)
+        found[: self.n_contact] = self.basis.to_complex(g)
+        return found
 
 
 @dataclass(frozen=True)
@@ -269,7 +274,7 @@ class CompliancePoint:
             x, self.outputs_lin = moved[:n], moved[stop:]
         else:
             excited = slice(n, stop) if compliance.base is None else slice(0, stop)
-            ports = self._through_ports(compliance.port_force(None)[excited], excited)
+            ports = self._through_ports(compliance.excited[excited], excited)
             x, self.outputs_lin = basis.to_real(ports[:n]), basis.to_real(ports[stop:])
         self.x_lin = x if compliance.base is None else x - compliance.base
 
@@ -369,15 +374,22 @@ class CompliancePoint:
             return self._by_modes(g, outputs)
         return c.basis.to_real(self._through_ports(c.basis.to_complex(g), contacts, outputs))
 
-    def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """d / d omega of contact displacement and outputs under g alone, or under the excitation where g is None."""
+    def slope(self, g: np.ndarray, load_factor: float) -> tuple[np.ndarray, np.ndarray]:
+        """d / d omega of contact displacement and outputs under g and the excitation, vibrating part times factor."""
         c = self.compliance
-        force = c.port_force(g)
+        return self._slope(c.excited * np.where(c.basis.harmonics, load_factor, 1.0) + c.pushed(g))
+
+    def _slope(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """d / d omega of contact displacement and outputs under port forces (n_port, n_harmonic)."""
+        c = self.compliance
         moved = np.zeros_like(force)
         for (_, positions), ports in zip(c.groups, self.ports, strict=True):
-            for p, port in zip(positions, ports, strict=True):
-                moved[:, p] = port.slope(force[:, p], 1j * self._harmonics[p])
+            moved[:, positions] = self._port_slopes(ports, force[:, positions], 1j * self._harmonics[positions])
         return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
+
+    def _port_slopes(self, ports: Any, force: np.ndarray, by: np.ndarray) -> np.ndarray:
+        """d / d omega of the displacement of ports under forces (n_port, len(ports)); by : d s / d omega of each."""
+        return by * slopes(ports, force)
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """G restricted to contact rows (active ones) times (n_active, n_coeff), as exact as a Newton direction needs.
@@ -406,19 +418,11 @@ class CompliancePoint:
     @cached_property
     def _coarse_compliance(self) -> np.ndarray:
         """Q^T sqrt(k) G sqrt(k) Q by the modes alone, on all coefficients; Q is `preconditioned`."""
-        c, basis = self.compliance, self.compliance.basis
-        size = c.preconditioned.shape[1]
-        blocks = np.zeros((size, basis.n_coeff, size, basis.n_coeff))
+        c, size = self.compliance, self.compliance.preconditioned.shape[1]
+        amplitude = np.empty((len(self._harmonics), size, size), complex)
         for modes, (_, positions), ports in zip(c.coarse_parts, c.groups, self.ports, strict=True):
-            for p, port in zip(positions, ports, strict=True):
-                amplitude = self._in_coarse(modes, port)  # acts on X_h = a_h - i b_h
-                cosine, *sine = np.flatnonzero(basis.order == basis.harmonics[p])
-                blocks[:, cosine, :, cosine] = amplitude.real
-                for column in sine:
-                    blocks[:, column, :, column] = amplitude.real
-                    blocks[:, cosine, :, column] = amplitude.imag
-                    blocks[:, column, :, cosine] = -amplitude.imag
-        return blocks.reshape(size * basis.n_coeff, size * basis.n_coeff)
+            amplitude[positions] = [self._in_coarse(modes, port) for port in ports]
+        return c.basis.real_matrices(amplitude)
 
     def _in_coarse(self, modes: np.ndarray, port: Any) -> np.ndarray:
         """(r, r) compliance of the `preconditioned` shapes at one harmonic, through the modes of its system."""

@@ -19,6 +19,7 @@ Source  block elimination of modal coordinates (ours); static correction of trun
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -349,25 +350,33 @@ class PortCompliance:
             found += x.unit * ratio**k * w[rows, columns]
         return found
 
-    def slope(self, force: np.ndarray, by: complex = 1.0) -> np.ndarray:
-        """d (apply) / d s of all ports under forces (n_port, ...), times `by`: d s over that of what is asked for."""
-        x, s, ratio = self.expansion, self.s, self.ratio
-        z = product(x.b.conj().T, force).astype(complex)
-        dz = np.zeros_like(z)
-        d_core = 2 * s * np.eye(len(x.lam)) + x.c
-        for k, (e, t) in enumerate(zip(x.e_in, x.t, strict=True), start=1):
-            part = product(e.conj().T, force)
-            z -= ratio**k * part
-            dz -= k * ratio ** (k - 1) / x.s_unit * part
-            d_core = d_core - (k + 1) * s**k * t
-        y = self.through_core(z)
-        dy = self.through_core(dz - d_core @ y)
-        out = product(x.b, dy)
-        for k, e in enumerate(x.e, start=1):
-            out -= product(e, ratio**k * dy + k * ratio ** (k - 1) / x.s_unit * y)
-        for k, w in enumerate(x.higher, start=1):
-            out += x.unit * k * ratio ** (k - 1) / x.s_unit * product(w, force)
-        return by * out
+
+def slopes(ports: Sequence[PortCompliance], force: np.ndarray) -> np.ndarray:
+    """d (apply) / d s of all ports of one expansion under forces (n_port, len(ports)), each at an s of its own."""
+    x = ports[0].expansion
+    s, ratio = np.array([port.s for port in ports]), np.array([port.ratio for port in ports])
+    powers = [k * ratio ** (k - 1) / x.s_unit for k in range(1, 1 + max(len(x.e), len(x.higher)))]
+
+    def through_cores(z: np.ndarray) -> np.ndarray:
+        return np.stack([port.through_core(column) for port, column in zip(ports, z.T, strict=True)], axis=1)
+
+    z = product(x.b.conj().T, force).astype(complex)
+    dz = np.zeros_like(z)
+    for k, e in enumerate(x.e_in, start=1):
+        part = product(e.conj().T, force)
+        z -= ratio**k * part
+        dz -= powers[k - 1] * part
+    y = through_cores(z)
+    dz -= 2 * s * y + x.c @ y
+    for k, t in enumerate(x.t, start=1):
+        dz += (k + 1) * s**k * (t @ y)
+    dy = through_cores(dz)
+    out = product(x.b, dy)
+    for k, e in enumerate(x.e, start=1):
+        out -= product(e, ratio**k * dy + powers[k - 1] * y)
+    for k, w in enumerate(x.higher, start=1):
+        out += x.unit * powers[k - 1] * product(w, force)
+    return out
 
 
 def product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:

@@ -100,19 +100,16 @@ class HeldPoint(CompliancePoint):
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
         return self._moved(super().outputs(g), -self.loose(g) * self._ways[1])
 
-    def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """d / d omega of contact displacement and outputs under g alone, or of what is held where g is None."""
-        row, a = self.compliance.row, self.receptance
-        excited = super().slope(None)
-        turn = self._fundamental(excited[1])[row]
-        turned = [(self._fundamental(e) - way * turn) / a for e, way in zip(excited, self._ways, strict=True)]
-        if g is None:
-            held = self.compliance.amplitude
-            moved = [self._moved(e, held * t - self._fundamental(e)) for e, t in zip(excited, turned, strict=True)]
-            return moved[0], moved[1]
-        free, loose = super().slope(g), self.loose(g)
-        turn = self._fundamental(free[1])[row]
-        moved = [self._moved(f, -loose * t - turn * way) for f, t, way in zip(free, turned, self._ways, strict=True)]
+    def slope(self, g: np.ndarray, load_factor: float) -> tuple[np.ndarray, np.ndarray]:
+        """d / d omega of contact displacement and outputs under g and what is held, vibrating part times factor."""
+        c = self.compliance
+        excited, free = self._slope(c.excited), self._slope(c.pushed(g))
+        turn, turn_free = (self._fundamental(part[1])[c.row] for part in (excited, free))
+        driven, moved = self.force(g, load_factor), []
+        for e, f, way in zip(excited, free, self._ways, strict=True):
+            first = self._fundamental(e)
+            by = driven * (first - way * turn) - way * turn_free - load_factor * first
+            moved.append(self._moved(e * np.where(c.basis.order, load_factor, 1.0) + f, by))
         return moved[0], moved[1]
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

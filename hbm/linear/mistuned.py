@@ -25,7 +25,7 @@ from scipy.linalg import inv, lu_factor, lu_solve
 from tribodyn.fem.cyclic import of_sector
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.linear.expansion import Expansion
+from tribodyn.hbm.linear.expansion import Expansion, slopes
 from tribodyn.reduction.model import ReducedModel
 
 ROOM = 2e8  # bytes of matrices of sectors alike that are kept for frequencies met again
@@ -90,7 +90,7 @@ class Alike:
 
     def slope(self, s: complex) -> np.ndarray:
         """d (at) / d s."""
-        return self._of_every_index(lambda one: one.at(s).slope(np.eye(self.n_port, dtype=complex)))
+        return self._of_every_index(lambda one: slopes([one.at(s)] * self.n_port, np.eye(self.n_port, dtype=complex)))
 
     def _of_every_index(self, make: Callable[[Expansion], np.ndarray]) -> np.ndarray:
         N = self.n_sectors
@@ -257,14 +257,11 @@ class MistunedPoint:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
         return self._output_rows(self._displaced(self._on_ports(g)))
 
-    def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """d / d omega of contact displacement and outputs under g alone, or under the excitation where g is None."""
+    def slope(self, g: np.ndarray, load_factor: float) -> tuple[np.ndarray, np.ndarray]:
+        """d / d omega of contact displacement and outputs under g and the excitation, vibrating part times factor."""
         a = self.compliance.alike
-        if g is None:
-            force = np.zeros((len(self._h), a.n_sectors, a.n_port), complex)
-            force[:, :, a.loads] = self.compliance.force
-        else:
-            force = self._on_ports(g)
+        force = self._on_ports(g)
+        force[:, :, a.loads] += self.compliance.force * np.where(self._h, load_factor, 1.0)[:, None, None]
         # all forces on sectors alike, those of the deviating stiffness among them
         waves = np.matmul(self._H, fft.ifft(force, axis=1)[..., None])[..., 0]
         force[:, :, a.ports] -= fft.fft(self._reaction(waves[:, :, a.ports]), axis=1)
@@ -298,7 +295,7 @@ class MistunedPoint:
     def blocks(self) -> np.ndarray:
         """(N, n_c n_coeff, n_c n_coeff) what the contacts of a sector do to themselves, of its own and its neighbours'
         deviations; a preconditioner."""
-        a, basis = self.compliance.alike, self.compliance.basis
+        a = self.compliance.alike
         N, n_c, r = a.n_sectors, len(a.k), self._around.shape[2]
         found = np.repeat(self._contact.mean(axis=1)[:, None], N, axis=1)  # (n_h, N, n_c, n_c)
         if r:
@@ -310,15 +307,7 @@ class MistunedPoint:
             d = np.repeat(self.compliance.deviation[(np.arange(N)[:, None] + near) % N], r, axis=1)[None, :, :, None]
             to, out = to.transpose(0, 2, 1, 3).reshape(-1, 1, n_c, m), out.reshape(-1, 1, n * r, n_c)
             found = found - to @ np.linalg.solve(np.eye(m) + d * around, d * out)
-        blocks = np.zeros((N, n_c, basis.n_coeff, n_c, basis.n_coeff))
-        for h, g in zip(basis.harmonics, found, strict=True):
-            cosine, *sine = np.flatnonzero(basis.order == h)
-            blocks[:, :, cosine, :, cosine] = g.real
-            for column in sine:  # g acts on X_h = a_h - i b_h
-                blocks[:, :, column, :, column] = g.real
-                blocks[:, :, cosine, :, column] = g.imag
-                blocks[:, :, column, :, cosine] = -g.imag
-        return blocks.reshape(N, n_c * basis.n_coeff, -1)
+        return self.compliance.basis.real_matrices(found)
 
 
 class JacobianProduct:

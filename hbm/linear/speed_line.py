@@ -70,6 +70,9 @@ class LinePoint(CompliancePoint):
 
         return [[ports(line.basis.harmonics[p]) for p in positions] for _, positions in line.groups]
 
+    def _port_slopes(self, ports: list[LinePorts], force: np.ndarray, by: np.ndarray) -> np.ndarray:
+        return np.stack([port.slope(f, b) for port, f, b in zip(ports, force.T, by, strict=True)], axis=1)
+
     def _in_coarse(self, modes: np.ndarray, port: LinePorts) -> np.ndarray:
         c = self.compliance
         shapes = c.preconditioned.T * np.sqrt(c.k)

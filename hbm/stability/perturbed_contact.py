@@ -36,7 +36,7 @@ def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[com
     x = np.ascontiguousarray((state.x @ balance.basis.functions(angle).T).transpose(2, 0, 1))
     memory, bits = time_step.memory_after(law, x, contact, memory)
     slopes = np.zeros((STEPS, n_pair, c + n_state, 2 * c + n_state))
-    time_step.slopes_of_period(law, contact, x, memory, bits, slopes)
+    time_step.along(law, contact, x[-1], x, memory, bits, x[:0], slopes)
     of_x, of_s, of_x0 = np.split(slopes, [c, c + n_state], axis=3)
     waves = np.exp(1j * np.outer(angle, np.arange(-top, top + 1)))
     p = np.kron(np.eye(c), waves[:, None]).reshape(STEPS, 1, c, c * nc)

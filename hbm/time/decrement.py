@@ -110,6 +110,6 @@ class _Marched:
         before = np.einsum("pcm,tm->tpc", x + 3 * np.pi * fall * x_slope, functions[: len(self._angle)])
         memory, bits = time_step.memory_after(self._law, np.ascontiguousarray(before), self._contact, self._memory)
         forces = np.empty_like(falling)
-        time_step.along(self._law, before[-1], falling, self._contact, memory, bits, forces)
+        time_step.along(self._law, self._contact, before[-1], falling, memory, bits, forces, np.empty((0, 0, 0, 0)))
         g, path = (series[len(self._angle) - 1 :] for series in (self._k * falling - forces, falling))
         return -0.5 * float(np.sum((g[1:] + g[:-1]) * np.diff(path, axis=0)))

@@ -131,8 +131,9 @@ class TimeStepper:
         components = joint.parameters.components
         normal = components.index("n") if "n" in components else -1
         packed, gap = joint.parameters.packed(), joint.parameters.gap
-        self.contact = time_step.Contact(packed, gap, normal, compliance, self.options.contact)
         self.law = compiled_law.pointer(joint.module.step)
+        forgets = normal >= 0 and time_step.forgets(self.law, packed, gap, normal, self.balance.memory)
+        self.contact = time_step.Contact(packed, gap, normal, compliance, forgets, self.options.contact)
 
     def worn(self, balance: HarmonicBalance) -> TimeStepper:
         """The same for a balance that differs in its gaps alone."""

@@ -32,6 +32,7 @@ warnings.filterwarnings("ignore", "First-class function type", NumbaExperimental
 SWEEPS, SLOW = 60, 0.5  # at most of Gauss-Seidel; factor per sweep from which on it is slow
 LOCAL, DAMPED = 40, 20  # iterations of one pair; from which on its steps are halved
 NEWTON = 60
+MOST = 3  # components of a pair: loops over min(c, MOST) are unrolled, in a third less time
 SHORTEST = 0.1  # share of a Newton step that is tried before a worse point is taken all the same
 
 
@@ -45,6 +46,7 @@ class Contact(NamedTuple):
     p : (n_pair, ...) packed parameters; gap : (n_pair,) [m]; normal : position of the component n, -1 without one
     A : (n_pair * c, n_pair * c) compliance of a step, row i the displacement of all under a unit force i; symmetric
         but for Coriolis forces
+    forgets : whether a pair that touches has forgotten its memory, see `forgets`
     accuracy : of the contact's equations, relative to the largest contact displacement
     """
 
@@ -52,6 +54,7 @@ class Contact(NamedTuple):
     gap: np.ndarray
     normal: int
     A: np.ndarray
+    forgets: bool = False
     accuracy: float = 1e-12
 
 
@@ -85,7 +88,7 @@ class Moving(NamedTuple):
 
 class Space(NamedTuple):
     """Work space of a step: `room` of one pair, two for its equations, y = A f, then of all pairs status bits, slopes
-    J = df/dx with the factors of 1 + A J of each pair and their pivots, memory, and the x and f tried.
+    J = df/dx with the inverse M of 1 + A J of each pair, memory, and the x and f tried.
     """
 
     work: tuple[np.ndarray, ...]
@@ -95,7 +98,6 @@ class Space(NamedTuple):
     bits: np.ndarray
     J: np.ndarray
     M: np.ndarray
-    pivots: np.ndarray
     memory: np.ndarray
     x: np.ndarray
     f: np.ndarray
@@ -104,10 +106,9 @@ class Space(NamedTuple):
     def of(cls, n_pair: int, c: int, n_state: int) -> Space:
         """For so many pairs, components and states of the memory."""
         small = np.zeros(c), np.zeros(c), np.zeros(n_pair * c)
-        status, pivots = np.zeros(n_pair, np.int64), np.zeros((n_pair, c), np.int64)
         J, M = np.full((2, n_pair, c, c), np.nan)
         x, f = np.zeros((2, n_pair, c))
-        return cls(room(c, n_state), *small, status, J, M, pivots, np.zeros((n_pair, n_state)), x, f)
+        return cls(room(c, n_state), *small, np.zeros(n_pair, np.int64), J, M, np.zeros((n_pair, n_state)), x, f)
 
 
 class Record(NamedTuple):
@@ -127,28 +128,20 @@ class Record(NamedTuple):
     slopes: np.ndarray
 
 
-@numba.njit(cache=True)
-def put(values, to):
-    """Copy a contiguous array; to assign one array to a slice of another takes numba seconds to compile."""
-    a, b = values.ravel(), to.ravel()
-    for i in range(b.size):
-        b[i] = a[i]
-
-
 @numba.njit(**PLAIN)
-def put_vector(values, to):
-    """Copy a short vector: of one, `put` takes most of its time to shape it."""
+def put(values, to):
+    """Copy a vector; to assign one array to a slice of another takes numba seconds to compile."""
     for i in range(to.size):
         to[i] = values[i]
 
 
 @numba.njit(cache=True)
 def room(c, n_state):
-    """Work space of one pair: f, memory, df/dx after `advance`; the other three slopes of the law; two for a touch."""
+    """Work space of a pair: f, memory, df/dx after `advance`; other slopes of the law; two for a touch; a matrix."""
     return (
         np.zeros(c), np.zeros(n_state), np.zeros((c, c)),
         np.zeros((c, n_state)), np.zeros((n_state, c)), np.zeros((n_state, n_state)),
-        np.zeros(c), np.zeros((n_state, 2 * c + n_state)),
+        np.zeros(c), np.zeros((n_state, 2 * c + n_state)), np.zeros((c, c)),
     )  # fmt: skip
 
 
@@ -161,8 +154,8 @@ def advance(step, x0, was_open, x1, s, p, gap, normal, work, chained):
     Returns the status bits, negative where the pair touches on the way and the law has a memory: `before` in `work`
     then holds the derivative of that at the touch with respect to (x1, s, x0)
     """
-    f, memory, J, dfs, dsx, dss, touch, before = work
-    c, n_state = x1.size, s.size
+    f, memory, J, dfs, dsx, dss, touch, before, _ = work
+    c, n_state = min(x1.size, MOST), s.size
     for r in range(n_state):
         memory[r] = s[r]
     closes = normal >= 0 and was_open and n_state > 0 and x0[normal] < gap < x1[normal]
@@ -212,7 +205,7 @@ def clear(J, dfs, dsx, dss):
 @numba.njit(**PLAIN)
 def slopes_of(touched, work, D):
     """Derivative D of (f, memory) with respect to (x1, memory before, x0), of what `advance` left in `work`."""
-    _, _, J, dfs, dsx, dss, _, before = work
+    _, _, J, dfs, dsx, dss, _, before, _ = work
     c = J.shape[0]
     D[:] = 0.0
     add(J, D[:c, :c])
@@ -244,58 +237,51 @@ def add_product(A, B, D):
 
 @numba.njit(**PLAIN)
 def differ(A, B):
-    """Whether two matrices differ."""
-    for a in range(A.shape[0]):
-        for b in range(A.shape[1]):
+    """Whether two small matrices differ."""
+    for a in range(min(A.shape[0], MOST)):
+        for b in range(min(A.shape[1], MOST)):
             if A[a, b] != B[a, b]:
                 return True
     return False
 
 
 @numba.njit(**PLAIN)
-def factorise(M, pivots):
-    """Factors of a small matrix in its place, with the rows that are exchanged."""
-    n = pivots.size
+def invert(M, R):
+    """Inverse R of a small matrix M, which is lost; columns without a pivot are left as they are."""
+    n = min(M.shape[0], MOST)
+    for i in range(n):
+        for q in range(n):
+            R[i, q] = 1.0 if i == q else 0.0
     for i in range(n):
         best = i
         for j in range(i + 1, n):
             if abs(M[j, i]) > abs(M[best, i]):
                 best = j
-        pivots[i] = best
+        if M[best, i] == 0.0:
+            continue
         for q in range(n):
             M[i, q], M[best, q] = M[best, q], M[i, q]
-        for j in range(i + 1, n):
-            if M[i, i] != 0.0:
-                M[j, i] /= M[i, i]
-            for q in range(i + 1, n):
-                M[j, q] -= M[j, i] * M[i, q]
-
-
-@numba.njit(**PLAIN)
-def solve_small(M, pivots, r):
-    """M^-1 r in place of r by what `factorise` has made of M; rows of zeros leave r as it is."""
-    n = r.size
-    for i in range(n):
-        r[i], r[pivots[i]] = r[pivots[i]], r[i]
-    for i in range(n):
-        for q in range(i):
-            r[i] -= M[i, q] * r[q]
-    for i in range(n - 1, -1, -1):
-        for q in range(i + 1, n):
-            r[i] -= M[i, q] * r[q]
-        if M[i, i] != 0.0:
-            r[i] /= M[i, i]
+            R[i, q], R[best, q] = R[best, q], R[i, q]
+        share = 1.0 / M[i, i]
+        for q in range(n):
+            M[i, q] *= share
+            R[i, q] *= share
+        for j in range(n):
+            share = M[j, i] if j != i else 0.0
+            for q in range(n):
+                M[j, q] -= share * M[i, q]
+                R[j, q] -= share * R[i, q]
 
 
 @numba.njit(inline="always", **PLAIN)
-def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, work, r, J, M, pivots):
+def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, work, r, J, M):
     """Newton on x + own f(x) = b for one pair from the guess x, which is overwritten; returns bits, 0: failed.
 
     bits : of the guess, whose force and memory are in `work` then; 0 where it is not known
-    M, pivots : factors of 1 + own J, kept from solution to solution as long as the slope J stays what it was
+    M : inverse of 1 + own J, kept from solution to solution as long as the slope J stays what it was
     """
-    f, slope = work[0], work[2]
-    c = x.size
+    f, slope, matrix = work[0], work[2], work[8]
+    c = min(x.size, MOST)
     known = bits != 0
     for it in range(LOCAL):
         if not known:
@@ -303,10 +289,10 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, wor
             if differ(slope, J):
                 for a in range(c):
                     for q in range(c):
-                        J[a, q], M[a, q] = slope[a, q], 1.0 if a == q else 0.0
+                        J[a, q], matrix[a, q] = slope[a, q], 1.0 if a == q else 0.0
                         for k in range(c):
-                            M[a, q] += own[a, k] * slope[k, q]
-                factorise(M, pivots)
+                            matrix[a, q] += own[a, k] * slope[k, q]
+                invert(matrix, M)
         known = False
         size = 0.0
         for a in range(c):
@@ -316,21 +302,22 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, wor
             size = max(size, abs(r[a]))
         if size <= near:
             break
-        solve_small(M, pivots, r)
+        part = 1.0 if it < DAMPED else 0.5
         for a in range(c):
-            x[a] -= r[a] if it < DAMPED else 0.5 * r[a]
+            for q in range(c):
+                x[a] -= part * M[a, q] * r[q]
     else:
         bits = 0
     return abs(bits)
 
 
 @numba.njit(**PLAIN)
-def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, pivots, memory, near, backward, work, r, b):
+def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, memory, near, backward, work, r, b):
     """One round of Gauss-Seidel over all pairs; y = A f and all else moves on in place but x and memory of open pairs.
 
     Returns the largest displacement of a pair, negative where one failed
     """
-    n_pair, c = x.shape
+    n_pair, c = x.shape[0], min(x.shape[1], MOST)
     normal, A = contact.normal, contact.A
     moved = 0.0
     for turn in range(n_pair):
@@ -348,15 +335,15 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, pivots, m
             for q in range(c):
                 b[a] += own[a, q] * f[i, q]
         if opened:
-            put_vector(b, x[i])
+            put(b, x[i])
         elif off <= 0.1 * near and known != 0:
             continue
         if known != 0:
-            put_vector(f[i], work[0])
-            put_vector(memory[i], work[1])
+            put(f[i], work[0])
+            put(memory[i], work[1])
         bits[i] = solve_pair(
             step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], normal, own, b, 0.1 * near, known, work,
-            r, J[i], M[i], pivots[i],
+            r, J[i], M[i],
         )  # fmt: skip
         if bits[i] == 0:
             return -1.0
@@ -364,7 +351,7 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, pivots, m
         for a in range(c):
             b[a] = work[0][a] - f[i, a]
             f[i, a] = work[0][a]
-        put_vector(work[1], memory[i])
+        put(work[1], memory[i])
         add_rows(A, o, b, y)
     return moved
 
@@ -416,7 +403,7 @@ def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse, 
 def sweeps(step, contact, x_free, x0, was_open, s, x, f, scale, space):
     """As `solve_contact`, pair after pair."""
     n_pair, c = x.shape
-    work, r, b, y, bits, J, M, pivots, memory, _, _ = space
+    work, r, b, y, bits, J, M, memory, _, _ = space
     for i in range(n_pair):
         bits[i] = SEPARATES if contact.normal >= 0 and was_open[i] and f[i, contact.normal] == 0.0 else 0
     before = np.inf
@@ -424,9 +411,10 @@ def sweeps(step, contact, x_free, x0, was_open, s, x, f, scale, space):
     for it in range(SWEEPS):
         near = contact.accuracy * scale
         moved = sweep(
-            step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, pivots, memory, near, it % 2 == 1, work, r, b
+            step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, memory, near, it % 2 == 1, work, r, b
         )
-        scale = max(scale, largest(x))
+        if it == 0:
+            scale = max(scale, largest(x))
         if 0.0 <= moved <= contact.accuracy * scale:
             for i in range(n_pair):
                 if bits[i] == SEPARATES:
@@ -462,9 +450,9 @@ def residual(step, contact, x_free, x0, was_open, s, x, f, J, space):
         space.bits[i] = abs(
             advance(step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], contact.normal, work, False)
         )
-        put_vector(work[0], f[i])
-        put(work[2], J[i])
-        put_vector(work[1], space.memory[i])
+        put(work[0], f[i])
+        put(work[2].ravel(), J[i].ravel())
+        put(work[1], space.memory[i])
     displace(contact.A, f, y)
     return x.ravel() - x_free + y
 
@@ -497,7 +485,7 @@ def chord(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
         move = -np.dot(inverse, r)
         r_before = r
         x += move.reshape(x.shape)
-    put(start, x)
+    put(start.ravel(), x.ravel())
     return -1, scale
 
 
@@ -515,42 +503,36 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
         scale = max(scale, np.abs(x).max())
         error = np.abs(r).max()
         if error <= contact.accuracy * scale:
-            put(np.linalg.inv(full), inverse)
+            put(np.linalg.inv(full).ravel(), inverse.ravel())
             return SWEEPS + it + 1, scale
         if error >= best and length > SHORTEST:  # a kink lies on the way: go less far
             length *= 0.5
         else:
             best, length = error, 1.0
-            put(x, x_best)
+            put(x.ravel(), x_best.ravel())
             full = np.eye(n_pair * c)
             for i in range(n_pair):
                 o = i * c
                 add(np.dot(np.ascontiguousarray(A[o : o + c].T), np.ascontiguousarray(J[i])), full[0:, o : o + c])
             direction = np.linalg.solve(full, r)
-        put(x_best - length * direction.reshape(x.shape), x)
+        put(x_best.ravel() - length * direction, x.ravel())
     return -1, scale
 
 
 @numba.njit(**PLAIN)
-def pass_on(step, contact, x, was_open, x_new, memory, bits, work, slopes):
-    """Memory and bits of all pairs over a step that is known; slopes : (n, ...) the first is filled, if any."""
+def pass_on(step, contact, x, was_open, x_new, memory, bits, work, forces, slopes):
+    """Memory and bits of all pairs over a step that is known; of forces and slopes (n, ...) the first is filled."""
     chained = slopes.shape[0] > 0
     for i in range(x.shape[0]):
         now = advance(
             step, x[i], was_open[i], x_new[i], memory[i], contact.p[i], contact.gap[i], contact.normal, work, chained
         )
-        put_vector(work[1], memory[i])
+        put(work[1], memory[i])
         if chained:
             slopes_of(now < 0, work, slopes[0, i])
+        if forces.shape[0] > 0:
+            put(work[0], forces[0, i])
         bits[i] = abs(now)
-
-
-@numba.njit(cache=True)
-def slopes_of_period(step, contact, xs, memory, bits, slopes):
-    """Derivatives of the law (n_step, n_pair, ...) along a periodic displacement xs (n_step, n_pair, c)."""
-    work = room(xs.shape[2], memory.shape[1])
-    for j in range(xs.shape[0]):
-        pass_on(step, contact, xs[j - 1], bits == SEPARATES, xs[j], memory, bits, work, slopes[j:])
 
 
 @numba.njit(**PLAIN)
@@ -568,20 +550,37 @@ def foresee(x_free, f, f_before, bits, A, y, x_new, f_new, was_open):
 
 
 @numba.njit(**PLAIN)
-def take_up(step, contact, x, was_open, x_new, memory, bits, space):
-    """As `pass_on` after `solve_contact`, which has left the memory of all but open pairs."""
-    work = space.work
+def take_up(step, contact, x, was_open, x_new, memory, bits, space, late):
+    """As `pass_on` after `solve_contact`, which has left the memory of all but open pairs.
+
+    late : leave the memory of pairs that stay open as it is
+    """
+    work, normal = space.work, contact.normal
     for i in range(x.shape[0]):
         bits[i] = space.bits[i]
         if bits[i] != SEPARATES:
-            put_vector(space.memory[i], memory[i])
+            put(space.memory[i], memory[i])
+            continue
+        if late and was_open[i] and x_new[i, normal] < contact.gap[i]:
             continue
         bits[i] = abs(
-            advance(
-                step, x[i], was_open[i], x_new[i], memory[i], contact.p[i], contact.gap[i], contact.normal, work, False
-            )
+            advance(step, x[i], was_open[i], x_new[i], memory[i], contact.p[i], contact.gap[i], normal, work, False)
         )
-        put_vector(work[1], memory[i])
+        put(work[1], memory[i])
+
+
+@numba.njit(cache=True)
+def forgets(step, p, gap, normal, memory):
+    """Whether pairs that touch stand where they would with another memory (n_pair, n_state) before; normal is last."""
+    work, x = room(normal + 1, memory.shape[1]), np.zeros(normal + 1)
+    for i in range(len(memory)):
+        x[normal] = gap[i]
+        advance(step, x, False, x, memory[i], p[i], gap[i], -1, work, False)
+        after = work[1].copy()
+        advance(step, x, False, x, memory[i] + 1.0, p[i], gap[i], -1, work, False)
+        if np.any(work[1] != after):
+            return False
+    return True
 
 
 @numba.njit(cache=True)
@@ -608,9 +607,10 @@ def march(step, contact, linear, moving, record, space):
         if rounds < 0:
             return j, spent, speed
         if chained:
-            pass_on(step, contact, x, was_open, x_new, memory, bits, space.work, record.slopes[j:])
+            pass_on(step, contact, x, was_open, x_new, memory, bits, space.work, record.f[:0], record.slopes[j:])
         else:
-            take_up(step, contact, x, was_open, x_new, memory, bits, space)
+            late = contact.forgets and j + 1 < len(linear.impulse)
+            take_up(step, contact, x, was_open, x_new, memory, bits, space, late)
         keep(x_new, f_new, bits, x, f, f_before, record.x[j], record.f[j], record.bits)
         kick = np.dot(linear.Q, 0.5 * np.dot(flat, linear.U))
         speed = max(speed, move(z_free, kick, z, record.z[j]))
@@ -640,25 +640,16 @@ def move(z_free, kick, z, z_kept):
 
 
 @numba.njit(cache=True)
-def along(step, before, xs, contact, memory, bits, forces):
+def along(step, contact, before, xs, memory, bits, forces, slopes):
     """The law of all pairs through displacements xs (n_step, n_pair, c) that follow `before` (n_pair, c).
 
-    memory (n_pair, n_state) and bits (n_pair,) move on in place; forces : (n_step, n_pair, c) to be filled, or empty
+    memory (n_pair, n_state) and bits (n_pair,) move on in place; forces : (n_step, n_pair, c) and slopes, as of
+    `Record`, to be filled, or empty
     """
-    n_step, n_pair, c = xs.shape
-    work = room(c, memory.shape[1])
-    for j in range(n_step):
-        for i in range(n_pair):
-            x0 = xs[j - 1, i] if j > 0 else before[i]
-            was_open = bits[i] == SEPARATES
-            bits[i] = abs(
-                advance(
-                    step, x0, was_open, xs[j, i], memory[i], contact.p[i], contact.gap[i], contact.normal, work, False
-                )
-            )
-            put_vector(work[1], memory[i])
-            if forces.shape[0] > 0:
-                put_vector(work[0], forces[j, i])
+    work = room(xs.shape[2], memory.shape[1])
+    for j in range(len(xs)):
+        x = xs[j - 1] if j > 0 else before
+        pass_on(step, contact, x, bits == SEPARATES, xs[j], memory, bits, work, forces[j:], slopes[j:])
 
 
 @numba.njit(cache=True)
@@ -666,5 +657,5 @@ def memory_after(step, xs, contact, memory):
     """Memory (n_pair, n_state) and status after two rounds of a periodic displacement xs (n_step, n_pair, c)."""
     s, bits = memory.copy(), np.zeros(xs.shape[1], np.int64)
     for _ in range(2):
-        along(step, xs[-1], xs, contact, s, bits, xs[:0])
+        along(step, contact, xs[-1], xs, s, bits, xs[:0], np.empty((0, 0, 0, 0)))
     return s, bits

@@ -70,7 +70,11 @@ def of_life(
     changes = tuple(changes)  # all at once: each state asks for all of them
     joints, by_law = problem.balance.contact.joints, _by_numbers(problem, numbers)
     last, n = len(changes) + len(by_law), len(changes) + len(by_law) + 1 + len(joints)
-    opens = np.zeros((len(problem.area), n))
+    area, spread = problem.area, np.zeros((len(problem.area), n))
+    for i, change in enumerate(changes):  # lengths move the areas that wear
+        up, down = (one.model.interface.area for one in (change.above, change.below))
+        spread[:, i] = (up - down) / (2 * change.step)
+    opens = np.zeros((len(area), n))
     for i, joint in enumerate(joints, last + 1):
         opens[joint.rows, i] = 1.0
     tangent, depth = _Tangent(problem, changes, by_law, opens), np.zeros_like(opens)
@@ -78,7 +82,7 @@ def of_life(
     for i, row in enumerate(rows[:-1]):
         before, after = after, state_of(problem, rows[i + 1])
         depth = tangent.along(row, rows[:i], before, after, depth)
-    ends, deepest, area = [first, after], int(after.depth.argmax()), problem.area
+    ends, deepest = [first, after], int(after.depth.argmax())
     if worn.preload_at_rest is not None:
         quiet = PreloadAtRest(problem).quiet(first)
         rests = assess(quiet, first.depth, 0.0, None)
@@ -89,7 +93,8 @@ def of_life(
     )
     longer = (had - left) / left[last]
     ended = depth + np.outer(depth[:, last], longer)
-    slopes, by_gap = np.stack([life * longer, ended[deepest], area @ ended]), np.zeros((3, len(area)))
+    slopes = np.stack([life * longer, ended[deepest], area @ ended + after.depth @ spread])
+    by_gap = np.zeros((3, len(area)))
     for i, joint in enumerate(joints, last + 1):
         by_gap[:, joint.rows] = slopes[:, i, None] / len(joint.rows)
     by, values = slopes[:, :last], np.array([life, after.depth[deepest], area @ after.depth])
@@ -273,10 +278,19 @@ class _Cycle:
 
     def _by(self, change: Change) -> np.ndarray:
         """(n_pair,) d rate by a parameter, at the same x."""
-        own, sides = self.balance, (change.above, change.below)
+        own, sides, problem = self.balance, (change.above, change.below), self.tangent.problem
         found = np.zeros(len(self.solved.x))
-        if any(one.contact is not own.contact or one.memory is not own.memory for one in sides):
-            up, down = (self._rate(replace(own, contact=one.contact, memory=one.memory)) for one in sides)
+        if any(
+            one.contact is not own.contact or one.memory is not own.memory or one.model is not own.model
+            for one in sides
+        ):
+            up, down = (
+                self._rate(
+                    replace(own, contact=one.contact, memory=one.memory),
+                    problem=replace(problem, area=problem.area + one.model.interface.area - own.model.interface.area),
+                )
+                for one in sides
+            )
             found = (up - down) / (2 * change.step)
         return found if change.touching is None else found + self._by(change.touching)
 

@@ -9,7 +9,7 @@ import skfem
 from tests.helpers.mixed_meshes import mixed_cells, write_mixed
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.geometry.mesh import quality
-from tribodyn.geometry.sources import read, solid
+from tribodyn.geometry.sources import msh, read, solid
 from tribodyn.geometry.sources.raw import Cells, RawMesh
 
 
@@ -152,3 +152,12 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, version, bi
                 refusals.append(str(refusal))
     assert len(refusals) > 24
     assert not any("\n" in said for said in refusals)
+
+
+def test_binary_numbers_that_look_like_a_section_cut_no_file_short(tmp_path):
+    path = tmp_path / "box.msh"
+    path.write_bytes(b"$MeshFormat\n4.1 1 8\n$EndMeshFormat\n$Nodes\n\x01\n$G\n\x02\n$EndNodes\n")
+    msh._check(path)
+    path.write_bytes(path.read_bytes().replace(b"$EndNodes", b""))
+    with pytest.raises(ValueError, match=r"it ends inside \$Nodes"):
+        msh._check(path)

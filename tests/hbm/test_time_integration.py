@@ -236,11 +236,22 @@ def test_a_pair_that_rounding_solves_keeps_its_own_memory():
     x_free = np.concatenate([np.full(3, 2e-2), np.full(3, 0.5 + 4e-16)])  # less than what rounds 1000 off
     space, memory = Space.of(2, 3, 2), s.copy()
     space.bits[1] = STICKS
-    work, r, b, y, bits, J, M, pivots = space[:8]
-    sweep(
-        law, contact, x_free, x.copy(), np.zeros(2, bool), s, x, f, y, bits, J, M, pivots, memory, 2e-15, False, work,
-        r, b,
-    )  # fmt: skip
+    work, r, b, y, bits, J, M = space[:7]
+    sweep(law, contact, x_free, x.copy(), np.zeros(2, bool), s, x, f, y, bits, J, M, memory, 2e-15, False, work, r, b)
     assert bits.all()
     assert np.isfinite(x).all()
     assert np.array_equal(memory[1], s[1])
+
+
+def test_memory_of_open_pairs_is_left_where_a_touch_forgets_it() -> None:
+    """A period in which pairs separate is the same, bit for bit, with the law asked at every step of an open pair."""
+    balance = random_balance(0.3, shaker=600.0)
+    stepper = TimeStepper(balance, OMEGA, Options(256))
+    assert stepper.contact.forgets
+    start = stepper.start_from(balance.evaluate(OMEGA, balance.stuck(OMEGA)))
+    here, record, *_ = stepper.period(start)
+    stepper.contact = stepper.contact._replace(forgets=False)
+    there, *_ = stepper.period(start)
+    assert 0 < np.mean(record.f[..., 2] == 0) < 1
+    for one, other in zip(here, there, strict=True):
+        assert np.array_equal(one, other)

@@ -28,6 +28,7 @@ def bench(
     fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
     way: Annotated[tuple[str, ...], Parameter(name="--way", negative=(), consume_multiple=False)] = (),
     contact: Annotated[tuple[str, ...], Parameter(name="--contact", negative=(), consume_multiple=False)] = (),
+    peer: Path | None = None,
     out: Path = Path("scaling.png"),
     as_json: Json = False,
 ) -> None:
@@ -48,11 +49,19 @@ def bench(
     contact
         Set-up, memory and seconds of one response at 0+3 on "500", "1500", "3k", "12k" or "48k" contact DOFs instead,
         with residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
+    peer
+        A Python interpreter with pyHarm (pip install pyHarm-os): small problems in both programs instead.
     out
         File of the plot of --scaling.
     as_json
         Print JSON for machines.
     """
+    if peer is not None:
+        from tests.proof import peers
+
+        races = peers.run(peer, aside)
+        print(json.dumps(peers.as_records(races), indent=2) if as_json else peers.as_text(races))
+        return
     if fe:
         from tests.proof import large_fe
 

@@ -12,12 +12,14 @@ import tribodyn as td
 from tests.helpers.coarse_scenes import BEAM, BLADE, RIG
 from tests.helpers.steps_again import elasticity_anew, exactly
 from tribodyn.hbm import derivatives as exact
+from tribodyn.hbm.gradient import NoDerivative
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import references, settings, varying, wear_run
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.varying import Varying, keys
+from tribodyn.workflows.run.varying import Varying, geometry_keys, keys
 from tribodyn.workflows.scene import scene_file
 
 LOCATED = "harmonics.transitions=located"
@@ -26,6 +28,7 @@ COARSE = {
     "blade": (*BLADE, "response.method=adaptive"),
     "rig": (*RIG, LOCATED),
 }
+AT_800_HZ = (*BEAM, "wear.motion=balance", "wear.at=800 Hz", LOCATED)
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +50,53 @@ def test_the_laws_of_scaling_hold(beam):
     stiffer = sum(row for key, row in rows.items() if key.endswith(("_stiffness", "young")))
     softens = {"frequency": 0.5, "amplitude": -1.0, "phase": 0.0, "energy": -1.0, "preload": 0.0, "wear rate": -1.0}
     np.testing.assert_allclose(stiffer, [softens[name] for name in names], atol=1e-5)
+
+
+LENGTHS = tuple(f"geometry.{name}" for name in ("length", "width", "height", "patch_length"))
+
+
+def similar(rows, lengths, rest):
+    """What all lengths times c make, with springs by c, forces by c^2 and what `rest` says."""
+    powers = dict.fromkeys(lengths, 1) | {key: 1 for key in rows if key.endswith("_stiffness")}
+    powers |= {key: 2 for key in rows if key.startswith("loads.")} | rest
+    return sum(power * rows[key] for key, power in powers.items())
+
+
+def test_the_law_of_similarity_holds_of_lengths():
+    """Bodies that are alike have time and displacements by c, work by c^3, forces by c^2."""
+    file = scene_file.read("beam", COARSE["beam"])
+    found = td.studies.derivatives(file, only=(*keys(file.scene), *LENGTHS))
+    wanted = {"frequency": -1.0, "amplitude": 1.0, "phase": 0.0, "energy": 3.0, "preload": 2.0, "wear rate": 3.0}
+    total = similar(found.elasticities, LENGTHS, {})
+    np.testing.assert_allclose(total, [wanted[name] for name in found.found.names], atol=2e-6)
+
+
+@pytest.mark.slow
+def test_the_law_of_similarity_holds_of_a_life():
+    """At a given frequency, which takes the density by 1 / c^2: c times as deep in the same life."""
+    file = scene_file.read("beam", AT_800_HZ)
+    found = td.studies.derivatives(file, of="life", only=(*keys(file.scene), *LENGTHS))
+    total = similar(found.elasticities, LENGTHS, {"material.density": -2})
+    np.testing.assert_allclose(total, [0.0, 1.0, 3.0], atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "key", "sentence"),
+    [
+        ("beam", "geometry.patch_length=99.9999 mm", "geometry.patch_length", "keep it below half of geometry.length"),
+        pytest.param("rig", LOCATED, "geometry.contact_width", "what meets at the contact", marks=pytest.mark.slow),
+    ],
+)
+def test_a_length_whose_mesh_does_not_stay_the_same_is_refused(name, change, key, sentence):
+    """Beside a limit there is no part; heights of a measured face are other ones where its nodes move."""
+    varying = Varying(scene_file.read(name, (*COARSE[name], change)), Progress())
+    with pytest.raises(NoDerivative, match=sentence):
+        varying.nodes_moved(key)
+
+
+def test_a_response_that_is_highest_at_an_end_has_no_derivatives_of_a_peak():
+    with pytest.raises(SolveFailed, match="the response is highest at an end"):
+        td.studies.derivatives("beam", overrides=(*COARSE["beam"], "response.frequency=['380 Hz', '500 Hz']"))
 
 
 @pytest.mark.parametrize("name", scene_file.names())
@@ -81,12 +131,22 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
     assert sum("the table is that of one side" in line for line in replace(beam, found=marked).lines()) == 1
 
 
-@pytest.mark.parametrize("name", ["beam", "blade", pytest.param("rig", marks=pytest.mark.slow)])
-def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name):
+@pytest.mark.parametrize(
+    ("name", "only", "step", "order"),
+    [
+        ("beam", ("contact.friction", "damping.modal"), 2e-5, 1),
+        ("blade", ("contact.friction", "damping.modal"), 2e-5, 1),
+        pytest.param("rig", ("contact.friction", "damping.modal"), 2e-5, 1, marks=pytest.mark.slow),
+        pytest.param("beam", ("geometry.length", "geometry.height"), 1e-4, 2, marks=pytest.mark.slow),
+        pytest.param("blade", ("geometry.span", "geometry.shroud_angle"), 3e-5, 1, marks=pytest.mark.slow),
+        pytest.param("rig", ("geometry.height", "geometry.thickness"), 1e-3, 2, marks=pytest.mark.slow),
+    ],
+)
+def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, step, order):
     """At a fixed frequency, and along the peak."""
     file = scene_file.read(name, COARSE[name])
-    along = td.studies.derivatives(file, only=("contact.friction", "damping.modal")).found
-    value, step, omega = keys(file.scene), 2e-5, along.state.omega
+    along = td.studies.derivatives(file, only=only).found
+    value, omega = keys(file.scene) | geometry_keys(file.scene), along.state.omega
     fixed = td.studies.derivatives(file, at=omega / (2 * np.pi), only=along.parameters).found
 
     def solved(key, factor):
@@ -100,8 +160,8 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name):
         for which, found, error in ((0, fixed, 1e-5), (1, along, 1e-5)):
             wide, narrow = ((sides[1 + h][which] - sides[1 - h][which]) / (2 * h) for h in (step, step / 2))
             kept = len(wide)  # all but the wear rate
-            # second derivatives jump where a transition comes or goes: the error of a difference is linear in its step
-            difference = (2 * narrow - wide) / found.values[:kept]
+            # second derivatives jump where a transition comes or goes: by small steps the error is linear in them
+            difference = (2**order * narrow - wide) / (2**order - 1) / found.values[:kept]
             elasticity = found.slopes[:kept, i] * value[key] / found.values[:kept]
             size = np.maximum(np.abs(difference), 0.1)  # below this the differences are rounding
             assert (np.abs(elasticity - difference) <= error * size).all(), (key, elasticity, difference)
@@ -158,9 +218,6 @@ def test_derivatives_of_a_mode_are_those_of_modes_found_anew():
         values.append(td.studies.derivatives("beam", **changed, only=("damping.modal",)).found.values)
     difference = (values[0] - values[1]) / (2 * h) / found.found.values
     np.testing.assert_allclose(found.elasticities["contact.friction"], difference, rtol=1e-5)
-
-
-AT_800_HZ = (*BEAM, "wear.motion=balance", "wear.at=800 Hz", LOCATED)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import signal
 import sys
@@ -56,10 +57,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _run(arguments: Sequence[str] | None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        app(given, exit_on_error=False, print_error=False)
+        command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
     except cyclopts.UnknownCommandError as error:
         said = str(error).partition(" Available commands:")[0].rstrip(". ")
         raise ValueError(f"{said}{'' if said.endswith('?') else '.'} Available commands: {', '.join(WORDS)}") from None
+    if not gc.isenabled():
+        gc.freeze()  # what is imported now is looked through no more
+        gc.enable()
+    sys.exit(command(*bound.args, **bound.kwargs) or 0)
 
 
 def guard(command: Callable[[], object]) -> None:

@@ -13,10 +13,11 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from tribodyn import declare
+from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.contact.joint import Contact
-from tribodyn.hbm.gradient import Change, Posed
+from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
@@ -31,7 +32,11 @@ from tribodyn.workflows.scene.schema import MeshScene, Scene
 # beam's stiffness is 2e-6 off, for 3e-8; with 1e-5 a peak at a corner, seen from 3e-4 half widths, 3e-4, for 3e-6
 STEP = 1e-6
 REBUILT = 1e-3  # the same of a number of the structure, whose rounding is larger
-STRUCTURAL = ("material.", "materials.", "springs.")
+# by which lengths and angles move nodes, for matrices, areas and gaps; a model is reduced anew by 4 times as much. By
+# 10 times a harmonic beside its own resonance takes the coarse blade's preload by its span 4e-5 off; by 1, rounding the
+# coarse rig's amplitude by its height
+NODES = 1e-4
+STRUCTURAL = ("material.", "materials.", "springs.", *(GEOMETRY := ("geometry.", "bodies.")))
 OF_CONTACT = ("tangential_stiffness", "normal_stiffness")
 
 
@@ -70,6 +75,18 @@ def keys(scene: Scene) -> dict[str, float]:
     return found
 
 
+def geometry_keys(scene: Scene) -> dict[str, float]:
+    """The lengths and angles of the parts of a scene by their keys, SI units; zeros are left out."""
+    parts = {f"bodies.{name}": body for name, body in getattr(scene, "bodies", {}).items()}
+    parts["geometry"] = getattr(scene, "geometry", None)
+    return {
+        f"{table}.{name}": value
+        for table, part in parts.items()
+        for name, value in ({} if part is None else part.parameters).items()
+        if isinstance(value, float) and value != 0.0
+    }
+
+
 class Varying:
     """A scene with its model, and what a step of each of its numbers makes of it."""
 
@@ -88,7 +105,9 @@ class Varying:
         self.part, self.plain = part, plain
         self.model = modelling.make_model(self.scene, part, reduced)
         self.own = Posed.of(self.model.balance)
+        self.values = keys(self.scene) | geometry_keys(self.scene)
         self._ways: dict[str, SecondOrderSystem] = {}  # key -> what the reduced model moves by where it doubles
+        self._beside: dict[str, tuple[Part, Part]] = {}  # key -> the part with its nodes moved to both sides
 
     @staticmethod
     def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
@@ -100,40 +119,47 @@ class Varying:
         anew = self._settles or self.anew(key)
         linear = self._scales(key) or self.follows(key)
         step = (REBUILT if anew or linear else self.step) * abs(value)
+        if key.startswith(GEOMETRY):
+            self.nodes_moved(key)  # or refused
+            step = 4 * NODES * abs(value) if anew else step
         far: tuple[Posed, ...] | None = () if anew or linear else None
         if self._settles or (anew and key.startswith((*STRUCTURAL, "wheel."))):
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
         touching = None
         if (anew or linear) and not self._settles and _touches(key):
             small = self.step * abs(value)
-            scenes = (self._changed(key, value + side).scene for side in (small, -small))
-            up, down = (replace(self.own, contact=self._contact(scene)) for scene in scenes)
+            up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
             touching = Change(key, small, up, down)
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
 
     def _changed(self, key: str, value: float) -> SceneFile:
         """The scene with another value of a key; read again only where other numbers follow from it."""
-        if key.startswith("wheel.") or key.endswith(".temperature"):
+        if key.startswith(("wheel.", *GEOMETRY)) or key.endswith(".temperature"):
             return self.file.changed(f"{key}={value!r}")
         return replace(self.file, scene=_with(self.scene, key.split("."), value))
 
-    def _contact(self, scene: Scene) -> Contact:
-        """The contact of a scene."""
-        return Contact.of(self.own.model, joints.make_joints(scene, self.plain))
+    def _contact(self, key: str, value: float) -> Contact:
+        """The contact with another value of a key."""
+        plain = self.plain
+        if key.startswith(GEOMETRY):
+            plain = replace(plain, interface=self._interface(plain.interface, key, value))
+        return Contact.of(self.own.model, joints.make_joints(self._changed(key, value).scene, plain))
 
     def posed(self, key: str, value: float) -> Posed:
         """The problem with another value of a key; nothing is solved but what the preload comes to rest in."""
         file = self._changed(key, value)
         scene, part, plain = file.scene, self.part, self.plain
         if self._scales(key):
-            plain = _scaled(plain, key.rpartition(".")[2], value / keys(self.scene)[key])
+            plain = _scaled(plain, key.rpartition(".")[2], value / self.values[key])
         elif self.follows(key):
             plain = self._followed(key, value)
+            if part is not None and key.startswith(GEOMETRY):
+                part = replace(part, interface=self._interface(part.interface, key, value))
         elif self.anew(key):
             part, plain = self._made(file)
         reduced = self.own.model
         if plain is not self.plain or self._damps(scene, plain):
-            more, like = value / keys(self.scene)[key], self._damped
+            more, like = value / self.values[key], self._damped
             if self._scales(key) and scene.damping.modal is not None and scene.damping.state != "stuck":
                 more, like = more**0.5, _scaled(like, key.rpartition(".")[2], more)  # as all frequencies go
             if key == "damping.modal" or like is not self._damped:  # the same modes
@@ -150,9 +176,9 @@ class Varying:
         if isinstance(scene, MeshScene) and part is not None:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
         if self.follows(key) and np.array_equal(reduced.interface.B, self.own.model.interface.B):
-            reduced = replace(reduced, interface=self.own.model.interface)  # the same coordinates
+            reduced = replace(reduced, interface=replace(reduced.interface, B=self.own.model.interface.B))  # the same
         structural = self.anew(key) or self._scales(key) or self.follows(key)
-        contact = self._contact(scene) if _touches(key) and not structural else self.own.contact
+        contact = self._contact(key, value) if _touches(key) and not structural else self.own.contact
         loads = self.own.excitation if key.startswith("contact") else joints.excite(scene, base)
         return Posed(reduced, contact, loads, self.own.memory)
 
@@ -174,6 +200,8 @@ class Varying:
 
     def follows(self, key: str) -> bool:
         """Whether the reduced matrices follow the full ones, which are linear in it."""
+        if key.startswith(GEOMETRY) and self._settles:  # bolts are as long as their part is thick
+            return False
         return key.startswith(STRUCTURAL) and not self._scales(key) and self._sensitivity is not None
 
     @cached_property
@@ -202,8 +230,14 @@ class Varying:
 
     def _followed(self, key: str, value: float) -> ReducedModel:
         """The reduced model with another value of a key that it follows."""
-        share, following, scene = value / keys(self.scene)[key] - 1, self._sensitivity, self.file.mesh_scene
+        share, following, scene = value / self.values[key] - 1, self._sensitivity, self.file.mesh_scene
         assert following is not None
+        if key.startswith(GEOMETRY):
+            moved = following.moved([(self._way(key), share)])
+            interface = self._interface(moved.interface, key, value)
+            turned = [self._coordinates(one)[1].B for one in self.nodes_moved(key)]
+            turn = share / (2 * NODES) * ((turned[0] - turned[1]) @ following.shapes)
+            return replace(moved, interface=replace(interface, B=interface.B + turn) if turn.any() else interface)
         if key == "material.young" and _loaded_alike(scene):  # all stiffness but that of the springs
             springs = [(self._way(f"springs.{name}.stiffness"), -share) for name in scene.springs]
             return following.moved(springs, share)
@@ -213,10 +247,57 @@ class Varying:
         """What the reduced model moves by where a key is doubled."""
         if key not in self._ways:
             assert self._sensitivity is not None
-            change = self._doubled(key, 2 * keys(self.scene).get(key, 0.0))
-            change = change.projected(self._relative[1]) if self._relative else change
+            if key.startswith(GEOMETRY):
+                up, down = (self._coordinates(one)[0] for one in self.nodes_moved(key))
+                change = _between(up, down, 1 / (2 * NODES))
+            else:
+                change = self._doubled(key, 2 * self.values.get(key, 0.0))
+                change = change.projected(self._relative[1]) if self._relative else change
             self._ways[key] = self._sensitivity.towards(change)
         return self._ways[key]
+
+    def _coordinates(self, part: Part) -> tuple[SecondOrderSystem, ContactInterface]:
+        """System and interface of a part in the coordinates that it is reduced in."""
+        if not self.file.mesh_scene.reduction.relative:
+            return part.system, part.interface
+        return relative(part.system, part.interface)[:2]
+
+    def _reach(self, key: str) -> float:
+        """Share of a length or angle within which its mesh has to stay the same one that moves."""
+        return NODES if self.follows(key) else 8 * NODES
+
+    def nodes_moved(self, key: str) -> tuple[Part, Part]:
+        """The part with its nodes moved to a length or angle above and below.
+
+        Raises  NoDerivative where the mesh or what meets at the contact is another one there, or none
+        """
+        if key not in self._beside:
+            assert self.part is not None
+            value, reach = self.values[key], self._reach(key)
+            try:
+                up, down = (self._part(self._changed(key, value * side)) for side in (1 + reach, 1 - reach))
+            except ValueError as reason:
+                raise NoDerivative(f"beside {key} = {value:g}: {reason}") from None
+            if not _smooth(up, self.part, down):
+                raise NoDerivative(f"beside {key} = {value:g} its mesh or what meets at the contact is another one")
+            self._beside[key] = up, down
+        return self._beside[key]
+
+    @staticmethod
+    def _part(file: SceneFile) -> Part:
+        """The part of another scene, which is not kept."""
+        with TemporaryDirectory() as folder:
+            mesh, node_sets = modelling.make_mesh(file, Path(folder))
+        part = modelling.make_part(file.mesh_scene, mesh, node_sets, file.folder)
+        return modelling.with_surfaces(file, part)[0]
+
+    def _interface(self, own: ContactInterface, key: str, value: float) -> ContactInterface:
+        """An interface with its places, frames, areas and gaps moved to another length or angle."""
+        share = (value / self.values[key] - 1) / (2 * self._reach(key))
+        up, down = (one.interface for one in self.nodes_moved(key))
+        names = ("points", "frames", "area", "gap")
+        moved = {n: getattr(own, n) + share * (getattr(up, n) - getattr(down, n)) for n in names}
+        return replace(own, **moved)
 
     def _doubled(self, key: str, value: float) -> SecondOrderSystem:
         """What the full system moves by where a key is doubled; springs need no assembly."""
@@ -229,16 +310,11 @@ class Varying:
             change = part.restricted(spring.matrix(part.mesh, part.node_sets))
             still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
             return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
-        twice, mesh, node_sets = self._changed(key, value), part.mesh, dict(part.node_sets)
+        twice = self._changed(key, value)
         if scene.material is None:  # its mesh has the materials
-            with TemporaryDirectory() as folder:
-                mesh, node_sets = modelling.make_mesh(twice, Path(folder))
-        new = modelling.make_part(twice.mesh_scene, mesh, node_sets, twice.folder).system
-        moves = {
-            kind: {name: getattr(new, kind)[name] - v for name, v in getattr(own, kind).items()}
-            for kind in ("loads", "outputs")
-        }
-        return SecondOrderSystem(new.mass - own.mass, new.stiffness - own.stiffness, None, **moves)
+            return _between(self._part(twice).system, own)
+        new = modelling.make_part(twice.mesh_scene, part.mesh, dict(part.node_sets), twice.folder)
+        return _between(new.system, own)
 
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""
@@ -263,9 +339,36 @@ def _with(table: Any, path: Sequence[str], value: float) -> Any:
     return {**table, name: new} if inside else table.model_copy(update={name: new})
 
 
+def _between(new: SecondOrderSystem, old: SecondOrderSystem, factor: float = 1.0) -> SecondOrderSystem:
+    """The difference of two systems times a factor."""
+    moves = {
+        kind: {name: factor * (v - getattr(old, kind)[name]) for name, v in getattr(new, kind).items()}
+        for kind in ("loads", "outputs")
+    }
+    return SecondOrderSystem(factor * (new.mass - old.mass), factor * (new.stiffness - old.stiffness), None, **moves)
+
+
+def _smooth(up: Part, own: Part, down: Part) -> bool:
+    """Whether two parts to both sides of one have its mesh and its pairs, and all of it moves evenly."""
+    if any(one.points.shape != own.points.shape or not np.array_equal(one.free, own.free) for one in (up, down)):
+        return False
+    for above, here, below in zip(*map(_shapes, (up, own, down)), strict=True):
+        if not above.shape == here.shape == below.shape:
+            return False
+        if abs(above + below - 2 * here).max() > 0.1 * abs(above - below).max() + 1e-12 * abs(here).max():
+            return False
+    return True
+
+
+def _shapes(part: Part) -> tuple[Any, ...]:
+    """What moves with the nodes of a part."""
+    i = part.interface
+    return part.points, i.area, i.gap, i.frames, i.B, part.system.stiffness
+
+
 def _touches(key: str) -> bool:
     """Whether the law of a contact may see a key."""
-    return key.startswith(("contact", "material")) and not key.endswith(".density")
+    return key.startswith(("contact", "material", *GEOMETRY)) and not key.endswith(".density")
 
 
 def _loaded_alike(scene: MeshScene) -> bool:

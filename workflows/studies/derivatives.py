@@ -28,7 +28,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, pipeline, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.run.varying import STEP, Varying, keys
+from tribodyn.workflows.run.varying import GEOMETRY, STEP, Varying, geometry_keys, keys
 from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import Scene
@@ -195,19 +195,19 @@ def derivatives(
     """
     file, at = read_scene(scene, overrides), None if at is None else to_si(at, "Hz")
     amplitude = None if amplitude is None else to_si(amplitude, "m")
-    known = keys(file.scene)
+    known, moving = keys(file.scene), geometry_keys(file.scene)
     if of == "life":
         if file.scene.wear is None:
             raise SceneError("a life needs [wear] in the scene")
         known |= {key: value for key, (value, *_) in wear_run.law_numbers(file.scene).items()}
-    unknown = [key for key in only if key not in known]
+    unknown = [key for key in only if key not in known | moving]
     if unknown:
-        raise SceneError(f"{unknown[0]} is no number that a response depends on: these are {', '.join(known)}")
+        raise SceneError(f"{unknown[0]} is no number that a response depends on: these are {', '.join(known | moving)}")
     if (amplitude is not None and of != "mode") or (at is not None and of in ("mode", "life")):
         raise SceneError("--amplitude is that of --of mode, and --at a frequency of --of response or fold")
     if of == "mode" and amplitude is None and file.scene.backbone is None:
         raise SceneError("give --amplitude of the mode, or backbone.modal_amplitude in the scene")
-    wanted = {key: value for key, value in known.items() if not only or key in only}
+    wanted = {key: value for key, value in (known | moving).items() if key in (only or known)}
     with limited(file.scene.solver.threads):
         return _of_scene(file, of, amplitude if of == "mode" else at, wanted, reporter(progress))
 
@@ -304,6 +304,8 @@ def _found(
         raise NoDerivative("the response has no fold")
     fits = branch.amplitude(settings.OUTPUT) if at is None else -np.abs(branch.frequency - at)
     near = int(np.argmax(np.where(points, fits, -np.inf)))
+    if at is None and not fold and near in (0, len(branch.omega) - 1):
+        raise NoDerivative(branch.no_peak(settings.OUTPUT))
     x = balance.shaped(branch.contact[near])
     state = balance.evaluate(branch.omega[near] if at is None or fold else 2 * np.pi * at, x)
     if fold:
@@ -312,14 +314,22 @@ def _found(
     return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), options)
 
 
+def _moves(varying: Varying, key: str) -> bool:
+    """Whether a length or angle moves the nodes of a mesh that stays the same."""
+    with suppress(NoDerivative):
+        return bool(varying.nodes_moved(key))
+    return False
+
+
 def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[tuple[str, str], float]:
     """Derivatives of numbers of a finished run, of its first state and its life, by some keys of its scene.
 
     Returns (number, key) -> d number / d key, SI units, as far as these are exact
     """
     scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
-    known, in_wear = keys(scene), {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
+    known, in_wear = varying.values, {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
     own, more = ({key: of[key] for key in wanted if key in of} for of in (known, in_wear))
+    own = {key: value for key, value in own.items() if not key.startswith(GEOMETRY) or _moves(varying, key)}
     joints = varying.model.balance.contact.joints
     gaps = {"contact.gap" if one.name == "contact" else f"contacts.{one.name}.gap": one.rows for one in joints}
     gaps = {key: rows for key, rows in gaps.items() if key in wanted}
