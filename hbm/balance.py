@@ -245,19 +245,19 @@ class HarmonicBalance:
         most = np.pi * self.basis.harmonics[-1] * sizes[0] * sizes[1]
         return np.where((state.cycle.status == STICKS) | (np.abs(work) <= ROUNDING * most), 0.0, work)
 
+    def normal_force(self, state: State) -> np.ndarray:
+        """(n_pair,) static normal force [N]; zero where the law has no normal component."""
+        if "n" not in self.contact.components or not self.basis.has_static:
+            return np.zeros(self.contact.n_pair)
+        return np.asarray(state.cycle.force[:, self.contact.components.index("n"), 0])
+
     def preload(self, state: State) -> float:
-        """Static normal force of the whole contact [N]; zero where the law has no normal component."""
-        components = self.contact.components
-        if "n" not in components or not self.basis.has_static:
-            return 0.0
-        return float(state.cycle.force[:, components.index("n"), 0].sum())
+        """Static normal force of the whole contact [N]."""
+        return float(self.normal_force(state).sum())
 
     def preload_by_joint(self, state: State) -> dict[str, float]:
-        """Static normal force of every joint [N]; zero where its law has no normal component."""
-        if "n" not in self.contact.components or not self.basis.has_static:
-            return {joint.name: 0.0 for joint in self.contact.joints}
-        normal = state.cycle.force[:, self.contact.components.index("n"), 0]
-        return {name: float(force.sum()) for name, force in self.contact.by_joint(normal).items()}
+        """Static normal force of every joint [N]."""
+        return {name: float(force.sum()) for name, force in self.contact.by_joint(self.normal_force(state)).items()}
 
     def history(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Displacement [m] and contact force [N] over one period, both (n_pair, n_component, n_samples)."""

@@ -45,6 +45,9 @@ class Rules:
     # parameters by one step that counts
     corner: float = 1e-2
     seen: float = 1e-3
+    # of a wear law: step of its numbers, and along the gap, where a slope that is another one than by the step of a gap
+    # says that the law counts samples of a force with jumps
+    of_law: float = 1e-3
 
 
 RULES = Rules()

@@ -54,12 +54,11 @@ class OperatingPoint:
 class Correction:
     """How far a solved cycle is from where it is to be taken.
 
-    distance : to the right frequency [rad/s]; dx : d x / d omega (n_pair, n_component, n_coeff) [m s]; solves : spent
+    distance : to the right frequency [rad/s]; solves : spent
     accuracy : that the frequency is wanted with [rad/s]
     """
 
     distance: float
-    dx: np.ndarray
     solves: int
     accuracy: float = 0.0
 
@@ -107,7 +106,7 @@ class AtFrequency:
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the fixed frequency."""
-        return Correction(self.omega - state.omega, np.zeros_like(state.x), 0)
+        return Correction(self.omega - state.omega, 0)
 
 
 @dataclass(frozen=True)
@@ -325,7 +324,7 @@ class AtPeak:
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the peak, by its slope and as though one mode responded."""
         here = Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), self.output)
-        return Correction(here.distance, here.dx, 0, self._resolution(here))
+        return Correction(here.distance, 0, self._resolution(here))
 
     def _resolution(self, here: Slope) -> float:
         """How exactly the frequency of a peak beside a point is wanted [rad/s]."""

@@ -38,19 +38,14 @@ class BesidePeak:
     @single
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """From a neighbouring x at the ratio: back to the peak, refine it, and to the ratio again."""
-        solution, solves = self._walk(balance, omega, omega / self.ratio, x)
-        at_peak = self.peak.next(balance, omega / self.ratio, solution.state.x)
-        found = self._beside(balance, at_peak)
-        return replace(found, solves=found.solves + solves)
+        return self._beside(balance, self.at_peak(balance, omega, x))
 
     @single
     def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> Overtaking:
         """The cycle at the ratio to a peak that has overtaken the tracked one, None where none has."""
-        omega = point.state.omega
-        back, solves = self._walk(balance, omega, omega / self.ratio, point.state.x)
-        tracked = self.peak.next(balance, omega / self.ratio, back.state.x)
+        tracked = self.at_peak(balance, point.state.omega, point.state.x)
         higher = self.peak.overtaken(balance, tracked)
-        spent = solves + tracked.solves + higher.solves
+        spent = tracked.solves + higher.solves
         if higher.point is None:
             return replace(higher, solves=spent)
         found = self._beside(balance, higher.point)
@@ -59,11 +54,16 @@ class BesidePeak:
     @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the ratio times the frequency of the peak, which is found from it."""
-        solution, solves = self._walk(balance, state.omega, state.omega / self.ratio, state.x)
-        at_peak = self.peak.next(balance, state.omega / self.ratio, solution.state.x)
+        at_peak = self.at_peak(balance, state.omega, state.x)
         distance = self.ratio * at_peak.state.omega - state.omega
         accuracy = self.ratio * self.peak.correct(balance, at_peak.state).accuracy
-        return Correction(distance, np.zeros_like(state.x), solves + at_peak.solves, accuracy)
+        return Correction(distance, at_peak.solves, accuracy)
+
+    def at_peak(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """The peak itself, from an x at the ratio to it."""
+        solution, solves = self._walk(balance, omega, omega / self.ratio, x)
+        found = self.peak.next(balance, omega / self.ratio, solution.state.x)
+        return replace(found, solves=found.solves + solves)
 
     def _beside(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
         omega = peak.state.omega

@@ -24,7 +24,6 @@ from tribodyn.hbm.wear.evolution import (
     WearProblem,
     WearState,
     assess,
-    first_at_rest,
     first_preload,
     kept_beside,
     reason_to_stop,
@@ -114,11 +113,9 @@ def evolve(
             state = with_growth(problem, state, always=machine is not None)
         if machine is not None:
             state = machine.of(state, _planned(rows))
-        first = (first_preload(problem, rows, state), first_at_rest(rows, state))
-        reason = reason_to_stop(problem, state, *first, rows, tolerance.share * tolerance.scale)
+        reason = reason_to_stop(problem, state, rows, tolerance.share * tolerance.scale)
         if reason:
-            nothing = np.zeros_like(problem.area)
-            rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, _no_plan(state)))
+            rows.append(row_of(problem, state, plan=_no_plan(state)))
             end = reason
         else:
             taken = _taken(problem, machine, tolerance, state, rows)
@@ -177,8 +174,7 @@ def _taken(
     try:
         return _step_in_time(problem, machine, tolerance, state, rows)
     except IntegrationFailed as failure:
-        nothing = np.zeros_like(problem.area)
-        row = row_of(problem, state, 0.0, nothing, nothing, 0.0, _no_plan(state))
+        row = row_of(problem, state, plan=_no_plan(state))
         return _Taken(row, None, WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
 
 
@@ -424,7 +420,6 @@ def _explicit_step(
     impact and branches are short, the rule continues in such steps.
     problem : that the state is solved in; it is looked for with the harmonics of scans, failing that with fewer
     """
-    nothing = np.zeros_like(problem.area)
     plan = _no_plan(state)
     scans = fewer_harmonics.of_scans(whole)
     fewer = fewer_harmonics.with_fewer(scans)
@@ -445,7 +440,7 @@ def _explicit_step(
                 row = row_of(problem, state, length, worn, length * state.work, 1.0, plan)
                 return _Taken(row, replace(after, solves=0))
             failure = after.failure
-    failed = row_of(problem, state, 0.0, nothing, nothing, 0.0, plan)
+    failed = row_of(problem, state, plan=plan)
     return _Taken(failed, None, failure or WearEnd.NO_STEP.say())
 
 

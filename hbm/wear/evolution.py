@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,6 +15,7 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.sites import Site
 from tribodyn.hbm.newton import lead
 from tribodyn.hbm.outcome import CONVERGED, Outcome, WearEnd
+from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.law import JointWear
@@ -105,16 +106,11 @@ class WearProblem:
 
     def preload_of(self, state: WearState) -> float:
         """Mean normal force of the joints that wear in the first duty of a state [N]."""
-        if state.means is not None:
-            return float(state.means.normal_force[self.pairs].sum())
-        return self.preload(state.points[0].state)
+        return float(self.normal_force(state)[self.pairs].sum())
 
-    def preload(self, state: State) -> float:
-        """Static normal force of the joints that wear [N]."""
-        if len(self.wearing) == len(self.balance.contact.joints):
-            return self.balance.preload(state)
-        preload = self.balance.preload_by_joint(state)
-        return float(sum(preload[name] for name in self.wearing))
+    def normal_force(self, state: WearState) -> np.ndarray:
+        """(n_pair,) mean normal force in the first duty of a state [N]."""
+        return self.balance.normal_force(state.points[0].state) if state.means is None else state.means.normal_force
 
     def in_duty(self, duty: Duty, depth: np.ndarray | None = None) -> HarmonicBalance:
         """The problem of a duty with its loads, worn by a depth (n_pair,) [m]; unworn by default."""
@@ -202,14 +198,27 @@ def worn_state(
     """The wear law applied to solved duties."""
     rate, work = np.zeros_like(depth), np.zeros_like(depth)
     for duty, point in zip(problem.mission, points, strict=True):
-        balance = problem.in_duty(duty, depth)
-        for name, wear in problem.wearing.items():
-            pairs = balance.contact.joint(name).rows
-            of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
-            exposure = wear_law.Exposure(balance, point.state, *of_joint, cycles, name)
-            rate[pairs] += duty.share * wear_law.depth_rate(wear.law, exposure)
-            work[pairs] += duty.share * exposure.energy
+        of_duty = wear_of(problem, problem.in_duty(duty, depth), point.state, depth, cycles)
+        rate, work = rate + duty.share * of_duty[0], work + duty.share * of_duty[1]
     return WearState(depth, cycles, tuple(points), rate, work, solves, problem.pairs)
+
+
+def wear_of(
+    problem: WearProblem,
+    balance: HarmonicBalance,
+    solved: State | Callable[[], State],
+    depth: np.ndarray,
+    cycles: float,
+    motion: PeriodicMotion | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n_pair,) depth [m] and friction work [J] of a cycle of a worn contact, or of a motion in time."""
+    rate, work = np.zeros_like(depth), np.zeros_like(depth)
+    for name, wear in problem.wearing.items():
+        pairs = balance.contact.joint(name).rows
+        of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
+        exposure = wear_law.Exposure(balance, solved, *of_joint, cycles, name, motion)
+        rate[pairs], work[pairs] = wear_law.depth_rate(wear.law, exposure), exposure.energy
+    return rate, work
 
 
 def _neighbour(
@@ -273,26 +282,23 @@ def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.nda
 def reason_to_stop(
     problem: WearProblem,
     state: WearState,
-    first_preload: float,
-    first_at_rest: float = float("nan"),
     rows: Sequence[WearRow] = (),
     step_depth: float = 0.0,
 ) -> Outcome[WearEnd] | None:
     """Why a run ends at a state; None where it continues.
 
-    first_preload, first_at_rest : of the unworn contact, vibrating and at rest [N]
     rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
         more than ENDLESS cycles for it
     """
     if state.failure:
         return state.failure
     share = problem.lost_below_at_rest
-    if share is not None and state.preload_at_rest <= share * first_at_rest:
+    if share is not None and state.preload_at_rest <= share * (rows[0] if rows else state).preload_at_rest:
         return WearEnd.LOST_AT_REST.say(f" {share:.3g} of its first value")
     if state.separated:
         return WearEnd.LOST.say()
     preload = problem.preload_of(state)
-    if preload < problem.lost_below * first_preload:
+    if preload < problem.lost_below * first_preload(problem, rows, state):
         return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value")
     lost = lost_joint(problem, state, rows) if problem.any_joint else None
     if lost is not None:
@@ -312,8 +318,7 @@ def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) 
     """The first joint whose preload has fallen below the share that the problem asks for; None for none."""
     if not rows or "n" not in problem.balance.contact.components or not problem.balance.basis.has_static:
         return None
-    contact, now = problem.balance.contact, state.points[0].state.cycle.force
-    normal = now[:, contact.components.index("n"), 0] if state.means is None else state.means.normal_force
+    contact, normal = problem.balance.contact, problem.normal_force(state)
     size = contact.n_pair // problem.copies
     for name in problem.wearing:
         pairs = contact.joint(name).rows
@@ -329,17 +334,37 @@ def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) 
 def row_of(
     problem: WearProblem,
     state: WearState,
-    cycles_in_step: float,
-    worn: np.ndarray,
-    work: np.ndarray,
+    cycles_in_step: float = 0.0,
+    worn: np.ndarray | float = 0.0,
+    work: np.ndarray | float = 0.0,
     step_error: float = 0.0,
     plan: np.ndarray | None = None,
 ) -> WearRow:
-    """The history row of a state, with what its step wears [m] and dissipates [J]."""
-    balance = problem.in_duty(problem.mission[0], state.depth)
-    taken = (cycles_in_step, worn, work, state.solves, step_error, plan, state.preload_at_rest)
-    preload = problem.preload_of(state)
-    row = replace(WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken), growth=state.growth)
+    """The history row of a state, with what its step wears [m] and dissipates [J]; the first duty is what it shows."""
+    balance, point = problem.in_duty(problem.mission[0], state.depth), state.points[0]
+    solved, shape = point.state, (-1, point.state.x.shape[2])
+    row = WearRow(
+        cycles=state.cycles,
+        cycles_in_step=cycles_in_step,
+        depth=state.depth,
+        worn=np.broadcast_to(worn, state.depth.shape),
+        energy=np.maximum(balance.energy(solved), 0.0),
+        preload=problem.preload_of(state),
+        normal_force=balance.normal_force(solved),
+        status=solved.cycle.status,
+        omega=solved.omega,
+        amplitude=point.amplitude,
+        force=solved.cycle.force.reshape(shape),
+        response=point.response,
+        solves=state.solves,
+        step_error=step_error,
+        plan=np.zeros(0) if plan is None else plan,
+        work=np.broadcast_to(work, state.depth.shape),
+        duty_omega=np.array([p.state.omega for p in state.points]),
+        duty_displacement=np.stack([p.state.x.reshape(shape) for p in state.points]),
+        preload_at_rest=state.preload_at_rest,
+        growth=state.growth,
+    )
     means = state.means
     if means is None:
         return row
@@ -362,8 +387,3 @@ def state_of(problem: WearProblem, row: WearRow) -> WearState:
 def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:
     """Preload of the unworn contact [N]."""
     return rows[0].preload if rows else problem.preload_of(state)
-
-
-def first_at_rest(rows: Sequence[WearRow], state: WearState) -> float:
-    """Preload of the unworn contact at rest [N]; nan where it was not asked for."""
-    return rows[0].preload_at_rest if rows else state.preload_at_rest

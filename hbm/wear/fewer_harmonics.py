@@ -26,7 +26,8 @@ def settled(whole: WearProblem, state: WearState) -> tuple[WearProblem, WearStat
     A state that was solved with fewer harmonics than the problem has carries zeros in the others.
     """
     harmonics = whole.balance.basis.harmonics
-    count = 1 + harmonics.index(_top(whole, state))
+    top = top_harmonic(whole.balance.basis, [point.state.x for point in state.points])
+    count = 1 + harmonics.index(top)
     if count == len(harmonics):
         return whole, state
     problem = _with_harmonics(whole, harmonics[:count])
@@ -97,11 +98,6 @@ def carried(problem: WearProblem, state: WearState) -> WearState:
         points.append(OperatingPoint.of(balance, there, duty.site.output, point.solves))
     made = worn_state(problem, state.depth, state.cycles, points, state.solves)
     return replace(made, preload_at_rest=state.preload_at_rest, lost=state.lost)
-
-
-def _top(problem: WearProblem, state: WearState) -> int:
-    """The highest harmonic that any duty of a state moves in."""
-    return top_harmonic(problem.balance.basis, [point.state.x for point in state.points])
 
 
 def top_harmonic(basis: HarmonicBasis, displacements: Sequence[np.ndarray]) -> int:

@@ -2,49 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import Outcome, WearEnd
 
-if TYPE_CHECKING:
-    from tribodyn.hbm.balance import HarmonicBalance
-    from tribodyn.hbm.continuation.operating_point import OperatingPoint
-
 LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
 LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends
 OF_MOTION = ("spread", "mean_error", "settled", "periods", "moving")  # of a row whose motion was marched in time
 
 
+Number = TypeVar("Number")
+Count = TypeVar("Count")
+
+
 @dataclass(frozen=True)
-class WearRow:
+class _State(Generic[Number, Count]):
+    """What one row, or all rows, of a wear run have; see WearHistory."""
+
+    cycles: Number
+    cycles_in_step: Number
+    depth: np.ndarray
+    worn: np.ndarray
+    energy: np.ndarray
+    preload: Number
+    normal_force: np.ndarray
+    status: np.ndarray
+    omega: Number
+    amplitude: Number
+    force: np.ndarray
+    response: np.ndarray
+    solves: Count
+    step_error: Number
+    plan: np.ndarray
+    work: np.ndarray
+    duty_omega: np.ndarray
+    duty_displacement: np.ndarray
+
+
+@dataclass(frozen=True)
+class WearRow(_State[float, int]):
     """One wear step; the fields are those of WearHistory, without the row axis.
 
     worn : (n_pair,) depth that the step wears after this state [m]
     """
 
-    cycles: float
-    cycles_in_step: float
-    depth: np.ndarray
-    worn: np.ndarray
-    energy: np.ndarray
-    preload: float
-    normal_force: np.ndarray
-    status: np.ndarray
-    omega: float
-    amplitude: float
-    force: np.ndarray
-    response: np.ndarray
-    solves: int
-    step_error: float
-    plan: np.ndarray
-    work: np.ndarray
-    duty_omega: np.ndarray
-    duty_displacement: np.ndarray
     preload_at_rest: float = float("nan")
     growth: float = float("nan")
     spread: float = 0.0
@@ -58,54 +63,9 @@ class WearRow:
         """(n_contact, n_coeff) of the first duty [m]."""
         return self.duty_displacement[0]
 
-    @classmethod
-    def of(
-        cls,
-        balance: HarmonicBalance,
-        points: Sequence[OperatingPoint],
-        depth: np.ndarray,
-        cycles: float,
-        preload: float,
-        cycles_in_step: float,
-        worn: np.ndarray,
-        work: np.ndarray,
-        solves: int,
-        step_error: float = 0.0,
-        plan: np.ndarray | None = None,
-        preload_at_rest: float = float("nan"),
-    ) -> WearRow:
-        """The row of solved operating points, one per duty; the first one is what the row shows."""
-        point = points[0]
-        state = point.state
-        shape = (-1, state.x.shape[2])
-        normal = np.zeros(len(depth))
-        if "n" in balance.contact.components and balance.basis.has_static:
-            normal = state.cycle.force[:, balance.contact.components.index("n"), 0]
-        return cls(
-            cycles=cycles,
-            cycles_in_step=cycles_in_step,
-            depth=depth,
-            worn=worn,
-            energy=np.maximum(balance.energy(state), 0.0),
-            preload=preload,
-            normal_force=normal,
-            status=state.cycle.status,
-            omega=state.omega,
-            amplitude=point.amplitude,
-            force=state.cycle.force.reshape(shape),
-            response=point.response,
-            solves=solves,
-            step_error=step_error,
-            plan=np.zeros(0) if plan is None else plan,
-            work=work,
-            duty_omega=np.array([p.state.omega for p in points]),
-            duty_displacement=np.stack([p.state.x.reshape(shape) for p in points]),
-            preload_at_rest=preload_at_rest,
-        )
-
 
 @dataclass(frozen=True)
-class WearHistory:
+class WearHistory(_State[np.ndarray, np.ndarray]):
     """Evolution of a contact under wear; row i is the state solved at the start of wear step i.
 
     cycles : (n_row,) vibration cycles passed before the row's state
@@ -142,24 +102,6 @@ class WearHistory:
         in the balance
     """
 
-    cycles: np.ndarray
-    cycles_in_step: np.ndarray
-    depth: np.ndarray
-    worn: np.ndarray
-    energy: np.ndarray
-    preload: np.ndarray
-    normal_force: np.ndarray
-    status: np.ndarray
-    omega: np.ndarray
-    amplitude: np.ndarray
-    force: np.ndarray
-    response: np.ndarray
-    solves: np.ndarray
-    step_error: np.ndarray
-    plan: np.ndarray
-    work: np.ndarray
-    duty_omega: np.ndarray
-    duty_displacement: np.ndarray
     end: Outcome[WearEnd]
     preload_at_rest: np.ndarray | None = None
     growth: np.ndarray | None = None
@@ -271,41 +213,20 @@ def history(rows: list[WearRow], end: Outcome[WearEnd]) -> WearHistory:
     return WearHistory(**columns, end=end)
 
 
-@dataclass(frozen=True)
-class WearEvents:
-    """Cycles at which contact changes for good, nan where it has not.
-
-    lifts : (n_pair,) from then on the pair opens in a part of the cycle; lost : (n_pair,) it touches no more
-    """
-
-    lifts: np.ndarray
-    lost: np.ndarray
-
-    @property
-    def first_lift(self) -> float | None:
-        """Cycles until a pair that was closed all the time opens for the first time."""
-        return _first(self.lifts)
-
-    @property
-    def first_loss(self) -> float | None:
-        """Cycles until the first pair loses contact."""
-        return _first(self.lost)
-
-
 def events(
     history: WearHistory, components: tuple[str, ...], gap: np.ndarray, basis: HarmonicBasis
-) -> WearEvents | None:
-    """Locate the events between rows by a straight line through the penetration of each pair.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cycles (n_pair,) from which on a pair opens in a part of the cycle, and touches no more; nan where that is never.
 
+    Located between rows by a straight line through the penetration of each pair; none without a normal component.
     components : of the contact; gap : (n_pair,) of the unworn contact [m]
-    Returns None for a contact without a normal component
     """
     if "n" not in components or not len(history.cycles):
-        return None
+        return np.zeros(0), np.zeros(0)
     normal = history.displacement[:, components.index("n") :: len(components)]  # (n_row, n_pair, n_coeff)
     penetration = basis.to_time(normal) - (gap + history.depth)[..., None]
     deepest, shallowest = penetration.max(axis=-1), penetration.min(axis=-1)
-    return WearEvents(_crossings(history.cycles, shallowest), _crossings(history.cycles, deepest))
+    return _crossings(history.cycles, shallowest), _crossings(history.cycles, deepest)
 
 
 def _crossings(cycles: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -323,6 +244,7 @@ def _crossings(cycles: np.ndarray, value: np.ndarray) -> np.ndarray:
     return found
 
 
-def _first(cycles: np.ndarray) -> float | None:
+def first(cycles: np.ndarray) -> float | None:
+    """The first of some events that was not there from the start."""
     later = cycles[cycles > 0]
     return float(later.min()) if len(later) else None

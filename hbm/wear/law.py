@@ -21,6 +21,7 @@ from tribodyn.found import Kind
 if TYPE_CHECKING:
     from tribodyn.hbm.balance import HarmonicBalance, State
     from tribodyn.hbm.contact.joint import Joint
+    from tribodyn.hbm.time.time_integration import PeriodicMotion
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,8 @@ class Exposure:
     area : (n_pair,) tributary area [m2]; numbers : the law's own by name, each (n_pair,)
     depth : (n_pair,) wear depth so far [m]; cycles : vibration cycles so far
     on : name of the joint, the first one by default
+    motion : in time, of which this is one period and `state` its part in the balance's harmonics; None for a cycle of
+        the balance
     """
 
     balance: HarmonicBalance
@@ -62,6 +65,7 @@ class Exposure:
     depth: np.ndarray
     cycles: float
     on: str = ""
+    motion: PeriodicMotion | None = None
 
     @cached_property
     def state(self) -> State:
@@ -82,17 +86,21 @@ class Exposure:
     @cached_property
     def energy(self) -> np.ndarray:
         """(n_pair,) friction work over the cycle, both tangential directions [J]; rounding below zero is cut off."""
-        return np.maximum(self.balance.energy(self.state)[self.joint.rows], 0.0)
+        energy = self.balance.energy(self.state) if self.motion is None else self.motion.energy
+        return np.maximum(energy[self.joint.rows], 0.0)
 
     @property
     def status(self) -> np.ndarray:
         """(n_pair,) bits of what happened in the cycle, see `hbm.contact.law`."""
-        return self.state.cycle.status[self.joint.rows]
+        return (self.state.cycle if self.motion is None else self.motion).status[self.joint.rows]
 
     @cached_property
     def history(self) -> tuple[np.ndarray, np.ndarray]:
         """Displacement [m] and contact force [N] over the cycle, both (n_pair, n_component, n_samples)."""
-        balance = self.balance
+        balance, motion = self.balance, self.motion
+        if motion is not None:
+            at = np.ix_(self.joint.rows, balance.contact.columns(self.joint))
+            return motion.x[at], motion.force[at]
         return balance.contact.history_of(self.joint, self.state.x, balance.basis, balance.memory)
 
     @cached_property

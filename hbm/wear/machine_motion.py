@@ -25,8 +25,7 @@ from tribodyn.hbm.time import wave_in_time
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import PeriodicMotion
-from tribodyn.hbm.wear import law as wear_law
-from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
+from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState, wear_of
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.hbm.wear.step_control import Tolerance, expected
 
@@ -57,29 +56,6 @@ class MotionRules:
 RULES = MotionRules()
 
 
-@dataclass(frozen=True, kw_only=True)
-class MotionExposure(wear_law.Exposure):
-    """One period of a motion in time as a wear law sees it; `state` is the part of it in the balance's harmonics."""
-
-    motion: PeriodicMotion
-
-    @cached_property
-    def energy(self) -> np.ndarray:
-        """(n_pair,) friction work over the period [J]."""
-        return np.maximum(self.motion.energy[self.joint.rows], 0.0)
-
-    @property
-    def status(self) -> np.ndarray:
-        """(n_pair,) bits of what happened in the period."""
-        return self.motion.status[self.joint.rows]
-
-    @cached_property
-    def history(self) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement [m] and contact force [N], both (n_pair, n_component, n_step)."""
-        at = np.ix_(self.joint.rows, self.balance.contact.columns(self.joint))
-        return self.motion.x[at], self.motion.force[at]
-
-
 class MachineMotion:
     """The motions of all duties, each followed while the contact wears and the balance's own motion is left.
 
@@ -102,7 +78,25 @@ class MachineMotion:
 
     @cached_property
     def _stiffness(self) -> np.ndarray:
-        return static_stiffness(self._problem.balance)
+        """(n_pair, n_pair) static normal forces that fall when gaps open, with every pair closed and stuck [N/m].
+
+        Zero where the contact has no normal component or the balance no harmonic 0
+        """
+        balance = self._problem.balance
+        contact, basis = balance.contact, balance.basis
+        found = np.zeros((contact.n_pair, contact.n_pair))
+        if "n" not in contact.components or not basis.has_static:
+            return found
+        width = len(contact.components)
+        rows = contact.components.index("n") + width * np.arange(contact.n_pair)
+        k = balance.reference_stiffness
+        point = balance.at(balance.omega_max)
+        for i, row in enumerate(rows):
+            pull = np.zeros((len(k), basis.n_coeff))
+            pull[row, 0] = k[row]
+            found[:, i] = -k[rows] * point.apply(pull)[rows, 0]
+            found[i, i] += k[row]
+        return found
 
     def take_up(self, row: WearRow) -> None:
         """What moved when the row of an interrupted run was come to."""
@@ -178,10 +172,8 @@ class MachineMotion:
 
             found.append(follower.mean(balance, point.state.omega, wears, asked))
         shares = [duty.share for duty in problem.mission]
-        rate, work = (
-            np.sum([s * part for s, part in zip(shares, parts, strict=True)], axis=0)
-            for parts in ([m.seen for m in found], [m.energy for m in found])
-        )
+        rate = np.sum([s * m.seen for s, m in zip(shares, found, strict=True)], axis=0)
+        work = np.sum([s * m.energy for s, m in zip(shares, found, strict=True)], axis=0)
         works = np.array([s * float(m.energy.sum()) for s, m in zip(shares, found, strict=True)])
         weight = works / works.sum() if works.sum() > 0 else works
         first = found[0]
@@ -268,31 +260,4 @@ def _depth_rate(
     def state() -> State:
         return balance.evaluate(motion.omega, motion.coefficients(motion.x, balance.basis), jacobian=False)
 
-    rate = np.zeros_like(depth)
-    for name, wear in problem.wearing.items():
-        pairs = balance.contact.joint(name).rows
-        of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
-        exposure = MotionExposure(balance, state, *of_joint, cycles, name, motion=motion)
-        rate[pairs] = wear_law.depth_rate(wear.law, exposure)
-    return rate
-
-
-def static_stiffness(balance: HarmonicBalance) -> np.ndarray:
-    """(n_pair, n_pair) static normal forces that fall when gaps open, with every pair closed and stuck [N/m].
-
-    Zero where the contact has no normal component or the balance no harmonic 0
-    """
-    contact, basis = balance.contact, balance.basis
-    found = np.zeros((contact.n_pair, contact.n_pair))
-    if "n" not in contact.components or not basis.has_static:
-        return found
-    width = len(contact.components)
-    rows = contact.components.index("n") + width * np.arange(contact.n_pair)
-    k = balance.reference_stiffness
-    point = balance.at(balance.omega_max)
-    for i, row in enumerate(rows):
-        pull = np.zeros((len(k), basis.n_coeff))
-        pull[row, 0] = k[row]
-        found[:, i] = -k[rows] * point.apply(pull)[rows, 0]
-        found[i, i] += k[row]
-    return found
+    return wear_of(problem, balance, state, depth, cycles, motion)[0]

@@ -1,17 +1,20 @@
 """Derivatives of a life by any parameter: the tangent of the wear steps that a run took.
 
-Every stage of a step ends at a depth h = b + s r(x, h, p), b the depth before it and s its cycles, with x in balance at
-its place. Pairs wear by their own work E, r = c E, so that dh is eliminated pair by pair, and one factor of
+Every stage of a step ends at a depth h = b + s r(x, h, p), b the depth before it and s its cycles, with the x of every
+duty of the mission in balance at its place. A pair wears by its own cycles alone, so that dh is eliminated pair by
+pair, and one factor of
 
-    d x - G (k d x - d f) = x_p + R_w d w,    d f = f_x d x + f_p - f_n d h,    d h = d b + s (c_p E + c d E)
+    d x - G (k d x - d f) = x_p + R_w d w,    d f = f_x d x + f_p - f_n d h,    d h = d b + s (r_x d x + r_h d h + r_p)
 
-serves all parameters: dh/dp goes on from step to step, of as many directions as there are parameters. The frequency of
-a peak moves with p and h, dw = w_p dp + w_h dh, see `hbm.derivatives`. The life Z ends where N(h(Z), p) is a share of
+serves all parameters: dh/dp goes on from step to step, of as many directions as there are parameters. The slopes of
+the rate r are differences of the wear law itself, pair by pair, whatever it asks of a cycle. The frequency of a peak
+moves with p and h, dw = w_p dp + w_h dh, see `hbm.derivatives`. The life Z ends where N(h(Z), p) is a share of
 the first preload. Its steps keep their shares of it, so that all cycles times c act as all wear coefficients would:
 
     d ln Z / dp = (N0_p / N0 - N_p / N) / (N_c / N)
 
-A jump to another resonance, a motion in time, or a step over the end of a branch has no derivative.
+A jump to another resonance, a motion in time, a step over the end of a branch, or a wear law whose rate jumps as a pair
+begins to lift has no derivative.
 Source  ours; of the step Alexander 1977, see dirk_stages
 """
 
@@ -19,23 +22,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.hbm.balance import HarmonicBalance, Linearisation
+from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.derivatives import RULES as EXACT, Derivatives, peak_moves
-from tribodyn.hbm.gradient import Change, Gradient, NoDerivative, Posed
+from tribodyn.hbm.gradient import RULES as GRADIENT, Change, Gradient, NoDerivative, Posed
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.dirk_stages import GAMMA, Search, begun, depth_per_work, first_stage
-from tribodyn.hbm.wear.evolution import WearProblem, WearState, assess, state_of
+from tribodyn.hbm.wear.evolution import Duty, WearProblem, WearState, assess, state_of, wear_of
 from tribodyn.hbm.wear.fewer_harmonics import top_harmonic
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, cycles_to_preload
-from tribodyn.hbm.wear.implicit_stage import work_slope
+from tribodyn.hbm.wear.implicit_stage import WearingBalance, work_slope
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 
 
@@ -44,12 +48,12 @@ def of_life(
     problem: WearProblem,
     worn: WearHistory,
     changes: Iterable[Change],
-    coefficients: Mapping[str, tuple[float, Sequence[str]]],
+    numbers: Mapping[str, tuple[str, Sequence[str]]],
     share: float = LIFE_SHARE,
 ) -> Derivatives:
     """Derivatives of life [cycles], and of largest depth [m] and worn volume [m3] at its end.
 
-    worn : a run of the problem; coefficients : name -> wear coefficient and the joints that wear by it
+    worn : a run of the problem; numbers : name -> a wear law's own number, such as coefficient, and joints that have it
     share : of the first preload, where the life ends. The gaps of a joint open together: each pair has the same part
     Raises  NoDerivative where there is no life, or no derivative along it
     """
@@ -64,19 +68,16 @@ def of_life(
     rows = worn.rows()[: end + 1]
     _check(problem, rows)
     changes = tuple(changes)  # all at once: each state asks for all of them
-    joints, columns = problem.balance.contact.joints, [*coefficients.values(), (1.0, tuple(problem.wearing))]
-    last, n = len(changes) + len(coefficients), len(changes) + len(columns) + len(joints)
+    joints, by_law = problem.balance.contact.joints, _by_numbers(problem, numbers)
+    last, n = len(changes) + len(by_law), len(changes) + len(by_law) + 1 + len(joints)
     area, spread = problem.area, np.zeros((len(problem.area), n))
     for i, change in enumerate(changes):  # lengths move the areas that wear
         up, down = (one.model.interface.area for one in (change.above, change.below))
         spread[:, i] = (up - down) / (2 * change.step)
-    grows, opens = -spread / area[:, None], np.zeros((len(area), n))
-    for i, (value, names) in enumerate(columns, len(changes)):  # the last of them: all steps, by all joints
-        for name in names:
-            grows[problem.balance.contact.joint(name).rows, i] = 1 / value
+    opens = np.zeros((len(area), n))
     for i, joint in enumerate(joints, last + 1):
         opens[joint.rows, i] = 1.0
-    tangent, depth = _Tangent(problem, changes, grows, opens), np.zeros_like(opens)
+    tangent, depth = _Tangent(problem, changes, by_law, opens), np.zeros_like(opens)
     after = first = state_of(problem, rows[0])
     for i, row in enumerate(rows[:-1]):
         before, after = after, state_of(problem, rows[i + 1])
@@ -87,7 +88,7 @@ def of_life(
         rests = assess(quiet, first.depth, 0.0, None)
         tangent, ends = replace(tangent, problem=quiet), [rests, assess(quiet, after.depth, 0.0, rests)]
     had, left = (
-        tangent.moved(state, base, 0.0).preload / problem.preload_of(state)
+        tangent.moved(state, base, 0.0)[2] / problem.preload_of(state)
         for state, base in zip(ends, (np.zeros_like(depth), depth), strict=True)
     )
     longer = (had - left) / left[last]
@@ -98,52 +99,42 @@ def of_life(
         by_gap[:, joint.rows] = slopes[:, i, None] / len(joint.rows)
     by, values = slopes[:, :last], np.array([life, after.depth[deepest], area @ after.depth])
     return Derivatives(
-        ("life", "depth", "volume"), values, (*(change.name for change in changes), *coefficients), by,
+        ("life", "depth", "volume"), values, (*(change.name for change in changes), *numbers), by,
         np.full(last, bool(tangent.corners)), by, by, np.zeros(3), by_gap, first.points[0].state,
     )  # fmt: skip
 
 
 def _check(problem: WearProblem, rows: Sequence[WearRow]) -> None:
     """Raise NoDerivative where there is none along the rows of a run."""
-    basis, (duty, *more) = problem.balance.basis, problem.mission
-    laws = sorted({wear.law for wear in problem.wearing.values()} - {"energy"})
-    if laws:
-        raise NoDerivative(f"the depth by wear law {laws[0]} does not go with the friction work alone")
-    if more or duty.balance is not None or isinstance(duty.site, BesidePeak) or problem.any_joint:
-        raise NoDerivative("cycles at several places, beside a peak, or until any joint is lost")
+    basis = problem.balance.basis
+    if problem.any_joint or any(duty.balance is not None for duty in problem.mission):
+        raise NoDerivative("cycles at several speeds, or until any joint is lost")
     for row, following in pairwise(rows):
-        where, moved = f"at {following.cycles:.4g} cycles", following.omega / row.omega - 1
+        where, moved = f"at {following.cycles:.4g} cycles", following.duty_omega / row.duty_omega - 1
         if row.periods:
             raise NoDerivative(f"at {row.cycles:.4g} cycles the motion is followed in time")
-        if abs(moved) > LARGEST_SHIFT:
-            jump = f"from {row.omega / (2 * np.pi):.5g} to {following.omega / (2 * np.pi):.5g} Hz"
+        if np.abs(moved).max() > LARGEST_SHIFT:
+            i = int(np.abs(moved).argmax())
+            jump = f"from {row.duty_omega[i] / (2 * np.pi):.5g} to {following.duty_omega[i] / (2 * np.pi):.5g} Hz"
             raise NoDerivative(f"{where} the response jumps {jump}")
         if len(row.plan) and not row.plan[0] > 0:
             raise NoDerivative(f"{where} the run stepped over the end of a branch of solutions, or to another peak")
-        if top_harmonic(basis, [following.displacement]) < basis.harmonics[-1]:
+        if top_harmonic(basis, list(following.duty_displacement)) < basis.harmonics[-1]:
             raise NoDerivative(f"{where} no motion with all harmonics follows")
-
-
-@dataclass(frozen=True)
-class _Moved:
-    """Derivatives of a state: depth (n_pair, n), depth per cycle (n_pair, n), and preload of the joints that wear."""
-
-    depth: np.ndarray
-    rate: np.ndarray
-    preload: np.ndarray
 
 
 @dataclass(frozen=True)
 class _Tangent:
     """The columns of a tangent, the changes first.
 
-    grows : (n_pair, n) d ln depth per work; opens : (n_pair, n) d gap besides the wear
+    by_law : the problem a step above and a step below each number of a wear law, and the step; one column follows, of
+        all steps longer together; opens : (n_pair, n) d gap besides the wear
     corners : cycles of the states where a pair is at a corner of its force, and the tangent that of one side
     """
 
     problem: WearProblem
     changes: tuple[Change, ...]
-    grows: np.ndarray
+    by_law: tuple[tuple[WearProblem, WearProblem, float], ...]
     opens: np.ndarray
     corners: list[float] = field(default_factory=list)
 
@@ -151,75 +142,206 @@ class _Tangent:
         self, row: WearRow, past: Sequence[WearRow], before: WearState, after: WearState, depth: np.ndarray
     ) -> np.ndarray:
         """Derivatives of the depth (n_pair, n) behind a step from those before it; past : the rows before."""
+        self._check_status(before, after)
         stride = row.cycles_in_step
         if not len(row.plan):  # of the thesis's rule
-            return depth + stride * self.moved(before, depth, 0.0).rate
-        reach, middle = GAMMA * stride, self._between(row, past, before)
+            return depth + stride * self.moved(before, depth, 0.0)[1]
+        drift, slopes = begun(self.problem, before, past, self.problem)  # the first stage again, as the run came to it
+        searches = [Search(float(slope)) for slope in slopes]
+        reach, middle = GAMMA * stride, first_stage(self.problem, before, stride, drift, searches)
         rate = (row.worn / stride - GAMMA * after.rate) / (1 - GAMMA)
         if middle.failure or np.abs(middle.rate - rate).max() > 1e-2 * rate.max():
             raise NoDerivative(f"at {middle.cycles:.4g} cycles the response passes to another motion within a step")
-        between = self.moved(middle, depth, reach).depth
-        return self.moved(after, depth + (1 - GAMMA) / GAMMA * (between - depth), reach).depth
+        between = self.moved(middle, depth, reach)[0]
+        return self.moved(after, depth + (1 - GAMMA) / GAMMA * (between - depth), reach)[0]
 
-    def _between(self, row: WearRow, past: Sequence[WearRow], before: WearState) -> WearState:
-        """The first stage of a step again, as the run came to it."""
-        drift, slopes = begun(self.problem, before, past, self.problem)
-        searches = [Search(float(slope)) for slope in slopes]
-        return first_stage(self.problem, before, row.cycles_in_step, drift, searches)
+    def _check_status(self, before: WearState, after: WearState) -> None:
+        """Raise NoDerivative where a wear law jumps with what a pair does, as one of impacts where it lifts."""
+        problem = self.problem
+        for duty, old, new in zip(problem.mission, before.points, after.points, strict=True):
+            balance, there = problem.in_duty(duty, after.depth), new.state
+            status = replace(there, cycle=replace(there.cycle, status=old.state.cycle.status))
+            rate, other = (wear_of(problem, balance, s, after.depth, after.cycles)[0] for s in (there, status))
+            if np.abs(other - rate).max() > EXACT.corner * np.abs(rate).max():
+                raise NoDerivative(f"before {after.cycles:.4g} cycles a wear law jumps as a pair lifts, slips or stops")
 
-    def moved(self, state: WearState, base: np.ndarray, stretch: float) -> _Moved:
-        """Derivatives of a state whose depth is `base` + stretch * rate, base (n_pair, n) by its columns."""
-        problem, solved, (duty,) = self.problem, state.points[0].state, self.problem.mission
-        balance = problem.in_duty(duty, state.depth)
-        changes = [_worn(change, problem.balance, balance) for change in self.changes]
-        jac, (n_pair, _, n_coeff), size = solved.cycle.jacobian, solved.x.shape, solved.x.size
+    def moved(self, state: WearState, base: np.ndarray, stretch: float) -> tuple[np.ndarray, ...]:
+        """Derivatives of a state whose depth is `base` + stretch * rate, base (n_pair, n) by its columns.
+
+        Returns those of depth [m], depth per cycle, both (n_pair, n), and preload of the joints that wear (n,)
+        """
+        problem, n, n_change = self.problem, base.shape[1], len(self.changes)
+        cycles = [_Cycle(self, duty, at.state, state) for duty, at in zip(problem.mission, state.points, strict=True)]
+        force, x, along, *rates = zip(*(cycle.slopes(n) for cycle in cycles), strict=True)
+        force, x, along = (np.concatenate(part, axis=1) for part in (force, x, along))
+        rate, by_gap, by_depth = (np.sum(part, axis=0) for part in rates)
+        rate = rate + by_gap[:, None] * self.opens
+        rate[:, n_change + len(self.by_law)] += state.rate
+        slope = stretch * along / (1 - stretch * by_depth)[:, None]
+        depth = (base + stretch * rate) / (1 - stretch * by_depth)[:, None]
+        duties = [problem.in_duty(duty) for duty in problem.mission]
+        given = (state.depth, 0.0, np.zeros_like(state.depth), state.depth)
+        stage = WearingBalance(duties, [duty.share for duty in problem.mission], *given)
+        omegas = tuple(cycle.solved.omega for cycle in cycles)
+        solved, side = stage.evaluate(omegas, np.concatenate([c.solved.x for c in cycles], axis=1)), stage.at(omegas)
+        jac, n_coeff, components = solved.cycle.jacobian, solved.x.shape[2], problem.balance.contact.components
+        normal = components.index("n") * n_coeff
         assert jac is not None
-        normal = balance.contact.components.index("n") * n_coeff
-        gap, along = -jac[:, :, normal], work_slope(balance, solved.x, solved.cycle)
-        force, x = np.zeros((*gap.shape, base.shape[1])), np.zeros((size, base.shape[1]))
-        gradient = Gradient(balance, solved, ())
-        above, below = gradient.of_gap()
-        if 2 * np.abs(above - below).max() > EXACT.corner * np.abs(above + below).max():
-            self.corners.append(state.cycles)
-        for i, change in enumerate(changes):
-            mean = np.mean(gradient.effects(change), axis=0)
-            force[..., i], x[:, i] = mean[:size].reshape(gap.shape), mean[size : 2 * size]
-        by_work, falls = depth_per_work(problem, state)[:, None], -_work(balance, gap[..., None], solved.x)
-        grows = by_work * state.work[:, None] * self.grows
-        at_x = _work(balance, force, solved.x) - falls * self.opens  # friction work at fixed x and depth
-        bend = 1 + stretch * by_work * falls
-        depth = (base + stretch * (grows + by_work * at_x)) / bend
-        slope = stretch * by_work / bend * along
-        point, opened = balance.at(solved.omega), force + gap[..., None] * (depth + self.opens)[:, None]
-        cycle = replace(solved.cycle, jacobian=jac + gap[:, :, None] * slope[:, None, :])
+        gap = -jac[:, :, normal :: len(components) * n_coeff].sum(axis=2)
+        opened = force + gap[..., None] * (depth + self.opens)[:, None]
         right = [
-            own.reshape(-1, n_coeff) - point.apply(f.reshape(-1, n_coeff))
-            for own, f in zip(x.T, np.moveaxis(opened, 2, 0), strict=True)
+            own.reshape(-1, n_coeff) - side.apply(f.reshape(-1, n_coeff))
+            for own, f in zip(np.moveaxis(x, 2, 0), np.moveaxis(opened, 2, 0), strict=True)
         ]
-        right.append(-balance.frequency_slope(solved)[0])
-        solution = _solved(Linearisation(point, balance.reference_stiffness, solved.x, cycle), right)
-        dx, by_omega = np.split(solution.reshape(n_pair, -1, len(right)), [-1], axis=2)
+        moving = [cycle for cycle in cycles if not isinstance(cycle.duty.site, AtFrequency)]
+        right += [side.join([(c is m) * -c.balance.frequency_slope(c.solved)[0] for c in cycles]) for m in moving]
+        wearing = replace(solved.cycle, jacobian=jac + gap[:, :, None] * slope[:, None, :])
+        columns = _solved(stage.linearise(replace(solved, cycle=wearing)), right)
+        dx, by_omega = np.split(columns.reshape(*gap.shape, -1), [n], axis=2)
         depth = depth + np.einsum("pc,pcn->pn", slope, dx)
-        if not isinstance(duty.site, AtFrequency):
-            try:
-                moves = peak_moves(balance, solved, duty.site.output, changes, duty.site.newton)
-            except NoDerivative as reason:
-                raise NoDerivative(f"at {state.cycles:.4g} cycles {reason}") from None
-            by_gap, turn = moves[len(changes) :], np.einsum("pc,pcn->pn", slope, by_omega)
-            omega = by_gap @ (depth + self.opens)
-            omega[: len(changes)] += moves[: len(changes)]
-            omega /= 1 - by_gap @ turn
-            depth, dx = depth + turn * omega, dx + by_omega * omega
-        moved = force + np.einsum("pcd,pdn->pcn", jac, dx) + gap[..., None] * (depth + self.opens)[:, None]
-        rate = grows + by_work * (at_x - falls * depth + np.einsum("pc,pcn->pn", along, dx))
-        return _Moved(depth, rate, moved[problem.pairs, normal].sum(axis=0))
+        if moving:
+            moves = np.stack([cycle.moves() for cycle in moving])
+            by_pair, turn = moves[:, n_change:], np.einsum("pc,pcn->pn", slope, by_omega)
+            omega = by_pair @ (depth + self.opens)
+            omega[:, :n_change] += moves[:, :n_change]
+            omega = np.linalg.solve(np.eye(len(moving)) - by_pair @ turn, omega)
+            depth, dx = depth + turn @ omega, dx + by_omega @ omega
+        moved = force + jac @ dx + gap[..., None] * (depth + self.opens)[:, None]
+        rate = rate + by_depth[:, None] * depth + np.einsum("pc,pcn->pn", along, dx)
+        return depth, rate, moved[problem.pairs, normal].sum(axis=0)
 
 
-def _work(balance: HarmonicBalance, force: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(n_pair, n) friction work along x of n forces (n_pair, n_component * n_coeff, n) [J]."""
-    forces = np.moveaxis(force, 2, 1).reshape(len(x), -1, *x.shape[1:])
-    works = balance.basis.work_per_cycle(forces, x[:, None])
-    return np.asarray(works[:, :, balance.contact.tangential].sum(axis=2))
+@dataclass(frozen=True)
+class _Cycle:
+    """The cycle of one duty at a state of the wear, and the slopes of its forces and of the depth that it wears."""
+
+    tangent: _Tangent
+    duty: Duty
+    solved: State
+    state: WearState
+
+    @cached_property
+    def balance(self) -> HarmonicBalance:
+        """Worn."""
+        return self.tangent.problem.in_duty(self.duty, self.state.depth)
+
+    @cached_property
+    def changes(self) -> list[Change]:
+        """Of the worn contact."""
+        return [_worn(change, self.tangent.problem.balance, self.balance) for change in self.tangent.changes]
+
+    def slopes(self, n: int) -> tuple[np.ndarray, ...]:
+        """Changes of force and x (n_pair, n_component * n_coeff, n) at the same x and forces by n columns, d rate / d x
+        (n_pair, n_component * n_coeff), d rate (n_pair, n), and d rate (n_pair,) by gap and by depth."""
+        gradient, problem = Gradient(self.balance, self.solved, ()), self.tangent.problem
+        above, below = gradient.of_gap()
+        both, by_work = [(2 * (above - below), above + below)], {w.law for w in problem.wearing.values()} == {"energy"}
+        if by_work:  # in closed form by x and gap, which is faster; at a corner both are of the same side
+            solved, basis, contact = self.solved, self.balance.basis, self.balance.contact
+            gain = self.duty.share * depth_per_work(problem, self.state)
+            along = gain[:, None] * work_slope(self.balance, solved.x, solved.cycle)
+            assert solved.cycle.jacobian is not None
+            column = -solved.cycle.jacobian[:, :, contact.components.index("n") * basis.n_coeff]
+            work = basis.work_per_cycle(column.reshape(solved.x.shape), solved.x)[:, contact.tangential]
+            by_gap = by_depth = gain * work.sum(axis=1)
+        else:
+            by_gap, by_depth = self._by_depth(0.0), self._by_depth(1.0)
+            both.append((self._by_depth(0.0, EXACT.of_law) - by_gap, by_gap))
+            along = self._by_x()
+        if any(np.abs(differ).max() > EXACT.corner * np.abs(size).max() for differ, size in both):
+            self.tangent.corners.append(self.state.cycles)
+        force, x, rate = (np.zeros((*shape, n)) for shape in (along.shape, along.shape, (len(along),)))
+        for i, change in enumerate(self.changes):
+            effect = np.mean(gradient.effects(change), axis=0)
+            force[..., i], x[..., i] = effect[: 2 * along.size].reshape(2, *along.shape)
+            rate[:, i] = self._by(change)
+        for i, (up, down, step) in enumerate(self.tangent.by_law, len(self.changes)):
+            rate[:, i] = (self._rate(problem=up) - self._rate(problem=down)) / (2 * step)
+        later = EXACT.of_law * self.state.cycles  # steps that are longer begin later, too
+        aged = (self._rate(later=later) - self._rate(later=-later)) / (2 * EXACT.of_law)
+        rate[:, len(self.changes) + len(self.tangent.by_law)] = aged
+        return force, x, along, rate, by_gap, by_depth
+
+    def _rate(
+        self,
+        balance: HarmonicBalance | None = None,
+        x: np.ndarray | None = None,
+        problem: WearProblem | None = None,
+        deeper: np.ndarray | float = 0.0,
+        later: float = 0.0,
+    ) -> np.ndarray:
+        """(n_pair,) share of the duty in the depth per cycle [m], with something changed."""
+        there, x = balance or self.balance, self.solved.x if x is None else x
+        state = replace(self.solved, x=x, cycle=there.contact.cycle(x, there.basis, there.memory, jacobian=False))
+        depth, cycles = self.state.depth + deeper, self.state.cycles + later
+        return self.duty.share * wear_of(problem or self.tangent.problem, there, state, depth, cycles)[0]
+
+    def _by(self, change: Change) -> np.ndarray:
+        """(n_pair,) d rate by a parameter, at the same x."""
+        own, sides, problem = self.balance, (change.above, change.below), self.tangent.problem
+        found = np.zeros(len(self.solved.x))
+        if any(
+            one.contact is not own.contact or one.memory is not own.memory or one.model is not own.model
+            for one in sides
+        ):
+            up, down = (
+                self._rate(
+                    replace(own, contact=one.contact, memory=one.memory),
+                    problem=replace(problem, area=problem.area + one.model.interface.area - own.model.interface.area),
+                )
+                for one in sides
+            )
+            found = (up - down) / (2 * change.step)
+        return found if change.touching is None else found + self._by(change.touching)
+
+    def _by_depth(self, worn: float, reach: float = GRADIENT.of_gap) -> np.ndarray:
+        """(n_pair,) d rate by the gap at the same x, which a depth opens that a law may ask for (worn = 1)."""
+        own, gap, step = self.balance, self.balance.contact.gap, reach * self._size
+        up, down = (self._rate(own.with_gap(gap + s), deeper=worn * s) for s in (step, -step))
+        return (up - down) / (2 * step)
+
+    def _by_x(self) -> np.ndarray:
+        """(n_pair, n_component * n_coeff) d rate of each pair by its own x, one coefficient of all pairs at a time."""
+        x, step = self.solved.x, GRADIENT.of_gap * self._size
+        moves = (step[:, None, None] * unit for unit in np.eye(x[0].size).reshape(-1, *x[0].shape))
+        return np.stack([(self._rate(x=x + d) - self._rate(x=x - d)) / (2 * step) for d in moves], axis=1)
+
+    @property
+    def _size(self) -> np.ndarray:
+        """(n_pair,) largest displacement [m]."""
+        return np.asarray(np.abs(self.solved.x).max(axis=(1, 2), initial=1e-12))
+
+    def moves(self) -> np.ndarray:
+        """(n_change + n_pair,) d omega of a place that moves with a peak, see `peak_moves`."""
+        site, balance, state, ratio = self.duty.site, self.balance, self.solved, 1.0
+        if isinstance(site, BesidePeak):
+            ratio, state = site.ratio, site.at_peak(balance, state.omega, state.x).state
+        try:
+            return ratio * peak_moves(balance, state, site.output, self.changes, site.newton)
+        except NoDerivative as reason:
+            raise NoDerivative(f"at {self.state.cycles:.4g} cycles {reason}") from None
+
+
+def _by_numbers(
+    problem: WearProblem, numbers: Mapping[str, tuple[str, Sequence[str]]]
+) -> tuple[tuple[WearProblem, WearProblem, float], ...]:
+    """The problem a step above and a step below each number of the joints' wear laws."""
+
+    found = []
+    for name, joints in numbers.values():
+        value = problem.wearing[joints[0]].numbers[name]
+        step = EXACT.of_law * float(np.max(value))
+        laws = [
+            {
+                of: replace(law, numbers={**law.numbers, name: value + s})
+                for of, law in problem.wearing.items()
+                if of in joints
+            }
+            for s in (step, -step)
+        ]
+        up, down = (replace(problem, wear={**problem.wearing, **changed}) for changed in laws)
+        found.append((up, down, step))
+    return tuple(found)
 
 
 def _worn(change: Change, unworn: HarmonicBalance, balance: HarmonicBalance) -> Change:

@@ -14,8 +14,6 @@ from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.evolution import (
     WearProblem,
     assess,
-    first_at_rest,
-    first_preload,
     reason_to_stop,
     row_of,
     state_of,
@@ -49,8 +47,7 @@ def evolve(
     end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps:
         state = at_rest.of(assess(problem, depth, cycles, before))
-        first = (first_preload(problem, rows, state), first_at_rest(rows, state))
-        reason = reason_to_stop(problem, state, *first, rows, step_depth)
+        reason = reason_to_stop(problem, state, rows, step_depth)
         whole = 0.0 if reason else max(1.0, float(np.floor(step_depth / state.rate.max())))  # eq. 3.30
         rows.append(row_of(problem, state, whole, whole * state.rate, whole * state.work))
         if on_row is not None:

@@ -27,7 +27,7 @@ from tribodyn.hbm.wear import error_controlled_rule, evolution, law as wear_law
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.machine_motion import MotionExposure, left_aside
+from tribodyn.hbm.wear.machine_motion import left_aside
 from tribodyn.hbm.wear.step_control import Tolerance, step_error
 
 LEFT = 0.5  # share of the preload
@@ -132,8 +132,9 @@ def test_a_law_by_slip_path_sees_a_motion_as_it_sees_a_balance(problem: WearProb
     motion = time_integration.integrate(balance, 420.0, state, Options(256))
     archard = JointWear.of("archard", coefficient=1e-9)
     rates = []
-    for exposure, own in ((wear_law.Exposure, {}), (MotionExposure, {"motion": motion})):
-        seen = exposure(balance, state, problem.area, archard.numbers, np.zeros(N_PAIR), 0.0, "contact", **own)
+    for own in (None, motion):
+        of_joint = (problem.area, archard.numbers, np.zeros(N_PAIR), 0.0, "contact")
+        seen = wear_law.Exposure(balance, state, *of_joint, own)
         rates.append(wear_law.depth_rate("archard", seen))
     np.testing.assert_allclose(*rates, rtol=0.02)
 

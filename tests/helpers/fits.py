@@ -1,8 +1,8 @@
-"""What a scene says to measured numbers."""
+"""What a scene says to measured numbers, and fits of models whose derivatives are differences."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies.fits.curve_target import CurveTarget
 from tribodyn.workflows.studies.fits.fit_file import Answers, Asked
+from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, Prediction, fit
+
+STEP = 1e-3  # of a parameter, over it or the width of its bounds
 
 
 def plain(file: SceneFile) -> ReducedModel:
@@ -23,3 +26,23 @@ def plain(file: SceneFile) -> ReducedModel:
 def predict(file: SceneFile, measured: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
     """(n_measured,) what a scene says to each measured number, to a curve at each of its points."""
     return Answers(file, modelling.build(file, Progress())).all_to(measured)
+
+
+def fit_by_differences(
+    parameters: Sequence[Parameter],
+    measured: Sequence[Measured],
+    predict: Prediction,
+    before: Mapping[str, float] | None = None,
+) -> Identification:
+    """A fit whose derivatives are differences within the bounds."""
+
+    def slopes(values: Mapping[str, float]) -> np.ndarray:
+        columns = []
+        for p in parameters:
+            step = STEP * (values[p.name] if p.ratio else p.high - p.low)
+            up, down = min(values[p.name] + step, p.high), max(values[p.name] - step, p.low)
+            sides = (predict({**values, p.name: side}) for side in (up, down))
+            columns.append(np.subtract(*sides) / (up - down))
+        return np.stack(columns, axis=1)
+
+    return fit(parameters, measured, predict, slopes, before)

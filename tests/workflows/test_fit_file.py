@@ -12,7 +12,7 @@ import pytest
 
 import tribodyn as td
 from tests.helpers.coarse_scenes import BLADE, RIG
-from tests.helpers.fits import plain, predict
+from tests.helpers.fits import fit_by_differences, plain, predict
 from tests.helpers.pages import ROOT, fences
 from tests.helpers.structures import BLOCKS
 from tests.proof.problems import cycle_at
@@ -25,7 +25,7 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file
 from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
 from tribodyn.workflows.studies.fits.fit_file import Known, Task
-from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
+from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 from tribodyn.workflows.studies.measured.measurement import Run
 
 BEAM = (
@@ -173,7 +173,7 @@ def test_a_wheel_has_the_frequencies_of_its_wave():
 def test_derivatives_at_zero_and_at_a_bound_are_those_of_the_prediction():
     """An unknown that starts at zero, and one that starts at its upper bound, both find their way."""
     parameters = [Parameter("x", -1.0, 1.0, (0.0,), ratio=False), Parameter("y", 1.0, 2.0, (2.0,))]
-    found = fit(
+    found = fit_by_differences(
         parameters,
         [Measured("a", 1.3), Measured("b", 2.6)],
         lambda v: np.array([1.0 + v["x"], v["y"] * (1 + v["x"])]) * (1 + 1e-7 * np.sin(1e9 * v["x"])),  # rounding

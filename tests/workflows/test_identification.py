@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
+from tests.helpers.fits import fit_by_differences as fit
+from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 
 
 def springs_in_a_row(values):

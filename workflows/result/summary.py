@@ -11,7 +11,7 @@ from tribodyn.hbm.continuation.branch import amplitude as vibration
 from tribodyn.hbm.continuation.parameter import FREQUENCY
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share, events
+from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share, events, first
 from tribodyn.workflows.result import verdict
 
 if TYPE_CHECKING:
@@ -151,10 +151,10 @@ def _wear(result: Result) -> dict[str, Any]:
     depth, cycles = result.depth_after(-1), float(wear.cycles[-1] + wear.cycles_in_step[-1])
     volume, split = float(depth @ patch.area), result.facts.share_of_body_1
     basis = HarmonicBasis(result.harmonics, max(EVENT_SAMPLES, 2 * result.harmonics[-1] + 1))
-    when = events(wear, patch.components, patch.gap, basis)
+    lifts, lost = events(wear, patch.components, patch.gap, basis)
     return {
-        "first_lift_cycles": None if when is None else when.first_lift,
-        "first_loss_cycles": None if when is None else when.first_loss,
+        "first_lift_cycles": first(lifts),
+        "first_loss_cycles": first(lost),
         "surface_volumes_m3": [split * volume, (1 - split) * volume],
         "depth_max_m": float(depth.max()),
         "depth_mean_m": float(depth @ patch.area / patch.area.sum()),

@@ -117,11 +117,12 @@ def wear_problem(
 
 def coefficients(scene: Scene) -> dict[str, float]:
     """Wear coefficient [m3/J] of every joint whose volume goes with the friction work; none where a scene wears not."""
-    return {name: value for value, joints in coefficient_keys(scene).values() for name in joints}
+    own = law_numbers(scene).values()
+    return {joint: value for value, _, joints, law in own if law == "energy" for joint in joints}
 
 
-def coefficient_keys(scene: Scene) -> dict[str, tuple[float, tuple[str, ...]]]:
-    """The same by the keys of the scene: coefficient, and the joints that wear by it."""
+def law_numbers(scene: Scene) -> dict[str, tuple[float, str, tuple[str, ...], str]]:
+    """Numbers of wear laws by the keys of the scene: value, name in its law, joints that wear by it, and the law."""
     if scene.wear is None:
         return {}
     own = {name: c.wear for name, c in scene.joints.items() if isinstance(c, NamedContact) and c.wear is not None}
@@ -129,9 +130,10 @@ def coefficient_keys(scene: Scene) -> dict[str, tuple[float, tuple[str, ...]]]:
     tables: list[tuple[str, JointWearTable, tuple[str, ...]]] = [("wear", scene.wear, rest)]
     tables += [(f"contacts.{name}.wear", table, (name,)) for name, table in own.items()]
     return {
-        f"{key}.coefficient": (table.numbers["coefficient"], joints)
+        f"{key}.{name}": (value, name, joints, table.law)
         for key, table, joints in tables
-        if table.law == "energy" and joints and table.numbers["coefficient"]
+        for name, value in table.numbers.items()
+        if joints and isinstance(value, float) and value
     }
 
 

@@ -126,7 +126,7 @@ class ResponseDerivatives(StudyResult):
         if "life" in f.names and self.corners:
             lines.append(
                 "warning: at a state of the wear a pair is at a corner of its contact force, such as grazing or first "
-                "slip: the table is that of one side"
+                "slip, or touches for so few samples that its wear law is rough: the table is that of one side"
             )
         for key in self.corners if "life" not in f.names else ():
             i = f.parameters.index(key)
@@ -199,7 +199,7 @@ def derivatives(
     if of == "life":
         if file.scene.wear is None:
             raise SceneError("a life needs [wear] in the scene")
-        known |= {key: value for key, (value, _) in wear_run.coefficient_keys(file.scene).items()}
+        known |= {key: value for key, (value, *_) in wear_run.law_numbers(file.scene).items()}
     unknown = [key for key in only if key not in known | moving]
     if unknown:
         raise SceneError(f"{unknown[0]} is no number that a response depends on: these are {', '.join(known | moving)}")
@@ -281,11 +281,11 @@ def _share(scene: Scene) -> float:
 
 
 def _of_life(varying: Varying, worn: WearHistory, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
-    scene, by_key = varying.scene, wear_run.coefficient_keys(varying.scene)
+    scene, by_key = varying.scene, wear_run.law_numbers(varying.scene)
     problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
-    coefficients = {key: by_key[key] for key in wanted if key in by_key}
+    numbers = {key: by_key[key][1:3] for key in wanted if key in by_key}
     own = {key: value for key, value in wanted.items() if key not in by_key}
-    return tangent.of_life(problem, worn, _changes(varying, own, advance), coefficients, _share(scene))
+    return tangent.of_life(problem, worn, _changes(varying, own, advance), numbers, _share(scene))
 
 
 def _found(
@@ -327,7 +327,7 @@ def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[
     Returns (number, key) -> d number / d key, SI units, as far as these are exact
     """
     scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
-    known, in_wear = varying.values, {key: value for key, (value, _) in wear_run.coefficient_keys(scene).items()}
+    known, in_wear = varying.values, {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
     own, more = ({key: of[key] for key in wanted if key in of} for of in (known, in_wear))
     own = {key: value for key, value in own.items() if not key.startswith(GEOMETRY) or _moves(varying, key)}
     joints = varying.model.balance.contact.joints

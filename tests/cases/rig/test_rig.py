@@ -11,6 +11,7 @@ import pytest
 from scipy.linalg import eigh
 
 from tests.helpers.coarse_scenes import QUICK_RIG as QUICK, RIG as COARSE
+from tests.helpers.fits import fit_by_differences as fit
 from tests.proof import __main__ as cli
 from tests.proof.cases.rig import fit as rig_fit, published, table as rig_table, time as rig_time
 from tests.proof.cases.rig.cases import apart
@@ -25,7 +26,7 @@ from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.joints import contact_stiffness
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
+from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 from tribodyn.workflows.studies.forces import forces
 
 

@@ -36,7 +36,7 @@ from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
 from tribodyn.workflows.studies.fits import posterior as posteriors
 from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
-from tribodyn.workflows.studies.fits.identification import DIFFERENCE, Identification, Measured, Parameter, fit
+from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit
 from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
 from tribodyn.workflows.studies.study_result import StudyResult
@@ -46,6 +46,7 @@ MEASURED_IN = {
     "open frequency": "Hz", "stuck frequency": "Hz", "preload": "N", "energy": "J", "amplitude": "m",
     "peak frequency": "Hz", "life": "", "work": "J",
 }  # fmt: skip
+DIFFERENCE = 1e-3  # step of a parameter, over it or the width of its bounds
 Quantity = float | str
 
 
@@ -182,8 +183,8 @@ def best(file: SceneFile, task: Task, progress: Progress) -> Fit:
             looked.parameters,
             looked.measured,
             lambda values: looked.trial(values, looked.targets, nearby=True),
-            known,
             lambda values: looked.slopes(values, looked.targets),
+            known,
         )
     return Fit(found, tuple(looked.changes(found.named(), digits=6)))
 

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.optimize import least_squares
 
 AT_BOUND = 1e-3  # of the width of the bounds: nearer than this counts as at the bound
-DIFFERENCE = 1e-3  # step of differences where no derivatives are known, in the scaled unknowns
 OPEN = 0.3  # relative standard error beyond which a parameter counts as not determined
 
 Prediction = Callable[[Mapping[str, float]], np.ndarray]
@@ -152,14 +151,13 @@ def fit(
     parameters: Sequence[Parameter],
     measured: Sequence[Measured],
     predict: Prediction,
+    slopes: Prediction,
     before: Mapping[str, float] | None = None,
-    slopes: Prediction | None = None,
 ) -> Identification:
     """Least squares of logarithmic residuals, from every combination of starts; the best is kept.
 
     predict : parameters by name -> (n_measured,) predictions, above 0
-    slopes : parameters by name -> (n_measured, n_parameter) derivatives of the predictions made last; differences of
-        predictions by default
+    slopes : parameters by name -> (n_measured, n_parameter) derivatives of the predictions made last
     before : the parameters as they were, for the report; the first starts by default
     Raises  ValueError where a prediction at a start is not a positive number, or a measured number is not
     Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
@@ -196,8 +194,6 @@ def fit(
 
     def slope(unknowns: np.ndarray) -> np.ndarray:
         """(n_measured, n_parameter) derivatives of the residuals by the unknowns."""
-        if slopes is None:
-            return weight[:, None] * _slope(predicted, unknowns, low, high)
         residual(unknowns)
         values = named(unknowns)
         scale = [values[p.name] if p.ratio else p.high - p.low for p in parameters]
@@ -219,17 +215,6 @@ def fit(
         count,
         np.array([first_values[p.name] for p in parameters]),
     )
-
-
-def _slope(
-    predicted: Callable[[np.ndarray], np.ndarray], at: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
-    """d ln(predicted) / d unknown (n_measured, n_parameter) by differences that stay within the bounds."""
-    columns = []
-    for j, step in enumerate(np.eye(len(at)) * DIFFERENCE):
-        up, down = np.minimum(at + step, high), np.maximum(at - step, low)
-        columns.append(np.log(predicted(up) / predicted(down)) / (up - down)[j])
-    return np.stack(columns, axis=1)
 
 
 def _deviation(slope: np.ndarray, squares: float) -> np.ndarray:

@@ -19,6 +19,7 @@ from functools import lru_cache
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tests.helpers.fits import fit_by_differences as identify
 from tests.proof.cases.rig.joints import Joints, joints_of
 from tests.proof.cases.rig.model import TIED, Rig, check
 from tests.proof.cases.rig.published import LIFE_MEASURED, OPEN, PRELOAD, STUCK, TABLE_5_3, WORK
@@ -26,7 +27,7 @@ from tests.proof.cases.rig.wear import RigWear, wear_down
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit as identify
+from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter
 
 RIGID = 1e11  # stiffness beyond which no published frequency changes by one in a thousand [N/m]
 MICROMETRE = 1e-6
