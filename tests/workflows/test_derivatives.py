@@ -154,7 +154,7 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
 @pytest.mark.parametrize(
     ("name", "only", "step", "order"),
     [
-        ("beam", ("contact.friction", "damping.modal"), 2e-5, 1),
+        ("beam", ("contact.friction", "damping.modal"), 1e-4, 1),
         ("blade", ("contact.friction", "damping.modal"), 2e-5, 1),
         pytest.param("rig", ("contact.friction", "damping.modal"), 2e-5, 1, marks=pytest.mark.slow),
         pytest.param("beam", ("geometry.length", "geometry.height"), 1e-4, 2, marks=pytest.mark.slow),
