@@ -11,9 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, triu
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, splu
 
-from tribodyn.fem.elementwise import Elementwise
 from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.mumps import Mumps
 
@@ -49,7 +48,7 @@ def factorise(
     few : rows that `solve_few` is to be fast for
     Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
-    if isinstance(K, Elementwise):
+    if isinstance(K, LinearOperator):
         return Multigrid(K, factorise)
     K = csr_matrix(K)
     if solver is None:

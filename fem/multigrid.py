@@ -6,13 +6,14 @@ The coarse level is the stiffness of linear elements on the same corners, an eig
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, lobpcg
 
-from tribodyn.fem.elementwise import Elementwise
+if TYPE_CHECKING:
+    from tribodyn.fem.elementwise import Elementwise
 
 
 class Multigrid:
