@@ -193,7 +193,7 @@ def _step_in_time(
     assert state.means is not None
     solves, periods = state.solves, state.means.periods
     target = _event(problem, state, rows)
-    # a deviation by as much depth as is left to wear lifts pairs that go on touching
+    # held to the depth that is left, too: more lifts pairs that go on touching, with most of a life still to come
     within = tolerance.share * tolerance.scale * min(_share_left(problem, state, rows, state), 1.0)
     given = all(isinstance(duty.site, AtFrequency) for duty in problem.mission)  # no peak moves with the depth
     while True:
