@@ -193,6 +193,8 @@ def _step_in_time(
     assert state.means is not None
     solves, periods = state.solves, state.means.periods
     target = _event(problem, state, rows)
+    # held to the depth that is left, too: more lifts pairs that go on touching, with most of a life still to come
+    within = tolerance.share * tolerance.scale * min(_share_left(problem, state, rows, state), 1.0)
     given = all(isinstance(duty.site, AtFrequency) for duty in problem.mission)  # no peak moves with the depth
     while True:
         there = replace(state, depth=machine.ahead(state, stride), cycles=state.cycles + stride, solves=0)
@@ -204,7 +206,8 @@ def _step_in_time(
         life = float(expected(tolerance, state.cycles + stride, state.depth + worn))
         chance = 0.5 * stride * float(np.hypot(state.means.error, there.means.error)) / (tolerance.share * life)
         # rates that scatter may agree by chance
-        error = max(chance, local_error(tolerance, problem.area, deviation, there.rate, stride, life))
+        told = max(chance, local_error(tolerance, problem.area, deviation, there.rate, stride, life))
+        error = max(told, float(np.abs(deviation).max()) / within)
         preload = problem.preload_of(there)
         if error <= 1.0 and preload < RULES.event_window[0] * target:
             stride, target = stride * _share_to(target, problem.preload_of(state), preload), 0.0
@@ -225,7 +228,7 @@ def _step_in_time(
             after, stride_after = worn_state(problem, after.depth, after.cycles, found.points, 0), 0.0
     plan = np.array([stride_after, *np.full(len(state.points), OF_STAGES.unknown_slope), look])
     work = stride * 0.5 * (state.work + there.work)
-    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
+    row = row_of(problem, replace(state, solves=solves), stride, worn, work, told, plan)
     return _Taken(replace(row, periods=periods), replace(after, solves=0))
 
 

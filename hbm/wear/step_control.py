@@ -80,14 +80,9 @@ def step_error(history: WearHistory, tolerance: Tolerance | None = None) -> Step
         return StepError(off, off)
     before, after = history.energy[taken], history.energy[taken + 1]
     change = np.abs(after - before).sum(axis=1) / (total[taken] + total[taken + 1])
-    share, share_after = before / total[taken, None], _shares(after)
+    share = before / total[taken, None]
+    share_after = after / np.maximum(total[taken + 1, None], np.finfo(float).tiny)  # no work is shared behind the last
     work = history.work[taken].sum(axis=1)
     worn = work @ share
     shift = np.abs(work @ (share_after - share)) / 2
     return StepError(float(cycles @ change / cycles.sum()), float(shift.max() / worn.max()))
-
-
-def _shares(energy: np.ndarray) -> np.ndarray:
-    """Each pair's share of the work of its row, none where a row has no work."""
-    total = energy.sum(axis=1, keepdims=True)
-    return np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)

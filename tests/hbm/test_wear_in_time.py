@@ -215,7 +215,7 @@ def test_a_motion_that_passes_is_marched_as_far_as_each_place_asks() -> None:
     again.take_up(flips, follower.kept())
     assert settled.periods > 2 * passed.periods == 2 * follower.options.block
     assert passed.error > 0.02 >= known.error
-    assert passed.energy.sum() == pytest.approx(settled.energy.sum(), rel=0.02)
+    assert passed.energy.sum() == pytest.approx(settled.energy.sum(), rel=0.01)
     later = [one.mean(flips, FLIPS_AT, lambda motion: motion.energy, 1.0) for one in (follower, again)]
     np.testing.assert_array_equal(later[1].energy, later[0].energy)
 
@@ -283,3 +283,18 @@ def test_the_largest_multiplier_without_the_monodromy_matrix(monkeypatch: pytest
     assert found[0] == pytest.approx(whole[0], rel=0.2)  # any value below 1 does
     assert max(found[0], whole[0]) < 1 < whole[1]
     assert found[1] == pytest.approx(whole[1], rel=0.01)
+
+
+def test_life_is_as_exact_where_little_is_left_to_wear(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rate in proportion to the preload: it falls exponentially, and half of a life passes below a tenth of it."""
+    problem, scale = replace(flipping(), lost_below=1e-3), 1e-6
+    gap = problem.balance.contact.gap
+
+    def mean(self: Follower, balance: HarmonicBalance, omega: float, see: object, asked: float) -> MeanMotion:
+        left = np.maximum(1 - (balance.contact.gap - gap) / scale, 0.0)
+        return MeanMotion(left, left, 1e-14 * left, np.zeros(1), 0.0, 0.0, settled=True, periods=8)
+
+    monkeypatch.setattr(Follower, "mean", mean)
+    found = error_controlled_rule.evolve(problem, Tolerance(0.05, scale), motion="time")
+    for share in (0.1, 0.01, 1e-3):
+        assert cycles_to_preload(found, share) == pytest.approx(np.log(1 / share) * scale / 1e-14, rel=0.01)
