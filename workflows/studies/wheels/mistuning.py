@@ -142,8 +142,7 @@ def stiffer(wheel: wheels.Wheel, balance: HarmonicBalance) -> Iterator[Change]:
             damped = of_modes(change) if of_modes else (damping.stiffness or 0.0) * change
             moved = replace(moved, damping=model.system.damping + damped)
         # from here to there is a step of one half to both sides of their middle
-        stiffened = replace(own, model=replace(model, system=moved))
-        yield Change(f"stiffness of sector {n}", 0.5, stiffened, own, ())
+        yield Change(f"stiffness of sector {n}", 0.5, replace(own, model=replace(model, system=moved)), own, ())
 
 
 def mistuned(
