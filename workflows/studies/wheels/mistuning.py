@@ -173,10 +173,9 @@ def mistuned(
         solved, output = process_time(), f"{OUTPUT}@{heights.max(axis=0).argmax()}"
         try:
             found = of_branch(file.scene, balance, branch, stiffer(wheel, balance), output=output)
-            at, seconds = dict(zip(found.parameters, factors.tolist(), strict=True)), process_time() - solved
-            peak: ResponseDerivatives | NoDerivative = ResponseDerivatives(
-                file.name, found, at, {}, solved - start, seconds, ()
-            )
+            at = dict(zip(found.parameters, factors.tolist(), strict=True))
+            times = solved - start, process_time() - solved
+            peak: ResponseDerivatives | NoDerivative = ResponseDerivatives(file.name, found, at, {}, *times, ())
         except NoDerivative as reason:
             peak = reason
         alike = wheels.follow(wheel.wave(), frequency, TOLERANCE)
