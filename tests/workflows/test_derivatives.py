@@ -201,14 +201,13 @@ def test_a_temperature_acts_through_the_numbers_of_its_table():
     np.testing.assert_allclose(rows["contact.temperature"], chain, atol=2e-6)
 
 
-@pytest.mark.parametrize(
-    ("at", "why"), [(200, "at this row of by_temperature the slopes of contact jump"), (400, "extend it")]
-)
-def test_at_a_row_of_its_table_a_temperature_has_no_derivative(at, why):
-    with pytest.raises(SolveFailed, match=why):
-        td.studies.derivatives(
-            "beam", only=("contact.temperature",), overrides=(*HOT_BEAM, f"contact.temperature={at} K")
-        )
+def test_at_a_row_of_its_table_a_temperature_has_no_derivative():
+    for at, why in (
+        (200, r"contact\.temperature: at this row of by_temperature contact has a corner"),
+        (400, "extend it"),
+    ):
+        with pytest.raises((SolveFailed, ValueError), match=why):
+            td.studies.derivatives("beam", overrides=(*HOT_BEAM, f"contact.temperature={at} K"))
 
 
 LEAF = ("geometry.n_column=7", "geometry.pin_column=2", "response.frequency=['120 Hz', '190 Hz']")

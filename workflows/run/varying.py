@@ -143,7 +143,7 @@ class Varying:
                 for one in (up[name], contact, down[name])
             )
             if (abs(above + below - 2 * here) > 1e-3 * abs(above - below) + 1e-12 * abs(here)).any():
-                raise NoDerivative(f"beside {key} = {value:g}: at this row of by_temperature the slopes of {name} jump")
+                raise NoDerivative(f"{key}: at this row of by_temperature {name} has a corner; --only takes other keys")
 
     def _changed(self, key: str, value: float) -> SceneFile:
         """The scene with another value of a key; read again only where other numbers follow from it."""
