@@ -6,7 +6,7 @@ contact and outputs "<name>@<sector>" are those of the whole wheel, sector by se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NoReturn, cast
@@ -139,8 +139,3 @@ class MistunedWheel:
 
 def _no_system(h: int) -> NoReturn:
     raise ValueError("sectors that differ have no system of one harmonic: stability and integration in time need one")
-
-
-def spread(values: Sequence[float] | np.ndarray, sector: np.ndarray) -> np.ndarray:
-    """Values of sectors (N,) at pairs, sector : (n_pair,)."""
-    return np.asarray(values, float)[sector]

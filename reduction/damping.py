@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.linalg import eigh
 from scipy.linalg.blas import dsyrk, zherk
@@ -25,6 +27,18 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
     multiply = zherk if np.iscomplexobj(weighted) else dsyrk
     upper = np.triu(multiply(1.0, weighted))
     return upper + np.triu(upper, 1).conj().T
+
+
+def modal_damping_towards(system: SecondOrderSystem, ratio: float) -> Callable[[np.ndarray], np.ndarray]:
+    """What makes dC of any dK (n, n), for a system whose C is that of `modal_damping`.
+
+    C M^-1 C = 4 zeta^2 K, so that dC M^-1 C + C M^-1 dC = 4 zeta^2 dK, in which every pair of modes is by itself
+    """
+    values, phi = eigh(system.damping, system.mass)
+    weighted, sums = system.mass @ phi, values[:, None] + values
+    resisted = sums > len(values) * np.finfo(float).eps * sums.max()
+    share = np.divide(4 * ratio**2, sums, out=np.zeros_like(sums), where=resisted)
+    return lambda change: weighted @ (share * (phi.conj().T @ (change @ phi))) @ weighted.conj().T
 
 
 def rayleigh(system: SecondOrderSystem, alpha: float, beta: float) -> np.ndarray:

@@ -128,34 +128,38 @@ class ReducedModel:
         return replace(self, system=self.system.projected(basis), interface=interface, basis=full)
 
     def with_damping(self, make: Damping) -> ReducedModel:
-        """The same model with another damping: `make` gives the matrix of every system that a harmonic sees.
+        """The same model with another damping: `make` gives the matrix of every system that a harmonic sees."""
+        damped = self.with_systems(lambda system, B: replace(system, damping=make(system, B)))
+        return damped if self.along is None else replace(damped, along=self.along.damped(make))
+
+    def with_systems(self, make: Callable[[SecondOrderSystem, np.ndarray], SecondOrderSystem]) -> ReducedModel:
+        """The same model with another system in place of each that a harmonic sees, made of it and its contact map.
 
         Harmonics that shared one system still do
         """
         made: dict[int, tuple[SecondOrderSystem, SecondOrderSystem]] = {}  # the key lives as long as its system
 
-        def damped(system: SecondOrderSystem, B: np.ndarray) -> SecondOrderSystem:
+        def changed(system: SecondOrderSystem, B: np.ndarray) -> SecondOrderSystem:
             if id(system) not in made:
-                made[id(system)] = system, replace(system, damping=make(system, B))
+                made[id(system)] = system, make(system, B)
             return made[id(system)][1]
 
-        first, seen = damped(self.system, np.asarray(self.interface.B)), self.per_harmonic
+        first, seen, any_wave = changed(self.system, np.asarray(self.interface.B)), self.per_harmonic, self.per_index
         if seen is None:
             return replace(self, system=first)
 
         def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
             system, B = seen(h)
-            return damped(system, B), B
+            return changed(system, B), B
 
-        if (any_wave := self.per_index) is None:
+        if any_wave is None:
             return replace(self, system=first, per_harmonic=per_harmonic)
 
         def per_index(index: int) -> tuple[SecondOrderSystem, np.ndarray]:
             system, B = any_wave(index)
-            return damped(system, B), B
+            return changed(system, B), B
 
-        along = None if self.along is None else self.along.damped(make)
-        return replace(self, system=first, per_harmonic=per_harmonic, per_index=per_index, along=along)
+        return replace(self, system=first, per_harmonic=per_harmonic, per_index=per_index)
 
 
 @dataclass(frozen=True)

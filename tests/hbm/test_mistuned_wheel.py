@@ -16,7 +16,7 @@ from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import recovery, travelling_wave as waves
-from tribodyn.hbm.mistuning import MistunedWheel, spread
+from tribodyn.hbm.mistuning import MistunedWheel
 from tribodyn.reduction import mistuning
 from tribodyn.reduction.cyclic import travelling_wave, wheel_model
 from tribodyn.reduction.damping import modal_damping
@@ -116,8 +116,8 @@ def test_friction_and_gap_that_differ_by_blade_are_the_dense_wheel(reduced):
     n_pair = len(springs(reduced))
 
     def change(own, sector):
-        numbers = {**own.numbers, "friction": own.numbers["friction"] * spread(factor, sector)}
-        return replace(own, numbers=numbers, gap=own.gap + spread(gap, sector))
+        numbers = {**own.numbers, "friction": own.numbers["friction"] * factor[sector]}
+        return replace(own, numbers=numbers, gap=own.gap + gap[sector])
 
     dense = whole(reduced, deviation, np.repeat(0.3 * factor, n_pair), np.repeat(gap, n_pair))
     there = newton.solve_from_rest(dense, 2 * np.pi * 250, EXACT)

@@ -29,6 +29,11 @@ COARSE = {
     "blade": (*BLADE, "response.method=adaptive"),
     "rig": (*RIG, LOCATED),
 }
+HOT = 'contact.by_temperature={temperature=["0 K", "200 K", "400 K"], friction=[0.5, 0.45, 0.3], ' + (
+    'tangential_stiffness=["470 N/um", "440 N/um", "350 N/um"]}'
+)
+HOT_BEAM = (*COARSE["beam"], "wear=", "contact.friction=", "contact.tangential_stiffness=", HOT)
+COARSE["warmed beam"] = (*HOT_BEAM, 'loads.static.hot={temperature="150 K"}', "material.expansion='1e-5 1/K'")
 AT_800_HZ = (*BEAM, "wear.motion=balance", "wear.at=800 Hz", LOCATED)
 
 
@@ -156,6 +161,7 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
     [
         ("beam", ("contact.friction", "damping.modal"), 1e-4, 1),
         ("blade", ("contact.friction", "damping.modal"), 2e-5, 1),
+        ("warmed beam", ("loads.static.hot.temperature",), 1e-4, 1),
         pytest.param("rig", ("contact.friction", "damping.modal"), 2e-5, 1, marks=pytest.mark.slow),
         pytest.param("beam", ("geometry.length", "geometry.height"), 1e-4, 2, marks=pytest.mark.slow),
         pytest.param("blade", ("geometry.span", "geometry.shroud_angle"), 3e-5, 1, marks=pytest.mark.slow),
@@ -164,7 +170,7 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
 )
 def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, step, order):
     """At a fixed frequency, and along the peak."""
-    file = scene_file.read(name, COARSE[name])
+    file = scene_file.read(name.split()[-1], COARSE[name])
     along = td.studies.derivatives(file, only=only).found
     value, omega = keys(file.scene) | geometry_keys(file.scene), along.state.omega
     fixed = td.studies.derivatives(file, at=omega / (2 * np.pi), only=along.parameters).found
@@ -185,6 +191,23 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, ste
             elasticity = found.slopes[:kept, i] * value[key] / found.values[:kept]
             size = np.maximum(np.abs(difference), 0.1)  # below this the differences are rounding
             assert (np.abs(elasticity - difference) <= error * size).all(), (key, elasticity, difference)
+
+
+def test_a_temperature_acts_through_the_numbers_of_its_table():
+    found = td.studies.derivatives("beam", overrides=(*HOT_BEAM, "contact.temperature=150 K"))
+    rows, value = found.elasticities, found.at
+    parts = {"contact.friction": -0.05 / 200, "contact.tangential_stiffness": -30e6 / 200}
+    chain = sum(slope * 150 / value[key] * rows[key] for key, slope in parts.items())
+    np.testing.assert_allclose(rows["contact.temperature"], chain, atol=2e-6)
+
+
+def test_at_a_row_of_its_table_a_temperature_has_no_derivative():
+    for at, why in (
+        (200, r"contact\.temperature: at this row of by_temperature contact has a corner"),
+        (400, "extend it"),
+    ):
+        with pytest.raises((SolveFailed, ValueError), match=why):
+            td.studies.derivatives("beam", overrides=(*HOT_BEAM, f"contact.temperature={at} K"))
 
 
 LEAF = ("geometry.n_column=7", "geometry.pin_column=2", "response.frequency=['120 Hz', '190 Hz']")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.wheel_scene import WHEEL
-from tribodyn.hbm import newton
+from tribodyn.hbm import derivatives as exact, newton
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
@@ -50,6 +50,48 @@ def test_factors_that_move_on_by_a_sector_move_the_amplitudes_on(scene: Path) ->
 def test_sectors_alike_are_amplified_by_nothing(scene: Path) -> None:
     found = mistuning.mistuned(scene, np.ones(6))
     assert found.amplification == pytest.approx(1.0, rel=5e-3)
+    assert "it has no derivatives by the factors: the response is highest at an end" in found.lines()[-1]
+    assert found.record()["derivatives"] is None
+
+
+SLOW = ("modal='2 %', state='stuck'", "mass=20.0, stiffness='1e-5 s'")
+
+
+@pytest.mark.parametrize("damping", ["modal='2 %'", *(pytest.param(one, marks=pytest.mark.slow) for one in SLOW)])
+def test_derivatives_by_the_factors_are_those_of_other_wheels(scene: Path, damping: str) -> None:
+    """Of a wheel that slips at its peak, along a direction in which every sector has a part of its own."""
+    near = ("contact.friction=0.3", "harmonics.transitions=located", "response.frequency=['822 Hz', '834 Hz']")
+    overrides = (*near, f"damping={{{damping}}}")
+    factors, way = mistuning.deviations(6, 0.02, 1), np.array([0.4, -1.0, 0.7, 0.9, -0.3, -0.6])
+    wheel, solved = wheels.build(scene_file.read(str(scene), overrides)), mistuning.mistuned(scene, overrides=overrides)
+    found, output = solved.peak.found, f"response@{solved.record()['worst_sector']}"
+    assert found.names[3] == "energy"
+    assert found.values[3] > 0
+    step = 3e-5
+    ends = (wheel.whole([float(one) for one in factors + side * way]) for side in (step, -step))
+    up, down = (exact.at_peak(one, found.state, output, ()).values[:2] for one in ends)
+    off, size = found.slopes[:2] @ way - (up - down) / (2 * step), np.linalg.norm(found.slopes[:2], axis=1)
+    assert (abs(off) < 1e-5 * size).all(), off / size
+
+
+def test_a_wheel_shows_the_derivatives_of_its_peak(scene: Path, tmp_path: Path) -> None:
+    overrides = ("response.frequency=['640 Hz', '680 Hz']",)
+    found = mistuning.mistuned(scene, spread=0.02, overrides=overrides)
+    rows = found.record()["derivatives"]["elasticities"]
+    size = [abs(row["amplitude"]) for row in rows.values()]
+    assert size == sorted(size, reverse=True)
+    assert sum(row["frequency"] for row in rows.values()) == pytest.approx(0.263, abs=0.002)
+    assert (
+        f"to first order a scatter of 0.1 % of all factors scatters the amplitude by {np.linalg.norm(size) / 10:.3g} %"
+        in str(found)
+    )
+    assert tmp_path / "derivatives.csv" in found.write(tmp_path)
+
+
+def test_damping_by_two_modes_of_a_wheel_has_no_derivatives(scene: Path) -> None:
+    two = ("response.frequency=['640 Hz', '680 Hz']", "damping={ratios=['2 %', '2 %'], modes=[0, 6]}")
+    found = mistuning.mistuned(scene, overrides=two)
+    assert found.lines()[-1].endswith("give damping.modal, or mass and stiffness")
 
 
 def test_the_command_takes_any_wheel(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

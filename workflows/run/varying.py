@@ -54,7 +54,7 @@ def keys(scene: Scene) -> dict[str, float]:
     for name, contact in scene.joints.items():
         table = "contact" if single else f"contacts.{name}"
         own = {n.name: contact.numbers.get(n.name) for n in declare.read(contact.law_file) if not n.whole}
-        add(table, contact, OF_CONTACT)
+        add(table, contact, (*OF_CONTACT, "temperature"))
         add(table, {name: None if value is None else float(value) for name, value in own.items()}, list(own))
     for kind in ("static", "harmonic"):
         for name, load in getattr(scene.loads, kind).items():
@@ -122,6 +122,8 @@ class Varying:
         if key.startswith(GEOMETRY):
             self.nodes_moved(key)  # or refused
             step = 4 * NODES * abs(value) if anew else step
+        if key.endswith(".temperature"):
+            self._between_rows(key, value, 2 * step)
         far: tuple[Posed, ...] | None = () if anew or linear else None
         if self._settles or (anew and key.startswith((*STRUCTURAL, "wheel."))):
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
@@ -131,6 +133,17 @@ class Varying:
             up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
             touching = Change(key, small, up, down)
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
+
+    def _between_rows(self, key: str, value: float, reach: float) -> None:
+        """Raises NoDerivative where a contact is at a row of its `by_temperature`, at which its slopes jump."""
+        up, down = (self._changed(key, value + side).scene.joints for side in (reach, -reach))
+        for name, contact in self.scene.joints.items():
+            above, here, below = (
+                np.array([one.tangential_stiffness, one.normal_stiffness, one.numbers.get("friction")], float)
+                for one in (up[name], contact, down[name])
+            )
+            if (abs(above + below - 2 * here) > 1e-3 * abs(above - below) + 1e-12 * abs(here)).any():
+                raise NoDerivative(f"{key}: at this row of by_temperature {name} has a corner; --only takes other keys")
 
     def _changed(self, key: str, value: float) -> SceneFile:
         """The scene with another value of a key; read again only where other numbers follow from it."""
@@ -368,7 +381,8 @@ def _shapes(part: Part) -> tuple[Any, ...]:
 
 def _touches(key: str) -> bool:
     """Whether the law of a contact may see a key."""
-    return key.startswith(("contact", "material", *GEOMETRY)) and not key.endswith(".density")
+    seen = key.startswith(("contact", "material", *GEOMETRY)) or key.endswith(".temperature")
+    return seen and not key.endswith(".density")
 
 
 def _loaded_alike(scene: MeshScene) -> bool:
@@ -382,19 +396,4 @@ def _loaded_alike(scene: MeshScene) -> bool:
 def _scaled(plain: ReducedModel, name: str, factor: float) -> ReducedModel:
     """The model with its stiffness or mass times a factor, as Young's modulus or the density of all of it make it."""
     matrix = {"young": "stiffness", "density": "mass"}[name]
-    made: dict[int, tuple[SecondOrderSystem, SecondOrderSystem]] = {}
-
-    def scaled(system: SecondOrderSystem) -> SecondOrderSystem:
-        if id(system) not in made:
-            made[id(system)] = system, replace(system, **{matrix: factor * getattr(system, matrix)})
-        return made[id(system)][1]
-
-    first, seen = scaled(plain.system), plain.per_harmonic
-    if seen is None:
-        return replace(plain, system=first)
-
-    def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
-        system, B = seen(h)
-        return scaled(system), B
-
-    return replace(plain, system=first, per_harmonic=per_harmonic)
+    return plain.with_systems(lambda system, B: replace(system, **{matrix: factor * getattr(system, matrix)}))

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm import derivatives as exact
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
@@ -238,7 +239,8 @@ def _of_scene(
                 found = _of_life(varying, worn, wanted, advance)
             else:
                 assert branch is not None
-                found = _found(varying, branch, at, wanted, advance, of == "fold")
+                changes = _changes(varying, wanted, advance)
+                found = of_branch(file.scene, balance, branch, changes, at, of == "fold")
         except NoDerivative as reason:
             raise SolveFailed(f"{file.name} has no derivatives here: {reason}") from None
     return ResponseDerivatives(
@@ -288,30 +290,30 @@ def _of_life(varying: Varying, worn: WearHistory, wanted: Mapping[str, float], a
     return tangent.of_life(problem, worn, _changes(varying, own, advance), numbers, _share(scene))
 
 
-def _found(
-    varying: Varying,
+def of_branch(
+    scene: Scene,
+    balance: HarmonicBalance,
     branch: Branch,
-    at: float | None,
-    wanted: Mapping[str, float],
-    advance: Advance,
+    changes: Iterator[Change],
+    at: float | None = None,
     fold: bool = False,
+    output: str = settings.OUTPUT,
 ) -> Derivatives:
-    """At a frequency [Hz], or along the highest peak of a response, or fold of it; wanted : key -> value."""
-    balance, scene = varying.model.balance, varying.scene
-    options, changes = settings.newton_options(scene), _changes(varying, wanted, advance)
+    """At a frequency [Hz], or along the highest peak of a response, or fold of it."""
+    options = settings.newton_options(scene)
     points = np.isin(np.arange(len(branch.omega)), branch.folds) if fold else branch.converged
     if not points.any():
         raise NoDerivative("the response has no fold")
-    fits = branch.amplitude(settings.OUTPUT) if at is None else -np.abs(branch.frequency - at)
+    fits = branch.amplitude(output) if at is None else -np.abs(branch.frequency - at)
     near = int(np.argmax(np.where(points, fits, -np.inf)))
     if at is None and not fold and near in (0, len(branch.omega) - 1):
-        raise NoDerivative(branch.no_peak(settings.OUTPUT))
+        raise NoDerivative(branch.no_peak(output))
     x = balance.shaped(branch.contact[near])
     state = balance.evaluate(branch.omega[near] if at is None or fold else 2 * np.pi * at, x)
     if fold:
         return exact.at_fold(balance, state, changes, options)
     take = exact.at_peak if at is None else exact.at_frequency
-    return take(balance, state, settings.OUTPUT, changes, wear_run.coefficients(scene), options)
+    return take(balance, state, output, changes, wear_run.coefficients(scene), options)
 
 
 def _moves(varying: Varying, key: str) -> bool:
@@ -346,7 +348,8 @@ def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[
 
     places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
     if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
-        add(lambda: _found(varying, response, places[0].frequency, own, lambda *_: None), OF_ROWS)
+        changes = _changes(varying, own, lambda *_: None)
+        add(lambda: of_branch(scene, varying.model.balance, response, changes, places[0].frequency), OF_ROWS)
     if worn is not None:
         add(lambda: _of_life(varying, worn, own | more, lambda *_: None), {"life_cycles": "life"})
     return slopes

@@ -6,22 +6,28 @@ contacts to one real model of the whole wheel. Memory and time grow with the num
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from time import process_time
 from typing import Annotated
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.hbm.continuation.branch import Branch, amplitude
+from tribodyn.fem.cyclic import sector_maps
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.threads import limited
+from tribodyn.reduction.damping import modal_damping_towards
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Number, quantity
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.derivatives import ResponseDerivatives, of_branch
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel as wheels
@@ -34,12 +40,14 @@ class Mistuned(StudyResult):
     """Responses of a wheel, and of the same wheel with all sectors alike.
 
     stiffness : (n_sectors,) factors; heights : (n_point, n_sectors) amplitudes of the wheel at its points [m]
+    peak : derivatives of the largest amplitude and its frequency by every factor, or why there are none
     """
 
     stiffness: np.ndarray
     branch: Branch
     heights: np.ndarray
     alike: Branch
+    peak: ResponseDerivatives | NoDerivative
 
     @property
     def amplification(self) -> float:
@@ -55,20 +63,31 @@ class Mistuned(StudyResult):
             "worst_sector": worst,
             "peak_m": float(self.heights.max()),
             "peak_alike_m": float(self.alike.amplitude(OUTPUT).max()),
+            "derivatives": None if isinstance(self.peak, NoDerivative) else self.peak.record(),
         }
 
     def lines(self) -> list[str]:
         """For people."""
-        return [
+        lines = [
             "factors on the stiffness: " + ", ".join(f"{factor:.4f}" for factor in self.stiffness),
             f"largest amplitude over that of sectors alike: {self.amplification:.3f}",
         ]
+        if isinstance(self.peak, NoDerivative):
+            return [*lines, f"it has no derivatives by the factors: {self.peak}"]
+        row, lines = self.peak.found.names.index("amplitude"), [*lines, *self.peak.lines()]
+        norm = np.linalg.norm([one[row] for one in self.peak.elasticities.values()])
+        lines.append(f"to first order a scatter of 0.1 % of all factors scatters the amplitude by {0.1 * norm:.3g} %")
+        tall = self.heights.max(axis=0)
+        if (tall > (1 - TOLERANCE) * tall.max()).sum() > 1:
+            lines.append("warning: another sector is as high, to which the largest amplitude may pass: a corner")
+        return lines
 
     def write(self, folder: Path) -> list[Path]:
-        """Write mistuned.csv, the amplitude of every sector over frequency, and mistuned.png."""
+        """Write mistuned.csv, the amplitude of every sector over frequency, mistuned.png, and those of its peak."""
         heights = {f"sector_{n}_m": column for n, column in enumerate(self.heights.T)}
         columns = {"frequency_Hz": self.branch.frequency, **heights}
-        return write_files(folder, {"mistuned": columns}, {"mistuned": self.plot()})
+        written = write_files(folder, {"mistuned": columns}, {"mistuned": self.plot()})
+        return written if isinstance(self.peak, NoDerivative) else [*written, *self.peak.write(folder)]
 
     def plot(self) -> Figure:
         """Amplitude of every sector over frequency, beside that of sectors alike."""
@@ -107,6 +126,25 @@ def checked(factors: Sequence[float] | np.ndarray, n_sectors: int) -> np.ndarray
     return values
 
 
+def stiffer(wheel: wheels.Wheel, balance: HarmonicBalance) -> Iterator[Change]:
+    """What the factor on the stiffness of every sector does to the balance of a whole wheel, which is linear.
+
+    Raises  NoDerivative for Rayleigh's damping of two modes, which may be a pair of the wheel that parts
+    """
+    own, model, damping = Posed.of(balance), balance.model, wheel.scene.damping
+    if damping.ratios is not None:
+        raise NoDerivative("damping.ratios goes by two modes of the wheel: give damping.modal, or mass and stiffness")
+    of_modes = None if damping.modal is None else modal_damping_towards(model.system, damping.modal)
+    for n, P in enumerate(sector_maps(wheel.reduced.sector)):
+        change = P.T @ (wheel.reduced.sector.system.stiffness @ P)
+        moved = replace(model.system, stiffness=model.system.stiffness + change)
+        if damping.given:
+            damped = of_modes(change) if of_modes else (damping.stiffness or 0.0) * change
+            moved = replace(moved, damping=model.system.damping + damped)
+        # from here to there is a step of one half to both sides of their middle
+        yield Change(f"stiffness of sector {n}", 0.5, replace(own, model=replace(model, system=moved)), own, ())
+
+
 def mistuned(
     scene: Source,
     stiffness: Annotated[Sequence[float] | None, quantity("")] = None,
@@ -129,7 +167,16 @@ def mistuned(
         n = wheel.n_sectors
         factors = deviations(n, spread, seed) if stiffness is None else checked(stiffness, n)
         frequency = file.scene.response.range
-        branch = wheels.follow(wheel.whole([float(one) for one in factors]), frequency, TOLERANCE)
+        balance, start = wheel.whole([float(one) for one in factors]), process_time()
+        branch = wheels.follow(balance, frequency, TOLERANCE)
+        heights = np.column_stack([branch.amplitude(f"{OUTPUT}@{i}") for i in range(n)])
+        solved, output = process_time(), f"{OUTPUT}@{heights.max(axis=0).argmax()}"
+        try:
+            found = of_branch(file.scene, balance, branch, stiffer(wheel, balance), output=output)
+            at = dict(zip(found.parameters, factors.tolist(), strict=True))
+            times = solved - start, process_time() - solved
+            peak: ResponseDerivatives | NoDerivative = ResponseDerivatives(file.name, found, at, {}, *times, ())
+        except NoDerivative as reason:
+            peak = reason
         alike = wheels.follow(wheel.wave(), frequency, TOLERANCE)
-    rows = [branch.output_names.index(f"{OUTPUT}@{i}") for i in range(n)]
-    return Mistuned(factors, branch, amplitude(branch.response[:, rows]), alike)
+    return Mistuned(factors, branch, heights, alike, peak)

@@ -26,7 +26,7 @@ from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.linear.travelling_wave import at_sector
-from tribodyn.hbm.mistuning import MistunedWheel, spread
+from tribodyn.hbm.mistuning import MistunedWheel
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction import mistuning as reduction
 from tribodyn.reduction.cyclic import ReducedSector
@@ -135,10 +135,10 @@ class Blades:
         """The whole wheel of a pattern."""
 
         def change(own: ContactParameters, sector: np.ndarray) -> ContactParameters:
-            made = replace(own, gap=own.gap + spread(pattern.gap, sector))
+            made = replace(own, gap=own.gap + pattern.gap[sector])
             if not pattern.friction.any() or "friction" not in own.numbers:
                 return made
-            factor = 1 + spread(pattern.friction, sector)
+            factor = 1 + pattern.friction[sector]
             return replace(made, numbers={**own.numbers, "friction": factor * own.numbers["friction"]})
 
         return self.wheel.balance(pattern.stiffness, change)
