@@ -118,8 +118,8 @@ def _theirs(python: Path, told: dict[str, Any], points: int) -> dict[str, Any]:
         told_all = {**told, "samples": SAMPLES, "tolerance": TOLERANCE, "step": step, "repeat": repeat}
         script = Path(__file__).with_name("peers_pyharm.py")
         done = subprocess.run(
-            [python.absolute(), script.resolve()], input=json.dumps([told_all]), timeout=seconds, capture_output=True, text=True,
-            env={**os.environ, **one}, cwd=gettempdir(),  # where it writes a file of its own
+            [python.absolute(), script.resolve()], input=json.dumps([told_all]), timeout=seconds, capture_output=True,
+            text=True, env={**os.environ, **one}, cwd=gettempdir(),  # where it writes a file of its own
         )  # fmt: skip
         if done.returncode:
             raise RuntimeError(f"pyHarm ended with: {done.stderr.strip().splitlines()[-1]}")
