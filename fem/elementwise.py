@@ -46,13 +46,13 @@ class Elements:
 
     def add_product(self, x: np.ndarray, total: np.ndarray) -> None:
         """Add forces under displacements x to a total, both (n_node, 3, k)."""
+        n_a, n_e = self.nodes.shape
         for own in self.batches():
-            nodes = self.nodes[:, own]
-            moved = np.empty((len(nodes), 3, x.shape[2], nodes.shape[1]), x.dtype)
-            _gather(x, nodes, moved)
-            at_points = self.basis @ moved.reshape(len(nodes), -1)
+            moved = np.empty((n_a, 3, x.shape[2], min(AT_ONCE, n_e - own.start)), x.dtype)
+            _gather(x, self.nodes, own.start, moved)
+            at_points = self.basis @ moved.reshape(n_a, -1)
             self.respond(at_points.reshape(len(self.weight), -1, 3, *moved.shape[2:]), own)
-            _scatter((self.basis.T @ at_points).reshape(moved.shape), nodes, total)
+            _scatter((self.basis.T @ at_points).reshape(moved.shape), self.nodes, own.start, total)
 
     def respond(self, at_points: np.ndarray, own: slice) -> None:
         """From displacements at points (n_q, 1, 3, k, n_e) of some elements to forces, in place."""
@@ -78,7 +78,7 @@ class Elastic(Elements):
 
     def respond(self, at_points: np.ndarray, own: slice) -> None:
         """From reference gradients at points (n_q, 3, 3, k, n_e) of some elements to weighted stresses, in place."""
-        _stresses(at_points, self.inverse[..., own], self.weight[:, own], self.law[..., own])
+        _stresses(at_points, self.inverse, self.weight, self.law, own.start)
 
     def gradients(self, own: slice) -> np.ndarray:
         """(n_e, n_q, 3, n_a) of the shape functions of some elements [1/m]."""
@@ -104,26 +104,27 @@ class Elastic(Elements):
         return scatter(corners, n_node, np.concatenate(blocks))
 
 
+# the kernels take whole arrays and the first of their elements: slices would have other types, each compiled for seconds
 @njit(cache=True)
-def _gather(x: np.ndarray, nodes: np.ndarray, found: np.ndarray) -> None:
+def _gather(x: np.ndarray, nodes: np.ndarray, start: int, found: np.ndarray) -> None:
     for a in range(nodes.shape[0]):
-        for e in range(nodes.shape[1]):
+        for e in range(found.shape[3]):
             for i in range(3):
                 for k in range(x.shape[2]):
-                    found[a, i, k, e] = x[nodes[a, e], i, k]
+                    found[a, i, k, e] = x[nodes[a, start + e], i, k]
 
 
 @njit(cache=True)
-def _scatter(force: np.ndarray, nodes: np.ndarray, total: np.ndarray) -> None:
+def _scatter(force: np.ndarray, nodes: np.ndarray, start: int, total: np.ndarray) -> None:
     for a in range(nodes.shape[0]):
-        for e in range(nodes.shape[1]):
+        for e in range(force.shape[3]):
             for i in range(3):
                 for k in range(total.shape[2]):
-                    total[nodes[a, e], i, k] += force[a, i, k, e]
+                    total[nodes[a, start + e], i, k] += force[a, i, k, e]
 
 
 @njit(cache=True, fastmath={"contract"})
-def _stresses(slopes: np.ndarray, inverse: np.ndarray, weight: np.ndarray, law: np.ndarray) -> None:
+def _stresses(slopes: np.ndarray, inverse: np.ndarray, weight: np.ndarray, law: np.ndarray, start: int) -> None:
     """In place of reference gradients (n_q, 3, 3, k, n_e) of displacements: weighted stresses, pulled back.
 
     Buffers of constant shape let the compiler work on several elements at once
@@ -131,9 +132,16 @@ def _stresses(slopes: np.ndarray, inverse: np.ndarray, weight: np.ndarray, law: 
     kind, n = slopes.dtype, slopes.shape[4]
     s, h, J = np.zeros((3, 3, AT_ONCE), kind), np.zeros((3, 3, AT_ONCE), kind), np.zeros((3, 3, AT_ONCE), kind)
     C, t, w = np.zeros((6, 6, AT_ONCE), kind), np.zeros((6, AT_ONCE), kind), np.zeros(AT_ONCE, kind)
-    C[:, :, :n] = law
+    for a in range(6):
+        for b in range(6):
+            for e in range(n):
+                C[a, b, e] = law[a, b, start + e]
     for q in range(slopes.shape[0]):
-        J[:, :, :n], w[:n] = inverse[q], weight[q]
+        for e in range(n):
+            w[e] = weight[q, start + e]
+            for i in range(3):
+                for j in range(3):
+                    J[i, j, e] = inverse[q, i, j, start + e]
         for k in range(slopes.shape[3]):
             for i in range(3):
                 for j in range(3):
