@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.helpers.pressed_body import N_PAIR, balance_of, life, pressed_body, wear_problem
+from tests.helpers.pressed_body import N_PAIR, balance_of, growth_by_few_modes, life, pressed_body, wear_problem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES
@@ -28,6 +29,13 @@ from tribodyn.hbm.wear.history import WearHistory, events, first
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.step_control import Tolerance, local_error, step_error
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_modes() -> Iterator[None]:
+    """Nothing here depends on the growth of perturbations."""
+    with growth_by_few_modes():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import scipy.linalg as sla
@@ -15,6 +19,7 @@ from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.hbm.wear.law import JointWear
@@ -58,6 +63,13 @@ def wear_problem(**changes: object) -> WearProblem:
         "lost_below": 0.01,
     }
     return WearProblem(**(given | changes))
+
+
+@contextmanager
+def growth_by_few_modes() -> Iterator[None]:
+    """Hill's method with four modes instead of twenty and more: most of a wear run's time on so small a body."""
+    with patch.object(exponents, "RULES", replace(exponents.RULES, fewest_modes=4, most_modes=4)):
+        yield
 
 
 def life(worn: WearHistory) -> float:
