@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.helpers.pressed_body import balance_of, pressed_body, wear_problem
+from tests.helpers.pressed_body import balance_of, growth_by_few_modes, pressed_body, wear_problem
 from tests.helpers.steps_again import EXACT, elasticity_anew
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
@@ -24,6 +24,13 @@ from tribodyn.hbm.wear.step_control import Tolerance
 SHARE, STEP, LOADS = 0.2, 1e-6, ("press", "shake")
 AT = AtFrequency("tip", 420.0, EXACT)
 PEAK = replace(AtPeak("tip", 250.0, 1200.0, newton=EXACT), tolerance=1e-7)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_modes():
+    """Lives do not depend on the growth of perturbations."""
+    with growth_by_few_modes():
+        yield
 
 
 def problem_of(site, name="", factor=1.0, **changes) -> WearProblem:
