@@ -104,7 +104,7 @@ class Elastic(Elements):
         return scatter(corners, n_node, np.concatenate(blocks))
 
 
-# the kernels take whole arrays and the first of their elements: slices would have other types, each compiled for seconds
+# the kernels take whole arrays and the first element of a batch: slices have other types, compiled for seconds each
 @njit(cache=True)
 def _gather(x: np.ndarray, nodes: np.ndarray, start: int, found: np.ndarray) -> None:
     for a in range(nodes.shape[0]):
