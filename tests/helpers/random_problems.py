@@ -184,11 +184,14 @@ def contact_forces(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
     """(n_contact, n_coeff) contact forces [N] at x by stepping the law through the cycle from one sample to the next.
 
     The memory is the one at which a march from the start of the load path repeats. Nothing is shared with the solver
-    but the law's step. Returns nan where the memory does not repeat within LONGEST cycles
+    but the law's step, of planar friction that along a chord, which begins at the memory and touches. Returns nan where the memory does not repeat within LONGEST cycles
     """
     joint, basis = balance.contact.joints[0], balance.basis
     law, p = joint.module, joint.parameters.packed()
     n_pair, n_comp, _ = x.shape
+    step, start = law.step, balance.memory
+    if hasattr(law, "chord"):
+        step, start = law.chord, np.concatenate([start, start, joint.parameters.gap[:, None]], axis=1)
     if basis.transitions == "located":
         return law.located(x, joint.parameters, balance.memory, basis, False).force.reshape(n_pair * n_comp, -1)
     angle = 2 * np.pi * np.arange(basis.n_samples) / basis.n_samples
@@ -198,14 +201,14 @@ def contact_forces(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
     phi = np.stack(columns, axis=1)
     forces = np.zeros((n_pair, n_comp, basis.n_samples))
     for i in range(n_pair):
-        path, memory = phi @ x[i].T, balance.memory[i].copy()
+        path, memory = phi @ x[i].T, start[i].copy()
         n_state = len(memory)
         for _ in range(LONGEST):
             before, size = memory.copy(), np.abs(memory).max(initial=0.0)
             for j, at in enumerate(path):
                 f = np.zeros(n_comp)
                 slopes = [np.zeros((a, b)) for a in (n_comp, n_state) for b in (n_comp, n_state)]
-                law.step(np.ascontiguousarray(at), memory, p[i], f, *slopes)
+                step(np.ascontiguousarray(at), memory, p[i], f, *slopes)
                 size = max(size, np.abs(memory).max(initial=0.0))
                 forces[i, :, j] = f
             if np.abs(memory - before).max(initial=0.0) <= 1e-12 * size:
