@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.helpers.pressed_body import growth_by_few_modes
 from tests.proof import __main__ as cli, extremes, extremes_march, extremes_wear
 from tests.proof.extremes_judge import judged, sampled_honestly, tried
 from tests.proof.extremes_march import held
@@ -21,7 +22,9 @@ def test_no_cell_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str], mo
     """Beside a reference of wear that is as coarse as its own error may be, which the judge allows for."""
     monkeypatch.setattr(extremes_wear, "TIGHT", 1e-2)
     monkeypatch.setattr(extremes_wear, "_references", {})
-    cli.app(["extremes", "--quick", "--json", "--out", str(tmp_path / "table.png")], result_action="return_value")
+    monkeypatch.setattr(extremes_wear, "MOST_STEPS", 50)
+    with growth_by_few_modes():
+        cli.app(["extremes", "--quick", "--json", "--out", str(tmp_path / "table.png")], result_action="return_value")
     rows = json.loads(capsys.readouterr().out)
     assert (tmp_path / "table.png").stat().st_size > 10_000
     assert len(rows) > 50
