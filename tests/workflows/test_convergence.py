@@ -70,8 +70,8 @@ def test_where_values_tend_to() -> None:
 
 
 def test_the_life_is_that_of_the_run_and_falls_within_its_doubt() -> None:
-    worn = ("wear.at=peak", "wear.motion=machine", 'wear.rule="error_controlled"', "harmonics.samples=64")
-    overrides = (*SMALL, *worn, "geometry.n_length=3", "reduction.modes=2")
+    worn = ("wear.at=peak", "wear.motion=machine", 'wear.rule="error_controlled"', "harmonics.samples=32")
+    overrides = (*SMALL, *worn, "response.points=10", "geometry.n_length=3", "reduction.modes=2")
     (one,) = convergence.converge("beam", settings=["wear"], most=3, overrides=overrides).table.ladders
     coarse, _, fine = one.rows
     life = fine.measured.values["life"]
