@@ -46,11 +46,9 @@ class Elements:
 
     def add_product(self, x: np.ndarray, total: np.ndarray) -> None:
         """Add forces under displacements x to a total, both (n_node, 3, k)."""
-        n_a, n_e = self.nodes.shape
         for own in self.batches():
-            moved = np.empty((n_a, 3, x.shape[2], min(AT_ONCE, n_e - own.start)), x.dtype)
-            _gather(x, self.nodes, own.start, moved)
-            at_points = self.basis @ moved.reshape(n_a, -1)
+            moved = np.ascontiguousarray(x[self.nodes[:, own]].transpose(0, 2, 3, 1))
+            at_points = self.basis @ moved.reshape(len(moved), -1)
             self.respond(at_points.reshape(len(self.weight), -1, 3, *moved.shape[2:]), own)
             _scatter((self.basis.T @ at_points).reshape(moved.shape), self.nodes, own.start, total)
 
@@ -105,15 +103,6 @@ class Elastic(Elements):
 
 
 # the kernels take whole arrays and the first element of a batch: slices have other types, compiled for seconds each
-@njit(cache=True)
-def _gather(x: np.ndarray, nodes: np.ndarray, start: int, found: np.ndarray) -> None:
-    for a in range(nodes.shape[0]):
-        for e in range(found.shape[3]):
-            for i in range(3):
-                for k in range(x.shape[2]):
-                    found[a, i, k, e] = x[nodes[a, start + e], i, k]
-
-
 @njit(cache=True)
 def _scatter(force: np.ndarray, nodes: np.ndarray, start: int, total: np.ndarray) -> None:
     for a in range(nodes.shape[0]):

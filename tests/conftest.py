@@ -15,11 +15,12 @@ import pytest
 
 ROOMS = ("geometry", "fem", "reduction", "hbm", "workflows", "properties", "proof", "cases", "documentation")
 PROCESSES = ("subprocess", "multiprocessing")  # a test module that imports one of them starts processes
-LONG = (  # more than 15 s of processor each, the longest first
-    "test_pages", "test_extremes", "test_rig", "test_errors", "test_fit_file", "test_wear_rules", "test_report",
-    "test_contact_events", "test_wear_in_time", "test_study", "test_run", "test_lives", "test_scene_brb",
-    "test_operating_line", "test_continuation_arc_length", "test_only_what_is_needed", "test_trade", "test_blade_study",
-    "test_pictures", "test_cli", "test_scene_blade", "test_scene_leaf_seal",
+LONG = (  # more than 12 s of processor each, the longest first
+    "test_pages", "test_errors", "test_scene_brb", "test_lives", "test_rig", "test_contact_events", "test_turbine",
+    "test_blade_study", "test_scene_leaf_seal", "test_wear_rules", "test_run", "test_only_what_is_needed",
+    "test_extremes", "test_pictures", "test_continuation_arc_length", "test_scene_blade", "test_scaling", "test_study",
+    "test_cli", "test_fit_file", "test_convergence", "test_operating_line", "test_optimise", "test_report",
+    "test_travelling_wave",
 )  # fmt: skip
 TESTS = Path(__file__).parent
 

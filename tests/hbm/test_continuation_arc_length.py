@@ -67,7 +67,7 @@ def test_lifting_mass_softens_and_folds_as_in_closed_form():
         assert len(branch.omega) < 200
 
 
-@pytest.mark.parametrize(("n_samples", "tip"), [(16, 9.0), (64, 5.27)])
+@pytest.mark.parametrize(("n_samples", "tip"), [(16, 9.0), pytest.param(64, 5.27, marks=pytest.mark.slow)])
 def test_corners_of_a_coarsely_sampled_contact_do_not_stop_the_walk(n_samples, tip):
     """Few samples turn the smooth curve into a zigzag whose corners turn by up to 170 degrees."""
     folds = []

@@ -184,7 +184,8 @@ def contact_forces(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
     """(n_contact, n_coeff) contact forces [N] at x by stepping the law through the cycle from one sample to the next.
 
     The memory is the one at which a march from the start of the load path repeats. Nothing is shared with the solver
-    but the law's step, of planar friction that along a chord, which begins at the memory and touches. Returns nan where the memory does not repeat within LONGEST cycles
+    but the law's step, for planar friction that along a chord, which begins at its memory. Returns nan where the memory
+    does not repeat within LONGEST cycles
     """
     joint, basis = balance.contact.joints[0], balance.basis
     law, p = joint.module, joint.parameters.packed()
