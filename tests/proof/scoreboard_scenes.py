@@ -31,7 +31,7 @@ WORN = 0.5  # share of the scenes that are worn
 # logarithm of the tangential force of the stuck contact over what friction can carry; with little of it wear fades
 # out before the contact is lost
 DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
-LOST = 0.05  # share of the preload where a life ends; the rest wears for two to four times as long, along another path a mesh
+LOST = 0.05  # share of the preload where a life ends: the rest lasts two to four times as long, on every mesh otherwise
 # frequencies at which they wear, over the resonance of the free part: half of them well below, where more motions stay
 BESIDE = ((0.4, 0.6), (0.4, 0.6), (0.85, 0.95), (1.05, 1.15))
 # where all scenes wear
