@@ -11,7 +11,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import Outcome, WearEnd
 
 LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
-LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends
+LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends unless a scene says where
 OF_MOTION = ("spread", "mean_error", "settled", "periods", "moving")  # of a row whose motion was marched in time
 
 

@@ -18,7 +18,6 @@ import scipy.linalg as sla
 
 from tests.proof import bracket
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.run import modelling, references, settings
 from tribodyn.workflows.run.progress import Progress
@@ -32,6 +31,7 @@ WORN = 0.5  # share of the scenes that are worn
 # logarithm of the tangential force of the stuck contact over what friction can carry; with little of it wear fades
 # out before the contact is lost
 DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
+LOST = 0.05  # share of the preload where a life ends: the rest lasts two to four times as long, on every mesh otherwise
 # frequencies at which they wear, over the resonance of the free part: half of them well below, where more motions stay
 BESIDE = ((0.4, 0.6), (0.4, 0.6), (0.85, 0.95), (1.05, 1.15))
 # where all scenes wear
@@ -81,7 +81,7 @@ def draw(number: int, seed: int, folder: Path, wearing: bool = False) -> Drawn:
     table["response"] |= {"frequency": [low, high], "points": int(rng.choice([30, 50]))}
     table["loads"]["harmonic"]["shake"]["value"] = force
     if worn:
-        table["wear"] = {"coefficient": "1e4 um3/J", "max_steps": 80, "lost_below": LIFE_SHARE}
+        table["wear"] = {"coefficient": "1e4 um3/J", "max_steps": 80, "lost_below": LOST}
         table["wear"] |= IN_TIME if wearing else _rule(rng)
         table["wear"] |= {"at": {"frequency": place}}
     if worn or family == "rig":

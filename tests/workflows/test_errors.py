@@ -153,9 +153,14 @@ def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
 
 
 def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
-    """An unstable motion of the balance is followed in time, or its share of the cycles is doubt."""
-    file = scene_file.read("beam", (*TINY, "geometry.n_patch=5", "wear.at=700 Hz", "wear.tolerance=60 %"))
+    """Its life ends where the scene says, too; an unstable share of the cycles is doubt."""
+    ended = ("wear.at=700 Hz", "wear.tolerance=60 %", "wear.lost_below=5 %")
+    file = scene_file.read("beam", (*TINY, "geometry.n_patch=5", *ended))
     result = td.run(file, overrides=["verdict.enabled=false"])
+    assert result.wear is not None
+    preload = result.wear.preload / result.wear.preload[0]
+    assert preload[-2] > 0.05 > preload[-1] > 1e-3
+    assert result.wear.cycles[-2] < result.summary()["life_cycles"] < result.wear.cycles[-1]
     limits = replace(DEFAULT, max_wear=0.0, harmonics=3)
     verdict_of = verdict.judge(file, td.build(file), result, td_progress(), limits)
     assert verdict_of.worn_ratio == pytest.approx(refine.mesh(file, 1 / 1.5)[1])
@@ -163,7 +168,6 @@ def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
     coarser = refine.harmonics(refine.modes(refine.mesh(file, 1 / 1.5)[0], 2) or file, 3)
     there = td.run(coarser, overrides=["verdict.enabled=false"])
     assert rows(judged, Refinement.COMBINED)["life"].refined == pytest.approx(there.summary()["life_cycles"], rel=1e-6)
-    assert result.wear is not None
     assert result.wear.growth is not None
     stated(judged, result.wear.unstable_share or 0.0)
     left = replace(result.wear, growth=np.where(np.arange(len(result.wear.growth)) < 2, 1e-3, -1e-3))

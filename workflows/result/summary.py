@@ -130,14 +130,14 @@ def _wear_table(result: Result) -> dict[str, Any]:
 
 
 def _life_share(result: Result) -> float:
-    """Share of the first preload where the life of a joint ends: the scene's `wear.lost_below`, else LIFE_SHARE."""
+    """Share of the first preload where a life ends: the scene's `wear.lost_below`, else LIFE_SHARE."""
     return float(_wear_table(result).get("lost_below") or LIFE_SHARE)
 
 
 def life_ends(result: Result) -> tuple[float, str]:
     """Share of the first preload where the life of a whole contact ends, and which preload that is."""
     at_rest = _wear_table(result).get("end_at") == "at_rest"
-    return (_life_share(result), "preload at rest") if at_rest else (LIFE_SHARE, "preload")
+    return _life_share(result), "preload at rest" if at_rest else "preload"
 
 
 def _wear(result: Result) -> dict[str, Any]:

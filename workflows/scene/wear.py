@@ -142,7 +142,7 @@ class Wear(JointWearTable):
     """Along which motion the error-controlled rule wears: "balance" takes the periodic one of the balance, "machine"
     follows in time what a machine does where it leaves that one, "time" takes the motion in time everywhere."""
     lost_below: Annotated[Number, Field(ge=0, lt=1)] = 0.0
-    """Share of the first preload at which the run ends; 0 waits until the last touch ends."""
+    """Share of the first preload at which life and run end; 0: the life at 0.1 %, the run at the last touch."""
     lost_of: Literal["all", "any"] = "all"
     """Whose preload `lost_below` counts: of all joints that wear together, or of whichever joint falls first."""
     end_at: Literal["vibrating", "at_rest"] = "vibrating"

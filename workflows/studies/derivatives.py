@@ -187,7 +187,7 @@ def derivatives(
 
     scene : name of a scene or a .toml file
     of : the response; the frequency of its fold; frequency and damping of the nonlinear mode of [backbone]; the life by
-        [wear] until 0.1 % of the preload is left, with the largest depth and the volume that are worn then
+        [wear], which ends at `wear.lost_below`, with the largest depth and the volume that are worn then
     at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too. The fold
         next to it; that of the largest amplitude by default
     amplitude : of the observed displacement in the mode, which stays; the last modal one of [backbone] by default
@@ -279,7 +279,7 @@ def _of_mode(
 def _share(scene: Scene) -> float:
     """Of the first preload, where the life that a result states ends."""
     assert scene.wear is not None
-    return (scene.wear.lost_below if scene.wear.end_at == "at_rest" else 0.0) or LIFE_SHARE
+    return scene.wear.lost_below or LIFE_SHARE
 
 
 def _of_life(varying: Varying, worn: WearHistory, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
