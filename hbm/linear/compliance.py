@@ -148,7 +148,7 @@ class ContactCompliance:
     def coarse_parts(self) -> list[np.ndarray]:
         """Share of the modes of each group in the `preconditioned` shapes, Q^T sqrt(k) b: (r, m)."""
         weighted = self.preconditioned.T * np.sqrt(self.k)
-        return [(weighted @ expansion.b[: self.n_contact]).astype(complex) for expansion, _ in self.groups]
+        return [weighted @ expansion.b[: self.n_contact] for expansion, _ in self.groups]
 
     @cached_property
     def coarse_shapes(self) -> np.ndarray:
