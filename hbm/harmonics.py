@@ -45,7 +45,7 @@ class HarmonicBasis:
         """Kept harmonics >= 1."""
         return self.harmonics[1:] if self.has_static else self.harmonics
 
-    @property
+    @cached_property
     def n_coeff(self) -> int:
         """Number of real coefficients."""
         return 2 * len(self.dynamic) + self.has_static

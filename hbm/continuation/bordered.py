@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as sla
 
 from tribodyn.hbm.balance import Linearisation, State
 from tribodyn.hbm.continuation.parameter import Parameter
@@ -71,7 +72,7 @@ def solve(
     tolerance: float,
     max_products: int,
 ) -> tuple[Direction, int]:
-    """Solve the bordered system by GMRES, or directly where GMRES stalls.
+    """Solve the bordered system by GMRES that keeps its few directions, or directly where it stalls.
 
     slope : (n_contact, n_coeff) dR/dp; border : c, of any norm; rhs : r (n_contact, n_coeff) [m] and s
     Returns the direction and the products spent
@@ -79,7 +80,8 @@ def solve(
     """
     rows = linear.rows
     shape = (len(rows), slope.shape[1])
-    column = slope[rows].ravel() * (metric.width / metric.length)
+    bordering = np.append(slope[rows].ravel() * (metric.width / metric.length), 0.0)
+    column = bordering[:-1]
     row = np.append(border.x[rows].ravel() / metric.length, border.p / metric.width)
     size = float(np.linalg.norm(row))
     if size == 0.0:
@@ -88,11 +90,13 @@ def solve(
     right = np.append(rhs[0][rows].ravel() / metric.length, rhs[1] / size)
 
     def product(v: np.ndarray) -> np.ndarray:
-        moved = linear.product(v[:-1].reshape(shape)).ravel() if len(rows) else v[:-1]
-        return np.append(moved + v[-1] * column, row @ v)
+        out = v[-1] * bordering
+        out[:-1] += linear.product(v[:-1].reshape(shape)).ravel() if len(rows) else v[:-1]
+        out[-1] = row @ v
+        return out
 
     precondition = _coarse_inverse(linear, column, row) if len(rows) else None
-    y, spent, reached = gmres(product, right, tolerance, max_products, precondition)
+    y, spent, reached = gmres(product, right, tolerance, max_products, precondition, flexible=True)
     if not reached <= max(10 * tolerance, 0.5):  # stalled: the direct way
         active = (rows[:, None] * shape[1] + np.arange(shape[1])).ravel()
         inner = linear.dense()[np.ix_(active, active)]
@@ -119,20 +123,21 @@ def _coarse_inverse(
     shape = (len(u), len(column) // len(u))
 
     def inner(d: np.ndarray) -> np.ndarray:
-        found: np.ndarray = a @ (u.T @ linear.g_slope(d.reshape(shape))).ravel()
-        return found
+        return np.asarray(a @ (u.T @ linear.g_slope(d.reshape(shape))).ravel())
 
-    bordered = np.empty((len(matrix) + 1, len(matrix) + 1))
+    bordered = np.empty((len(matrix) + 1, len(matrix) + 1), order="F")
     bordered[:-1, :-1], bordered[:-1, -1] = matrix, inner(column)
     bordered[-1, :-1], bordered[-1, -1] = (u.T @ row[:-1].reshape(shape)).ravel(), row[-1] - row[:-1] @ column
-    try:
-        inverse = np.linalg.inv(bordered)
-    except np.linalg.LinAlgError:
+    factor, pivots, zero = sla.lapack.dgetrf(bordered, overwrite_a=True)
+    if zero:
         return None
 
     def apply(v: np.ndarray) -> np.ndarray:
-        y = inverse @ np.append(inner(v[:-1]), v[-1] - row[:-1] @ v[:-1])
-        return np.append(v[:-1] - y[-1] * column + (u @ y[:-1].reshape(u.shape[1], -1)).ravel(), y[-1])
+        y = sla.lapack.dgetrs(factor, pivots, np.append(inner(v[:-1]), v[-1] - row[:-1] @ v[:-1]))[0]
+        out = v.copy()
+        out[:-1] += (u @ y[:-1].reshape(u.shape[1], -1)).ravel() - y[-1] * column
+        out[-1] = y[-1]
+        return out
 
     return apply
 

@@ -101,6 +101,36 @@ def displaced(moved, higher, left, n, n_e, unit, ratio, has_static, real, imag, 
 
 
 @numba.njit(cache=True)
+def displaced_slope(forces, higher, left, unit, omega, s_unit, c, t, ratio, has_static, real, imag, pivots, static):
+    """d / d omega of `displaced`: of (i ratio)^k it is k / omega times that, of the core d S / d s times i h.
+
+    forces, higher : times modes and e (n_coeff, m + n_e m), times the W_k; c (m, m), t (n_e, m, m) : of the core
+    """
+    m, n_port, s = len(c), left.shape[1], 1 if has_static else 0
+    n_e = len(left) // m - 1
+    of_powers = np.repeat(np.arange(n_e + 1) / omega, m)
+    y = modal_forces(forces, n_e, ratio, has_static)
+    dy = modal_forces(forces * of_powers, n_e, ratio, has_static)
+    solve_core(y, real, imag, pivots, static, has_static)
+    for h in range(len(ratio)):
+        at = complex(0.0, ratio[h] * s_unit)
+        for i in range(m):
+            pushed = 2.0 * at * y[s + h, i]
+            for j in range(m):
+                by, power = complex(c[i, j], 0.0), at
+                for k in range(n_e):
+                    by -= (k + 2) * power * t[k, i, j]
+                    power *= at
+                pushed += by * y[s + h, j]
+            dy[s + h, i] -= at / omega * pushed
+    solve_core(dy, real, imag, pivots, static, has_static)
+    rows = modal_rows(dy, n_e, ratio, has_static) + modal_rows(y, n_e, ratio, has_static) * of_powers
+    by_powers = higher * np.repeat(np.arange(1, higher.shape[1] // n_port + 1) / omega, n_port)
+    moved = np.dot(rows, left)
+    return gathered(moved, np.zeros(moved.shape), by_powers, n_port, n_port, unit, ratio, has_static)
+
+
+@numba.njit(cache=True)
 def nearly_displaced(force, w0, b, b_turned, ratio, has_static, real, imag, pivots, static):
     """Displacement (n, n_coeff) by W_0, which may be empty, and modes alone, in the single precision of these.
 

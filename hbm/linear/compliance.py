@@ -22,7 +22,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
 from tribodyn.hbm.linear.all_harmonics import few_rows
-from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad, slopes
+from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
 from tribodyn.hbm.linear.ritz_expansion import RitzExpansion
 from tribodyn.reduction.model import ReducedModel
 
@@ -130,7 +130,7 @@ class ContactCompliance:
         other.__dict__.update(self.__dict__)
         other.basis = basis
         other._active, other._points = None, {}
-        for made in ("outside", "coarse_parts", "excited"):
+        for made in ("outside", "coarse_parts", "coarse_shapes", "excited"):
             other.__dict__.pop(made, None)
         other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
         other.base = None if self.base is None else self.basis.transfer(self.base, basis)
@@ -149,6 +149,12 @@ class ContactCompliance:
         """Share of the modes of each group in the `preconditioned` shapes, Q^T sqrt(k) b: (r, m)."""
         weighted = self.preconditioned.T * np.sqrt(self.k)
         return [weighted @ expansion.b[: self.n_contact] for expansion, _ in self.groups]
+
+    @cached_property
+    def coarse_shapes(self) -> np.ndarray:
+        """(n_contact, r) displacement of the `preconditioned` shapes, zero where nothing is sprung."""
+        root, shapes = np.sqrt(self.k)[:, None], self.preconditioned
+        return np.divide(shapes, root, out=np.zeros(shapes.shape), where=root > 0)
 
     def _coarse_modes(self) -> np.ndarray:
         """(n_contact, r) shapes Q of sqrt(k) x, orthonormal, that carry the contact flexibility but for a small share.
@@ -193,32 +199,39 @@ class ContactCompliance:
 
     @cached_property
     def outside(self) -> Outside | None:
-        """What excitation and outputs take from the matrices of one real system; None where they are not at hand."""
-        if not self.shared_real or self.residual is not None:
+        """What excitation and outputs take from the matrices of one real system; None where there are several."""
+        if not self.shared_real:
             return None
-        x, basis, n = self.groups[0][0], self.basis, self.n_contact
+        x, n = self.groups[0][0], self.n_contact
         stop, p = n + self.n_load, x.n_port
-        rows = np.ascontiguousarray(basis.to_real(self.excited[:stop]).T)
-        outputs = [w[:n, stop:] for w in (x.w0, *x.higher)]
+        rows = np.ascontiguousarray(self.excited[:stop].T)
+        if self.residual is None:
+            moved, columns = rows @ x.columns[:stop], np.concatenate([x.w0[:n, stop:], x.columns[:n, p:]], axis=1)
+        else:  # in place of W_0, between the contacts alone
+            still, none = np.zeros((self.basis.n_coeff, p)), np.zeros((n, p - stop))
+            if self.base is not None:
+                still[:, :n] = self.residual.apply(self.excited[:n]).T
+            moved, columns = np.concatenate([still, rows @ x.b[:stop]], axis=1), np.concatenate([none, x.b[:n]], axis=1)
+        higher = [w[:n, stop:] for w in x.higher]
         return Outside(
-            (rows @ x.columns[:stop], self.moving(rows) @ x.single[:stop]),
-            np.concatenate([outputs[0], x.columns[:n, p:]], axis=1),
-            np.concatenate(outputs[1:], axis=1) if len(outputs) > 1 else x.single[:n],
+            (moved, self.moving(rows) @ x.single[:stop]),
+            columns,
+            np.concatenate(higher, axis=1) if higher else x.single[:n],
             np.ascontiguousarray(x.left[:, stop:]),
         )
 
     @cached_property
     def excited(self) -> np.ndarray:
-        """(n_port, n_harmonic) complex port forces of the excitation."""
+        """(n_port, n_coeff) port forces of the excitation."""
         base = np.zeros((self.n_contact, self.basis.n_coeff)) if self.base is None else self.base
         found = self.pushed(self.k[:, None] * base)
-        found[self.n_contact : self.n_contact + self.n_load] = self._load
+        found[self.n_contact : self.n_contact + self.n_load] = self.basis.to_real(self._load)
         return found
 
     def pushed(self, g: np.ndarray) -> np.ndarray:
-        """(n_port, n_harmonic) complex port forces of contact forces g (n_contact, n_coeff) [N]."""
-        found = np.zeros((self.n_contact + self.n_load + len(self.output_names), len(self.basis.harmonics)), complex)
-        found[: self.n_contact] = self.basis.to_complex(g)
+        """(n_port, n_coeff) port forces of contact forces g (n_contact, n_coeff) [N]."""
+        found = np.zeros((self.n_contact + self.n_load + len(self.output_names), self.basis.n_coeff))
+        found[: self.n_contact] = g
         return found
 
 
@@ -265,6 +278,7 @@ class CompliancePoint:
     def __init__(self, compliance: ContactCompliance, omega: float):
         self.compliance = compliance
         self.omega = omega
+        self._turns = omega or 1e-150  # [rad/s] whose powers vanish at rest, where their slopes over it do not
         basis = compliance.basis
         self._harmonics = np.asarray(basis.harmonics, float)
         self.ports = self._solved()
@@ -274,14 +288,14 @@ class CompliancePoint:
             x, self.outputs_lin = moved[:n], moved[stop:]
         else:
             excited = slice(n, stop) if compliance.base is None else slice(0, stop)
-            ports = self._through_ports(compliance.excited[excited], excited)
+            ports = self._through_ports(basis.to_complex(compliance.excited[excited]), excited)
             x, self.outputs_lin = basis.to_real(ports[:n]), basis.to_real(ports[stop:])
         self.x_lin = x if compliance.base is None else x - compliance.base
 
     def _solved(self) -> Any:
         """What gives the displacement of ports, group by group and harmonic by harmonic."""
-        c, s = self.compliance, 1j * self.omega
-        return [[expansion.at(s * c.basis.harmonics[p]) for p in positions] for expansion, positions in c.groups]
+        s = 1j * self.omega * self._harmonics
+        return [expansion.at_each(s[positions]) for expansion, positions in self.compliance.groups]
 
     def _through_ports(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
         first = self.compliance.groups[0][0]
@@ -289,7 +303,7 @@ class CompliancePoint:
         for (_, positions), ports in zip(self.compliance.groups, self.ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
                 if force[:, p].any():
-                    out[:, p] = port.apply(force[:, p], columns, rows)
+                    out[:, p] = port.matrix(rows, columns) @ force[:, p]
         return out
 
     def apply(self, g: np.ndarray) -> np.ndarray:
@@ -329,14 +343,8 @@ class CompliancePoint:
         """G g without what a factor would have to be asked for; see `left_out`."""
         if self.compliance.residual is None:
             return self.apply(g)
-        return self._by_modes(g, slice(self.compliance.n_contact))
-
-    def _by_modes(self, g: np.ndarray, ports: slice) -> np.ndarray:
-        """Displacement of some ports under contact forces g, of one real system by its modes alone."""
-        b = self.compliance.groups[0][0].b
-        rows = all_harmonics.modal(np.ascontiguousarray(g.T) @ b[: self.compliance.n_contact], 0, *self.core)
-        found: np.ndarray = (rows @ b[ports].T).T
-        return found
+        b = self.compliance.groups[0][0].b[: self.compliance.n_contact]
+        return np.asarray((all_harmonics.modal(np.ascontiguousarray(g.T) @ b, 0, *self.core) @ b.T).T)
 
     def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
         """The same for one real system: every matrix meets all harmonics in one real product."""
@@ -358,7 +366,7 @@ class CompliancePoint:
         lower_upper = [port.factor.T for port in self.ports[0] if port.factor is not None]  # at rest there are none
         factors = np.array(lower_upper, complex).reshape(-1, x.n_mode, x.n_mode)
         pivots = np.array([p.pivots for p in self.ports[0] if p.pivots is not None], np.int32).reshape(-1, x.n_mode)
-        ratio = self.omega / x.s_unit * np.array(basis.dynamic)
+        ratio = self._turns / x.s_unit * np.array(basis.dynamic)
         real, imag = (np.ascontiguousarray(part) for part in (factors.real, factors.imag))
         return ratio, basis.has_static, real, imag, pivots, x.static_lam
 
@@ -370,26 +378,27 @@ class CompliancePoint:
             rows = np.ascontiguousarray(g.T)
             return self._from_rows(rows @ o.columns, c.moving(rows) @ o.single, o.left)
         contacts, outputs = slice(0, c.n_contact), slice(c.n_contact + c.n_load, None)
-        if c.residual is not None:  # which outputs have none of
-            return self._by_modes(g, outputs)
         return c.basis.to_real(self._through_ports(c.basis.to_complex(g), contacts, outputs))
 
     def slope(self, g: np.ndarray, load_factor: float) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega of contact displacement and outputs under g and the excitation, vibrating part times factor."""
         c = self.compliance
-        return self._slope(c.excited * np.where(c.basis.harmonics, load_factor, 1.0) + c.pushed(g))
+        return self._slope(c.excited * np.where(c.basis.order, load_factor, 1.0) + c.pushed(g))
 
     def _slope(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """d / d omega of contact displacement and outputs under port forces (n_port, n_harmonic)."""
-        c = self.compliance
-        moved = np.zeros_like(force)
-        for (_, positions), ports in zip(c.groups, self.ports, strict=True):
-            moved[:, positions] = self._port_slopes(ports, force[:, positions], 1j * self._harmonics[positions])
-        return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
-
-    def _port_slopes(self, ports: Any, force: np.ndarray, by: np.ndarray) -> np.ndarray:
-        """d / d omega of the displacement of ports under forces (n_port, len(ports)); by : d s / d omega of each."""
-        return by * slopes(ports, force)
+        """d / d omega of contact displacement and outputs under port forces (n_port, n_coeff)."""
+        c, x = self.compliance, self.compliance.groups[0][0]
+        if c.shared_real:
+            rows = np.ascontiguousarray(force.T)
+            pushed = rows @ x.left.T, c.moving(rows) @ x.single
+            moved = all_harmonics.displaced_slope(*pushed, x.left, x.unit, self._turns, x.s_unit, x.c, x.t, *self.core)
+        else:
+            amplitudes, slopes = c.basis.to_complex(force), np.zeros((len(force), len(self._harmonics)), complex)
+            for (_, positions), ports in zip(c.groups, self.ports, strict=True):
+                for p, port in zip(positions, ports, strict=True):
+                    slopes[:, p] = port.slope(amplitudes[:, p], 1j * self._harmonics[p])
+            moved = c.basis.to_real(slopes)
+        return moved[: c.n_contact], moved[c.n_contact + c.n_load :]
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """G restricted to contact rows (active ones) times (n_active, n_coeff), as exact as a Newton direction needs.
@@ -410,10 +419,7 @@ class CompliancePoint:
 
     def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """U (n_rows, r) and A (r n_coeff, r n_coeff) with G ~ U A U^T on contact rows; r may be 0."""
-        c = self.compliance
-        root = np.sqrt(c.k[rows])[:, None]
-        shapes = c.preconditioned[rows]
-        return np.divide(shapes, root, out=np.zeros(shapes.shape), where=root > 0), self._coarse_compliance
+        return self.compliance.coarse_shapes[rows], self._coarse_compliance
 
     @cached_property
     def _coarse_compliance(self) -> np.ndarray:

@@ -19,7 +19,6 @@ Source  block elimination of modal coordinates (ours); static correction of trun
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -166,7 +165,7 @@ class Expansion:
         else:
             m, order = len(lam), 1 if len(lam) == n else 8
         self._build(lam[:m], phi[:, :m], factor, order, ports)
-        self.error = float(np.abs(self.at(s).apply(probe) - exact).max() / np.abs(exact).max())
+        self.error = float(np.abs(self.at(s).matrix() @ probe - exact).max() / np.abs(exact).max())
         del self._system, self._flow
 
     def _build(
@@ -233,21 +232,31 @@ class Expansion:
 
     def at(self, s: complex) -> PortCompliance:
         """The compliance at s = i h w."""
-        if s == 0 and self.flow is None:
-            return PortCompliance(self, s, None, None)
-        core = s * self.c
+        return self.at_each(np.array([s]))[0]
+
+    def at_each(self, s: np.ndarray) -> list[PortCompliance]:
+        """The compliance at several s = i h w (n,)."""
+        # transposed: LAPACK then factors them where they lie
+        cores = np.multiply(s[:, None, None], self.c.T, order="C")
         for k, t in enumerate(self.t):
-            core -= s ** (k + 2) * t
-        core.flat[:: len(core) + 1] += (self.lam if s != 0 else self.static_lam) + s * s
+            cores -= (s ** (k + 2))[:, None, None] * t.T
+        diagonals = cores.reshape(len(s), -1)[:, :: self.n_mode + 1]
+        diagonals += np.where(s[:, None] != 0, self.lam, self.static_lam) + (s * s)[:, None]
         if self.flow is not None:
-            core += self.flow
-        factor, pivots, _ = sla.lapack.zgetrf(core)
-        if s != 0 and np.abs(np.diag(factor)).min() < RULES.resonance_distance * abs(s) ** 2:
+            cores += self.flow.T
+        found = []
+        for one, core in zip(s, cores, strict=True):
+            diagonal = one == 0 and self.flow is None
+            factor, pivots = (None, None) if diagonal else sla.lapack.zgetrf(core.T, overwrite_a=True)[:2]
+            found.append(PortCompliance(self, one, factor, pivots))
+        resonant = np.abs(diagonals).min(axis=1) < RULES.resonance_distance * np.abs(s) ** 2
+        if resonant.any():
+            hertz = np.abs(s[resonant][0]) / (2 * np.pi)
             raise UndampedResonance(
-                f"the stuck structure has an undamped resonance at {abs(s) / (2 * np.pi):.6g} Hz, where its response "
+                f"the stuck structure has an undamped resonance at {hertz:.6g} Hz, where its response "
                 "is infinite: give it damping or take another frequency"
             )
-        return PortCompliance(self, s, factor, pivots)
+        return found
 
 
 def _rigid(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]:
@@ -334,10 +343,6 @@ class PortCompliance:
         solution: np.ndarray = sla.lapack.zgetrs(self.factor, self.pivots, z)[0]
         return solution.reshape(z.shape)
 
-    def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
-        """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
-        return self.matrix(rows, columns) @ force
-
     def matrix(self, rows: slice = slice(None), columns: slice = slice(None)) -> np.ndarray:
         """Displacement of the ports in `rows` under unit forces at those in `columns`."""
         x, ratio = self.expansion, self.ratio
@@ -350,40 +355,24 @@ class PortCompliance:
             found += x.unit * ratio**k * w[rows, columns]
         return found
 
-
-def slopes(ports: Sequence[PortCompliance], force: np.ndarray) -> np.ndarray:
-    """d (apply) / d s of all ports of one expansion under forces (n_port, len(ports)), each at an s of its own."""
-    x = ports[0].expansion
-    s, ratio = np.array([port.s for port in ports]), np.array([port.ratio for port in ports])
-    powers = [k * ratio ** (k - 1) / x.s_unit for k in range(1, 1 + max(len(x.e), len(x.higher)))]
-
-    def through_cores(z: np.ndarray) -> np.ndarray:
-        return np.stack([port.through_core(column) for port, column in zip(ports, z.T, strict=True)], axis=1)
-
-    z = product(x.b.conj().T, force).astype(complex)
-    dz = np.zeros_like(z)
-    for k, e in enumerate(x.e_in, start=1):
-        part = product(e.conj().T, force)
-        z -= ratio**k * part
-        dz -= powers[k - 1] * part
-    y = through_cores(z)
-    dz -= 2 * s * y + x.c @ y
-    for k, t in enumerate(x.t, start=1):
-        dz += (k + 1) * s**k * (t @ y)
-    dy = through_cores(dz)
-    out = product(x.b, dy)
-    for k, e in enumerate(x.e, start=1):
-        out -= product(e, ratio**k * dy + powers[k - 1] * y)
-    for k, w in enumerate(x.higher, start=1):
-        out += x.unit * powers[k - 1] * product(w, force)
-    return out
-
-
-def product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """matrix @ vector in the precision of the matrix, without widening a real matrix to complex."""
-    if np.iscomplexobj(matrix):
-        return matrix @ vector.astype(matrix.dtype)
-    if not np.iscomplexobj(vector):
-        return matrix @ vector.astype(matrix.dtype)
-    real, imag = np.ascontiguousarray(vector.real, matrix.dtype), np.ascontiguousarray(vector.imag, matrix.dtype)
-    return (matrix @ real).astype(float) + 1j * (matrix @ imag)
+    def slope(self, force: np.ndarray, by: complex) -> np.ndarray:
+        """`by` times d / d s of the displacement of all ports under forces (n_port, ...)."""
+        x, s, ratio = self.expansion, self.s, self.ratio
+        powers = [k * ratio ** (k - 1) / x.s_unit for k in range(1, 1 + max(len(x.e), len(x.higher)))]
+        z = x.b.conj().T @ force.astype(complex)
+        dz = np.zeros_like(z)
+        for k, e in enumerate(x.e_in, start=1):
+            part = e.conj().T @ force
+            z -= ratio**k * part
+            dz -= powers[k - 1] * part
+        y = self.through_core(z)
+        dz -= 2 * s * y + x.c @ y
+        for k, t in enumerate(x.t, start=1):
+            dz += (k + 1) * s**k * (t @ y)
+        dy = self.through_core(dz)
+        out = x.b @ dy
+        for k, e in enumerate(x.e, start=1):
+            out -= e @ (ratio**k * dy + powers[k - 1] * y)
+        for k, w in enumerate(x.higher, start=1):
+            out += x.unit * powers[k - 1] * (w @ force)
+        return by * out

@@ -25,7 +25,7 @@ from scipy.linalg import inv, lu_factor, lu_solve
 from tribodyn.fem.cyclic import of_sector
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.linear.expansion import Expansion, slopes
+from tribodyn.hbm.linear.expansion import Expansion
 from tribodyn.reduction.model import ReducedModel
 
 ROOM = 2e8  # bytes of matrices of sectors alike that are kept for frequencies met again
@@ -90,7 +90,7 @@ class Alike:
 
     def slope(self, s: complex) -> np.ndarray:
         """d (at) / d s."""
-        return self._of_every_index(lambda one: slopes([one.at(s)] * self.n_port, np.eye(self.n_port, dtype=complex)))
+        return self._of_every_index(lambda one: one.at(s).slope(np.eye(self.n_port), 1.0))
 
     def _of_every_index(self, make: Callable[[Expansion], np.ndarray]) -> np.ndarray:
         N = self.n_sectors

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm.linear.expansion import Expansion, PortCompliance, SingularStuckSystem, product
+from tribodyn.hbm.linear.expansion import Expansion, SingularStuckSystem
 from tribodyn.reduction.residual_flexibility import ResidualFlexibility
 
 
@@ -51,29 +51,6 @@ class RitzExpansion(Expansion):
         self.b_single = self.b[: len(b)].astype(np.float32)
         self.w0, self.order, self.n_mode = None, 1, len(self.lam)  # type: ignore[assignment]
         self.w0_single = np.zeros((0, 0), np.float32)
+        self.left, self.single, self.unit = np.ascontiguousarray(self.b.T), np.zeros((len(ports), 0), np.float32), 1.0
         self.e, self.e_in, self.higher, self.t = [], [], [], np.zeros((0, 0, 0))
         self.error = residual.error(s_max)
-
-    def at(self, s: complex) -> PortCompliance:
-        """The compliance at s = i h w."""
-        plain = super().at(s)
-        return RitzPort(self, s, plain.factor, plain.pivots)
-
-
-class RitzPort(PortCompliance):
-    """D(s)^-1 between ports at one s."""
-
-    def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
-        """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
-        x = self.expansion
-        assert isinstance(x, RitzExpansion)
-        out = product(x.b[rows], self.through_core(product(x.b[columns].T, force).astype(complex)))
-        n = x._n_contact
-        pushed, moved = (np.arange(x.n_port)[chosen] for chosen in (columns, rows))
-        if (pushed < n).any() and (moved < n).any():
-            full = np.zeros((n, *force.shape[1:]), complex)
-            full[pushed[pushed < n]] = force[pushed < n]
-            parts = np.stack([full.real, full.imag], axis=-1).reshape(n, -1)
-            still = x.residual.apply(parts).reshape(*full.shape, 2)
-            out[moved < n] += (still[..., 0] + 1j * still[..., 1])[moved[moved < n]]
-        return out

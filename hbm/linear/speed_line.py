@@ -70,9 +70,6 @@ class LinePoint(CompliancePoint):
 
         return [[ports(line.basis.harmonics[p]) for p in positions] for _, positions in line.groups]
 
-    def _port_slopes(self, ports: list[LinePorts], force: np.ndarray, by: np.ndarray) -> np.ndarray:
-        return np.stack([port.slope(f, b) for port, f, b in zip(ports, force.T, by, strict=True)], axis=1)
-
     def _in_coarse(self, modes: np.ndarray, port: LinePorts) -> np.ndarray:
         c = self.compliance
         shapes = c.preconditioned.T * np.sqrt(c.k)
@@ -116,10 +113,6 @@ class LinePorts:
             change = change if of.velocity_matrix is None else change + at * of.velocity_matrix
         q = self._under(self.rows.conj().T @ force)
         return self.rows_change @ q + self.rows @ self._under(self.rows_change.conj().T @ force - change @ q)
-
-    def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
-        """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
-        return self.moved[rows, columns] @ force
 
     def matrix(self, rows: slice = slice(None), columns: slice = slice(None)) -> np.ndarray:
         """Displacement of the ports in `rows` under unit forces at those in `columns`."""

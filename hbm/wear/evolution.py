@@ -254,7 +254,7 @@ def kept_beside(problem: WearProblem, before: WearState, depth: np.ndarray, cycl
     for duty, known in zip(problem.mission, before.points, strict=True):
         omega, x = known.state.omega, known.state.x
         near, balance = problem.in_duty(duty, before.depth), problem.in_duty(duty, depth)
-        guess = x + near.gap_response(near.evaluate(omega, x), depth - before.depth)
+        guess = x + near.gap_response(known.state, depth - before.depth)
         found = newton.solve(balance, omega, guess, duty.site.newton)
         if not found.converged:
             found = replace(known.solution, state=balance.evaluate(omega, x))

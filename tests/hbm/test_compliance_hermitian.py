@@ -11,6 +11,7 @@ from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import expansion
+from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.reduction.model import ReducedModel
 
 N_PAIR, N = 4, 40
@@ -103,19 +104,20 @@ def test_expansion_holds_up_to_the_highest_harmonic_of_each_system(balance):
     assert np.abs(balance.at(OMEGA).apply(g) - x).max() < 1e-7 * np.abs(x).max()
 
 
-def test_slopes_equal_finite_differences(balance):
-    omega, step = 0.6 * OMEGA, 2e-4
-    g = np.random.default_rng(2).normal(size=(3 * N_PAIR, balance.basis.n_coeff))
+@pytest.mark.parametrize("harmonics", [HARMONICS, (0, 5)])  # the last two share one real system
+def test_slopes_equal_finite_differences(balance, harmonics):
+    compliance, omega, step = balance.compliance.restricted(HarmonicBasis(harmonics, 64)), 0.6 * OMEGA, 2e-4
+    g = np.random.default_rng(2).normal(size=(3 * N_PAIR, compliance.basis.n_coeff))
     for factor, part in ((1.0, 0.0), (0.0, 1.0), (0.7, 1.0)):  # of the loads and of g
         both = []
         for at in (omega + step, omega - step):
-            point, loads = balance.at(at), np.where(balance.basis.order, factor, 1.0)
+            point, loads = compliance.at(at), np.where(compliance.basis.order, factor, 1.0)
             both.append(
                 (point.x_lin * loads + point.apply(part * g), point.outputs_lin * loads + point.outputs(part * g))
             )
-        slopes = balance.at(omega).slope(part * g, factor)
+        slopes = compliance.at(omega).slope(part * g, factor)
         for slope, (up, down) in zip(slopes, zip(*both, strict=True), strict=True):
-            assert np.abs(slope - (up - down) / (2 * step)).max() < 1e-6 * np.abs(slope).max()
+            assert np.abs(slope - (up - down) / (2 * step)).max() <= 1e-6 * np.abs(slope).max()
 
 
 def test_newton_direction_equals_the_derivative(balance):
@@ -158,11 +160,34 @@ def test_coriolis_forces_in_few_modes_against_a_direct_solve(is_complex):
         s = 1j * w
         q = np.linalg.solve(dynamic + s * (damping + gyroscopic) + s**2 * np.eye(n), ports.conj().T @ force)
         exact = ports @ q
-        assert np.abs(found.at(s).apply(force) - exact).max() < 1e-8 * np.abs(exact).max()
+        assert np.abs(found.at(s).matrix() @ force - exact).max() < 1e-8 * np.abs(exact).max()
     step = 1e-5 * OMEGA
-    ahead, behind = (found.at(1j * (0.5 * OMEGA + d)).apply(force) for d in (step, -step))
-    slope = expansion.slopes([found.at(0.5j * OMEGA)], force[:, None])[:, 0]
+    ahead, behind = (found.at(1j * (0.5 * OMEGA + d)).matrix() @ force for d in (step, -step))
+    slope = found.at(0.5j * OMEGA).slope(force, 1.0)
     assert np.abs(slope - (ahead - behind) / (2j * step)).max() < 1e-5 * np.abs(slope).max()
+
+
+def test_all_harmonics_of_one_real_system_in_few_modes_have_the_slopes_of_each():
+    rng = np.random.default_rng(6)
+    n, rows = 120, 3
+    basis, half = np.linalg.qr(rng.normal(size=(n, n)))[0], rng.normal(size=(n, n))
+    omega = np.geomspace(20, 4e4, n)
+    damping = basis.T @ (np.diag(0.03 * omega) + 1e-2 * half @ half.T) @ basis
+    loads, outputs = {"shaker": rng.normal(size=n), "rest": rng.normal(size=n)}, {"y": rng.normal(size=n)}
+    system = SecondOrderSystem(np.eye(n), basis.T @ np.diag(omega**2) @ basis, damping, loads, outputs)
+    nodes = np.zeros((1, 3)), np.eye(3)[None], np.ones(1), np.zeros(1)
+    contact = ContactInterface(("t1", "t2", "n"), *nodes, rng.normal(size=(rows, n)), np.zeros((0, 4), int))
+    model, load = ReducedModel(system, contact), Excitation.of({"rest": 2e3}, {1: {"shaker": 900 - 300j}})
+    compliance = ContactCompliance(model, np.full((1, rows), 1e3), HarmonicBasis((0, 1, 2), 64), load, 0.5 * OMEGA)
+    (truncated, _), g = compliance.groups[0], rng.normal(size=(rows, compliance.basis.n_coeff))
+    assert compliance.shared_real
+    assert truncated.order > 2
+    point = compliance.at(0.3 * OMEGA)
+    force = compliance.basis.to_complex(compliance.excited + compliance.pushed(g))
+    each = [port.slope(f, 1j * h) for h, port, f in zip((0, 1, 2), point.ports[0], force.T, strict=True)]
+    expected = compliance.basis.to_real(np.stack(each, axis=1))
+    for found, wanted in zip(point.slope(g, 1.0), (expected[:rows], expected[-1:]), strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-13 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("harmonics", [HARMONICS, (0, 5)])  # the last two share one real system

@@ -30,7 +30,7 @@ from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.structure import NamedContact
 from tribodyn.workflows.scene.wear import JointWearTable, Wear
 
-KEEPING = 0.05  # share of the time that goes into writing steps: a kill loses as many as take twenty times one writing
+KEEPING = 0.01  # share of the time that goes into writing steps: a kill loses as many as take 100 times one writing
 
 
 def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advance: Advance) -> Result:
