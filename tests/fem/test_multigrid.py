@@ -12,7 +12,7 @@ from skfem import MeshHex, MeshHex2, MeshTet, MeshTet2
 
 from tests.helpers.fits import plain
 from tribodyn.fem.elasticity import assemble
-from tribodyn.fem.elementwise import matrices
+from tribodyn.fem.elementwise import Elementwise, matrices
 from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.material import Material, Orthotropic
 from tribodyn.fem.modes import modes
@@ -57,7 +57,13 @@ def test_products_are_those_of_assembled_matrices(mesh, material) -> None:
         np.testing.assert_allclose(one @ x[:, 0], other @ x[:, 0], atol=1e-13 * size)
         np.testing.assert_allclose(one.astype(np.float32) @ x.astype(np.float32), other @ x, atol=2e-6 * size)
         np.testing.assert_allclose(one.diagonal(), other.diagonal(), rtol=1e-12)
-    by, linear = one.linear()  # of the stiffness
+    (elements,) = one.elements  # of the stiffness
+    rises = np.linspace(1.0, 2.0, elements.nodes.shape[1])
+    varied = replace(elements, law=elements.law * rises, weight=elements.weight * rises)
+    backwards = {n: np.ascontiguousarray(getattr(varied, n)[..., ::-1]) for n in ("nodes", "weight", "inverse", "law")}
+    ways = [Elementwise([own], one.n_node, one.free, one.rest) @ x for own in (varied, replace(varied, **backwards))]
+    np.testing.assert_allclose(*ways, atol=1e-13 * np.abs(ways[0]).max())
+    by, linear = one.linear()
     np.testing.assert_allclose((linear - by.T @ other @ by).toarray(), 0.0, atol=1e-13 * np.abs(linear).max())
 
 

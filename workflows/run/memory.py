@@ -6,7 +6,8 @@ import os
 import sys
 from pathlib import Path
 
-FACTOR_BYTES = 15e3  # of a sparse Cholesky factor, for each DOF
+# bytes for each DOF, as measured in docs/validation/large.md: of a factor; of elements with a factor of linear ones
+OF_SOLVER = {"direct": 15e3, "mumps": 15e3, "multigrid": 3.4e3}
 
 
 def forget_peak() -> None:
@@ -29,18 +30,16 @@ def peak() -> float:
         return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
-def check(n_dof: int, solver: str = "direct") -> None:
-    """Raise ValueError where the factorisation of a model of so many DOFs does not fit into this machine's memory."""
-    if solver in ("multigrid", "mumps"):  # none, or perhaps on other hosts
-        return
+def check(n_dof: int, solver: str, columns: int = 0) -> None:
+    """Raise ValueError where a model of so many DOFs, its modes and shapes (n_dof, columns) do not fit this machine."""
     try:
         machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, OSError, ValueError):  # as on Windows
         return
-    needed = FACTOR_BYTES * n_dof
-    if needed > machine:
+    needed = (OF_SOLVER[solver] + 8 * columns) * n_dof
+    if needed > machine and solver != "mumps":  # perhaps on other hosts
+        less = ', or set reduction.solver = "multigrid", which takes less and far longer' if solver == "direct" else ""
         raise ValueError(
             f"the mesh has {n_dof} DOFs, whose factorisation needs some {needed / 1e9:.0f} GB, and this machine has "
-            f"{machine / 1e9:.0f} GB: make the mesh coarser, or set "
-            'reduction.solver = "multigrid", which takes less and far longer'
+            f"{machine / 1e9:.0f} GB: make the mesh coarser{less}"
         )

@@ -27,6 +27,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import SingularStuckSystem, UnbalancedLoad
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.damping import modal_damping, rayleigh, rayleigh_of_ratios
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import hold
@@ -115,7 +116,9 @@ def plain_of(file: SceneFile, part: Part) -> ReducedModel:
     """The reduction of a part, not damped and with nothing prescribed; made once on a machine, see kept."""
 
     def made() -> ReducedModel:
-        memory.check(part.system.n_dof, file.mesh_scene.reduction.solver)
+        wanted, own = file.mesh_scene.reduction, part.interface
+        shapes = min(LIMITS.clusters, own.n_pair) * len(own.components)
+        memory.check(part.system.n_dof, wanted.solver, shapes + (wanted.modes or 0))
         return plain_model(file.mesh_scene, part)
 
     return kept.reduction(file, part, made)

@@ -105,7 +105,7 @@ def plan(file: SceneFile) -> Plan:
     scene = file.scene
     check_names(scene, own_files=False)
     elements = nodes = held = 0
-    sparse = False
+    sparse, solver = False, "direct"
     remarks: list[str] = []
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
@@ -127,7 +127,7 @@ def plan(file: SceneFile) -> Plan:
         full = len(free)
         pairs, masters = _contact(built, mesh, node_sets, free)
         held = int(built.geometry is not None and built.geometry.no_turning is not None)
-        modes, cutoff = built.reduction.modes, built.reduction.cutoff
+        modes, cutoff, solver = built.reduction.modes, built.reduction.cutoff, built.reduction.solver
         sparse = without_masters(built, pairs * len(components(scene)), held > 0)
         if sparse:
             masters = LIMITS.clusters * len(components(scene)) + 5
@@ -137,7 +137,7 @@ def plan(file: SceneFile) -> Plan:
     model = masters + (modes if modes is not None else 50) - held
     memory = (
         200e6  # the program itself
-        + memory_use.FACTOR_BYTES * full
+        + memory_use.OF_SOLVER[solver] * full
         + 3 * 8.0 * full * model
         + 10 * 8.0 * model**2
         + (0.0 if sparse else 8 * 8.0 * contact**2)
