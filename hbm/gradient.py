@@ -122,6 +122,7 @@ class Posed:
     """What a parameter changes of a balance: its model, contact, loads and the start of the load path.
 
     balance : all of it, where it was made already
+    alike : whether its coordinates are those of the solved problem even where its contact map is another one
     """
 
     model: ReducedModel
@@ -129,6 +130,7 @@ class Posed:
     excitation: Excitation
     memory: np.ndarray
     balance: HarmonicBalance | None = None
+    alike: bool = False
 
     @classmethod
     def of(cls, balance: HarmonicBalance) -> Posed:
@@ -140,8 +142,8 @@ class Posed:
 class Change:
     """A parameter p of some name: the problem a step above and a step below it.
 
-    twice : where p acts on the structure, whose changes have no corners: the same by two steps, for a difference of
-        order four, which a system near its own resonance needs; none of these where the model moves linearly
+    twice : where p acts on the structure: the same by two steps, for a difference of order four, which a system near
+        its own resonance needs; none of these where the model moves linearly, without corners
     touching : what p changes of the contact besides, whose forces have corners, by a smaller step
     """
 
@@ -175,12 +177,17 @@ def _sides(posed: Posed, balance: HarmonicBalance, omega: float) -> list[_Side]:
     """The linear side of a problem at a frequency [rad/s], harmonic by harmonic."""
     found = []
     for h in balance.basis.harmonics:
-        system, B = posed.model.at_harmonic(h)
-        C = np.stack([system.outputs[name] for name in balance.compliance.output_names])
+        system, B, C = _maps(posed, balance, h)
         stiffness = stuck_dynamic_stiffness(system, B, balance.reference_stiffness, 1j * h * omega)
         factor = sla.lu_factor(stiffness if h or np.iscomplexobj(B) else stiffness.real, overwrite_a=True)
-        found.append(_Side(system, np.asarray(B), C, factor))
+        found.append(_Side(system, B, C, factor))
     return found
+
+
+def _maps(posed: Posed, balance: HarmonicBalance, h: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
+    """System, contact map and outputs that a harmonic of a problem sees."""
+    system, B = posed.model.at_harmonic(h)
+    return system, np.asarray(B), np.stack([system.outputs[name] for name in balance.compliance.output_names])
 
 
 def _difference(new: SecondOrderSystem, old: SecondOrderSystem, s: complex, u: np.ndarray) -> np.ndarray | float:
@@ -303,15 +310,24 @@ class Gradient:
 
     def _moved(self, posed: Posed, sides: list[_Side]) -> list[np.ndarray]:
         """Coordinates under the loads of a problem and this g."""
-        return [side.solve(force) for side, force in zip(sides, self._forces(posed, sides), strict=True)]
+        sized = zip(self.balance.basis.harmonics, sides, self._pulls(posed), strict=True)
+        return [s.solve(s.B.conj().T @ g + self._loads(posed, s.system, h)) for h, s, g in sized]
 
-    def _forces(self, posed: Posed, sides: Sequence[_Side]) -> list[np.ndarray]:
-        balance, basis = self.balance, self.balance.basis
-        k, base = balance.reference_stiffness[:, None], posed.excitation.base
-        moved = self.state.flat if base is None else self.state.flat + balance.loaded(base)
-        g = basis.to_complex(k * moved - self.state.cycle.force.reshape(moved.shape))
-        sized = zip(basis.harmonics, sides, g.T, strict=True)
-        return [side.B.conj().T @ part + self._loads(posed, side.system, h) for h, side, part in sized]
+    def _pull(self, posed: Posed) -> np.ndarray:
+        """g (n_contact, n_coeff) that a problem has with this state."""
+        k, base = self.balance.reference_stiffness[:, None], posed.excitation.base
+        moved = self.state.flat if base is None else self.state.flat + self.balance.loaded(base)
+        return k * moved - self.state.cycle.force.reshape(moved.shape)
+
+    def _pulls(self, posed: Posed) -> np.ndarray:
+        """The same of each harmonic (n_harmonic, n_contact)."""
+        return np.asarray(self.balance.basis.to_complex(self._pull(posed)).T)
+
+    def _besides(self, posed: Posed) -> np.ndarray | float:
+        """What there is in x besides the motion of the coordinates."""
+        base, residual = posed.excitation.base, posed.model.residual
+        x = 0.0 if residual is None else residual.apply(self._pull(posed))
+        return x if base is None else x - self.balance.loaded(base)
 
     def _force(self, contact: Contact, memory: np.ndarray) -> np.ndarray:
         """(n_pair, n_component, n_coeff) what another contact adds to the forces at the same x [N]."""
@@ -320,26 +336,25 @@ class Gradient:
         cycle = contact.cycle(self.state.x, self.balance.basis, memory, jacobian=False)
         return np.asarray(cycle.force - self.state.cycle.force)
 
-    def _structure(self, above: Posed, below: Posed) -> tuple[np.ndarray, np.ndarray]:
-        """What model and loads of one problem add to x and outputs of another at the same u and contact forces."""
-        balance, own = self.balance, self.balance.model
-        if above.model is below.model and above.excitation is below.excitation:
+    def _structure(self, posed: Posed) -> tuple[np.ndarray, np.ndarray]:
+        """What model and loads of a problem add to x and outputs at the same u and contact forces."""
+        balance, own = self.balance, self.own
+        if posed.model is own.model and posed.excitation is own.excitation:
             return np.zeros_like(self.state.flat), np.zeros((len(self._sides[0].C), balance.basis.n_coeff))
-        if above.model.interface.B is not own.interface.B or below.model.interface.B is not own.interface.B:
-            there, here = (self._seen(one, _sides(one, balance, self.state.omega)) for one in (above, below))
+        if not posed.alike and posed.model.interface.B is not own.model.interface.B:
+            there, here = self._seen(posed, _sides(posed, balance, self.state.omega)), self._seen(own, self._sides)
             return there[0] - here[0], there[1] - here[1]
-        base, before = above.excitation.base, below.excitation.base
-        slid = np.zeros_like(self.state.flat) if base is None or before is None else balance.loaded(base - before)
-        pulled, moved = balance.reference_stiffness[:, None] * slid, []
-        pulls = balance.basis.to_complex(pulled).T
-        for h, side, u, pull in zip(balance.basis.harmonics, self._sides, self.u, pulls, strict=True):
-            up, down = (one.model.at_harmonic(h)[0] for one in (above, below))  # in the same coordinates
-            changed = self._loads(above, up, h) - self._loads(below, down, h) + side.B.conj().T @ pull
-            if up is not down:
-                changed = changed - _difference(up, down, 1j * h * self.state.omega, u)
-            moved.append(side.solve(changed) if changed.any() else changed)
-        x, y = self._real(self._sides, moved)
-        return x - slid + (0.0 if own.residual is None else own.residual.apply(pulled)), y
+        seen, pulls = [], zip(self._pulls(posed), self._pulls(own), strict=True)
+        for h, side, u, (g, here) in zip(balance.basis.harmonics, self._sides, self.u, pulls, strict=True):
+            system, B, C = _maps(posed, balance, h)  # in the same coordinates
+            more = B.conj().T @ g - side.B.conj().T @ here
+            more = more + self._loads(posed, system, h) - self._loads(own, side.system, h)
+            if system is not side.system:
+                more = more - _difference(system, side.system, 1j * h * self.state.omega, u)
+            moved = side.solve(more) if more.any() else more
+            seen.append((side.B @ moved + (B - side.B) @ u, side.C @ moved + (C - side.C) @ u))
+        x, y = self._real(seen)
+        return x + self._besides(posed) - self._besides(own), y
 
     def _loads(self, posed: Posed, system: SecondOrderSystem, h: int) -> np.ndarray:
         """(n,) loads of a harmonic."""
@@ -348,43 +363,34 @@ class Gradient:
 
     def _seen(self, posed: Posed, sides: list[_Side]) -> tuple[np.ndarray, np.ndarray]:
         """x and outputs of a problem under this g."""
-        balance = self.balance
-        x, y = self._real(sides, self._moved(posed, sides))
-        base, residual = posed.excitation.base, posed.model.residual
-        if residual is not None:
-            moved = self.state.flat if base is None else self.state.flat + balance.loaded(base)
-            k = balance.reference_stiffness[:, None]
-            x = x + residual.apply(k * moved - self.state.cycle.force.reshape(moved.shape))
-        return x if base is None else x - balance.loaded(base), y
+        x, y = self._real([(s.B @ u, s.C @ u) for s, u in zip(sides, self._moved(posed, sides), strict=True)])
+        return x + self._besides(posed), y
 
-    def _real(self, sides: list[_Side], u: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Coefficients of x and of the outputs of coordinates u (n,) of each harmonic."""
-        maps = ([side.B for side in sides], [side.C for side in sides])
-        x, y = (
-            self.balance.basis.to_real(np.stack([rows @ v for rows, v in zip(of, u, strict=True)], axis=-1))
-            for of in maps
-        )
+    def _real(self, seen: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients of x and of the outputs from those of each harmonic."""
+        x, y = (self.balance.basis.to_real(np.stack(of, axis=-1)) for of in zip(*seen, strict=True))
         return x, y
 
     def effects(self, change: Change) -> tuple[np.ndarray, np.ndarray]:
         """One-sided slopes above and below a parameter of contact forces at
         the same x, and of x and outputs at the same forces, in one vector."""
         up, down = self._added(change.above, change.below)
-        far = self._added(*change.twice) if change.twice else ()
-        if change.twice is not None:
-            up = (8 * (up - down) - (far[0] - far[1])) / 12 if far else (up - down) / 2
-            down = -up
+        if change.twice:
+            far = self._added(*change.twice)
+            mean, jump = (8 * (up - down) - (far[0] - far[1])) / 12, 2 * (up + down) - (far[0] + far[1]) / 2
+            up, down = mean + jump / 2, jump / 2 - mean
+        elif change.twice is not None:
+            up, down = (up - down) / 2, (down - up) / 2
         above, below = up / change.step, -down / change.step
         if change.touching is None:
             return above, below
         besides = self.effects(change.touching)
         return above + besides[0], below + besides[1]
 
-    def _added(self, above: Posed, below: Posed) -> tuple[np.ndarray, np.ndarray]:
-        """Vectors of `effects` of two problems to both sides of this one, halfway between them but for the contact."""
-        half = np.concatenate([part.ravel() for part in self._structure(above, below)]) / 2
-        up, down = (self._force(one.contact, one.memory).ravel() for one in (above, below))
-        return np.concatenate([up, half]), np.concatenate([down, -half])
+    def _added(self, above: Posed, below: Posed) -> list[np.ndarray]:
+        """Vectors of `effects` of two problems to both sides of this one."""
+        sides = ((self._force(one.contact, one.memory), *self._structure(one)) for one in (above, below))
+        return [np.concatenate([part.ravel() for part in side]) for side in sides]
 
     @cached_property
     def _rows(self) -> np.ndarray:

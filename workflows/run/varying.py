@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -18,10 +18,12 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.contact.joint import Contact
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed
+from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, wave_of
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
-from tribodyn.workflows.run import bodies, joints, matrix_model, modelling, part_reduction
+from tribodyn.workflows.run import bodies, joints, matrix_model, modelling, part_reduction, sector
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.loads import KINDS
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
@@ -32,9 +34,9 @@ from tribodyn.workflows.scene.schema import MeshScene, Scene
 # beam's stiffness is 2e-6 off, for 3e-8; with 1e-5 a peak at a corner, seen from 3e-4 half widths, 3e-4, for 3e-6
 STEP = 1e-6
 REBUILT = 1e-3  # the same of a number of the structure, whose rounding is larger
-# by which lengths and angles move nodes, for matrices, areas and gaps; a model is reduced anew by 4 times as much. By
-# 10 times a harmonic beside its own resonance takes the coarse blade's preload by its span 4e-5 off; by 1, rounding the
-# coarse rig's amplitude by its height
+# by which lengths and angles move nodes, for matrices, areas and gaps, and in a wheel its rows, whose frames are no
+# rotations elsewhere; a model is reduced anew by 4 times as much. By 10 times a harmonic beside its own resonance takes
+# the coarse blade's preload by its span 4e-5 off; by 1, rounding the coarse rig's amplitude by its height
 NODES = 1e-4
 STRUCTURAL = ("material.", "materials.", "springs.", *(GEOMETRY := ("geometry.", "bodies.")))
 OF_CONTACT = ("tangential_stiffness", "normal_stiffness")
@@ -121,9 +123,7 @@ class Varying:
         step = (REBUILT if anew or linear else self.step) * abs(value)
         if key.startswith(GEOMETRY):
             self.nodes_moved(key)  # or refused
-            step = 4 * NODES * abs(value) if anew else step
-        if key.endswith(".temperature"):
-            self._between_rows(key, value, 2 * step)
+            step = (4 if anew else 1) * NODES * abs(value) if anew or self._sector else step
         far: tuple[Posed, ...] | None = () if anew or linear else None
         if self._settles or (anew and key.startswith((*STRUCTURAL, "wheel."))):
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
@@ -133,17 +133,6 @@ class Varying:
             up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
             touching = Change(key, small, up, down)
         return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
-
-    def _between_rows(self, key: str, value: float, reach: float) -> None:
-        """Raises NoDerivative where a contact is at a row of its `by_temperature`, at which its slopes jump."""
-        up, down = (self._changed(key, value + side).scene.joints for side in (reach, -reach))
-        for name, contact in self.scene.joints.items():
-            above, here, below = (
-                np.array([one.tangential_stiffness, one.normal_stiffness, one.numbers.get("friction")], float)
-                for one in (up[name], contact, down[name])
-            )
-            if (abs(above + below - 2 * here) > 1e-3 * abs(above - below) + 1e-12 * abs(here)).any():
-                raise NoDerivative(f"{key}: at this row of by_temperature {name} has a corner; --only takes other keys")
 
     def _changed(self, key: str, value: float) -> SceneFile:
         """The scene with another value of a key; read again only where other numbers follow from it."""
@@ -188,12 +177,9 @@ class Varying:
         base = None
         if isinstance(scene, MeshScene) and part is not None:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
-        if self.follows(key) and np.array_equal(reduced.interface.B, self.own.model.interface.B):
-            reduced = replace(reduced, interface=replace(reduced.interface, B=self.own.model.interface.B))  # the same
-        structural = self.anew(key) or self._scales(key) or self.follows(key)
-        contact = self._contact(key, value) if _touches(key) and not structural else self.own.contact
+        contact = self._contact(key, value) if _touches(key) and plain is self.plain else self.own.contact
         loads = self.own.excitation if key.startswith("contact") else joints.excite(scene, base)
-        return Posed(reduced, contact, loads, self.own.memory)
+        return Posed(reduced, contact, loads, self.own.memory, alike=self.follows(key))
 
     @property
     def _settles(self) -> bool:
@@ -220,41 +206,59 @@ class Varying:
     @cached_property
     def _sensitivity(self) -> Sensitivity | None:
         """None where the model is no plain reduction by Craig and Bampton of a part that stands still."""
-        part, plain = self.part, self.plain
-        if part is None or plain.basis is None or plain.info.masters is None or len(part.held):
+        part, plain, wave = self.part, self.plain, self._sector
+        if part is None or plain.info.masters is None or len(part.held) or self._spins:
             return None
-        if plain.per_harmonic is not None or plain.info.n_interface_modes is not None or plain.residual is not None:
+        if wave is not None:
+            plain = ReducedModel(wave.sector.system, wave.sector.interface, wave.basis, wave.info)
+        if plain.basis is None or plain.info.n_interface_modes is not None or plain.residual is not None:
             return None
-        if part.system.gyroscopic is not None:
-            return None
-        system, shapes = part.system, plain.basis
-        if self._relative is not None:
-            system, shapes = self._relative[0], shapes.copy()
+        (system, _, back), shapes = self._here, plain.basis
+        if back is not None:
+            shapes = shapes.copy()
             shapes[body_1_dofs(part.interface).ravel()] = part.interface.B @ plain.basis
         return Sensitivity(system, plain, shapes)
 
     @cached_property
-    def _relative(self) -> tuple[SecondOrderSystem, csr_matrix] | None:
-        """The full system in relative coordinates, and the way back from them; None where it is reduced in its own."""
-        if self.part is None or not self.file.mesh_scene.reduction.relative:
-            return None
-        system, _, back = relative(self.part.system, self.part.interface)
-        return system, back
+    def _sector(self) -> ReducedSector | None:
+        """The reduced sector of a wheel whose waves have all coordinates of it, None for other models."""
+        wave: Any = getattr(self.plain.per_harmonic, "__self__", None)
+        small = wave.reduced if isinstance(getattr(wave, "index_of", None), WaveIndices) else None
+        return None if small is None or small.sector.system.n_dof > LIMITS.many else small
+
+    @cached_property
+    def _here(self) -> tuple[SecondOrderSystem, ContactInterface, csr_matrix | None]:
+        """`_coordinates` of the own part."""
+        return self._coordinates(cast(Part, self.part))
+
+    def _coordinates(self, part: Part) -> tuple[SecondOrderSystem, ContactInterface, csr_matrix | None]:
+        """System and interface of a part in the coordinates that it is reduced in, and the way back from them."""
+        if self._sector is None and self.file.mesh_scene.reduction.relative:
+            return relative(part.system, part.interface)
+        return part.system, part.interface, None
 
     def _followed(self, key: str, value: float) -> ReducedModel:
         """The reduced model with another value of a key that it follows."""
         share, following, scene = value / self.values[key] - 1, self._sensitivity, self.file.mesh_scene
         assert following is not None
-        if key.startswith(GEOMETRY):
-            moved = following.moved([(self._way(key), share)])
-            interface = self._interface(moved.interface, key, value)
-            turned = [self._coordinates(one)[1].B for one in self.nodes_moved(key)]
-            turn = share / (2 * NODES) * ((turned[0] - turned[1]) @ following.shapes)
-            return replace(moved, interface=replace(interface, B=interface.B + turn) if turn.any() else interface)
         if key == "material.young" and _loaded_alike(scene):  # all stiffness but that of the springs
             springs = [(self._way(f"springs.{name}.stiffness"), -share) for name in scene.springs]
-            return following.moved(springs, share)
-        return following.moved([(self._way(key), share)])
+            moved = following.moved(springs, share)
+        else:
+            moved = following.moved([(self._way(key), share)])
+        wave, turned = self._sector, list[Any]()
+        if key.startswith(GEOMETRY):
+            there = self.nodes_moved(key)[int(share < 0)]
+            rows = [(self._coordinates(there)[1].B, self._here[1].B)]
+            if wave is not None:
+                rows.append(tuple(sector.sector(scene, one).left for one in (there, cast(Part, self.part))))
+            turned = [abs(share) / NODES * ((new - old) @ following.shapes) for new, old in rows]
+            moved = replace(moved, interface=self._interface(moved.interface, key, value, turned[0]))
+        if wave is None:
+            return moved
+        left = wave.sector.left + (turned[1] if turned else 0.0)
+        small = replace(wave, sector=replace(wave.sector, system=moved.system, interface=moved.interface, left=left))
+        return wave_of(small, cast(int, self.plain.info.engine_order), WaveIndices(small))
 
     def _way(self, key: str) -> SecondOrderSystem:
         """What the reduced model moves by where a key is doubled."""
@@ -265,15 +269,9 @@ class Varying:
                 change = _between(up, down, 1 / (2 * NODES))
             else:
                 change = self._doubled(key, 2 * self.values.get(key, 0.0))
-                change = change.projected(self._relative[1]) if self._relative else change
+                change = change if self._here[2] is None else change.projected(self._here[2])
             self._ways[key] = self._sensitivity.towards(change)
         return self._ways[key]
-
-    def _coordinates(self, part: Part) -> tuple[SecondOrderSystem, ContactInterface]:
-        """System and interface of a part in the coordinates that it is reduced in."""
-        if not self.file.mesh_scene.reduction.relative:
-            return part.system, part.interface
-        return relative(part.system, part.interface)[:2]
 
     def _reach(self, key: str) -> float:
         """Share of a length or angle within which its mesh has to stay the same one that moves."""
@@ -304,13 +302,13 @@ class Varying:
         part = modelling.make_part(file.mesh_scene, mesh, node_sets, file.folder)
         return modelling.with_surfaces(file, part)[0]
 
-    def _interface(self, own: ContactInterface, key: str, value: float) -> ContactInterface:
-        """An interface with its places, frames, areas and gaps moved to another length or angle."""
+    def _interface(self, own: ContactInterface, key: str, value: float, turned: Any = 0.0) -> ContactInterface:
+        """An interface with its places, frames, areas and gaps moved to another length or angle, its rows `turned`."""
         share = (value / self.values[key] - 1) / (2 * self._reach(key))
         up, down = (one.interface for one in self.nodes_moved(key))
         names = ("points", "frames", "area", "gap")
         moved = {n: getattr(own, n) + share * (getattr(up, n) - getattr(down, n)) for n in names}
-        return replace(own, **moved)
+        return replace(own, **moved, B=own.B + turned)
 
     def _doubled(self, key: str, value: float) -> SecondOrderSystem:
         """What the full system moves by where a key is doubled; springs need no assembly."""
@@ -323,11 +321,7 @@ class Varying:
             change = part.restricted(spring.matrix(part.mesh, part.node_sets))
             still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
             return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
-        twice = self._changed(key, value)
-        if scene.material is None:  # its mesh has the materials
-            return _between(self._part(twice).system, own)
-        new = modelling.make_part(twice.mesh_scene, part.mesh, dict(part.node_sets), twice.folder)
-        return _between(new.system, own)
+        return _between(self._part(self._changed(key, value)).system, own)
 
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""
@@ -365,18 +359,14 @@ def _smooth(up: Part, own: Part, down: Part) -> bool:
     """Whether two parts to both sides of one have its mesh and its pairs, and all of it moves evenly."""
     if any(one.points.shape != own.points.shape or not np.array_equal(one.free, own.free) for one in (up, down)):
         return False
-    for above, here, below in zip(*map(_shapes, (up, own, down)), strict=True):
+    names, parts = ("area", "gap", "frames", "B"), (up, own, down)
+    shapes = ((one.points, *(getattr(one.interface, name) for name in names)) for one in parts)
+    for above, here, below in zip(*shapes, strict=True):
         if not above.shape == here.shape == below.shape:
             return False
         if abs(above + below - 2 * here).max() > 0.1 * abs(above - below).max() + 1e-12 * abs(here).max():
             return False
     return True
-
-
-def _shapes(part: Part) -> tuple[Any, ...]:
-    """What moves with the nodes of a part."""
-    i = part.interface
-    return part.points, i.area, i.gap, i.frames, i.B, part.system.stiffness
 
 
 def _touches(key: str) -> bool:

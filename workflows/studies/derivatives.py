@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import process_time
 from typing import Any, Literal
@@ -60,7 +61,7 @@ class ResponseDerivatives(StudyResult):
 
     found : by key of the scene; at : the values of the keys, SI units; joints : joint -> its pairs
     response_seconds, seconds : of one processor, of the response and of the derivatives; anew : keys with which the
-        model is reduced anew, which takes most of the time
+        model is reduced anew, which takes most of the time; without : keys that have no derivative, and why
     """
 
     name: str
@@ -70,6 +71,7 @@ class ResponseDerivatives(StudyResult):
     response_seconds: float
     seconds: float
     anew: tuple[str, ...]
+    without: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def elasticities(self) -> dict[str, np.ndarray]:
@@ -142,6 +144,7 @@ class ResponseDerivatives(StudyResult):
         share = 100 * self.seconds / self.response_seconds
         what = "life" if "life" in f.names else "response"
         lines.append(f"{self.seconds:.3g} s, {share:.2g} % of the {self.response_seconds:.3g} s of the {what}")
+        lines += [f"without {key}: {why}" for key, why in self.without.items()]
         if self.anew:
             lines.append(f"most of them for {len(self.anew)} keys with which the model is reduced anew")
         return lines
@@ -210,70 +213,73 @@ def derivatives(
         raise SceneError("give --amplitude of the mode, or backbone.modal_amplitude in the scene")
     wanted = {key: value for key, value in (known | moving).items() if key in (only or known)}
     with limited(file.scene.solver.threads):
-        return _of_scene(file, of, amplitude if of == "mode" else at, wanted, reporter(progress))
+        return _of_scene(file, of, amplitude if of == "mode" else at, wanted, None if only else {}, reporter(progress))
 
 
 def _of_scene(
-    file: SceneFile, of: str, at: float | None, wanted: Mapping[str, float], report: Any
+    file: SceneFile, of: str, at: float | None, wanted: Mapping[str, float], without: dict[str, str] | None, report: Any
 ) -> ResponseDerivatives:
-    """Of a scene that was read; at : frequency [Hz], or the amplitude of a mode [m]; wanted : key -> value."""
+    """Of a scene that was read; at : frequency [Hz], or the amplitude of a mode [m]; wanted : key -> value; without :
+    see `_changes`."""
     varying = Varying(file, report, OF_MODE if of == "mode" else STEP)
     balance, clock = varying.model.balance, process_time()
-    mode = branch = worn = None
+    find: Callable[[Iterator[Change]], Derivatives]
     if of == "mode":
         asked = AmplitudeRange.of(file, None if at is None else at / DECADES, at, None, None)
-        mode = backbones.along(file, balance, asked, report)
+        find = partial(_of_mode, varying, backbones.along(file, balance, asked, report), modal=at is None)
     elif of == "life":
         with report.track("wear") as advance:
             worn = wear_run.worn_out(file, varying.model, _share(file.scene))
+        find = partial(_of_life, varying, worn, wanted=wanted)
     else:
         with report.track("frequency response") as advance:
             branch = curve.follow_response(file.scene, balance, advance)
         pipeline.check_branch(branch)
+        find = partial(of_branch, file.scene, balance, branch, at=at, fold=of == "fold")
     solved = process_time()
     with report.track("derivatives") as advance:
         try:
-            if mode is not None:
-                found = _of_mode(varying, mode, wanted, advance, modal=at is None)
-            elif worn is not None:
-                found = _of_life(varying, worn, wanted, advance)
-            else:
-                assert branch is not None
-                changes = _changes(varying, wanted, advance)
-                found = of_branch(file.scene, balance, branch, changes, at, of == "fold")
+            found = find(_changes(varying, wanted, advance, without))
         except NoDerivative as reason:
             raise SolveFailed(f"{file.name} has no derivatives here: {reason}") from None
     return ResponseDerivatives(
         file.name,
         found,
-        wanted,
+        {key: wanted[key] for key in found.parameters},
         {joint.name: joint.rows for joint in balance.contact.joints},
         solved - clock,
         process_time() - solved,
-        tuple(key for key in wanted if varying.anew(key)),
+        tuple(key for key in found.parameters if varying.anew(key)),
+        without or {},
     )
 
 
 Advance = Callable[[float, str], None]
 
 
-def _changes(varying: Varying, wanted: Mapping[str, float], advance: Advance) -> Iterator[Change]:
+def _changes(
+    varying: Varying, wanted: Mapping[str, float], advance: Advance, without: dict[str, str] | None
+) -> Iterator[Change]:
+    """Of every key but those of wear laws; one without a derivative goes into `without`, where that is given."""
     for i, (key, value) in enumerate(wanted.items()):
         advance(i / len(wanted), key)
-        yield varying.change(key, value)
+        try:
+            if key in varying.values:
+                yield varying.change(key, value)
+        except (NoDerivative, ValueError) as reason:
+            if without is None:
+                raise
+            without[key] = str(reason)
 
 
-def _of_mode(
-    varying: Varying, mode: Backbone, wanted: Mapping[str, float], advance: Advance, modal: bool
-) -> Derivatives:
+def _of_mode(varying: Varying, mode: Backbone, changes: Iterator[Change], modal: bool) -> Derivatives:
     """At the last point of a backbone."""
     if mode.end.kind is not BranchEnd.REACHED:
         raise NoDerivative(f"the backbone {mode.end}")
     problem = FreeVibration(varying.model.balance, mode.number, mode.output)
     x = varying.model.balance.shaped(mode.contact[-1])
     point = problem.at(x, mode.omega[-1], mode.damping[-1], mode.modal_amplitude[-1])
-    changes, options = _changes(varying, wanted, advance), settings.newton_options(varying.scene)
-    return exact.at_mode(problem, point, changes, options, modal)
+    return exact.at_mode(problem, point, changes, settings.newton_options(varying.scene), modal)
 
 
 def _share(scene: Scene) -> float:
@@ -282,12 +288,13 @@ def _share(scene: Scene) -> float:
     return scene.wear.lost_below or LIFE_SHARE
 
 
-def _of_life(varying: Varying, worn: WearHistory, wanted: Mapping[str, float], advance: Advance) -> Derivatives:
+def _of_life(
+    varying: Varying, worn: WearHistory, changes: Iterator[Change], wanted: Mapping[str, float]
+) -> Derivatives:
     scene, by_key = varying.scene, wear_run.law_numbers(varying.scene)
     problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
     numbers = {key: by_key[key][1:3] for key in wanted if key in by_key}
-    own = {key: value for key, value in wanted.items() if key not in by_key}
-    return tangent.of_life(problem, worn, _changes(varying, own, advance), numbers, _share(scene))
+    return tangent.of_life(problem, worn, changes, numbers, _share(scene))
 
 
 def of_branch(
@@ -316,13 +323,6 @@ def of_branch(
     return take(balance, state, output, changes, wear_run.coefficients(scene), options)
 
 
-def _moves(varying: Varying, key: str) -> bool:
-    """Whether a length or angle moves the nodes of a mesh that stays the same, at a small share of a run's time."""
-    with suppress(NoDerivative):
-        return varying.follows(key) and bool(varying.nodes_moved(key))
-    return False
-
-
 def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[tuple[str, str], float]:
     """Derivatives of numbers of a finished run, of its first state and its life, by some keys of its scene.
 
@@ -331,7 +331,7 @@ def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[
     scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
     known, in_wear = varying.values, {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
     own, more = ({key: of[key] for key in wanted if key in of} for of in (known, in_wear))
-    own = {key: value for key, value in own.items() if not key.startswith(GEOMETRY) or _moves(varying, key)}
+    own = {key: value for key, value in own.items() if not key.startswith(GEOMETRY) or varying.follows(key)}
     joints = varying.model.balance.contact.joints
     gaps = {"contact.gap" if one.name == "contact" else f"contacts.{one.name}.gap": one.rows for one in joints}
     gaps = {key: rows for key, rows in gaps.items() if key in wanted}
@@ -347,9 +347,9 @@ def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[
                 slopes.update({(number, key): float(column[at]) for key, column in by.items()})
 
     places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
+    changes = partial(_changes, varying, own, lambda *_: None, {})
     if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
-        changes = _changes(varying, own, lambda *_: None)
-        add(lambda: of_branch(scene, varying.model.balance, response, changes, places[0].frequency), OF_ROWS)
+        add(lambda: of_branch(scene, varying.model.balance, response, changes(), places[0].frequency), OF_ROWS)
     if worn is not None:
-        add(lambda: _of_life(varying, worn, own | more, lambda *_: None), {"life_cycles": "life"})
+        add(lambda: _of_life(varying, worn, changes(), more), {"life_cycles": "life"})
     return slopes
