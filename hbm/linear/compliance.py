@@ -11,6 +11,7 @@ the modes alone, and what these leave out is a product with a sparse factor.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -32,6 +33,7 @@ class ComplianceRules:
     """What is kept at hand, and how large the preconditioner gets."""
 
     points_kept: int = 4  # frequencies at hand, for the duties of a mission that are solved in turn
+    shared_room: float = 256e6  # bytes of those at hand where problems that are solved one after another share them
     # of the contact flexibility, on average over the systems of the harmonics, from which on a mode counts in the
     # preconditioner. Its matrix has the modes times the coefficients: so many rows at most, unless these are
     # FEWEST_COARSE modes. 0 to 31 on 20 pairs of a wheel: 0.09 s with 6 modes, 10 s with all 60
@@ -72,11 +74,8 @@ class ContactCompliance:
         self.output_names = tuple(system.outputs)
         self.load_names = sorted({name for _, name in excitation.loads})
         self.n_load = len(self.load_names)
-        self._load = np.zeros((self.n_load, len(basis.harmonics)), complex)
-        for (h, name), value in excitation.loads.items():
-            if h in basis.harmonics:
-                self._load[self.load_names.index(name), basis.harmonics.index(h)] = value
-        self.base = excitation.base
+        self._excite(excitation)
+        self.residual = model.residual
         self.groups: list[tuple[Expansion, list[int]]] = []
         for positions, mirrored in _sharing(model, basis.harmonics):
             system, b = model.at_harmonic(basis.harmonics[positions[0]])
@@ -89,14 +88,39 @@ class ContactCompliance:
             self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max, wanted), positions))
             if mirrored:
                 self.groups.append((self.groups[-1][0].mirrored(), mirrored))
-            if basis.has_static and 0 in positions:
-                self._check_balance(self.groups[-1 - bool(mirrored)][0])
-        self.residual = model.residual
+        self._check_balance()
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = self._one_real()
         self.coarse = self._coarse_modes()
         self._points: dict[float, CompliancePoint] = {}
+        self._most = RULES.points_kept
         self._active: tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+
+    def _excite(self, excitation: Excitation) -> None:
+        """Take the amplitudes of the loads and the motion of the ground."""
+        harmonics = self.basis.harmonics
+        self._load = np.zeros((self.n_load, len(harmonics)), complex)
+        for (h, name), value in excitation.loads.items():
+            if h in harmonics:
+                self._load[self.load_names.index(name), harmonics.index(h)] = value
+        self.base = excitation.base
+
+    def under(self, excitation: Excitation) -> ContactCompliance:
+        """The same under other amplitudes of its loads.
+
+        It has the expansions and takes what they gave at frequencies, from now on as many as there is room for
+        """
+        other = copy(self)
+        for made in ("outside", "excited"):
+            other.__dict__.pop(made, None)
+        other._excite(excitation)
+        other._check_balance()
+        widest = max(e.n_mode if self.shared_real else max(e.n_mode, self.n_contact) for e, _ in self.groups)
+        size = 32 * widest**2 * len(self.basis.harmonics)  # of a complex matrix and its parts, or of factors besides
+        other._most = max(RULES.points_kept, int(RULES.shared_room / size))
+        other._points = {omega: point.under(other) for omega, point in self._points.items()}
+        self._points = {}
+        return other
 
     def port_rows(self, system: SecondOrderSystem, b: np.ndarray) -> np.ndarray:
         """(n_port, n) rows of the contacts b, the loads and the outputs of a system."""
@@ -114,8 +138,11 @@ class ContactCompliance:
         first = self.groups[0][0]
         return len(self.groups) == 1 and first.hermitian and not np.iscomplexobj(first.w0)
 
-    def _check_balance(self, expansion: Expansion) -> None:
+    def _check_balance(self) -> None:
         """Raise UnbalancedLoad where static loads push a rigid motion of a structure that nothing holds."""
+        if not self.basis.has_static or self.residual is not None:
+            return
+        expansion = next(expansion for expansion, positions in self.groups if 0 in positions)
         loads = slice(self.n_contact, self.n_contact + self.n_load)
         pushed = expansion.b[loads, : expansion.rigid.shape[1]] * self._load[:, :1]
         if np.abs(pushed.sum(axis=0)).max(initial=0.0) > RULES.unbalanced * np.abs(pushed).max(initial=0.0):
@@ -183,10 +210,10 @@ class ContactCompliance:
         return self._active[1]
 
     def at(self, omega: float) -> CompliancePoint:
-        """The compliance at one excitation frequency [rad/s]; the last RULES.points_kept ones are kept."""
+        """The compliance at one excitation frequency [rad/s]; the last ones are kept."""
         point = self._points.pop(omega, None) or self._make(omega)
         self._points[omega] = point
-        if len(self._points) > RULES.points_kept:
+        if len(self._points) > self._most:
             del self._points[next(iter(self._points))]
         return point
 
@@ -279,9 +306,19 @@ class CompliancePoint:
         self.compliance = compliance
         self.omega = omega
         self._turns = omega or 1e-150  # [rad/s] whose powers vanish at rest, where their slopes over it do not
-        basis = compliance.basis
-        self._harmonics = np.asarray(basis.harmonics, float)
+        self._harmonics = np.asarray(compliance.basis.harmonics, float)
         self.ports = self._solved()
+        self._excite()
+
+    def under(self, compliance: ContactCompliance) -> CompliancePoint:
+        """That of the same expansions under other loads."""
+        other = copy(self)
+        other.compliance = compliance
+        other._excite()
+        return other
+
+    def _excite(self) -> None:
+        compliance, basis = self.compliance, self.compliance.basis
         n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
         if compliance.outside is not None:
             moved = self._from_rows(*compliance.outside.excitation, compliance.groups[0][0].left)

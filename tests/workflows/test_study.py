@@ -21,10 +21,12 @@ from scipy import stats
 import tribodyn as td
 from tests.helpers import dying
 from tests.helpers.command import leave
-from tribodyn.workflows.run import modelling
+from tribodyn.hbm.linear import compliance
+from tribodyn.workflows.run import kept, modelling
+from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.many import pictures, pool, space, study_file
 from tribodyn.workflows.studies.many.table import Journal
-from tribodyn.workflows.studies.many.task import Row, Task
+from tribodyn.workflows.studies.many.task import Row, Task, solve
 
 TINY = [
     "harmonics.kept=[0, 1]",
@@ -149,6 +151,26 @@ def test_a_row_is_what_the_run_itself_gives(done: Path) -> None:
 def test_the_table_does_not_depend_on_the_workers(done: Path, tmp_path: Path) -> None:
     td.studies.grid(TABLES, tmp_path, workers=1)
     assert (tmp_path / "study.csv").read_bytes() == (done / "study.csv").read_bytes()
+
+
+def test_runs_that_share_their_linear_side_give_what_each_gives_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    base, springs, damping = scene_file.read("beam"), "contact.tangential_stiffness=300 N/um", "damping.modal=2 %"
+    changes = ["", f"{FRICTION}=0.3", f"{PRESS}=10 kN", springs, damping, "loads.harmonic.shake.value=8 kN"]
+    always = (*TINY, "response.points=20", "verdict.enabled=false")
+    tasks = [Task(n, base.name, base.text, (*always, *filter(None, [c])), base.folder) for n, c in enumerate(changes)]
+    alone = [solve(task).numbers for task in tasks]
+    assert len({tuple(numbers.values()) for numbers in alone}) == len(tasks), alone
+    made: list[float] = []
+    expansion = compliance.Expansion.__init__
+
+    def counted(self: compliance.Expansion, *arguments: Any) -> None:
+        made.append(1.0)
+        expansion(self, *arguments)
+
+    monkeypatch.setattr(compliance.Expansion, "__init__", counted)
+    with kept.at_hand():
+        assert [solve(task).numbers for task in tasks] == alone
+    assert len(made) == 4  # the first, other springs, other damping, and back: not for friction and loads
 
 
 def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(

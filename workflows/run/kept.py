@@ -16,16 +16,17 @@ import platform
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import ContextVar, Token
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from filelock import FileLock
 
 from tribodyn.fem.part import Part
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.threads import limited, usable
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.version import package_version
@@ -54,7 +55,7 @@ OF_JOINT = {
 """... and a contact of it, besides the numbers of its law."""
 
 T = TypeVar("T")
-_last: ContextVar[dict[str, tuple[Any, Any]] | None] = ContextVar("tribodyn_last", default=None)
+_last: ContextVar[dict[str, Any] | None] = ContextVar("tribodyn_last", default=None)
 
 
 def early_of(scene: MeshScene) -> str:
@@ -72,12 +73,26 @@ def early_of(scene: MeshScene) -> str:
 
 @contextmanager
 def at_hand() -> Iterator[None]:
-    """Within it the last part and the last reduction stay in memory too, for scenes that differ little."""
-    before = _last.set({})
+    """Within it the last part, reduction and balance stay in memory too, for scenes that differ little."""
+    before = keep_at_hand()
     try:
         yield
     finally:
         _last.reset(before)
+
+
+def keep_at_hand() -> Token[dict[str, Any] | None]:
+    """The same as long as this process lives."""
+    return _last.set({})
+
+
+def beside(make: Callable[[HarmonicBalance | None], HarmonicBalance]) -> HarmonicBalance:
+    """A problem made beside the last one, whose linear side it may have, where that stays in memory."""
+    last = _last.get()
+    if last is None:
+        return make(None)
+    last["balance"] = made = make(last.get("balance"))
+    return made
 
 
 def part(file: SceneFile, make: Callable[[], Part]) -> Part:
@@ -186,12 +201,15 @@ def _write(path: Path, what: object) -> None:
     """Keep an entry, and let the longest unused go; nothing where it is too large or the disk is full."""
     fresh = path.with_suffix(".new")
     try:
-        with fresh.open("wb") as stream:
-            said = _Digested(stream)
-            stream.write(said.digest.digest())
-            pickle.dump(what, said, pickle.HIGHEST_PROTOCOL)
+        with fresh.open("wb+") as stream:
+            start = stream.write(bytes(hashlib.sha256().digest_size))
+            pickle.dump(what, stream, pickle.HIGHEST_PROTOCOL)
+            if stream.tell() > ROOM / 4:
+                raise OSError(errno.EFBIG, "too large to be kept")
+            stream.seek(start)
+            said = hashlib.file_digest(stream, "sha256").digest()
             stream.seek(0)
-            stream.write(said.digest.digest())
+            stream.write(said)
         os.replace(fresh, path)
         entries = [(entry.stat().st_mtime, entry.stat().st_size, entry) for entry in path.parent.glob("*.pickle")]
         total = sum(size for _, size, _ in entries)
@@ -201,17 +219,3 @@ def _write(path: Path, what: object) -> None:
                 total -= size
     except OSError:
         fresh.unlink(missing_ok=True)
-
-
-class _Digested:
-    """A file that is written with a digest of it, up to a quarter of all room."""
-
-    def __init__(self, stream: IO[bytes]):
-        self.stream, self.digest, self.size = stream, hashlib.sha256(), 0
-
-    def write(self, data: Any) -> None:
-        self.size += memoryview(data).nbytes
-        if self.size > ROOM / 4:
-            raise OSError(errno.EFBIG, "too large to be kept")
-        self.digest.update(data)
-        self.stream.write(data)

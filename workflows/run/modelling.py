@@ -264,8 +264,11 @@ class Problem:
             bolts = tightening.tightened(scene, tightening.rods(scene, part.mesh, part.node_sets), alone)
         return cls(scene, part, reduced, made, bolts)
 
-    def balance(self, harmonics: tuple[int, ...]) -> HarmonicBalance:
-        """The balance of some harmonics; raises ValueError where they leave out what the scene has in harmonic 0."""
+    def balance(self, harmonics: tuple[int, ...], like: HarmonicBalance | None = None) -> HarmonicBalance:
+        """The balance of some harmonics; raises ValueError where they leave out what the scene has in harmonic 0.
+
+        like : a problem that may have its linear side
+        """
         scene, wanted, gap = self.scene, self.scene.harmonics, self.reduced.interface.gap
         auto = wanted.transitions == "auto"
         basis = HarmonicBasis(harmonics, wanted.samples, joint_transitions(self.joints) if auto else wanted.transitions)
@@ -279,7 +282,7 @@ class Problem:
         bolts = {(0, name): force for name, force in self.bolts.items()}
         excitation = replace(excitation, loads={**excitation.loads, **bolts})
         top = settings.highest_frequency(scene)
-        made = HarmonicBalance.of(self.reduced, self.joints, basis, excitation, top)
+        made = HarmonicBalance.of(self.reduced, self.joints, basis, excitation, top, like=like)
         return preloaded(scene, self.reduced, made) if scene.preload.frictionless else made
 
     def choice(self) -> HarmonicChoice:
@@ -297,7 +300,7 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     problem = Problem.of(scene, part, reduced)
     choice = problem.choice() if scene.harmonics.automatic and not chosen else None
     harmonics = scene.harmonics.kept or chosen or (choice.harmonics if choice else ())
-    final = problem.balance(harmonics)
+    final = kept.beside(lambda like: problem.balance(harmonics, like))
     if part is not None and isinstance(scene, MeshScene) and scene.other_speeds:
         final = replace(final, at_speed=_at_speeds(scene, part, harmonics))
     return Model(part, final.model, final, choice)

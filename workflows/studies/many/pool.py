@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import signal
+import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context, parent_process
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
 from tribodyn.extras import package
+from tribodyn.workflows.run import kept
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.studies.many.task import Row, Task, solve
+from tribodyn.workflows.studies.many.task import Row, Task
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
 LOCAL = "local"
@@ -29,17 +32,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Numbered(Protocol):
-    """A run, from 1, and the hash of all that its row depends on."""
-
-    @property
-    def number(self) -> int: ...
-
-    @property
-    def key(self) -> str: ...
-
-
-Work = TypeVar("Work", bound=Numbered)
+Work = TypeVar("Work", bound=Task)
 
 
 def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) -> Iterator[Row]:
@@ -51,11 +44,13 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
     # Gmsh, once used in this process, sets this to the default: a pipe to a dead process would end the study
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python begins
+    processes = get_context("forkserver" if sys.platform == "linux" else "spawn")
+    processes.set_forkserver_preload([__name__])  # what all of them import is imported once
     waiting, deaths = deque(tasks), Counter[int]()
     while waiting:
         alone = deaths[waiting[0].number] > 0
         limit = 1 if alone else min(workers, len(waiting))
-        pool = ProcessPoolExecutor(limit, get_context("spawn"), _begin)
+        pool = ProcessPoolExecutor(limit, processes, _begin)
         under_way: dict[Future[Row], Work] = {}
         try:
             while under_way or (waiting and (deaths[waiting[0].number] > 0) == alone):
@@ -86,7 +81,9 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
 
 def _begin() -> None:
     """In every process of the pool: processes and threads do not multiply, and none outlives the study."""
+    gc.freeze()  # what is imported is looked through no more
     threadpool_limits(1)
+    kept.keep_at_hand()
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -108,7 +105,7 @@ def _stop(pool: ProcessPoolExecutor) -> None:
         process.join()
 
 
-def on_cluster(tasks: Sequence[Task], address: str, workers: int) -> Iterator[Row]:
+def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callable[[Work], Row]) -> Iterator[Row]:
     """Rows as they come, by dask.distributed; all that is distributed about a study is its work.
 
     address : of a scheduler, such as tcp://host:8786, or "local" for a cluster of `workers` processes of its own

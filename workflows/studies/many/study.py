@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,14 @@ from typing import Any
 import tomli_w
 
 from tribodyn.hbm.threads import limited
+from tribodyn.workflows.run import kept
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import pictures, pool, space, study_file
+from tribodyn.workflows.studies.many.pool import Work
 from tribodyn.workflows.studies.many.study_file import Study
 from tribodyn.workflows.studies.many.table import Journal, StudyTable, table, write
 from tribodyn.workflows.studies.many.task import Row, Task, solve
@@ -40,10 +42,6 @@ class Runner:
     def __post_init__(self) -> None:
         if self.workers is not None and self.workers < 1:
             raise ValueError(f"workers {self.workers}: give at least 1")
-
-    def below(self, name: str) -> Runner:
-        """The same in a folder below."""
-        return replace(self, folder=self.folder / name)
 
 
 def grid(
@@ -87,36 +85,13 @@ def run(
     inside : one worker is this process itself, where few runs are done at a time and starting another would cost more
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
-    folder, progress, scheduler, resume = runner.folder, runner.progress, runner.scheduler, runner.resume
-    varied = [*space.runs(study), *more]
+    folder, varied = runner.folder, [*space.runs(study), *more]
     tasks, refused = _tasks(study, varied)
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
-        journal, rows = Journal(folder), dict(refused)
-        earlier, again = journal.rows() if resume else {}, ("lost", "failed") if runner.retry else ("lost",)
-        for task in tasks:
-            row = earlier.get(task.key)
-            if row is not None and row.status not in again:
-                rows[task.number] = replace(row, run=task.number)
-        known = [row for number, row in sorted(rows.items()) if number not in refused]
-        # rows that this study does not ask for stay too: one that is larger may
-        previous = journal.begin((earlier | {row.key: row for row in known}).values(), resume)
-        if previous:
-            progress.say(f"the rows that were here are now {previous}")
-        if resume:
-            progress.say(f"{len(known)} of {len(varied)} runs are done already")
-        left = [task for task in tasks if task.number not in rows]
-        count = runner.workers or pool.cores()
-        if left:
-            where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(left))} processes"
-            progress.say(f"{len(left)} runs on {where}, one thread for each run")
+        rows = dict(refused)
         try:
-            with progress.track(f"{len(left)} runs") as advance:
-                for done, row in enumerate(_finished(left, count, scheduler, inside), 1):
-                    journal.add(row)
-                    rows[row.run] = row
-                    bad = sum(one.status != "complete" for one in rows.values())
-                    advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
+            finish(tasks, runner, rows, solve, inside=inside)
         finally:
             found = table(study.name, varied, rows, folder) if rows else None
             if found is not None:
@@ -127,24 +102,55 @@ def run(
     return found
 
 
+def finish(
+    tasks: Sequence[Work],
+    runner: Runner,
+    rows: dict[int, Row],
+    solve: Callable[[Work], Row],
+    what: str = "runs",
+    inside: bool = False,
+) -> None:
+    """Do what the folder does not hold already: every row is on disk, and in `rows`, as it comes; see `run`."""
+    progress, scheduler, resume = runner.progress, runner.scheduler, runner.resume
+    journal, refused = Journal(runner.folder), len(rows)
+    earlier, again = journal.rows() if resume else {}, ("lost", "failed") if runner.retry else ("lost",)
+    known = [replace(earlier[task.key], run=task.number) for task in tasks if task.key in earlier]
+    known = [row for row in known if row.status not in again]
+    rows |= {row.run: row for row in known}
+    # rows that are not asked for now stay too: a study that is larger may
+    previous = journal.begin((earlier | {row.key: row for row in known}).values(), resume)
+    if previous:
+        progress.say(f"the rows that were here are now {previous}")
+    if resume:
+        progress.say(f"{len(known)} of {len(tasks) + refused} {what} are done already")
+    left = [task for task in tasks if task.number not in rows]
+    count = runner.workers or pool.cores()
+    if left:
+        where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(left))} processes"
+        progress.say(f"{len(left)} {what} on {where}, one thread for each")
+    with progress.track(f"{len(left)} {what}") as advance:
+        if not left:
+            coming: Iterator[Row] = iter(())
+        elif scheduler:
+            coming = pool.on_cluster(left, scheduler, count, solve)
+        else:
+            coming = _here(left, solve) if inside and count == 1 else pool.finished(left, count, solve)
+        for done, row in enumerate(coming, 1):
+            journal.add(row)
+            rows[row.run] = row
+            bad = sum(one.status != "complete" for one in rows.values())
+            advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
+
+
 def draw(found: StudyTable, folder: Path) -> None:
     """Pictures of a study, as far as its runs make any."""
     if pictures.shown(found):
         found.plot().savefig(folder / "study.png")
 
 
-def _finished(tasks: Sequence[Task], workers: int, scheduler: str, inside: bool) -> Iterator[Row]:
-    if not tasks:
-        return iter(())
-    if inside and workers == 1 and not scheduler:
-        return _here(tasks)
-    return pool.on_cluster(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers, solve)
-
-
-def _here(tasks: Sequence[Task]) -> Iterator[Row]:
-    with limited(1):
-        for task in tasks:
-            yield solve(task)
+def _here(tasks: Sequence[Work], solve: Callable[[Work], Row]) -> Iterator[Row]:
+    with limited(1), kept.at_hand():
+        yield from map(solve, tasks)
 
 
 def task_at(study: Study, values: Mapping[str, Any]) -> Task:

@@ -7,6 +7,7 @@ import threading
 import time
 import tomllib
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -46,7 +47,7 @@ class Task:
     folder: Path
     slopes: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Hash of all that the row depends on: scene, overrides, contents of the files that they name, version."""
         content = hashlib.sha256(repr((__version__, self.text, self.overrides, self.slopes)).encode())

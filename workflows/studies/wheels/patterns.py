@@ -6,10 +6,7 @@ meshed and reduced once in every process.
 
 from __future__ import annotations
 
-import hashlib
 import time
-import tomllib
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -30,7 +27,6 @@ from tribodyn.hbm.mistuning import MistunedWheel
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction import mistuning as reduction
 from tribodyn.reduction.cyclic import ReducedSector
-from tribodyn.version import __version__
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED
 from tribodyn.workflows.result.readable import write_columns
@@ -40,14 +36,12 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
-from tribodyn.workflows.studies.many import pool
-from tribodyn.workflows.studies.many.table import Journal
-from tribodyn.workflows.studies.many.task import Row, Status
+from tribodyn.workflows.studies.many.study import Runner, finish
+from tribodyn.workflows.studies.many.task import Row, Status, Task
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
@@ -214,24 +208,16 @@ def _hertz(omega: float) -> str:
     return f"{omega / (2 * np.pi):.5g} Hz"
 
 
-@dataclass(frozen=True)
-class PatternTask:
-    """One pattern of a scene, for any process; key : hash of all that its row depends on."""
+class PatternTask(Task):
+    """One pattern of a scene, for any process: that of its number."""
 
-    number: int
-    name: str
-    text: str
-    overrides: tuple[str, ...]
-    folder: Path
-    key: str
-
-    @property
-    def wheel(self) -> tuple[object, ...]:
-        """What the wheel is made of."""
-        return self.text, self.overrides, self.folder
+    @cached_property
+    def key(self) -> str:
+        """Hash of all that the row depends on."""
+        return f"{super().key} {self.number}"
 
 
-_ready: tuple[tuple[object, ...], Blades] | None = None  # of the process
+_ready: tuple[Task, Blades] | None = None  # of the process
 
 
 def solve(task: PatternTask) -> Row:
@@ -240,9 +226,10 @@ def solve(task: PatternTask) -> Row:
     start = time.process_time()
     with limited(1):
         try:
-            if _ready is None or _ready[0] != task.wheel:
+            wheel = replace(task, number=0)
+            if _ready is None or _ready[0] != wheel:
                 file = scene_file.parse(task.text, f"{task.name}.toml", task.overrides, task.folder)
-                _ready = task.wheel, Blades.of(file)
+                _ready = wheel, Blades.of(file)
             blades = _ready[1]
             alike, _ = blades.alike, blades.ends  # of all patterns
             start = time.process_time()
@@ -344,13 +331,9 @@ class Patterns(StudyResult):
 
 
 def tasks_of(file: SceneFile, count: int) -> list[PatternTask]:
-    """The patterns 1 to `count` of a scene."""
-    values = [tomllib.loads(file.text), *(one.partition("=")[2].strip(" \"'") for one in file.overrides)]
-    others = [one for one in file.overrides if one.partition("=")[0].strip() != "mistuning.patterns"]
-    content = repr((__version__, file.text, others, digests(values, file.folder)))
-    return [
-        PatternTask(n, file.name, file.text, file.overrides, file.folder, _key(content, n)) for n in range(1, count + 1)
-    ]
+    """The patterns 1 to `count` of a scene, whose rows do not depend on how many there are."""
+    others = tuple(one for one in file.overrides if one.partition("=")[0].strip() != "mistuning.patterns")
+    return [PatternTask(n, file.name, file.text, others, file.folder) for n in range(1, count + 1)]
 
 
 def patterns(
@@ -375,24 +358,11 @@ def patterns(
     asked, wheel = asked_of(file), file.mesh_scene.wheel
     if wheel is None:
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
-    if workers is not None and workers < 1:
-        raise ValueError(f"--workers {workers}: give at least 1")
+    runner = Runner(folder, report, workers, resume=resume, retry=resume)
     folder.mkdir(parents=True, exist_ok=True)
+    rows: dict[int, Row] = {}
     with alone_in(folder):
-        tasks = tasks_of(file, asked.patterns)
-        journal = Journal(folder)
-        earlier = {key: row for key, row in journal.rows().items() if row.status == "complete"} if resume else {}
-        rows = {task.number: earlier[task.key] for task in tasks if task.key in earlier}
-        journal.begin(earlier.values(), resume)
-        left = [task for task in tasks if task.number not in rows]
-        if resume:
-            report.say(f"{len(rows)} of {len(tasks)} patterns are done already")
-        count = workers or pool.cores()
-        with report.track(f"{len(left)} patterns") as advance:
-            for done, row in enumerate(_finished(left, count), 1):
-                journal.add(row)
-                rows[row.run] = row
-                advance(done / len(left), f"{done} of {len(left)}")
+        finish(tasks := tasks_of(file, asked.patterns), runner, rows, solve, "patterns", inside=True)
     found = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks), folder)
     names = ("amplification", "peak_m", "peak_hz", "blade", "solves")
     columns = {name: [row.numbers.get(name, np.nan) for row in found.rows] for name in names}
@@ -401,13 +371,3 @@ def patterns(
     if found.complete:
         found.plot().savefig(folder / "mistuning.png")
     return found
-
-
-def _finished(tasks: Sequence[PatternTask], workers: int) -> Iterator[Row]:
-    if workers == 1:
-        return map(solve, tasks)
-    return pool.finished(tasks, workers, solve) if tasks else iter(())
-
-
-def _key(content: str, number: int) -> str:
-    return hashlib.sha256(f"{content} {number}".encode()).hexdigest()
