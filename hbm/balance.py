@@ -17,6 +17,7 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.sparse import issparse
 
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.contact.joint import Contact, Joint
 from tribodyn.hbm.contact.law import STICKS, ContactCycle
 from tribodyn.hbm.excitation import Excitation
@@ -120,14 +121,13 @@ class HarmonicBalance:
         """Whether this has the linear side of another problem but for the amplitudes of its loads."""
         basis, excitation, omega_max = others
         own, loads = self.compliance, {name for _, name in excitation.loads}
-        if (own.basis, {*own.load_names}, self.omega_max) != (basis, loads, omega_max) or model.along is not None:
+        if (own.basis, {*own.load_names}, self.omega_max) != (basis, loads, omega_max):
             return False
-        infos = (
-            (m.info.engine_order, m.info.n_sectors, id(m.residual), m.per_index is None) for m in (self.model, model)
-        )
-        mine, other = ({"k": k, **m.seen(basis.harmonics)} for k, m in ((own.k, self.model), (springs.ravel(), model)))
-        alike = len({*infos}) == 1 and list(mine) == list(other) and self.model.along is None
-        return alike and all(part is other[name] or np.array_equal(part, other[name]) for name, part in mine.items())
+        sides = ((self.model, own.k), (model, springs.ravel()))
+        kinds = {(m.info.engine_order, m.info.n_sectors, m.per_index is None, id(m.residual)) for m, _ in sides}
+        alone = len(kinds) == 1 and self.model.along is None and model.along is None
+        one, two = ([k, *(x for h in basis.harmonics for x in m.at_harmonic(h))] for m, k in sides)
+        return alone and all(map(_same, one, two))
 
     @property
     def n_unknown(self) -> int:
@@ -280,6 +280,15 @@ class HarmonicBalance:
     def history(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Displacement [m] and contact force [N] over one period, both (n_pair, n_component, n_samples)."""
         return self.contact.history(state.x, self.basis, self.memory)
+
+
+def _same(one: Any, two: Any) -> bool:
+    """Whether two arrays, or two systems in all that they hold, are equal to the last bit."""
+    if isinstance(one, SecondOrderSystem):
+        return _same(vars(one), vars(two))
+    if isinstance(one, dict):
+        return list(one) == list(two) and all(map(_same, one.values(), two.values()))
+    return one is two or np.array_equal(one, two)
 
 
 class LinearSide(Protocol):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -104,16 +104,6 @@ class ReducedModel:
         if self.per_harmonic is not None:
             return self.per_harmonic(h)
         return self.system, np.asarray(self.interface.B)
-
-    def seen(self, harmonics: Iterable[int]) -> dict[tuple[Any, ...], Any]:
-        """Every matrix, load and output that harmonics see, by harmonic and name."""
-        found: dict[tuple[Any, ...], Any] = {}
-        for h in harmonics:
-            system, found[h, "B"] = self.at_harmonic(h)
-            parts = {(h, name): part for name, part in vars(system).items()}
-            for name, part in parts.items():
-                found |= {(*name, n): p for n, p in part.items()} if isinstance(part, Mapping) else {name: part}
-        return found
 
     def require_masters(self, needed_by: str) -> None:
         """Raise ValueError where the coordinates leave out a part of the contact's flexibility."""

@@ -16,7 +16,7 @@ import platform
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar, Token
+from contextvars import ContextVar
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -74,16 +74,11 @@ def early_of(scene: MeshScene) -> str:
 @contextmanager
 def at_hand() -> Iterator[None]:
     """Within it the last part, reduction and balance stay in memory too, for scenes that differ little."""
-    before = keep_at_hand()
+    before = _last.set({})
     try:
         yield
     finally:
         _last.reset(before)
-
-
-def keep_at_hand() -> Token[dict[str, Any] | None]:
-    """The same as long as this process lives."""
-    return _last.set({})
 
 
 def beside(make: Callable[[HarmonicBalance | None], HarmonicBalance]) -> HarmonicBalance:

@@ -12,8 +12,9 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
 from multiprocessing import get_context, parent_process
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -25,12 +26,7 @@ from tribodyn.workflows.studies.many.task import Row, Task
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
 LOCAL = "local"
 WAIT = "20s"  # for a scheduler to answer
-
-
-def cores() -> int:
-    """Processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
+_always = ExitStack()  # what a process of the pool is within as long as it lives
 
 Work = TypeVar("Work", bound=Task)
 
@@ -83,7 +79,7 @@ def _begin() -> None:
     """In every process of the pool: processes and threads do not multiply, and none outlives the study."""
     gc.freeze()  # what is imported is looked through no more
     threadpool_limits(1)
-    kept.keep_at_hand()
+    _always.enter_context(kept.at_hand())
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -123,18 +119,14 @@ def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callabl
     try:
         by_future = {client.submit(solve, task, pure=False, priority=-i): task for i, task in enumerate(tasks)}
         for future in distributed.as_completed(list(by_future), loop=client.loop):
-            yield _row(future, by_future.pop(future), address)
+            task, why = by_future.pop(future), future.exception() if future.status == "error" else None
+            if why is not None:  # the run itself raises nothing: its workers died, or cannot run it at all
+                yield Row(task.number, task.key, "lost", " ".join(f"{type(why).__name__}: {why}".split()))
+            elif future.status == "finished":
+                yield future.result()
+            else:
+                raise SolveFailed(f"the scheduler at {address} was lost")
     finally:
         client.close()
         if cluster is not None:
             cluster.close()
-
-
-def _row(future: Any, task: Task, address: str) -> Row:
-    if future.status == "finished":
-        row: Row = future.result()
-        return row
-    if future.status == "error":  # the run itself raises nothing: its workers died, or cannot run it at all
-        error = future.exception()
-        return Row(task.number, task.key, "lost", " ".join(f"{type(error).__name__}: {error}".split()))
-    raise SolveFailed(f"the scheduler at {address} was lost")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 import tomli_w
 
-from tribodyn.hbm.threads import limited
+from tribodyn.hbm.threads import limited, usable
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress, Report, reporter
@@ -124,7 +125,7 @@ def finish(
     if resume:
         progress.say(f"{len(known)} of {len(tasks) + refused} {what} are done already")
     left = [task for task in tasks if task.number not in rows]
-    count = runner.workers or pool.cores()
+    count = runner.workers or usable(sys.maxsize)
     if left:
         where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(left))} processes"
         progress.say(f"{len(left)} {what} on {where}, one thread for each")
