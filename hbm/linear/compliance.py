@@ -106,10 +106,7 @@ class ContactCompliance:
         self.base = excitation.base
 
     def under(self, excitation: Excitation) -> ContactCompliance:
-        """The same under other amplitudes of its loads.
-
-        It has the expansions and takes what they gave at frequencies, from now on as many as there is room for
-        """
+        """The same under other amplitudes of its loads; takes over the frequencies at hand, and keeps more of them."""
         other = copy(self)
         for made in ("outside", "excited"):
             other.__dict__.pop(made, None)

@@ -74,11 +74,6 @@ class Stability:
     diameters: np.ndarray | None = None
 
     @property
-    def multipliers(self) -> np.ndarray:
-        """(n,) complex factors exp(lambda T) by which perturbations change over one period."""
-        return np.exp(self.exponents * 2 * np.pi / self.omega)
-
-    @property
     def n_unstable(self) -> int:
         """Number of exponents that grow."""
         return int(np.sum(self.exponents.real > RULES.neutral_growth * self.omega))

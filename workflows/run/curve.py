@@ -20,11 +20,11 @@ from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.workflows.result.readable import measured, sparkline
 from tribodyn.workflows.result.result import Result, ShearBounds, WornResponses
 from tribodyn.workflows.run import settings
-from tribodyn.workflows.run.progress import Advance, unread
+from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.schema import Scene
 
 
-def follow_response(scene: Scene, balance: HarmonicBalance, advance: Advance = unread, folds: bool = True) -> Branch:
+def follow_response(scene: Scene, balance: HarmonicBalance, advance: Advance, folds: bool = True) -> Branch:
     """The response curve of the unworn contact by the scene's continuation method, its highest peaks solved.
 
     folds : whether a curve on which a sweep jumps is followed round its folds, where its highest peak may be; not where
@@ -48,7 +48,7 @@ def follow_response(scene: Scene, balance: HarmonicBalance, advance: Advance = u
         advance(done / wanted, f"{sparkline(*np.array(seen).T)} {hertz}, {height}", seen[-1])
 
     def along(problem: HarmonicBalance) -> Branch:
-        found: Branch = method.follow(problem, *ends, options, None if advance is unread else told)
+        found: Branch = method.follow(problem, *ends, options, told)
         return found
 
     if asked.control == "amplitude":

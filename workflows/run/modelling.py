@@ -265,10 +265,7 @@ class Problem:
         return cls(scene, part, reduced, made, bolts)
 
     def balance(self, harmonics: tuple[int, ...], like: HarmonicBalance | None = None) -> HarmonicBalance:
-        """The balance of some harmonics; raises ValueError where they leave out what the scene has in harmonic 0.
-
-        like : a problem that may have its linear side
-        """
+        """The balance of some harmonics, see `of`; raises ValueError where harmonic 0 is needed and left out."""
         scene, wanted, gap = self.scene, self.scene.harmonics, self.reduced.interface.gap
         auto = wanted.transitions == "auto"
         basis = HarmonicBasis(harmonics, wanted.samples, joint_transitions(self.joints) if auto else wanted.transitions)

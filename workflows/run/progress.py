@@ -18,10 +18,6 @@ NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a 
 FORESEEN = 0.02  # share of the work from which on the time left is given: the first steps compile
 
 
-def unread(*_: object) -> None:
-    """An Advance that nobody reads."""
-
-
 class Progress:
     """Reports stages and long work on a console, and in a log file; without both it reports nothing."""
 
@@ -45,7 +41,7 @@ class Progress:
         """Long work: yields a function to call with the share that is done and a note."""
         start = time.perf_counter()
         if self._console is None:
-            yield self._lines(name, start) if self._log else unread
+            yield self._lines(name, start) if self._log else lambda *_: None
         elif self._console.is_terminal:
             columns = (TextColumn("{task.description}"), BarColumn(12), TaskProgressColumn())
             left, before = TextColumn("{task.fields[left]}{task.fields[note]}"), compiled()

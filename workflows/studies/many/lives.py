@@ -189,7 +189,8 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
         points = quantiles.next_runs(sample, found.surrogate, shares[0], min(BATCH, wanted.most - done))
         added += [space.run_of(point) for point in points]
     folder = runner.folder
-    studies.draw(table, folder)
+    if pictures.shown(table):
+        table.plot().savefig(folder / "study.png")
     error, source = _model_error(study, middle, table, folder, runner.progress)
     distribution = _result(study, table, found, sample, shares, error, source)
     (folder / "lives.json").write_text(json.dumps(distribution.record(), indent=2) + "\n", encoding="utf-8")

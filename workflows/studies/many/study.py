@@ -98,8 +98,8 @@ def run(
             if found is not None:
                 write(found, folder)
         assert found is not None
-        if drawn:
-            draw(found, folder)
+        if drawn and pictures.shown(found):
+            found.plot().savefig(folder / "study.png")
     return found
 
 
@@ -141,12 +141,6 @@ def finish(
             rows[row.run] = row
             bad = sum(one.status != "complete" for one in rows.values())
             advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
-
-
-def draw(found: StudyTable, folder: Path) -> None:
-    """Pictures of a study, as far as its runs make any."""
-    if pictures.shown(found):
-        found.plot().savefig(folder / "study.png")
 
 
 def _here(tasks: Sequence[Work], solve: Callable[[Work], Row]) -> Iterator[Row]:

@@ -208,7 +208,7 @@ class Journal:
         previous = None if resume else set_aside(self.path)
         fresh = self.path.with_suffix(".new")
         with fresh.open("w", encoding="utf-8") as file:
-            file.writelines(f"{json.dumps(row.record())}\n" for row in rows)
+            file.writelines(f"{json.dumps(vars(row))}\n" for row in rows)
             file.flush()
             os.fsync(file.fileno())
         os.replace(fresh, self.path)
@@ -217,6 +217,6 @@ class Journal:
     def add(self, row: Row) -> None:
         """Append a row and wait until the disk has it."""
         with self.path.open("a", encoding="utf-8") as file:
-            file.write(f"{json.dumps(row.record())}\n")
+            file.write(f"{json.dumps(vars(row))}\n")
             file.flush()
             os.fsync(file.fileno())

@@ -6,10 +6,10 @@ import hashlib
 import threading
 import time
 import tomllib
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -74,10 +74,6 @@ class Row:
     sentence: str
     numbers: dict[str, float] = field(default_factory=dict)
     seconds: float = 0.0
-
-    def record(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self)
 
 
 _one_at_a_time = threading.Lock()  # workers may have several threads, Gmsh and the threads of BLAS are of a process

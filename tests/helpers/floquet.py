@@ -1,0 +1,12 @@
+"""Floquet multipliers of a stability that was found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribodyn.hbm.stability.exponents import Stability
+
+
+def multipliers(found: Stability) -> np.ndarray:
+    """(n,) complex factors exp(lambda T) by which perturbations change over one period."""
+    return np.exp(found.exponents * 2 * np.pi / found.omega)
