@@ -7,7 +7,6 @@ import threading
 import time
 import tomllib
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -47,7 +46,7 @@ class Task:
     folder: Path
     slopes: tuple[str, ...] = ()
 
-    @cached_property
+    @property
     def key(self) -> str:
         """Hash of all that the row depends on: scene, overrides, contents of the files that they name, version."""
         content = hashlib.sha256(repr((__version__, self.text, self.overrides, self.slopes)).encode())

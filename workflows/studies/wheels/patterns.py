@@ -211,7 +211,7 @@ def _hertz(omega: float) -> str:
 class PatternTask(Task):
     """One pattern of a scene, for any process: that of its number."""
 
-    @cached_property
+    @property
     def key(self) -> str:
         """Hash of all that the row depends on."""
         return f"{super().key} {self.number}"
