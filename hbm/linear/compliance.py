@@ -300,8 +300,7 @@ class CompliancePoint:
     blocks = None
 
     def __init__(self, compliance: ContactCompliance, omega: float):
-        self.compliance = compliance
-        self.omega = omega
+        self.compliance, self.omega = compliance, omega
         self._turns = omega or 1e-150  # [rad/s] whose powers vanish at rest, where their slopes over it do not
         self._harmonics = np.asarray(compliance.basis.harmonics, float)
         self.ports = self._solved()
