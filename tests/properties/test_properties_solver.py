@@ -58,7 +58,8 @@ def check(balance: HarmonicBalance, state: State) -> None:
     offsets = [parameters.gap, balance.memory, np.zeros(1) if base is None else base]
     tiny = 1e-14 * max(float(np.abs(offset).max(initial=0.0)) for offset in offsets)  # their rounding
     force = contact_forces(balance, state.x)
-    rounding = SINGLE + 5e-14 * condition(balance, state.omega)  # infinite where nothing holds it
+    left = newton.relative_residual(state, balance.x_lin(state.omega)) + 5e-14  # with what rounding adds to it
+    rounding = SINGLE + left * condition(balance, state.omega)  # infinite where nothing holds it
     if np.isfinite(force).all() and rounding < 1.0:
         size = max(float(np.linalg.norm(v)) for v in (state.x, balance.x_lin(state.omega), offsets[-1]))
         back = displacement_under(balance, state.omega, state.x, force)
