@@ -117,17 +117,17 @@ class HarmonicBalance:
             compliance = compliance_of(model, springs, basis, excitation, omega_max)
         return cls(model, contact, basis, excitation, omega_max, memory, compliance)
 
-    def _serves(self, model: ReducedModel, springs: np.ndarray, *others: Any) -> bool:
+    def _serves(
+        self, model: ReducedModel, springs: np.ndarray, basis: HarmonicBasis, excitation: Excitation, omega_max: float
+    ) -> bool:
         """Whether this has the linear side of another problem but for the amplitudes of its loads."""
-        basis, excitation, omega_max = others
         own, loads = self.compliance, {name for _, name in excitation.loads}
         if (own.basis, {*own.load_names}, self.omega_max) != (basis, loads, omega_max):
             return False
         sides = ((self.model, own.k), (model, springs.ravel()))
         kinds = {(m.info.engine_order, m.info.n_sectors, m.per_index is None, id(m.residual)) for m, _ in sides}
-        alone = len(kinds) == 1 and self.model.along is None and model.along is None
         one, two = ([k, *(x for h in basis.harmonics for x in m.at_harmonic(h))] for m, k in sides)
-        return alone and all(map(_same, one, two))
+        return len(kinds) == 1 and self.model.along is model.along is None and all(map(_same, one, two))
 
     @property
     def n_unknown(self) -> int:

@@ -181,6 +181,7 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, ste
             there = exact.at_frequency(balance, fixed.state, "response", ())
             return there.values, exact.at_peak(balance, along.state, "response", ()).values
 
+    floor = 0.2 if "geometry.shroud_angle" in only else 0.1  # below it differences are rounding; of this one, 3e-6
     for i, key in enumerate(along.parameters):
         sides = {factor: solved(key, factor) for factor in (1 + step, 1 - step, 1 + step / 2, 1 - step / 2)}
         for which, found, error in ((0, fixed, 1e-5), (1, along, 1e-5)):
@@ -189,7 +190,7 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, ste
             # second derivatives jump where a transition comes or goes: by small steps the error is linear in them
             difference = (2**order * narrow - wide) / (2**order - 1) / found.values[:kept]
             elasticity = found.slopes[:kept, i] * value[key] / found.values[:kept]
-            size = np.maximum(np.abs(difference), 0.2)  # below this the differences are rounding
+            size = np.maximum(np.abs(difference), floor)
             assert (np.abs(elasticity - difference) <= error * size).all(), (key, elasticity, difference)
 
 
