@@ -334,14 +334,13 @@ class Linearisation:
     def departure_slope(self, direction: np.ndarray) -> np.ndarray:
         """dg/dx . direction: (n_contact, n_coeff)."""
         out = np.zeros(self._shape)
-        if len(self.rows):
-            out[self.rows] = self.g_slope(direction[self.rows])
+        out[self.rows] = self.g_slope(direction[self.rows])
         return out
 
     def g_slope(self, active_direction: np.ndarray) -> np.ndarray:
         """dg/dx . direction on the rows of active pairs, both (n_active_rows, n_coeff)."""
-        shape = active_direction.shape
-        return np.matmul(self._dg, active_direction.reshape(len(self.active), -1, 1)).reshape(shape)
+        found: np.ndarray = pair_slopes.times(self._dg, active_direction)
+        return found
 
     def product(self, d: np.ndarray) -> np.ndarray:
         """(I - G dg/dx) d on the rows of active pairs, d (n_active_rows, n_coeff)."""
@@ -357,7 +356,7 @@ class Linearisation:
             return solved[self.rows]
         if self._coarse_factors is None:
             return d
-        found: np.ndarray = pair_slopes.preconditioned(d, self.g_slope(d), *self._coarse_factors)
+        found: np.ndarray = pair_slopes.preconditioned(d, self._dg, *self._coarse_factors)
         return found
 
     @cached_property
@@ -441,7 +440,7 @@ class Linearisation:
         else:
             # products that leave much out find a direction for one that leaves nothing out
             d, spent, reached = gmres(
-                exactly, b, tolerance, max_products, lambda v: nearly(v, INNER, INNER_PRODUCTS)[0], flexible=True
+                exactly, b, tolerance, max_products, lambda v: nearly(v, INNER, INNER_PRODUCTS)[0]
             )
         return self.spread(d.reshape(shape), rhs), spent, reached
 

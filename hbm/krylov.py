@@ -16,65 +16,63 @@ def gmres(
     tolerance: float,
     max_products: int,
     precondition: Callable[[np.ndarray], np.ndarray] | None = None,
-    flexible: bool = False,
 ) -> tuple[np.ndarray, int, float]:
-    """Solve A x = b by GMRES without restart, orthogonalised twice.
+    """Solve A x = b by flexible GMRES without restart, orthogonalised twice.
 
-    product : A times a vector (n,); precondition : an approximate inverse of A, applied from the right
-    flexible : the preconditioner is no linear map, such as an iteration of its own
+    product : A times a vector (n,)
+    precondition : an approximate inverse of A, applied from the right; it may be an iteration of its own
     Returns x, products spent, relative residual reached: infinite where a product is no number
-    Source  Saad and Schultz 1986; flexible: Saad 1993, doi 10.1137/0914028
+    Source  Saad 1993, doi 10.1137/0914028
     """
     beta = float(np.linalg.norm(b))
     if beta == 0.0:
         return np.zeros_like(b), 0, 0.0
     size = min(max_products, len(b))
     v = np.empty((min(size, FIRST_ROOM) + 1, len(b)))
-    h = np.zeros((size, size))
     v[0] = b / beta
-    cs, sn = np.zeros(size), np.zeros(size)
-    rhs = np.zeros(size + 1)
+    cs, sn, rhs = np.zeros(size), np.zeros(size), np.zeros(size + 1)
     rhs[0] = beta
     k = 0
+    columns: list[np.ndarray] = []  # of the Hessenberg matrix, turned
     directions: list[np.ndarray] = []
     for k in range(1, size + 1):
-        z = v[k - 1] if precondition is None else precondition(v[k - 1])
-        if flexible:
-            directions.append(z)
-        w = product(z)
-        span = v[:k]
-        coefficients = span @ w
-        w = w - coefficients @ span
-        again = span @ w
-        w -= again @ span
-        column = h[:, k - 1]
-        column[:k] = coefficients + again
-        norm = float(np.sqrt(w @ w))
+        directions.append(v[k - 1] if precondition is None else precondition(v[k - 1]))
+        if k == len(v):
+            v = np.concatenate([v, np.empty((min(k, size + 1 - k), len(b)))])
+        columns.append(np.empty(k))
+        radius, norm = _next(product(directions[-1]), v, columns[-1], cs, sn, rhs)
         if not np.isfinite(norm):  # a product beyond all numbers, as single precision has them
             return np.zeros_like(b), k, np.inf
-        radius = _rotate(column, cs, sn, rhs, k, norm)
         if radius == 0.0:
             k -= 1
             break
         if abs(rhs[k]) <= tolerance * beta or norm <= 1e-14 * radius:
             break
-        if k == len(v):
-            v = np.concatenate([v, np.empty((min(k, size + 1 - k), len(b)))])
-        v[k] = w / norm
     if k == 0:
         return np.zeros_like(b), 1, 1.0
-    y = np.zeros(k)
+    y = rhs[:k].copy()
     for i in range(k - 1, -1, -1):
-        y[i] = (rhs[i] - h[i, i + 1 : k] @ y[i + 1 :]) / h[i, i]
-    if flexible:
-        return y @ np.array(directions[:k]), k, abs(rhs[k]) / beta
-    x = y @ v[:k]
-    return x if precondition is None else precondition(x), k, abs(rhs[k]) / beta
+        y[i] /= columns[i][i]
+        y[:i] -= y[i] * columns[i][:i]
+    return y @ np.array(directions[:k]), k, abs(rhs[k]) / beta
 
 
 @numba.njit(cache=True)
-def _rotate(column, cs, sn, rhs, k, norm):
-    """Turn column k of the Hessenberg matrix upper triangular and the right-hand side with it; returns the diagonal."""
+def _next(w, v, column, cs, sn, rhs):
+    """Vector k of the space, v[k], from the product w of the one before, orthogonalised twice.
+
+    Fills the column (k,) of the Hessenberg matrix, turned upper triangular, and turns the right-hand side with it
+    Returns its diagonal, and the size of w outside of the space
+    """
+    k = len(column)
+    column[:] = np.dot(v[:k], w)
+    w = w - np.dot(column, v[:k])
+    again = np.dot(v[:k], w)
+    w -= np.dot(again, v[:k])
+    column += again
+    norm = np.sqrt(np.dot(w, w))
+    if norm > 0.0:
+        v[k] = w / norm
     for i in range(k - 1):
         a, b = column[i], column[i + 1]
         column[i] = cs[i] * a + sn[i] * b
@@ -85,4 +83,4 @@ def _rotate(column, cs, sn, rhs, k, norm):
         column[k - 1] = radius
         rhs[k] = -sn[k - 1] * rhs[k - 1]
         rhs[k - 1] *= cs[k - 1]
-    return radius
+    return radius, norm

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar, cast
 
+import numba
 import numpy as np
 
 from tribodyn.hbm.balance import NEARLY_ALL, HarmonicBalance, Linearisation, State
@@ -130,8 +132,14 @@ Solution = Solved[State]
 
 def relative_residual(state: Evaluation, x_lin: np.ndarray) -> float:
     """|R| / max(|x|, |x_lin|), Euclidean, 1 where only these vanish; invariant to the units."""
-    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)))
-    return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(state.residual.any())
+    scale = max(_size(state.x), _size(x_lin))
+    return _size(state.residual) / scale if scale > 0 else float(state.residual.any())
+
+
+def _size(values: np.ndarray) -> float:
+    """The Euclidean norm of all; numpy's own takes ten times as long where they are few."""
+    flat = values.ravel()
+    return math.sqrt(flat @ flat)
 
 
 @single
@@ -271,11 +279,20 @@ def wanted(
 
 def _stretched(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> float:
     """The stretch of the contact springs over the displacement; infinite where nothing touches or moves."""
-    k = balance.reference_stiffness[:, None]
-    stretch = np.divide(state.cycle.force.reshape(state.g.shape), k, out=np.zeros_like(state.g), where=k > 0)
-    size = float(np.linalg.norm(stretch))
-    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)))
+    size = float(_stretch(state.cycle.force.reshape(state.g.shape), balance.reference_stiffness))
+    scale = max(_size(state.x), _size(x_lin))
     return size / scale if size > 0.0 and scale > 0.0 else np.inf
+
+
+@numba.njit(cache=True)
+def _stretch(force, stiffness):
+    """The Euclidean norm of forces (n_contact, n) over their springs (n_contact,), those of no spring left out."""
+    total = 0.0
+    for i in range(len(stiffness)):
+        if stiffness[i] > 0.0:
+            for value in force[i]:
+                total += (value / stiffness[i]) ** 2
+    return math.sqrt(total)
 
 
 def _search(

@@ -96,7 +96,7 @@ def solve(
         return out
 
     precondition = _coarse_inverse(linear, column, row) if len(rows) else None
-    y, spent, reached = gmres(product, right, tolerance, max_products, precondition, flexible=True)
+    y, spent, reached = gmres(product, right, tolerance, max_products, precondition)
     if not reached <= max(10 * tolerance, 0.5):  # stalled: the direct way
         active = (rows[:, None] * shape[1] + np.arange(shape[1])).ravel()
         inner = linear.dense()[np.ix_(active, active)]

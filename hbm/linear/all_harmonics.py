@@ -40,8 +40,7 @@ def modal_forces(rows, n_e, ratio, has_static):
     s = 1 if has_static else 0
     z = np.empty((len(ratio) + s, m), np.complex128)
     if has_static:
-        for j in range(m):
-            z[0, j] = rows[0, j]
+        z[0] = rows[0, :m]
     for h in range(len(ratio)):
         a, b = rows[s + 2 * h], rows[s + 2 * h + 1]
         for j in range(m):
@@ -59,8 +58,7 @@ def solve_core(z, real, imag, pivots, static, has_static):
     """S^-1 z in place, for z (n_harmonic, m)."""
     s, m = 1 if has_static else 0, z.shape[1]
     for h in range(len(z) if len(real) == 0 else s):
-        for j in range(m):
-            z[h, j] /= static[j]
+        z[h] /= static
     x, y = np.empty(m), np.empty(m)  # real and imaginary part: loops over both are vectorised
     for h in range(len(real)):
         for j in range(m):
@@ -146,9 +144,7 @@ def nearly_displaced(force, w0, b, b_turned, ratio, has_static, real, imag, pivo
     for start in range(0, n, step):
         stop = min(start + step, n)
         rows = np.zeros((size, stop - start), b.dtype)
-        for i in range(start, stop):
-            for c in range(n_coeff):
-                rows[c, i - start] = force[i, c]
+        rows[:n_coeff] = force[start:stop].T
         pushed += np.dot(rows, b[start:stop])
         if len(w0):
             still += np.dot(rows, w0[start:stop])
@@ -156,11 +152,7 @@ def nearly_displaced(force, w0, b, b_turned, ratio, has_static, real, imag, pivo
     moved = np.dot(y.astype(b.dtype), b_turned)
     if len(w0):
         moved += still[:n_coeff]
-    out = np.empty((n, n_coeff))
-    for i in range(n):
-        for c in range(n_coeff):
-            out[i, c] = moved[c, i]
-    return out
+    return np.ascontiguousarray(moved[:n_coeff].T).astype(np.float64)
 
 
 @numba.njit(cache=True)
@@ -170,8 +162,7 @@ def modal_rows(y, n_e, ratio, has_static):
     s = 1 if has_static else 0
     rows = np.zeros((s + 2 * len(ratio), m * (n_e + 1)))
     if has_static:
-        for j in range(m):
-            rows[0, j] = y[0, j].real
+        rows[0, :m] = y[0].real
     for h in range(len(ratio)):
         a, b = rows[s + 2 * h], rows[s + 2 * h + 1]
         for j in range(m):
@@ -189,13 +180,9 @@ def gathered(modal, moved, higher, n, n_port, unit, ratio, has_static):
 
     The rows of `higher` are those of the harmonics >= 1.
     """
-    n_coeff = len(modal)
     s = 1 if has_static else 0
     n_power = higher.shape[1] // n_port
-    out = np.empty((n, n_coeff))
-    for c in range(n_coeff):
-        for i in range(n):
-            out[i, c] = modal[c, i] + moved[c, i]
+    out = np.ascontiguousarray((modal[:, :n] + moved[:, :n]).T)
     for h in range(len(ratio)):
         a, b, p, q = s + 2 * h, s + 2 * h + 1, 2 * h, 2 * h + 1
         size, odd_sign, even_sign = unit, 1.0, 1.0

@@ -115,7 +115,8 @@ class ContactCompliance:
         widest = max(e.n_mode if self.shared_real else max(e.n_mode, self.n_contact) for e, _ in self.groups)
         size = 32 * widest**2 * len(self.basis.harmonics)  # of a complex matrix and its parts, or of factors besides
         other._most = max(RULES.points_kept, int(RULES.shared_room / size))
-        other._points = {omega: point.under(other) for omega, point in self._points.items()}
+        same = np.array_equal(other._load, self._load) and other.base is self.base is None
+        other._points = {omega: point.under(other, same) for omega, point in self._points.items()}
         self._points = {}
         return other
 
@@ -306,11 +307,12 @@ class CompliancePoint:
         self.ports = self._solved()
         self._excite()
 
-    def under(self, compliance: ContactCompliance) -> CompliancePoint:
-        """That of the same expansions under other loads."""
+    def under(self, compliance: ContactCompliance, same: bool) -> CompliancePoint:
+        """That of the same expansions under other loads, or under the same again."""
         other = copy(self)
         other.compliance = compliance
-        other._excite()
+        if not same:
+            other._excite()
         return other
 
     def _excite(self) -> None:

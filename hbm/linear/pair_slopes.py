@@ -28,8 +28,8 @@ def departures(jacobian, stiffness):
             for b in range(m):
                 out[a, b] = -jacobian[i, a, b]
             out[a, a] += stiffness[i, a // n_coeff]
-            for b in range(m):
-                largest = max(largest, abs(out[a, b]))
+            for value in out[a]:
+                largest = max(largest, abs(value))
         if largest > NOTHING * stiffness[i].max():
             active[n] = i
             n += 1
@@ -56,29 +56,29 @@ def projected(slopes, u, n_coeff):
                             for q in range(r):
                                 row[first + q] += value * shape[q]
     inside = np.dot(u.T, through)
-    found = np.empty((r, n_coeff, r, n_coeff))
-    for p in range(r):
-        for a in range(n_coeff):
-            for b in range(n_coeff):
-                for q in range(r):
-                    found[p, a, q, b] = inside[p, (a * n_coeff + b) * r + q]
+    found = np.ascontiguousarray(inside.reshape(r, n_coeff, n_coeff, r).transpose(0, 1, 3, 2))
     return found.reshape(r * n_coeff, r * n_coeff)
 
 
 @numba.njit(cache=True)
-def preconditioned(d, slope, u, a, lower_upper, pivots):
-    """d + U (I - A U^T D U)^-1 A U^T D d for d and slope = D d, both (n_active * n_component, n_coeff).
+def times(slopes, d):
+    """D d for d (n_active * n_component, n_coeff), of its shape."""
+    n, m, _ = slopes.shape
+    moved, out = d.ravel(), np.zeros(n * m)
+    for i in range(n):
+        for a in range(m):
+            for b in range(m):
+                out[i * m + a] += slopes[i, a, b] * moved[i * m + b]
+    return out.reshape(d.shape)
+
+
+@numba.njit(cache=True)
+def preconditioned(d, slopes, u, a, lower_upper, pivots):
+    """d + U (I - A U^T D U)^-1 A U^T D d for d (n_active * n_component, n_coeff).
 
     lower_upper, pivots : factors of the matrix in brackets; row j of the first holds column j of L and U
     """
-    n_row, n_coeff = d.shape
-    r = u.shape[1]
-    pulled = np.zeros((r, n_coeff))
-    for i in range(n_row):
-        for p in range(r):
-            for b in range(n_coeff):
-                pulled[p, b] += u[i, p] * slope[i, b]
-    x = np.dot(a, pulled.ravel())
+    x = np.dot(a, np.dot(u.T, times(slopes, d)).ravel())
     for j in range(len(x)):
         x[j], x[pivots[j]] = x[pivots[j]], x[j]
     for j in range(len(x)):
@@ -91,9 +91,4 @@ def preconditioned(d, slope, u, a, lower_upper, pivots):
         value = x[j]
         for i in range(j):
             x[i] -= column[i] * value
-    found = d.copy()
-    for i in range(n_row):
-        for p in range(r):
-            for b in range(n_coeff):
-                found[i, b] += u[i, p] * x[p * n_coeff + b]
-    return found
+    return d + np.dot(u, x.reshape(u.shape[1], d.shape[1]))
