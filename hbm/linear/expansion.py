@@ -35,8 +35,8 @@ class ExpansionRules:
     # relative, of the expansion at the highest frequency asked for: below Newton's tolerance
     wanted_error: float = 5e-10
     rounding: float = 1e-7  # largest error that may be rounding
-    # modes and powers of s tried in turn
-    truncations: tuple[tuple[int, int], ...] = ((24, 3), (48, 3), (96, 3), (96, 4), (192, 4), (192, 6))
+    # modes and powers of s tried, cheap ones first: the last power is even, of mass; damping gives odd ones little
+    truncations: tuple[tuple[int, int], ...] = ((24, 3), (48, 3), (24, 5), (48, 5), (48, 7), (96, 7), (192, 7))
     all_modes_below: int = 1500  # coordinates up to which all modes are computed at once
     n_probe: int = 2  # forces that measure the error, and ports at which truncations are compared
     compared_ports: int = 64
@@ -153,15 +153,16 @@ class Expansion:
         exact = ports @ np.linalg.solve(free, force)
         del stuck, free
         few = np.linspace(0, len(ports) - 1, min(len(ports), RULES.compared_ports)).astype(int)
-        before = np.inf
+        tried: list[tuple[int, int, float]] = []
         for m, order in (c for c in RULES.truncations if c[0] < len(lam)):  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
             moved = self.at(s).matrix(slice(RULES.n_probe, None), slice(0, RULES.n_probe))
             error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())
             # near a resonance rounding of the direct solve itself is what remains: more modes would not help
+            before = min((e for few, low, e in tried if few <= m and low <= order), default=np.inf)
             if error <= wanted or 0.5 * before < error < RULES.rounding:
                 break
-            before = error
+            tried.append((m, order, error))
         else:
             m, order = len(lam), 1 if len(lam) == n else 8
         self._build(lam[:m], phi[:, :m], factor, order, ports)
