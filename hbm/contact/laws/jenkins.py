@@ -13,7 +13,6 @@ import numpy as np
 
 from tribodyn.declare import number
 from tribodyn.hbm.contact import located as transitions
-from tribodyn.hbm.contact.aft import by_kernel
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -84,7 +83,12 @@ def cycle(
     separation: 0), so a block of the Jacobian is a difference of prefix sums of basis products.
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_component - 1) slider positions at the start [m]
     """
-    return by_kernel(_cycle, x, parameters, memory, basis, jacobian)
+    n_pair, n_comp, n_coeff = x.shape
+    samples = basis.to_time(x)
+    force, status = np.empty_like(samples), np.zeros(n_pair, np.int64)
+    jac = np.zeros((n_pair if jacobian else 0, n_comp * n_coeff, n_comp * n_coeff))
+    _cycle(samples, parameters.packed(), memory, basis.synthesis, *basis.prefix_sums, force, jac, status)
+    return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
 
 
 @numba.njit(cache=True)
