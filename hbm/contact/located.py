@@ -10,8 +10,8 @@ nothing to the Jacobian but the derivative of the slider position at which a sti
 The result does not depend on the number of time samples: it is the Fourier integral itself, to rounding. Roots are
 isolated by Taylor bounds, so no number of events in one sample interval, nor a grazing one, is missed. Samples are of
 second order, of first order for friction that lifts, where the sampled Jacobian does not converge at all (measured in
-test_contact_located). Cost, measured: as 128 samples where most pairs stick; where all slip, twice that at H = 3, eight
-times at H = 15. A response curve with lifting pairs took as long either way: Newton needed 15 % fewer steps.
+test_contact_located). Cost, measured from H = 1 to 15: two to three times that of 128 samples where all slip, less
+where most pairs cannot. A response curve with lifting pairs took as long either way: Newton needed 15 % fewer steps.
 Source  Petrov and Ewins 2003 (friction element exact between transitions); moving walls and root isolation ours.
 """
 
@@ -34,7 +34,7 @@ SHORT = 0.5  # rad of the highest harmonic, below which a force is integrated by
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 # no array is made within, so none is counted; where a division by zero would be, another branch is taken
-_compiled = numba.njit(cache=True, _nrt=False, error_model="numpy")
+compiled = numba.njit(cache=True, _nrt=False, error_model="numpy")
 _inlined = numba.njit(cache=True, _nrt=False, error_model="numpy", forceinline=True)
 
 
@@ -139,7 +139,7 @@ def _cycle(x, load, grid, normal, k, mu, memory, hs, skip, force, jac, status):
                     _store(slope[1, skip:, skip:], mu[i] * kn, jac[i, o:, on:])
 
 
-@_compiled
+@compiled
 def _store(slope, factor, jac):
     """Put factor x slope into the first block of a part of the Jacobian."""
     for a in range(slope.shape[0]):
@@ -197,7 +197,7 @@ def _size(c, hs):
     return swing, bound
 
 
-@_compiled
+@compiled
 def _crossing(c, hs, bound, level, rising, left, right, angle):
     """Angle in [left, right] where the polynomial, monotone there, crosses a level; Halley from a guess in a bracket.
 
@@ -225,7 +225,7 @@ def _crossing(c, hs, bound, level, rising, left, right, angle):
     return angle
 
 
-@_compiled
+@compiled
 def _roots(c, hs, grid, cells, out, n):
     """Append all sign changes of a polynomial in (0, 2 pi] to out[n:], ascending; returns the new count.
 
@@ -290,7 +290,7 @@ def _roots(c, hs, grid, cells, out, n):
     return n
 
 
-@_compiled
+@compiled
 def _edges(r, u, load, swing, contact, touches, n_contact, hs, grid, cells, wall, edges, touching):
     """Angles between which the contact keeps its state and both walls are monotone; returns the number of intervals."""
     n = n_contact
@@ -334,7 +334,7 @@ def _pushed(w, origin, tilt, r, j, at, touching):
     return w, origin, tilt
 
 
-@_compiled
+@compiled
 def _segments(w, r, u, load, hs, touching, n_edge, at, wall, knots, waves, ends, segments):
     """Sticks and slips of the periodic cycle; returns their number.
 
@@ -368,7 +368,7 @@ def _segments(w, r, u, load, hs, touching, n_edge, at, wall, knots, waves, ends,
     return n
 
 
-@_compiled
+@compiled
 def _slip(w, r, u, load, hs, before, after, wall, left, right):
     """Angle in an interval, where it is 1e-12 at least, at which the wall u - r N meets the slider w."""
     width = right - left
@@ -411,7 +411,7 @@ def _add_span(factor, length, before, after, table):
         table[1, n] += factor * (before[0, n] - after[0, n])
 
 
-@_compiled
+@compiled
 def _products(table, hs, out):
     """Fourier coefficients a of basis function b over the spans summed in the table: (m, m)."""
     half = 0.5 / math.pi
@@ -431,7 +431,7 @@ def _products(table, hs, out):
             out[b, a + 1], out[b + 1, a] = sine + twist, sine - twist
 
 
-@_compiled
+@compiled
 def _add_short(factor, c, level, start, stop, hs, wave, force):
     """Add the Fourier coefficients of factor (c - level) over [start, stop], c a polynomial small beside its parts.
 
@@ -447,7 +447,7 @@ def _add_short(factor, c, level, start, stop, hs, wave, force):
             force[2 + 2 * q] += value * wave[1, hs[q]]
 
 
-@_compiled
+@compiled
 def _force(kt, mu, u, load, hs, knots, waves, ends, segments, n_segment, table, force, slope):
     """Coefficients of T, and their derivatives with respect to those of u over k_t and of N over mu.
 
@@ -492,7 +492,7 @@ def _force(kt, mu, u, load, hs, knots, waves, ends, segments, n_segment, table, 
             _subtract_slider(pull, span, waves, ends[s, 2], segments[s, 2], rows, hs, force, by_u, by_load)
 
 
-@_compiled
+@compiled
 def _subtract_slider(pull, span, waves, origin, tilt, rows, hs, force, by_u, by_load):
     """Minus the pull k_t w of one stick, and the derivative of w through the instant that determines it."""
     length, before, after = span
