@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from types import ModuleType
 
 import numba
@@ -70,28 +69,6 @@ def march(
     """
     phi = basis.synthesis if jacobian else basis.synthesis[:, :0]
     force, jac, status = _periodic(law, basis.to_time(x), parameters, memory, phi, basis.analysis)
-    return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
-
-
-def by_kernel(
-    kernel: Callable[..., None],
-    x: np.ndarray,
-    parameters: ContactParameters,
-    memory: np.ndarray,
-    basis: HarmonicBasis,
-    jacobian: bool,
-) -> ContactCycle:
-    """The cycle of a law that knows its Jacobian in closed form between transitions.
-
-    kernel : compiled, called with samples, packed parameters, memory, synthesis and both prefix sums of the basis; it
-        fills force (n_pair, n_component, n_samples), Jacobian (no pairs where it is not wanted) and status
-    Other arguments as for `march`
-    """
-    n_pair, n_comp, n_coeff = x.shape
-    samples = basis.to_time(x)
-    force, status = np.empty_like(samples), np.zeros(n_pair, np.int64)
-    jac = np.zeros((n_pair if jacobian else 0, n_comp * n_coeff, n_comp * n_coeff))
-    kernel(samples, parameters.packed(), memory, basis.synthesis, *basis.prefix_sums, force, jac, status)
     return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
 
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from tribodyn.declare import number
 from tribodyn.hbm.contact import located as transitions
-from tribodyn.hbm.contact.aft import by_kernel
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -84,7 +83,12 @@ def cycle(
     separation: 0), so a block of the Jacobian is a difference of prefix sums of basis products.
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_component - 1) slider positions at the start [m]
     """
-    return by_kernel(_cycle, x, parameters, memory, basis, jacobian)
+    n_pair, n_comp, n_coeff = x.shape
+    samples = basis.to_time(x)
+    force, status = np.empty_like(samples), np.zeros(n_pair, np.int64)
+    jac = np.zeros((n_pair if jacobian else 0, n_comp * n_coeff, n_comp * n_coeff))
+    _cycle(samples, parameters.packed(), memory, basis.synthesis, *basis.prefix_sums, force, jac, status)
+    return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
 
 
 @numba.njit(cache=True)
@@ -98,7 +102,7 @@ def _cycle(x, p, memory, phi, product, single, force, jac, status):
         status[i] = element(k, p[i, 4], p[i, 3], memory[i], x[i], phi, product, single, force[i], own, kind, slider)
 
 
-@numba.njit(cache=True)
+@transitions.compiled
 def element(k, mu, gap, memory, x, phi, product, single, force, jac, kind, slider):
     """The cycle of one element; writes its force (n_component, n_samples), adds to its Jacobian, returns the bits.
 
@@ -108,29 +112,24 @@ def element(k, mu, gap, memory, x, phi, product, single, force, jac, kind, slide
     n_comp, n_time = x.shape
     t = n_comp - 1
     want = jac.shape[0] > 0
-    kn, bits, n_open = k[t], 0, 0
+    kn, n_open, v, pressed = k[t], 0, x[t], force[t]
     for j in range(n_time):
-        N = kn * (x[t, j] - gap)
-        force[t, j] = N if N > 0.0 else 0.0
-        if N <= 0.0:
-            n_open += 1
-    if n_open > 0:
-        bits |= SEPARATES
+        N = kn * (v[j] - gap)
+        pressed[j] = N if N > 0.0 else 0.0
+        n_open += N <= 0.0
+    bits = SEPARATES if n_open > 0 else 0
     if want and n_open < n_time:
-        _add_normal(kn, n_open, force[t], product, t, jac)
+        _add_normal(kn, n_open, pressed, product, t, jac)
     for c in range(t):
         if n_open == n_time:
             force[c, :] = 0.0
             continue
-        origin, sense = _march(k[c], mu, memory[c], x[c], force[t], force[c], kind, slider)
-        for j in range(n_time):
-            bits |= STICKS if kind[j] == STICK else 0 if kind[j] == OPEN else SLIPS
-        if want:
-            _add_tangential(k[c], mu * kn, kind, origin, sense, c, t, phi, product, single, jac)
+        origin, sense = _march(k[c], mu, memory[c], x[c], pressed, force[c], kind, slider)
+        bits |= _add_tangential(k[c], mu * kn, kind, origin, sense, c, t, phi, product, single, want, jac)
     return bits
 
 
-@numba.njit(cache=True)
+@transitions.compiled
 def _add_normal(kn, n_open, N, product, t, jac):
     """d N / d v : k_n while closed."""
     n_time = N.size
@@ -153,7 +152,7 @@ def _add_normal(kn, n_open, N, product, t, jac):
                 jac[o + a, o + b] += kn * (product[j, a, b] - product[start, a, b])
 
 
-@numba.njit(cache=True)
+@transitions.compiled
 def _march(kt, mu, w, u, N, T, kind, slider):
     """One slider over its periodic cycle: force T, kind of every sample and slider position after it.
 
@@ -184,26 +183,30 @@ def _march(kt, mu, w, u, N, T, kind, slider):
     return origin, sense
 
 
-@numba.njit(cache=True)
-def _add_tangential(kt, slope, kind, origin, sense, c, t, phi, product, single, jac):
-    """d T / d u and d T / d v of one slider, one segment of samples of the same kind after the other.
+@transitions.compiled
+def _add_tangential(kt, slope, kind, origin, sense, c, t, phi, product, single, want, jac):
+    """The status bits of one slider and, if wanted, d T / d u and d T / d v, one segment after the other.
 
     `origin` is the sample where the present stick began, `side` the slope of the slip before it (0: separation).
     """
     n_time, m = phi.shape
     o, on = c * m, t * m
     if origin < 0:
-        for a in range(m):
-            jac[o + a, o + a] += kt
-        return
+        if want:
+            for a in range(m):
+                jac[o + a, o + a] += kt
+        return STICKS
     side = slope * SIDE[sense]
-    start = 0
+    start, bits = 0, 0
     for j in range(1, n_time + 1):
         now = kind[start]
         if j < n_time and kind[j] == now:
             continue
         first, last = product[start], product[j]
-        if now == STICK:
+        bits |= STICKS if now == STICK else 0 if now == OPEN else SLIPS
+        if not want:
+            pass
+        elif now == STICK:
             for a in range(m):
                 weight = single[j, a] - single[start, a]
                 for b in range(m):
@@ -216,3 +219,4 @@ def _add_tangential(kt, slope, kind, origin, sense, c, t, phi, product, single, 
                     for b in range(m):
                         jac[o + a, on + b] += side * (last[a, b] - first[a, b])
         start = j
+    return bits
