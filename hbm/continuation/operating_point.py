@@ -243,8 +243,8 @@ class AtPeak:
             beside = branch.omega[best - 1 : best + 2]
             width = float(np.ptp(beside)) / 2
             within = float(beside.min()) - self.reach * width, float(beside.max()) + self.reach * width
-            x = balance.shaped(branch.contact[best])
-            found = self._refine(balance, branch.omega[best], x, 0.5 * width, within)
+            omega = float(branch.omega[best])
+            found = self._refine(balance, omega, {omega: balance.shaped(branch.contact[best])}, 0.5 * width, within)
             solves += found.solves
             if found.solution.converged:
                 break
@@ -254,14 +254,16 @@ class AtPeak:
         """The solution at one frequency beside x; solves : spent before."""
         return OperatingPoint.of(balance, newton.solve(balance, omega, x, self.newton), self.output, solves + 1)
 
-    def within(self, balance: HarmonicBalance, omega: float, x: np.ndarray, low: float, high: float) -> OperatingPoint:
-        """Refine a maximum of a curve between two frequencies [rad/s] beside it."""
-        return self._refine(balance, omega, x, 0.25 * (high - low), (low, high))
+    def within(
+        self, balance: HarmonicBalance, omega: float, known: dict[float, np.ndarray], low: float, high: float
+    ) -> OperatingPoint:
+        """Refine a maximum of a curve between two frequencies [rad/s]; known : x by frequency, of no fold beside it."""
+        return self._refine(balance, omega, known, 0.25 * (high - low), (low, high))
 
     @single
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Refine from a neighbouring peak."""
-        return self._refine(balance, omega, x, None)
+        return self._refine(balance, omega, {omega: x}, None)
 
     @single
     def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> Overtaking:
@@ -352,7 +354,7 @@ class AtPeak:
         self,
         balance: HarmonicBalance,
         omega: float,
-        x: np.ndarray,
+        known: dict[float, np.ndarray],
         stride: float | None,
         within: tuple[float, float] = (0.0, np.inf),
     ) -> OperatingPoint:
@@ -360,37 +362,45 @@ class AtPeak:
             solution = newton.solve(balance, w, guess, self.newton)
             return Slope.of(balance, solution, self.output)
 
-        here = solve(omega, x)
+        here = solve(omega, known[omega])
         solves = 1
         if not here.solution.converged:
             return OperatingPoint.of(balance, here.solution, self.output, solves)
         resolution = self._resolution(here)
         stride = self.stride * here.width if stride is None else stride
-        uphill = other = None  # the latest points on either side of the zero, once it is bracketed
-        climbed: bool | None = None  # whether the last point inside the bracket replaced `uphill`
+        bracket: tuple[Slope, Slope] | None = None  # the latest points from both of which it rises towards the other
         before: Slope | None = None
-        share = 1.0  # of the way to the zero in the bracket, halved where a solve fails
+        share = 1.0  # of the way to the peak in the bracket, halved where a solve fails
         best = here
         while solves < 60 and abs(best.distance) > resolution:
             side = float(np.sign(here.slope))
-            if uphill is not None and other is not None:
-                if abs(uphill.omega - other.omega) <= resolution:  # as about a kink, where no slope vanishes
+            if bracket:
+                ends = sorted(end.omega for end in bracket)
+                if ends[1] - ends[0] <= resolution:  # as about a kink, where no slope vanishes
                     break
-                target = here.omega + share * (_zero(uphill, other) - here.omega)
+                peak = bracket[0].peak_before(bracket[1])
+                if before is not None and abs(before.omega - here.omega) < ends[1] - ends[0]:  # the last two are nearer
+                    zero = _zero(before, here)
+                    peak = zero if ends[0] < zero < ends[1] else peak
+                target = here.omega + share * (peak - here.omega)
+            elif before is None and within[int(side > 0)] in known:
+                target = within[int(side > 0)]
             elif before is None:
                 target = here.omega + (here.distance if abs(here.distance) < 20 * stride else side * stride)
             else:  # extrapolate the slope, never further than a few strides and always uphill
                 reach = abs(here.omega - before.omega)
-                guess = (_zero(before, here) - here.omega) * side
-                target = here.omega + side * (min(guess, 8 * reach) if guess > 0 else 3 * reach)
+                zero = (_zero(before, here) - here.omega) * side
+                target = here.omega + side * (min(zero, 8 * reach) if zero > 0 else 3 * reach)
             target = float(np.clip(target, max(1e-3 * omega, within[0]), min(balance.omega_max, within[1])))
             if abs(target - best.omega) <= resolution:
                 break
-            there = solve(target, here.predict(target))
+            guess = bracket[0].between(bracket[1], target) if bracket else here.predict(target)
+            there = solve(target, known.get(target, guess))
             solves += 1
-            if not there.solution.converged:
-                if uphill is not None and other is not None:
-                    if min(best.miss, abs(uphill.omega - other.omega) / best.width) <= self.near:
+            if not there.solution.converged or (target in known and there.slope * here.slope > 0):
+                known = {}
+                if bracket:
+                    if min(best.miss, abs(bracket[0].omega - bracket[1].omega) / best.width) <= self.near:
                         break
                     share *= 0.5
                     continue
@@ -399,27 +409,21 @@ class AtPeak:
                     break
                 continue
             share = 1.0
-            if there.slope * here.slope <= 0 and uphill is None:
-                uphill, other = here, there
-            elif uphill is not None and other is not None:
-                climbs = there.slope * uphill.slope > 0
-                kept = 0.5 if climbs == climbed else 1.0  # Illinois: an end that stays twice loses weight
-                if climbs:
-                    uphill, other = there, replace(other, weight=kept * other.weight)
-                else:
-                    uphill, other = replace(uphill, weight=kept * uphill.weight), there
-                climbed = climbs
+            if bracket:
+                bracket = (there, bracket[1]) if there.slope * bracket[0].slope > 0 else (bracket[0], there)
+            elif there.slope * here.slope <= 0:
+                bracket = here, there
             before, here = here, there
             if there.miss <= best.miss:
                 best, resolution = there, self._resolution(there)
-        if uphill is None and best.slope > 0 and best.omega >= (1 - 1e-9) * balance.omega_max:
+        if bracket is None and best.slope > 0 and best.omega >= (1 - 1e-9) * balance.omega_max:
             hertz = balance.omega_max / (2 * np.pi)
             raise NoPeak(
                 f"the resonance peak of {self.output} has moved beyond {hertz:.5g} Hz, the highest frequency that is "
                 "modelled: extend response.frequency"
             )
         found = best.solution
-        between = np.inf if uphill is None or other is None else abs(uphill.omega - other.omega)
+        between = abs(bracket[0].omega - bracket[1].omega) if bracket else np.inf
         if min(best.miss, between / best.width) > self.near:  # sampled forces have kinks, where the slope jumps
             hertz, rises = best.omega / (2 * np.pi), "rises" if best.slope > 0 else "falls"
             lost = SolveEnd.SITE_NOT_FOUND.say(
@@ -441,7 +445,7 @@ def _range(branch: Branch) -> str:
 
 def _zero(a: Slope, b: Slope) -> float:
     """Where the straight line through two distances vanishes [rad/s]; of one mode they lie on a line, slopes do not."""
-    fa, fb = a.weight * a.distance, b.weight * b.distance
+    fa, fb = a.distance, b.distance
     return (a.omega * fb - b.omega * fa) / (fb - fa) if fa != fb else 0.5 * (a.omega + b.omega)
 
 
@@ -449,6 +453,7 @@ def _zero(a: Slope, b: Slope) -> float:
 class Slope:
     """A solved point with d A^2 / d omega and d x / d omega, or along another tangent of its curve.
 
+    height : of the output [m]
     distance : to the peak [rad/s], were the response that of one mode, y = R / (p - omega)
     width : half width of the resonance at its peak, abs(p - omega) elsewhere [rad/s]
     """
@@ -456,10 +461,10 @@ class Slope:
     solution: Solution
     omega: float
     slope: float
+    height: float
     distance: float
     width: float
     dx: np.ndarray
-    weight: float = 1.0
 
     @property
     def miss(self) -> float:
@@ -488,7 +493,26 @@ class Slope:
         along, steepness = y[dynamic] @ dy[row][dynamic], dy[row][dynamic] @ dy[row][dynamic]
         distance = along / steepness if steepness > 0 else 0.0
         width = np.sqrt(y[dynamic] @ y[dynamic] / steepness) if steepness > 0 else state.omega
-        return cls(solution, state.omega, float(2 * along), float(distance), float(width), dx.reshape(state.x.shape))
+        height, dx = float(amplitude(y)), dx.reshape(state.x.shape)
+        return cls(solution, state.omega, float(2 * along), height, float(distance), float(width), dx)
 
     def predict(self, omega: float) -> np.ndarray:
         return self.solution.state.x + (omega - self.omega) * self.dx
+
+    def between(self, other: Slope, omega: float) -> np.ndarray:
+        """x of the Hermite cubic between two points."""
+        t = (omega - self.omega) / (other.omega - self.omega)
+        return (1 - t) ** 2 * ((1 + 2 * t) * self.solution.state.x + (omega - self.omega) * self.dx) + t**2 * (
+            (3 - 2 * t) * other.solution.state.x + (omega - other.omega) * other.dx
+        )
+
+    def peak_before(self, other: Slope) -> float:
+        """Frequency of the peak between two points from both of which the curve rises towards the other [rad/s].
+
+        By the Hermite cubic of 1 / height^2, which of one mode is a parabola
+        """
+        h, ratio = other.omega - self.omega, (self.height / other.height) ** 2
+        a, b = -h * self.slope / self.height**2, -h * other.slope / other.height**2 * ratio
+        square, cubic = 3 * (ratio - 1) - 2 * a - b, 3 * (a + b - 2 * (ratio - 1))
+        root = np.sqrt(square**2 - a * cubic)
+        return self.omega + h * float(-a / (square + root) if square > 0 else (root - square) / cubic)

@@ -16,7 +16,7 @@ from tribodyn.hbm.continuation import bordered, parameter
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
 from tribodyn.hbm.continuation.branch import Branch, BranchPoint
 from tribodyn.hbm.continuation.curve import CurvePoint, Segment
-from tribodyn.hbm.continuation.highest_peak import Sample, vertex
+from tribodyn.hbm.continuation.highest_peak import vertex
 from tribodyn.hbm.continuation.operating_point import AtPeak, NoPeak, OperatingPoint, Slope
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
@@ -70,10 +70,11 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
         if candidate.turns:
             point = along_arc(balance, branch, i, site)
         else:
-            x, omega = balance.shaped(branch.contact[i]), float(branch.omega[i])
+            three = [k for k in range(len(heights))[max(i - 1, 0) : i + 2] if k == i or k not in branch.folds]
+            known = {float(branch.omega[k]): balance.shaped(branch.contact[k]) for k in three}
             point = None
             with suppress(NoPeak):  # it still rises at the highest frequency that is modelled
-                point = site.within(balance, omega, x, candidate.low, candidate.high)
+                point = site.within(balance, float(branch.omega[i]), known, candidate.low, candidate.high)
         same = (1 - site.tolerance) * heights[i]  # lower than that lies on another part of the curve
         if point is None or not point.solution.converged or point.amplitude < same:
             failed += [candidate]
@@ -99,9 +100,9 @@ def _candidates(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> list[
     omega, height = branch.omega, np.where(branch.converged, branch.amplitude(site.output), -1.0)
     inner = (height[1:-1] > 0) & (height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])
     tops = np.flatnonzero(inner & (height[:-2] >= 0) & (height[2:] >= 0)) + 1
-    none, found = np.empty(0), []
+    found = []
     for i in map(int, tops):
-        foreseen = vertex([Sample(omega[k], none, height[k]) for k in (i - 1, i, i + 1)])[1]
+        foreseen = vertex(omega[i - 1 : i + 2], height[i - 1 : i + 2])[1]
         low, high = sorted((float(omega[i - 1]), float(omega[i + 1])))
         turns = bool((omega[i] - omega[i - 1]) * (omega[i + 1] - omega[i]) <= 0)
         found.append(_Candidate(foreseen, i, low, high, turns))
@@ -165,10 +166,6 @@ def along_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) ->
         point = CurvePoint.of(value, solution, tangent)
         return point, Slope.along(balance, balance.linearise(solution.state), solution, site.output, tangent)
 
-    def of(point: CurvePoint) -> OperatingPoint:
-        assert point.solution is not None
-        return OperatingPoint.of(balance, point.solution, site.output, spent)
-
     spent = 0
     try:
         here = solved(places[1], metric.unit(places[2] - places[0]))
@@ -195,6 +192,8 @@ def along_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) ->
             k = 0 if there[1].slope > 0 else 1
             ends[k], weight[k], weight[1 - k] = there, 1.0, 0.5 * weight[1 - k]  # Illinois
             best = min(best, there, key=lambda end: end[1].miss)
-        return max((of(end[0]) for end in [*ends, best]), key=lambda point: point.amplitude)
+        solutions = (end[1].solution for end in [*ends, best])
+        points = (OperatingPoint.of(balance, solution, site.output, spent) for solution in solutions)
+        return max(points, key=lambda point: point.amplitude)
     except BorderFailed:
         return None

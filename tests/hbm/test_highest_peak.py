@@ -9,7 +9,6 @@ import pytest
 
 from tests.helpers.pressed_body import balance_of, pressed_body
 from tribodyn.hbm.continuation import highest_peak
-from tribodyn.hbm.continuation.highest_peak import Sample
 from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.continuation.operating_point import AtPeak
 
@@ -21,21 +20,19 @@ def resonance(omega: np.ndarray, at: float, width: float, height: float) -> np.n
 
 def test_one_resonance_is_a_parabola() -> None:
     omega = np.array([990.0, 1001.5, 1004.0])
-    points = [Sample(w, np.empty(0), h) for w, h in zip(omega, resonance(omega, 1000.0, 3.0, 2e-3), strict=True)]
-    assert highest_peak.vertex(points) == pytest.approx((1000.0, 2e-3), rel=1e-9)
+    assert highest_peak.vertex(omega, resonance(omega, 1000.0, 3.0, 2e-3)) == pytest.approx((1000.0, 2e-3), rel=1e-9)
 
 
 def test_points_that_are_no_resonance_are_taken_as_they_are() -> None:
-    points = [Sample(w, np.empty(0), h) for w, h in ((990.0, 1e-6), (1000.0, 1.0), (1020.0, 0.999))]
-    assert highest_peak.vertex(points) == (1000.0, 1.0)
+    omega, heights = np.array([990.0, 1000.0, 1020.0]), np.array([1e-6, 1.0, 0.999])
+    assert highest_peak.vertex(omega, heights) == (1000.0, 1.0)
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("omega", [(1.0, 2.0, 2.0), (2.0, 2.0, 2.0), (2.0, 3.0, 2.0), (1.0, 2.0, 2.0 + 1e-15)])
 def test_points_where_a_curve_stands_or_turns_back_have_no_parabola(omega: tuple[float, ...]) -> None:
     """Met by arc length of two blocks out of a CAD file, which came back on the frequencies it had been at."""
-    points = [highest_peak.Sample(w, np.empty(0), height) for w, height in zip(omega, (1.0, 2.0, 1.5), strict=True)]
-    assert highest_peak.vertex(points) == (omega[1], 2.0)
+    assert highest_peak.vertex(np.array(omega), np.array([1.0, 2.0, 1.5])) == (omega[1], 2.0)
 
 
 def test_the_higher_of_two_outputs_comes_first_and_a_low_one_not_at_all() -> None:

@@ -98,7 +98,7 @@ def test_the_peak_of_a_sweep_does_not_depend_on_its_points(ratio: float, points:
 
 @pytest.mark.parametrize("failing", [(3,), (4,), (3, 4), range(2, 100)])
 def test_a_peak_beside_solves_that_fail_is_found_or_told(failing, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where sliders come to rest. Without any solve beside it, the highest point is no peak."""
+    """As where sliders come to rest: what is near enough then is the peak; without any solve there is none."""
     problem, solve, solves = StuckOscillator(1e-2), newton.solve, count(1)
     branch = natural.follow(problem.balance, *RANGE, natural.Options(n_points=10))
 
@@ -113,7 +113,7 @@ def test_a_peak_beside_solves_that_fail_is_found_or_told(failing, monkeypatch: p
         assert solved.peak("mass") is None
         assert "none was found beside the point at" in solved.no_peak("mass")
     else:
-        assert solved.amplitude("mass")[solved.peak("mass")] == pytest.approx(problem.peak[0], rel=1e-5)
+        assert solved.amplitude("mass")[solved.peak("mass")] == pytest.approx(problem.peak[0], rel=1e-4)
         assert solved.no_peak("mass") == ""
 
 

@@ -50,7 +50,7 @@ def worn(balance: HarmonicBalance, depth: np.ndarray) -> HarmonicBalance:
 
 def follow_response(file: SceneFile, balance: HarmonicBalance) -> Branch:
     """The response over the scene's range by the scene's method, as far as it goes, see `Branch.end`."""
-    return curve.follow_response(file.scene, balance, lambda *_: None)
+    return curve.follow_response(file.scene, balance)
 
 
 def follow_arc_length(file: SceneFile, balance: HarmonicBalance) -> Branch:

@@ -239,7 +239,7 @@ def _start(file: SceneFile, at: float | None) -> _Start:
         own, problems = own.with_load(duty.load), {top: b.with_load(duty.load) for top, b in problems.items()}
         point = duty.site.first(own)
     else:
-        point = states.highest_of(curve.follow_response(scene, own, lambda *_: None), own)
+        point = states.highest_of(curve.follow_response(scene, own), own)
     if not point.solution.converged:
         raise RuntimeError(f"there is no motion to begin with: {point.solution.outcome}")
     omega, x = point.state.omega, point.state.x

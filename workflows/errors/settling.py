@@ -159,7 +159,7 @@ def _state(file: SceneFile, model: Model) -> State:
     """Where the scene wears, or the peak of its response, looked for as a run does."""
     if file.scene.wear is not None:
         return states.unworn(file, model)
-    branch = curve.follow_response(file.scene, model.balance, lambda *_: None)
+    branch = curve.follow_response(file.scene, model.balance)
     return states.at_highest(file.scene, model.balance, branch)
 
 

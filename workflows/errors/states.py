@@ -70,7 +70,7 @@ class OnCurve:
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Follow the curve of a contact as the run does. Raises NoPeak, SolveFailed."""
-        branch = curve.follow_response(self.scene, balance, lambda *_: None)
+        branch = curve.follow_response(self.scene, balance)
         if not branch.converged[-1]:
             raise SolveFailed(f"the frequency response {branch.end}")
         return highest_of(branch, balance)

@@ -24,7 +24,9 @@ from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.schema import Scene
 
 
-def follow_response(scene: Scene, balance: HarmonicBalance, advance: Advance, folds: bool = True) -> Branch:
+def follow_response(
+    scene: Scene, balance: HarmonicBalance, advance: Advance | None = None, folds: bool = True
+) -> Branch:
     """The response curve of the unworn contact by the scene's continuation method, its highest peaks solved.
 
     folds : whether a curve on which a sweep jumps is followed round its folds, where its highest peak may be; not where
@@ -43,12 +45,13 @@ def follow_response(scene: Scene, balance: HarmonicBalance, advance: Advance, fo
     at = balance.compliance.output_names.index(settings.OUTPUT)
 
     def told(done: int, wanted: int, point: BranchPoint) -> None:
+        assert advance is not None
         seen.append((point.omega, float(amplitude(point.response[at]))))
         hertz, height = measured(point.omega / (2 * np.pi), "Hz", 4), measured(seen[-1][1], "m")
         advance(done / wanted, f"{sparkline(*np.array(seen).T)} {hertz}, {height}", seen[-1])
 
     def along(problem: HarmonicBalance) -> Branch:
-        found: Branch = method.follow(problem, *ends, options, told)
+        found: Branch = method.follow(problem, *ends, options, told if advance else lambda *_: None)
         return found
 
     if asked.control == "amplitude":

@@ -41,7 +41,7 @@ def run(
 
     folder : None keeps nothing on disk
     earlier : an unfinished result of the same scene to resume
-    row_only : without linear references, which the row of a study does not hold
+    row_only : without linear references and notes of progress, which the row of a study does not hold
     judge : measures the errors of the finished result, where the scene wants them
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
@@ -62,7 +62,7 @@ def run(
         keep(result)
         if result.response is None:
             with progress.track("frequency response") as advance:
-                frf = curve.follow_response(scene, model.balance, advance)
+                frf = curve.follow_response(scene, model.balance, None if row_only else advance)
             linear = None
             if not row_only:
                 with progress.stage("linear references"):
@@ -84,7 +84,7 @@ def run(
             with progress.track("responses of the worn contact") as advance:
 
                 def again(worn: HarmonicBalance) -> Branch:
-                    return curve.follow_response(scene, worn, lambda *_: None, folds=False)
+                    return curve.follow_response(scene, worn, folds=False)
 
                 count = scene.wear.responses
                 curves = curve.worn_responses(result, model.balance, count, again, advance)

@@ -14,7 +14,7 @@ import numpy as np
 
 from tribodyn.declare import number, require_limits
 from tribodyn.hbm import newton
-from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder, OnPoint
 from tribodyn.hbm.continuation.methods import arc_length
@@ -126,7 +126,7 @@ class _Sweep:
         builder, options = self.builder, self._options
         guess = predict(builder, value, options.rules.least_spacing)
         solution = newton.solve(*self._path.place(value), guess, options.newton)
-        led_back = solution.converged and self._leads_back(value, solution.state.x)
+        led_back = solution.converged and self._leads_back(value, solution.state)
         if not led_back and halvings > 0:
             middle = self._step(0.5 * (builder.value[-1] + value), halvings - 1)
             return self._step(value, halvings - 1) if middle.converged else middle
@@ -135,19 +135,25 @@ class _Sweep:
             self._jumps.append(value)
         return solution
 
-    def _leads_back(self, value: float, x: np.ndarray) -> bool:
-        """Whether a step to x at a value, where it is far from the extrapolation, comes back to the point before."""
-        builder, options = self.builder, self._options
-        before, last = builder.x[-1], len(builder.value) - 1
+    def _leads_back(self, value: float, state: State) -> bool:
+        """Whether a step to a value, where it is far from the extrapolation, comes back to the point before.
+
+        It does where that is near the tangent at its end, else where it is solved from there
+        """
+        builder, rules, path, x = self.builder, self._options.rules, self._path, state.x
+        here, before, last = builder.value[-1], builder.x[-1], len(builder.value) - 1
         first = max(builder.folds[-1] + 1 if builder.folds else 0, last - EXTRAPOLATION_DEGREE)
         step = np.linalg.norm(x - before)
         if last - first < 1:
             return True
         miss = x - extrapolate(np.array(builder.value[first:]), builder.x[first:], value)
-        if np.linalg.norm(miss) <= options.rules.abrupt * step:
+        if np.linalg.norm(miss) <= rules.abrupt * step:
             return True
-        back = newton.solve(*self._path.place(builder.value[-1]), x, options.newton)
-        return back.converged and bool(np.linalg.norm(back.state.x - before) <= options.rules.same * step)
+        slope, _, _ = path.place(value)[0].linearise(state).solve(-path.slope(value, state), rules.same)
+        if np.linalg.norm(x - before - (value - here) * slope.reshape(x.shape)) <= rules.abrupt * step:
+            return True
+        back = newton.solve(*path.place(here), x, self._options.newton)
+        return back.converged and bool(np.linalg.norm(back.state.x - before) <= rules.same * step)
 
 
 def _by_arc_length(
