@@ -122,15 +122,14 @@ class TimeStepper:
         )  # fmt: skip
         compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
         symmetric = system.gyroscopic is None and system.circulatory is None
-        compliance = 0.5 * (compliance + compliance.T) if symmetric else compliance.T
+        A = np.ascontiguousarray(0.5 * (compliance + compliance.T) if symmetric else compliance.T)
         joint = balance.contact.merged("time integration")
         packed, gap, components = joint.parameters.packed(), joint.parameters.gap, joint.parameters.components
         normal = components.index("n") if "n" in components else -1
         self.law = compiled_law.pointer(joint.module.step)
         forgets = normal >= 0 and time_step.forgets(self.law, packed, gap, normal, balance.memory)
-        compliance = np.ascontiguousarray(compliance)
-        self.contact = time_step.Contact(packed, gap, normal, compliance, forgets, options.contact)
-        self._space = self._fresh_space()
+        self.contact = time_step.Contact(packed, gap, normal, A, forgets, options.contact)
+        self._space = time_step.Space.of(self.n_pair, self.c, balance.memory.shape[1])
 
     def worn(self, balance: HarmonicBalance) -> TimeStepper:
         """The same for a balance that differs in its gaps alone."""
@@ -195,16 +194,13 @@ class TimeStepper:
         x_free += self._of_hold[2] @ hold
         contact = self.contact._replace(A=self.static)
         closed = np.zeros(self.n_pair, bool)
-        scale, space = float(np.abs(x).max()), self._fresh_space()
+        scale, space = float(np.abs(x).max()), time_step.Space.of(self.n_pair, self.c, s.shape[1])
         time_step.displace(contact.A, f, space.y)
         rounds, _ = time_step.solve_contact(self.law, contact, x_free, x.copy(), closed, s, x, f, scale, space)
         if rounds < 0:
             raise IntegrationFailed("the contact has no equilibrium to start from")
         s, bits = time_step.memory_after(self.law, x[None], self.contact, s)
         return Moving(z.copy(), x, f, s, bits, np.array(hold))
-
-    def _fresh_space(self) -> time_step.Space:
-        return time_step.Space.of(self.n_pair, self.c, self.balance.memory.shape[1])
 
     def period(self, start: Moving, with_slopes: bool = False) -> tuple[Moving, Record, int, float]:
         """March one period from t = 0.
