@@ -321,8 +321,7 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, memory, n
     """
     n_pair, c = x.shape[0], min(x.shape[1], MOST)
     normal, A, gap = contact.normal, contact.A, contact.gap
-    moved, onward = 0.0, -1 if backward else 1
-    i = n_pair if backward else -1
+    moved, onward, i = (0.0, -1, n_pair) if backward else (0.0, 1, -1)
     while True:
         i += onward
         while 0 <= i < n_pair and bits[i] == SEPARATES and x_free[i * c + normal] - y[i * c + normal] < gap[i]:
