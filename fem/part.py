@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
+import scipy
 from scipy.sparse import csr_matrix
 
 from tribodyn.fem.assembly import Assembly
@@ -30,8 +31,8 @@ class Stiff(Protocol):
 @dataclass(frozen=True)
 class Part:
     """system : over the free DOFs; interface : likewise; free : (n_free,) DOF of the mesh that each one is,
-    node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; mesh : scikit-fem's, or an assembly
-    held : (k, n_free) motions that are held besides, held @ q = 0, for reduction.prescribed
+    node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; nodes : (n_pair,) nearest to the pairs
+    mesh : scikit-fem's, or an assembly; held : (k, n_free) held besides, held @ q = 0, for reduction.prescribed
     pairs : contact face -> its pairs in the interface; node_sets : as geometry.mesh.read gives them
     joints : joint -> its pairs
     follow : (n_dof, n_free) displacement of all DOFs where some follow others, None where they are free or held
@@ -41,6 +42,7 @@ class Part:
     interface: ContactInterface
     free: np.ndarray
     points: np.ndarray
+    nodes: np.ndarray
     mesh: Any
     held: np.ndarray
     pairs: Mapping[str, slice]
@@ -133,8 +135,8 @@ def build(
         joint = contact.joint or contact.face
         joints[joint] = slice(joints[joint].start if joint in joints else own.start, own.stop)
     rows = np.array([motion.row(points, M) for motion in held]).reshape(len(held), K.shape[0])
-    nothing = SecondOrderSystem(M, K)
-    part = Part(nothing, interface, free, points, mesh, np.zeros((0, 0)), pairs, node_sets, joints, follow)
+    nothing, near = SecondOrderSystem(M, K), scipy.spatial.cKDTree(points).query(interface.points)[1]
+    part = Part(nothing, interface, free, points, near, mesh, rows, pairs, node_sets, joints, follow)
     system = SecondOrderSystem(
         mass=part.restricted(M),
         stiffness=part.restricted(K),

@@ -11,9 +11,7 @@ from dataclasses import dataclass, field, replace
 from io import StringIO
 from pathlib import Path
 
-import meshio
 import numpy as np
-from meshio._mesh import topological_dimension
 
 from tribodyn.geometry.sources import abaqus_cards, ansys, cad, msh, nastran, solid
 from tribodyn.geometry.sources.deck import Deck, in_si
@@ -21,11 +19,14 @@ from tribodyn.geometry.sources.raw import COMMON_NAMES, SURFACES, VOLUMES, Cells
 from tribodyn.geometry.sources.solid import SolidBody
 
 MOST_VALUES = 100  # an array of integers with more different values is a number, not a group
-topological_dimension.update({kind: 3 for kind in VOLUMES})  # meshio 5.3.5 forgets wedge15 and pyramid13
 
 
 def with_meshio(path: Path) -> RawMesh:
     """Read a file by its ending. Raises ValueError: it is none, or broken."""
+    import meshio  # 85 modules, of which few scenes need one
+    from meshio._mesh import topological_dimension
+
+    topological_dimension.update({kind: 3 for kind in VOLUMES})  # meshio 5.3.5 forgets wedge15 and pyramid13
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             file = meshio.read(path)

@@ -122,24 +122,21 @@ class TimeStepper:
         )  # fmt: skip
         compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
         symmetric = system.gyroscopic is None and system.circulatory is None
-        compliance = 0.5 * (compliance + compliance.T) if symmetric else compliance.T
-        self._meet(np.ascontiguousarray(compliance))
-
-    def _meet(self, compliance: np.ndarray) -> None:
-        """Take up the contact of the balance; compliance : of a step, as in `time_step.Contact`."""
-        joint = self.balance.contact.merged("time integration")
-        components = joint.parameters.components
+        A = np.ascontiguousarray(0.5 * (compliance + compliance.T) if symmetric else compliance.T)
+        joint = balance.contact.merged("time integration")
+        packed, gap, components = joint.parameters.packed(), joint.parameters.gap, joint.parameters.components
         normal = components.index("n") if "n" in components else -1
-        packed, gap = joint.parameters.packed(), joint.parameters.gap
         self.law = compiled_law.pointer(joint.module.step)
-        forgets = normal >= 0 and time_step.forgets(self.law, packed, gap, normal, self.balance.memory)
-        self.contact = time_step.Contact(packed, gap, normal, compliance, forgets, self.options.contact)
+        forgets = normal >= 0 and time_step.forgets(self.law, packed, gap, normal, balance.memory)
+        self.contact = time_step.Contact(packed, gap, normal, A, forgets, options.contact)
+        self._space = time_step.Space.of(self.n_pair, self.c, balance.memory.shape[1])
 
     def worn(self, balance: HarmonicBalance) -> TimeStepper:
         """The same for a balance that differs in its gaps alone."""
         other = copy(self)
         other.balance = balance
-        other._meet(self.contact.A)
+        parameters = balance.contact.merged("time integration").parameters
+        other.contact = self.contact._replace(p=parameters.packed(), gap=parameters.gap)
         return other
 
     def _load(self, n: int) -> np.ndarray:
@@ -197,16 +194,13 @@ class TimeStepper:
         x_free += self._of_hold[2] @ hold
         contact = self.contact._replace(A=self.static)
         closed = np.zeros(self.n_pair, bool)
-        scale, inverse, space = float(np.abs(x).max()), np.zeros_like(self.static), self._space(s)
+        scale, space = float(np.abs(x).max()), time_step.Space.of(self.n_pair, self.c, s.shape[1])
         time_step.displace(contact.A, f, space.y)
-        rounds, _ = time_step.solve_contact(self.law, contact, x_free, x.copy(), closed, s, x, f, scale, inverse, space)
+        rounds, _ = time_step.solve_contact(self.law, contact, x_free, x.copy(), closed, s, x, f, scale, space)
         if rounds < 0:
             raise IntegrationFailed("the contact has no equilibrium to start from")
         s, bits = time_step.memory_after(self.law, x[None], self.contact, s)
         return Moving(z.copy(), x, f, s, bits, np.array(hold))
-
-    def _space(self, memory: np.ndarray) -> time_step.Space:
-        return time_step.Space.of(self.n_pair, self.c, memory.shape[1])
 
     def period(self, start: Moving, with_slopes: bool = False) -> tuple[Moving, Record, int, float]:
         """March one period from t = 0.
@@ -226,7 +220,7 @@ class TimeStepper:
             impulse, rest = linear.impulse + impulse @ start.hold, linear.rest + rest @ start.hold
             linear = linear._replace(impulse=impulse, rest=rest)
             y = y + output_rest @ start.hold
-        failed, spent, speed = time_step.march(self.law, self.contact, linear, end, record, self._space(end.memory))
+        failed, spent, speed = time_step.march(self.law, self.contact, linear, end, record, self._space)
         if failed >= 0:
             raise IntegrationFailed(
                 f"the contact iteration did not converge in step {failed} of {n}: take more steps per period"

@@ -88,7 +88,10 @@ class Moving(NamedTuple):
 
 class Space(NamedTuple):
     """Work space of a step: `room` of one pair, two for its equations, y = A f, then of all pairs status bits, slopes
-    J = df/dx with the inverse M of 1 + A J of each pair, memory, and the x and f tried.
+    J = df/dx with the inverse M of 1 + A J of each pair, and memory. All steps with one A share it.
+
+    inverse : (n_contact, n_contact) of the derivative in the last step that needed Newton's method, its first entry
+        zero before that; such steps come in a row, and one inverse serves many of them
     """
 
     work: tuple[np.ndarray, ...]
@@ -99,16 +102,15 @@ class Space(NamedTuple):
     J: np.ndarray
     M: np.ndarray
     memory: np.ndarray
-    x: np.ndarray
-    f: np.ndarray
+    inverse: np.ndarray
 
     @classmethod
     def of(cls, n_pair: int, c: int, n_state: int) -> Space:
         """For so many pairs, components and states of the memory."""
         small = np.zeros(c), np.zeros(c), np.zeros(n_pair * c)
         J, M = np.full((2, n_pair, c, c), np.nan)
-        x, f = np.zeros((2, n_pair, c))
-        return cls(room(c, n_state), *small, np.zeros(n_pair, np.int64), J, M, np.zeros((n_pair, n_state)), x, f)
+        memory, inverse = np.zeros((n_pair, n_state)), np.zeros((n_pair * c, n_pair * c))
+        return cls(room(c, n_state), *small, np.zeros(n_pair, np.int64), J, M, memory, inverse)
 
 
 class Record(NamedTuple):
@@ -318,42 +320,44 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, memory, n
     Returns the largest displacement of a pair, negative where one failed
     """
     n_pair, c = x.shape[0], min(x.shape[1], MOST)
-    normal, A = contact.normal, contact.A
-    moved = 0.0
-    for turn in range(n_pair):
-        i = n_pair - 1 - turn if backward else turn
+    normal, A, gap = contact.normal, contact.A, contact.gap
+    moved, onward, i = (0.0, -1, n_pair) if backward else (0.0, 1, -1)
+    while True:
+        i += onward
+        while 0 <= i < n_pair and bits[i] == SEPARATES and x_free[i * c + normal] - y[i * c + normal] < gap[i]:
+            i += onward  # exerts no force
+        if not 0 <= i < n_pair:
+            return moved
         o = i * c
         opened = bits[i] == SEPARATES
-        if opened and x_free[o + normal] - y[o + normal] < contact.gap[i]:
-            continue  # exerts no force
         own = A[o : o + c, o : o + c].T
+        x_i, f_i, free, under = x[i], f[i], x_free[o : o + c], y[o : o + c]
         known = 0 if opened else bits[i]
         off = 0.0
         for a in range(c):
-            b[a] = x_free[o + a] - y[o + a]
-            off = max(off, abs(b[a] - x[i, a]))
+            b[a] = free[a] - under[a]
+            off = max(off, abs(b[a] - x_i[a]))
             for q in range(c):
-                b[a] += own[a, q] * f[i, q]
+                b[a] += own[a, q] * f_i[q]
         if opened:
-            put(b, x[i])
+            put(b, x_i)
         elif off <= 0.1 * near and known != 0:
             continue
         if known != 0:
-            put(f[i], work[0])
+            put(f_i, work[0])
             put(memory[i], work[1])
         bits[i] = solve_pair(
-            step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], normal, own, b, 0.1 * near, known, work,
+            step, x0[i], was_open[i], x_i, s[i], contact.p[i], gap[i], normal, own, b, 0.1 * near, known, work,
             r, J[i], M[i],
         )  # fmt: skip
         if bits[i] == 0:
             return -1.0
         moved = max(moved, off)
         for a in range(c):
-            b[a] = work[0][a] - f[i, a]
-            f[i, a] = work[0][a]
+            b[a] = work[0][a] - f_i[a]
+            f_i[a] = work[0][a]
         put(work[1], memory[i])
         add_rows(A, o, b, y)
-    return moved
 
 
 @numba.njit(**PLAIN)
@@ -382,28 +386,26 @@ def largest(x):
 
 
 @numba.njit(cache=True)
-def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse, space):
+def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, space):
     """Solve x + A f(x) = x_free for all pairs from the guesses x, f, which are overwritten; s is the memory before.
 
     space : with y = A f of the guess; the memory at x is left there, but of open pairs
-    inverse : (n_contact, n_contact) of the derivative in the last step that needed Newton's method, zeros before the
-        first; such steps come in a row, and one inverse serves many of them
     Returns rounds spent (negative: failed) and the scale of x
     """
-    if inverse[0, 0] == 0.0:
+    if space.inverse[0, 0] == 0.0:
         rounds, scale = sweeps(step, contact, x_free, x0, was_open, s, x, f, scale, space)
     else:
-        rounds, scale = chord(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse)
+        rounds, scale = chord(step, contact, x_free, x0, was_open, s, x, f, scale, space)
     if rounds > 0:
         return rounds, scale
-    return newton(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse)
+    return newton(step, contact, x_free, x0, was_open, s, x, f, scale, space)
 
 
 @numba.njit(**PLAIN)
 def sweeps(step, contact, x_free, x0, was_open, s, x, f, scale, space):
     """As `solve_contact`, pair after pair."""
     n_pair, c = x.shape
-    work, r, b, y, bits, J, M, memory, _, _ = space
+    work, r, b, y, bits, J, M, memory, _ = space
     for i in range(n_pair):
         bits[i] = SEPARATES if contact.normal >= 0 and was_open[i] and f[i, contact.normal] == 0.0 else 0
     before = np.inf
@@ -458,9 +460,9 @@ def residual(step, contact, x_free, x0, was_open, s, x, f, J, space):
 
 
 @numba.njit(cache=True)
-def chord(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
+def chord(step, contact, x_free, x0, was_open, s, x, f, scale, space):
     """As `newton` with the inverse of an earlier step; x stays where it was if that does not get there."""
-    J, start = np.empty(space.J.shape), x.copy()
+    J, start, inverse = np.empty(space.J.shape), x.copy(), space.inverse
     before, slow = np.inf, 0
     move, r_before = np.zeros(x.size), np.zeros(x.size)
     for it in range(SWEEPS):
@@ -490,7 +492,7 @@ def chord(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
 
 
 @numba.njit(cache=True)
-def newton(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
+def newton(step, contact, x_free, x0, was_open, s, x, f, scale, space):
     """As `solve_contact`, all pairs at once, where they are too stiffly coupled to be solved in turn."""
     n_pair, c = x.shape
     A = contact.A
@@ -503,7 +505,7 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, space, inverse):
         scale = max(scale, np.abs(x).max())
         error = np.abs(r).max()
         if error <= contact.accuracy * scale:
-            put(np.linalg.inv(full).ravel(), inverse.ravel())
+            put(np.linalg.inv(full).ravel(), space.inverse.ravel())
             return SWEEPS + it + 1, scale
         if error >= best and length > SHORTEST:  # a kink lies on the way: go less far
             length *= 0.5
@@ -590,46 +592,49 @@ def march(step, contact, linear, moving, record, space):
     Returns the step that failed or -1, the rounds of the contact solver spent, and the largest |h v|
     """
     z, x, f, memory, bits, _ = moving
-    x_new, f_new = space.x, space.f
-    m = linear.Q.shape[1]
+    n_step, m = len(linear.impulse), linear.Q.shape[1]
     spent, scale, speed = 0, largest(x), 0.0
     chained = record.slopes.shape[0] > 0
-    inverse = np.zeros((x.size, x.size))
+    space.inverse[0, 0] = 0.0
     record.bits[:] = 0
-    f_before, flat, was_open = f.copy(), f.ravel(), np.empty(x.shape[0], np.bool_)
-    kick = np.dot(linear.Q, 0.5 * np.dot(flat, linear.U))
-    for j in range(linear.impulse.shape[0]):
-        z_free = np.dot(linear.E, z) + linear.impulse[j] - kick
-        x_free = np.dot(linear.U, z_free[:m]) + linear.rest[j]
+    f_before, was_open, half = f, np.empty(x.shape[0], np.bool_), np.empty(m)
+    kick, z_free, x_free = np.empty(2 * m), np.empty(2 * m), np.empty(x.size)
+    push_modes(f.ravel(), linear.U, linear.Q, half, kick)
+    for j in range(n_step):
+        x_new, f_new = record.x[j], record.f[j]
+        np.dot(linear.E, z, z_free)
+        z_free += linear.impulse[j]
+        z_free -= kick
+        np.dot(linear.U, z_free[:m], x_free)
+        x_free += linear.rest[j]
         foresee(x_free, f, f_before, bits, contact.A, space.y, x_new, f_new, was_open)
-        rounds, scale = solve_contact(step, contact, x_free, x, was_open, memory, x_new, f_new, scale, inverse, space)
+        rounds, scale = solve_contact(step, contact, x_free, x, was_open, memory, x_new, f_new, scale, space)
         spent += abs(rounds)
         if rounds < 0:
             return j, spent, speed
         if chained:
             pass_on(step, contact, x, was_open, x_new, memory, bits, space.work, record.f[:0], record.slopes[j:])
         else:
-            late = contact.forgets and j + 1 < len(linear.impulse)
-            take_up(step, contact, x, was_open, x_new, memory, bits, space, late)
-        keep(x_new, f_new, bits, x, f, f_before, record.x[j], record.f[j], record.bits)
-        kick = np.dot(linear.Q, 0.5 * np.dot(flat, linear.U))
-        speed = max(speed, move(z_free, kick, z, record.z[j]))
+            take_up(step, contact, x, was_open, x_new, memory, bits, space, contact.forgets and j + 1 < n_step)
+        record.bits[:] |= bits
+        x, f, f_before = x_new, f_new, f
+        push_modes(f.ravel(), linear.U, linear.Q, half, kick)
+        speed = max(speed, arrive(z_free, kick, z, record.z[j]))
+    put(x.ravel(), moving.x.ravel())
+    put(f.ravel(), moving.f.ravel())
     return -1, spent, speed
 
 
-@numba.njit(**PLAIN)
-def keep(x_new, f_new, bits, x, f, f_before, x_kept, f_kept, bits_kept):
-    """Displacements and forces of all pairs after a step: moved on, and recorded."""
-    for i in range(x.shape[0]):
-        bits_kept[i] |= bits[i]
-        for a in range(x.shape[1]):
-            f_before[i, a] = f[i, a]
-            x[i, a] = x_kept[i, a] = x_new[i, a]
-            f[i, a] = f_kept[i, a] = f_new[i, a]
+@numba.njit(cache=True)
+def push_modes(f, U, Q, half, kick):
+    """Half the impulse `kick` (2 m,) that forces f (n_contact,) give the modes within a step; half (m,) to work on."""
+    np.dot(f, U, half)
+    half *= 0.5
+    np.dot(Q, half, kick)
 
 
 @numba.njit(**PLAIN)
-def move(z_free, kick, z, z_kept):
+def arrive(z_free, kick, z, z_kept):
     """z after a step, moved on and recorded; returns |h v|."""
     speed = 0.0
     for i in range(z.size):

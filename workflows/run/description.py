@@ -8,7 +8,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
-import scipy
 
 from tribodyn.fem.assembly import pieces
 from tribodyn.fem.part import Part
@@ -41,7 +40,7 @@ def described(
 ) -> Result:
     """The result before anything was solved: where it comes from and what is modelled; part None for matrices."""
     reduced, i = balance.model, balance.model.interface
-    nodes = np.full(i.n_pair, -1) if part is None else scipy.spatial.cKDTree(part.points).query(i.points)[1]
+    nodes = np.full(i.n_pair, -1) if part is None else part.nodes
     wears = file.scene.wear is not None
     free = free_deflection(balance) if wears else np.full(i.n_pair, np.nan)
     patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free)

@@ -22,7 +22,7 @@ class Table(BaseModel):
     it from the source: to let pydantic do so costs every command half a second.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @model_validator(mode="before")
     @classmethod
