@@ -30,6 +30,7 @@ from tribodyn.reduction.model import ReducedModel
 
 ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
 NEARLY_ALL = 0.03  # share of the flexibility that products may leave out and still find Newton's directions alone
+Rest = Callable[[np.ndarray], np.ndarray] | None  # (n_contact, n_coeff) departures g [N] -> contact displacement [m]
 INNER, INNER_PRODUCTS = 0.05, 60  # residual and products of a direction within a direction, where they leave out more
 
 
@@ -65,10 +66,9 @@ class HarmonicBalance:
     compliance : the linear side, which problems that differ in contact or load share
     load_factor : on the harmonics >= 1 of the excitation
     at_rest : (n_pair, n_component) displacement under the static loads, where it is known [m]
-    held_rest : (n_contact, n_coeff) what the residual flexibility of the model is taken to give, whatever the contact
-        forces are [m]; None where it follows them, or there is none
-    asked : forces that the residual flexibility was asked for along the curve that is followed, and what it gave; None
-        where each solution stands for itself
+    rest : what the residual flexibility of the model is taken to give; None where its factor is asked, or there is none
+    asked : what is known of the residual flexibility along the curve that is followed, see its `recalled`; None where
+        each solution stands for itself
     at_speed : the problem of the same contact at other speeds of rotation [Hz], where a mission asks for them
     """
 
@@ -81,7 +81,7 @@ class HarmonicBalance:
     compliance: ContactCompliance
     load_factor: float = 1.0
     at_rest: np.ndarray | None = None
-    held_rest: np.ndarray | None = None
+    rest: Rest = None
     asked: list[np.ndarray] | None = None
     at_speed: Mapping[float, HarmonicBalance] = field(default_factory=dict)
 
@@ -217,12 +217,12 @@ class HarmonicBalance:
         flat = x.reshape(-1, x.shape[2])
         g = self.reference_stiffness[:, None] * flat - cycle.force.reshape(flat.shape)
         point = self.at(omega)
-        moved = point.apply(g) if self.held_rest is None else point.nearly(g) + self.held_rest
+        moved = point.apply(g) if self.rest is None else point.nearly(g) + self.rest(g)
         return State(omega, x, cycle, g, flat - self.x_lin(omega) - moved)
 
     def linearise(self, state: State) -> Linearisation:
         """d R / d x at a state whose contact derivative was asked for."""
-        return Linearisation(self.at(state.omega), self.reference_stiffness, state.x, state.cycle)
+        return Linearisation(self.at(state.omega), self.reference_stiffness, state.x, state.cycle, self.rest)
 
     def frequency_slope(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega at fixed x of R (n_contact, n_coeff) and of the outputs (n_output, n_coeff)."""
@@ -319,8 +319,8 @@ class Linearisation:
     active : pairs with a derivative; rows : their contact rows
     """
 
-    def __init__(self, point: LinearSide, stiffness: np.ndarray, x: np.ndarray, cycle: ContactCycle):
-        """G, the stuck springs (n_contact,) [N/m], and the contact cycle at x with its derivative."""
+    def __init__(self, point: LinearSide, stiffness: np.ndarray, x: np.ndarray, cycle: ContactCycle, rest: Rest = None):
+        """G, the stuck springs (n_contact,) [N/m], the contact cycle at x with its derivative, what `nearly` lacks."""
         jac = cycle.jacobian
         if jac is None:
             raise ValueError("linearise needs a state evaluated with its contact derivative")
@@ -328,13 +328,17 @@ class Linearisation:
         self.active, self._dg = pair_slopes.departures(jac, stiffness.reshape(n_pair, n_comp))
         self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
         self._shape, self._n_pair = (n_pair * n_comp, n_coeff), n_pair
-        self._point = point
+        self._point, self._rest = point, rest
         self._product = self._point.jacobian_product(self.rows)
 
     def departure_slope(self, direction: np.ndarray) -> np.ndarray:
         """dg/dx . direction: (n_contact, n_coeff)."""
+        return self._in_all_rows(self.g_slope(direction[self.rows]))
+
+    def _in_all_rows(self, active: np.ndarray) -> np.ndarray:
+        """(n_contact, n_coeff) of what vanishes but on the rows of active pairs."""
         out = np.zeros(self._shape)
-        out[self.rows] = self.g_slope(direction[self.rows])
+        out[self.rows] = active
         return out
 
     def g_slope(self, active_direction: np.ndarray) -> np.ndarray:
@@ -344,14 +348,14 @@ class Linearisation:
 
     def product(self, d: np.ndarray) -> np.ndarray:
         """(I - G dg/dx) d on the rows of active pairs, d (n_active_rows, n_coeff)."""
-        return d - self._product(self.g_slope(d))
+        slope = self.g_slope(d)
+        moved = self._product(slope)
+        return d - (moved if self._rest is None else moved + self._rest(self._in_all_rows(slope))[self.rows])
 
     def precondition(self, d: np.ndarray) -> np.ndarray:
         """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs, by blocks or coarse part of G."""
         if self._block_inverse is not None:
-            full = np.zeros(self._shape)
-            full[self.rows] = d
-            n = len(self._block_inverse)
+            full, n = self._in_all_rows(d), len(self._block_inverse)
             solved: np.ndarray = np.matmul(self._block_inverse, full.reshape(n, -1, 1)).reshape(self._shape)
             return solved[self.rows]
         if self._coarse_factors is None:
@@ -403,11 +407,8 @@ class Linearisation:
         """The solution of (I - G dg/dx) d = rhs in all rows (n_contact, n_coeff) from that in the active rows."""
         if len(self.rows) == self._shape[0]:
             return d
-        if len(self.rows) == 0:
-            return rhs.copy()
-        g = np.zeros(self._shape)
-        g[self.rows] = self.g_slope(d)
-        full = rhs + self._point.nearly(g)
+        g = self._in_all_rows(self.g_slope(d))
+        full = rhs + self._point.nearly(g) + (0.0 if self._rest is None else self._rest(g))
         full[self.rows] = d
         return full
 
@@ -430,9 +431,7 @@ class Linearisation:
             )
 
         def exactly(v: np.ndarray) -> np.ndarray:
-            g = np.zeros(self._shape)
-            g[self.rows] = self.g_slope(v.reshape(shape))
-            return v - self._point.apply(g)[self.rows].ravel()
+            return v - self._point.apply(self._in_all_rows(self.g_slope(v.reshape(shape))))[self.rows].ravel()
 
         b = rhs[self.rows].ravel()
         if self._point.left_out <= NEARLY_ALL:

@@ -24,9 +24,8 @@ class Rules:
     unresisted: float = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
     most_dense: int = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
     most_direct: int = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
-    most_corrections: int = 8  # of a residual flexibility, and what each leaves of the residual at the most
-    corrected: float = 0.5
-    closer: float = 0.1  # residual wanted while the residual flexibility is held, over what is not sure of it
+    most_corrections: int = 8  # of a residual flexibility
+    closer: float = 0.1  # what a step is to leave over what comes after it, with a residual flexibility
     # of the contact forces, wanted where these stretch their springs far less than x is large
     force_accuracy: float = 1e-4
     least_tolerance: float = 1e-12  # residual over displacement that rounding still lets through
@@ -165,43 +164,37 @@ def solve(
 def _solve_with_rest(
     balance: HarmonicBalance, residual: ResidualFlexibility, omega: float, start: np.ndarray, options: NewtonOptions
 ) -> Solution:
-    """The same with a residual flexibility: it is held while Newton solves, then taken anew, until nothing changes.
+    """The same with a residual flexibility R: Newton solves with what is known of it, then R is asked for more.
 
-    What it gives is known of forces that were asked for before, and bounded by the largest share left out of what the
-    forces differ from these: where the bound is small enough, nothing is asked for. Each correction is smaller by about
-    what the modes leave out; one that is not gives way to Newton's method on all
+    It is known of forces that were asked for before, and bounded by the largest share left out of what the forces
+    differ from these: where the bound is small enough, nothing is asked for. Too many corrections, each smaller by
+    about what the modes leave out, give way to Newton's method on all
     """
-    steps = products = 0
-    before = np.inf
+    steps, products, solved = 0, 0, False
     x_lin = balance.x_lin(omega)
     history: tuple[float, ...] = ()
     asked = [] if balance.asked is None else balance.asked
-    rest = np.zeros(())
-    state = replace(balance, held_rest=rest).evaluate(omega, start)
-    for count in range(RULES.most_corrections):
-        known, moved = residual.recalled(state.g, asked)
-        state, rest = replace(state, residual=state.residual + rest - moved), moved
-        unsure, error = residual.at_most(state.g - known, state.flat), relative_residual(state, x_lin)
-        goal = wanted(balance, state, x_lin, options)
+    near = replace(balance, rest=lambda g: residual.recalled(g, asked)[1])
+    state = near.evaluate(omega, start)
+    for _ in range(2 * RULES.most_corrections):
+        lacking, moved = residual.recalled(state.g, asked)
+        unsure, error = residual.at_most(lacking, state.flat), relative_residual(state, x_lin)
+        goal, history = wanted(balance, state, x_lin, options), (*history, error + unsure)
         if error + unsure <= goal:
-            return Solved(state, CONVERGED, steps, products, (*history, error + unsure))
-        if count > 0:
-            moved = residual.asked(state.g, asked)
-            state, rest = replace(state, residual=state.residual + rest - moved), moved
-            unsure, error = 0.0, relative_residual(state, x_lin)
-            history += (error,)
-            if error <= goal:
-                return Solved(state, CONVERGED, steps, products, history)
-            if not error < RULES.corrected * before:
-                break
-            before = error
-        closer = max(0.03 * options.tolerance, RULES.closer * min(unsure, error))
-        found = _solve(replace(balance, held_rest=rest), omega, state, replace(options, tolerance=closer))
-        steps, products, state = steps + found.steps, products + found.products, found.state
-        if not found.converged:
-            return replace(found, steps=steps, products=products)
-    moved = residual.apply(state.g)
-    found = _solve(balance, omega, replace(state, residual=state.residual + rest - moved), options)
+            return Solved(state, CONVERGED, steps, products, history)
+        if not np.isfinite(unsure):
+            break
+        if solved:
+            residual.ask(state.g, asked, RULES.closer * goal / unsure * float(np.linalg.norm(lacking)))
+            state = replace(state, residual=state.residual + moved - residual.recalled(state.g, asked)[1])
+        else:
+            closer = RULES.closer * max(goal, min(unsure, error))
+            found = _solve(near, omega, state, replace(options, tolerance=closer))
+            steps, products, state = steps + found.steps, products + found.products, found.state
+            if not found.converged:
+                return replace(found, steps=steps, products=products)
+        solved = not solved
+    found = _solve(balance, omega, balance.evaluate(omega, state.x), options)
     return replace(found, steps=steps + found.steps, products=products + found.products)
 
 

@@ -20,7 +20,7 @@ class ReductionLimits:
     ritz_modes : modes of `stuck_ritz`, as many as the compliance is expanded in at the most
     clusters : of pairs, each with a uniform traction for every component; docs/theory/residual_flexibility.md
     power_steps, power_vectors : of the iteration that measures how much flexibility is left out
-    recalled : times that residual flexibility was asked for and is kept, to say that of forces near by
+    recalled : forces whose columns residual flexibility was asked for and that are kept, to say that of forces near by
     dependent : share of its strain energy that a static shape must add to the others to be kept
     new : size of what modes lack of a shape, relative, below which it is rounding
     rounding : of the rows of a contact map

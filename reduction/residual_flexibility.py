@@ -86,43 +86,51 @@ class ResidualFlexibility:
         moved: np.ndarray = self.B @ solve_few(self.factor, self.B.T @ force)
         return moved - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
 
-    def asked(self, force: np.ndarray, known: list[np.ndarray]) -> np.ndarray:
-        """The same, which is added to the last that are known, for `recalled`."""
-        known.append(np.stack([force, self.apply(force)]))
-        del known[: -LIMITS.recalled]
-        return known[-1][1]
-
     def recalled(self, force: np.ndarray, asked: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Forces near these (n_contact, k) that the columns `asked` for last add up to, and R times them."""
-        known = np.concatenate([np.zeros((2, len(force), 0)), *asked], axis=2)
-        near, moved = known @ np.linalg.lstsq(self._weighted(known[0]), self._weighted(force))[0]
-        return near, moved
+        """What is not known of forces f (n_contact, k), k^-1/2 times that, and R times their known part.
 
-    def _weighted(self, force: np.ndarray, without: float = 0.0) -> np.ndarray:
-        """k^-1/2 f, and `without` for a force where there is no spring."""
-        root = np.sqrt(self.stiffness)[:, None]
-        return np.divide(force, root, out=np.where(force == 0.0, 0.0, without), where=root > 0)
-
-    def at_most(self, force: np.ndarray, moved: np.ndarray) -> float:
-        """What |k^1/2 R f| is at most over |k^1/2 x|, Euclidean, for x (n_contact, k): from `left_out` alone.
-
-        Infinite for a force where there is no spring
+        asked : none, or one pair (2, n_contact, j): orthonormal k^-1/2 f of forces that R was asked for, and R f
         """
+        weighted = self.weighted(force)
+        basis, moved = asked[0] if asked else np.zeros((2, len(force), 0))
+        parts = basis.T @ weighted
+        return weighted - basis @ parts, moved @ parts
+
+    def ask(self, force: np.ndarray, asked: list[np.ndarray], enough: float) -> None:
+        """Let R f (n_contact, k) be known but for so much of k^-1/2 f: by the largest directions of what is not."""
+        root = np.sqrt(self.stiffness)[:, None]
+        lacking, _ = self.recalled(root * self.recalled(force, asked)[0], asked)  # twice, as it may be small beside f
+        direction, size, _ = np.linalg.svd(lacking, full_matrices=False)
+        direction = direction[:, np.sqrt(np.cumsum(size[::-1] ** 2))[::-1] > enough]
+        if direction.size == 0:
+            return
+        new = np.stack([direction, self.apply(root * direction)])
+        columns = np.concatenate([*asked, new], axis=2)
+        parts = columns[0].T @ self.weighted(force)
+        latest, _ = np.linalg.qr(np.hstack([parts, np.eye(len(parts))]))  # this force, then those before
+        asked[:] = [columns @ latest[:, : LIMITS.recalled * force.shape[1]]]
+
+    def weighted(self, force: np.ndarray) -> np.ndarray:
+        """k^-1/2 f, infinite for a force where there is no spring."""
+        root = np.sqrt(self.stiffness)[:, None]
+        return np.divide(force, root, out=np.where(force == 0.0, 0.0, np.inf), where=root > 0)
+
+    def at_most(self, weighted: np.ndarray, moved: np.ndarray) -> float:
+        """What |k^1/2 R f| is at most over |k^1/2 x|, Euclidean, for k^-1/2 f and x (n_contact, k), by `left_out`."""
         size = np.linalg.norm(np.sqrt(self.stiffness)[:, None] * moved) or 1.0
-        return self.left_out * float(np.linalg.norm(self._weighted(force, np.inf)) / size)
+        return self.left_out * float(np.linalg.norm(weighted) / size)
 
     @cached_property
     def left_out(self) -> float:
-        """Largest eigenvalue of k^1/2 R k^1/2: 1 would be a contact that sees nothing else; by power iteration."""
-        root = np.sqrt(self.stiffness)[:, None]
-        x = np.random.default_rng(0).standard_normal((len(root), LIMITS.power_vectors))
-        size = np.zeros(1)
+        """Largest eigenvalue of k^1/2 R k^1/2: 1 would be a contact that sees nothing else; by a Krylov space."""
+        root, asked = np.sqrt(self.stiffness)[:, None], list[np.ndarray]()
+        force = root * np.random.default_rng(0).standard_normal((len(root), LIMITS.power_vectors))
         for _ in range(LIMITS.power_steps):
-            x, _ = np.linalg.qr(x)
-            y = root * self.apply(root * x)
-            size, turn = np.linalg.eigh(0.5 * (x.T @ y + y.T @ x))
-            x = y @ turn
-        return float(max(size[-1], 0.0))
+            self.ask(force, asked, LIMITS.new * float(np.linalg.norm(self.weighted(force))))
+            basis, moved = asked[0]
+            force = root**2 * moved[:, : force.shape[1]]
+        inside = basis.T @ (root * moved)
+        return float(max(np.linalg.eigvalsh(0.5 * (inside + inside.T))[-1], 0.0))
 
     def error(self, omega: float) -> float:
         """Error of the contact compliance at a frequency [rad/s], over the static one, by the mass that R leaves out.
