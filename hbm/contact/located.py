@@ -458,10 +458,12 @@ def _force(kt, mu, u, load, hs, knots, waves, ends, segments, n_segment, table, 
     whole = n_segment == 1 and segments[0, 0] == STICK and knots[ends[0, 1]] - knots[ends[0, 0]] == TURN
     n_short = 0
     if whole:  # linear, no integral, no rounding
-        slope[:] = 0.0
         for a in range(m):
-            force[a], by_u[a, a] = kt * u[a], 1.0
-    table[:] = 0.0
+            force[a] = kt * u[a]
+            for b in range(m):
+                by_u[a, b], by_load[a, b] = 1.0 if a == b else 0.0, 0.0
+    for n in range(table.shape[2]):  # in loops: in the short form numba takes a second to compile
+        table[0, 0, n], table[0, 1, n], table[1, 0, n], table[1, 1, n] = 0.0, 0.0, 0.0, 0.0
     for short in (False, True):
         if whole or (short and n_short == 0):
             break
