@@ -174,10 +174,10 @@ def _solve_with_rest(
     x_lin = balance.x_lin(omega)
     history: tuple[float, ...] = ()
     asked = [] if balance.asked is None else balance.asked
-    near = replace(balance, rest=lambda g: residual.recalled(g, asked)[1])
+    near = replace(balance, rest=lambda g: residual.recalled(g, asked))
     state = near.evaluate(omega, start)
     for _ in range(2 * RULES.most_corrections):
-        lacking, moved = residual.recalled(state.g, asked)
+        lacking = residual.lacking(state.g, asked)
         unsure, error = residual.at_most(lacking, state.flat), relative_residual(state, x_lin)
         goal, history = wanted(balance, state, x_lin, options), (*history, error + unsure)
         if error + unsure <= goal:
@@ -185,8 +185,9 @@ def _solve_with_rest(
         if not np.isfinite(unsure):
             break
         if solved:
+            without = state.residual + residual.recalled(state.g, asked)
             residual.ask(state.g, asked, RULES.closer * goal / unsure * float(np.linalg.norm(lacking)))
-            state = replace(state, residual=state.residual + moved - residual.recalled(state.g, asked)[1])
+            state = replace(state, residual=without - residual.recalled(state.g, asked))
         else:
             closer = RULES.closer * max(goal, min(unsure, error))
             found = _solve(near, omega, state, replace(options, tolerance=closer))

@@ -86,34 +86,34 @@ class ResidualFlexibility:
         moved: np.ndarray = self.B @ solve_few(self.factor, self.B.T @ force)
         return moved - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
 
-    def recalled(self, force: np.ndarray, asked: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """What is not known of forces f (n_contact, k), k^-1/2 times that, and R times their known part.
+    def recalled(self, force: np.ndarray, asked: Sequence[np.ndarray]) -> np.ndarray:
+        """R times the part of forces f (n_contact, k) that it is known of.
 
         asked : none, or one pair (2, n_contact, j): orthonormal k^-1/2 f of forces that R was asked for, and R f
         """
-        weighted = self.weighted(force)
         basis, moved = asked[0] if asked else np.zeros((2, len(force), 0))
-        parts = basis.T @ weighted
-        return weighted - basis @ parts, moved @ parts
+        known: np.ndarray = moved @ (basis.T @ self.lacking(force))
+        return known
+
+    def lacking(self, force: np.ndarray, asked: Sequence[np.ndarray] = ()) -> np.ndarray:
+        """k^-1/2 times the other part, all where R was not asked; infinite for a force where there is no spring."""
+        root = np.sqrt(self.stiffness)[:, None]
+        weighted = np.divide(force, root, out=np.where(force == 0.0, 0.0, np.inf), where=root > 0)
+        return weighted - asked[0][0] @ (asked[0][0].T @ weighted) if asked else weighted
 
     def ask(self, force: np.ndarray, asked: list[np.ndarray], enough: float) -> None:
         """Let R f (n_contact, k) be known but for so much of k^-1/2 f: by the largest directions of what is not."""
         root = np.sqrt(self.stiffness)[:, None]
-        lacking, _ = self.recalled(root * self.recalled(force, asked)[0], asked)  # twice, as it may be small beside f
+        lacking = self.lacking(root * self.lacking(force, asked), asked)  # twice, as it may be small beside f
         direction, size, _ = np.linalg.svd(lacking, full_matrices=False)
         direction = direction[:, np.sqrt(np.cumsum(size[::-1] ** 2))[::-1] > enough]
         if direction.size == 0:
             return
         new = np.stack([direction, self.apply(root * direction)])
         columns = np.concatenate([*asked, new], axis=2)
-        parts = columns[0].T @ self.weighted(force)
+        parts = columns[0].T @ self.lacking(force)
         latest, _ = np.linalg.qr(np.hstack([parts, np.eye(len(parts))]))  # this force, then those before
         asked[:] = [columns @ latest[:, : LIMITS.recalled * force.shape[1]]]
-
-    def weighted(self, force: np.ndarray) -> np.ndarray:
-        """k^-1/2 f, infinite for a force where there is no spring."""
-        root = np.sqrt(self.stiffness)[:, None]
-        return np.divide(force, root, out=np.where(force == 0.0, 0.0, np.inf), where=root > 0)
 
     def at_most(self, weighted: np.ndarray, moved: np.ndarray) -> float:
         """What |k^1/2 R f| is at most over |k^1/2 x|, Euclidean, for k^-1/2 f and x (n_contact, k), by `left_out`."""
@@ -126,7 +126,7 @@ class ResidualFlexibility:
         root, asked = np.sqrt(self.stiffness)[:, None], list[np.ndarray]()
         force = root * np.random.default_rng(0).standard_normal((len(root), LIMITS.power_vectors))
         for _ in range(LIMITS.power_steps):
-            self.ask(force, asked, LIMITS.new * float(np.linalg.norm(self.weighted(force))))
+            self.ask(force, asked, LIMITS.new * float(np.linalg.norm(self.lacking(force))))
             basis, moved = asked[0]
             force = root**2 * moved[:, : force.shape[1]]
         inside = basis.T @ (root * moved)
