@@ -33,8 +33,8 @@ class Rules:
     least_spacing : of the points extrapolated from, in steps: closer ones amplify what Newton leaves
     max_fold_points : by arc length on the way round folds, after which the sweep looks from rest
     max_corner_points : the same where a contact law has a simpler one to begin with, as its curves have corners
-    abrupt : miss of the extrapolation, in steps of x, from which on a step is solved backwards: over a jump it does
-        not lead back
+    abrupt : miss of the extrapolation, in the longer of the last two steps of x, from which on a step is solved
+        backwards: over a jump it does not lead back
     same : distance, in steps of x, within which it has led back
     """
 
@@ -147,10 +147,11 @@ class _Sweep:
         if last - first < 1:
             return True
         miss = x - extrapolate(np.array(builder.value[first:]), builder.x[first:], value)
-        if np.linalg.norm(miss) <= rules.abrupt * step:
+        far = rules.abrupt * max(step, np.linalg.norm(before - builder.x[-2]))  # where it turns, steps are short
+        if np.linalg.norm(miss) <= far:
             return True
         slope, _, _ = path.place(value)[0].linearise(state).solve(-path.slope(value, state), rules.same)
-        if np.linalg.norm(x - before - (value - here) * slope.reshape(x.shape)) <= rules.abrupt * step:
+        if np.linalg.norm(x - before - (value - here) * slope.reshape(x.shape)) <= far:
             return True
         back = newton.solve(*path.place(here), x, self._options.newton)
         return back.converged and bool(np.linalg.norm(back.state.x - before) <= rules.same * step)
