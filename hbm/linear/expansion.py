@@ -35,8 +35,8 @@ class ExpansionRules:
     # relative, of the expansion at the highest frequency asked for: below Newton's tolerance
     wanted_error: float = 5e-10
     rounding: float = 1e-7  # largest error that may be rounding
-    # modes and powers of s tried, cheap ones first: the last power is even, of mass; damping gives odd ones little
-    truncations: tuple[tuple[int, int], ...] = ((24, 3), (48, 3), (24, 5), (48, 5), (48, 7), (96, 7), (192, 7))
+    # modes and powers of s: the last power is even, of mass; damping gives odd ones little
+    truncations: tuple[tuple[int, int], ...] = ((24, 3), (48, 3), (24, 5), (48, 5), (96, 3), (48, 7), (96, 7), (192, 7))
     all_modes_below: int = 1500  # coordinates up to which all modes are computed at once
     n_probe: int = 2  # forces that measure the error, and ports at which truncations are compared
     compared_ports: int = 64
@@ -154,7 +154,9 @@ class Expansion:
         del stuck, free
         few = np.linspace(0, len(ports) - 1, min(len(ports), RULES.compared_ports)).astype(int)
         tried: list[tuple[int, int, float]] = []
-        for m, order in (c for c in RULES.truncations if c[0] < len(lam)):  # tried between the probe and a few ports
+        left, p = [c for c in RULES.truncations if c[0] < len(lam)], self.n_port
+        left.sort(key=lambda c: (c[1] - 1) * p * (4 * p + 16 * c[0]) + 48 * c[0] ** 2)  # bytes read for three harmonics
+        for m, order in left:  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
             moved = self.at(s).matrix(slice(RULES.n_probe, None), slice(0, RULES.n_probe))
             error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())
