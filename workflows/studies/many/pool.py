@@ -14,6 +14,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from multiprocessing import get_context, parent_process
+from multiprocessing.context import BaseContext
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -40,8 +41,7 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
     # Gmsh, once used in this process, sets this to the default: a pipe to a dead process would end the study
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python begins
-    processes = get_context("forkserver" if sys.platform == "linux" else "spawn")
-    processes.set_forkserver_preload([__name__])  # what all of them import is imported once
+    processes = prepared()
     waiting, deaths = deque(tasks), Counter[int]()
     while waiting:
         alone = deaths[waiting[0].number] > 0
@@ -73,6 +73,17 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
                     yield Row(task.number, task.key, "lost", told)
         finally:
             _stop(pool)
+
+
+def prepared() -> BaseContext:
+    """How processes begin: where they are forked from a server, it imports what all need from this call on."""
+    processes = get_context("forkserver" if sys.platform == "linux" else "spawn")
+    if sys.platform == "linux":
+        from multiprocessing import forkserver  # which Windows has not
+
+        processes.set_forkserver_preload([__name__])
+        forkserver.ensure_running()
+    return processes
 
 
 def _begin() -> None:

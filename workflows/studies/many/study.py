@@ -86,6 +86,8 @@ def run(
     inside : one worker is this process itself, where few runs are done at a time and starting another would cost more
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
+    if not (runner.scheduler or inside):
+        pool.prepared()  # imports while the runs are read
     folder, varied = runner.folder, [*space.runs(study), *more]
     tasks, refused = _tasks(study, varied)
     folder.mkdir(parents=True, exist_ok=True)
