@@ -155,7 +155,7 @@ class Expansion:
         few = np.linspace(0, len(ports) - 1, min(len(ports), RULES.compared_ports)).astype(int)
         tried: list[tuple[int, int, float]] = []
         rungs, p = [c for c in RULES.truncations if c[0] < len(lam)], self.n_port
-        rungs.sort(key=lambda c: (c[1] - 1) * p * (4 * p + 16 * c[0]) + 48 * c[0] ** 2)  # bytes read for three harmonics
+        rungs.sort(key=lambda c: (c[1] - 1) * p * (4 * p + 16 * c[0]) + 48 * c[0] ** 2)  # bytes of three harmonics
         for m, order in rungs:  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
             moved = self.at(s).matrix(slice(RULES.n_probe, None), slice(0, RULES.n_probe))
