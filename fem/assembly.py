@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem.material import AnyMaterial
+from tribodyn.refusal import Refusal
 
 Materials = AnyMaterial | Mapping[str, AnyMaterial]
 
@@ -56,7 +57,7 @@ class Assembly:
         names = [body.name for body in bodies]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice or not names:
-            raise ValueError(f"bodies.{twice[0]} is there twice: give each body its own name" if twice else "no body")
+            raise Refusal(f"bodies.{twice[0]} is there twice: give each body its own name" if twice else "no body")
         self.bodies = tuple(bodies)
         counts = [(b.mesh.doflocs.shape[1], b.mesh.t.shape[1], b.mesh.facets.shape[1]) for b in bodies]
         starts = np.cumsum([(0, 0, 0), *counts], axis=0)
@@ -124,4 +125,4 @@ def piece_of_facets(mesh: Any, facets: np.ndarray) -> tuple[Piece, np.ndarray]:
             return piece, facets - piece.facet
         if inside.any():
             break
-    raise ValueError("a face lies on several bodies; name the face of one body")
+    raise Refusal("a face lies on several bodies; name the face of one body")

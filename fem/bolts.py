@@ -18,6 +18,7 @@ from tribodyn.fem.elements import coordinates
 from tribodyn.fem.mortar import MORTAR
 from tribodyn.fem.springs import shares
 from tribodyn.fem.surface import surface
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,13 @@ class Bolt:
         axis = self._axis(mesh, node_sets)
         length = float(np.linalg.norm(axis))
         if np.intersect1d(head, nut).size or length <= 1e-6 * float(np.linalg.norm(np.ptp(points, axis=0))):
-            raise ValueError(
+            raise Refusal(
                 f"bolts.{self.name} crosses nothing: '{self.head}' and '{self.nut}' lie at one place; give the faces "
                 "under its head and under its nut"
             )
         for name, towards in ((self.head, axis), (self.nut, -axis)):
             if _outward(mesh, name) @ towards > MORTAR.facing * length:
-                raise ValueError(
+                raise Refusal(
                     f"bolts.{self.name} would pull at '{name}' instead of pressing on it: give the faces under head "
                     "and nut, which look away from each other"
                 )

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from scipy.sparse import csr_matrix, eye_array, vstack
 
+from tribodyn.refusal import Refusal
+
 if TYPE_CHECKING:
     from tribodyn.geometry.sources.directions import Directions
 
@@ -25,9 +27,9 @@ def named(groups: Mapping[str, np.ndarray], name: str, kind: str = "node set") -
     if name not in groups:
         near = get_close_matches(name, groups, 1)
         guess = f" (did you mean '{near[0]}'?)" if near else ""
-        raise ValueError(f"the mesh has no {kind} '{name}'{guess}; it has {', '.join(sorted(groups)) or 'none'}")
+        raise Refusal(f"the mesh has no {kind} '{name}'{guess}; it has {', '.join(sorted(groups)) or 'none'}")
     if len(groups[name]) == 0:
-        raise ValueError(f"the {kind} '{name}' is empty; check the geometry that defines it")
+        raise Refusal(f"the {kind} '{name}' is empty; check the geometry that defines it")
     return np.asarray(groups[name])
 
 
@@ -40,7 +42,7 @@ class Clamp:
 
     def __post_init__(self) -> None:
         if not self.axes or set(self.axes) - set(AXES):
-            raise ValueError(f"clamp '{self.nodes}': axes = '{self.axes}' must be some of the letters x, y, z")
+            raise Refusal(f"clamp '{self.nodes}': axes = '{self.axes}' must be some of the letters x, y, z")
 
     def dofs(self, node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
         """DOFs that are held."""
@@ -65,7 +67,7 @@ class NoMeanRotation:
         """
         axis = np.asarray(self.axis, dtype=float)
         if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
-            raise ValueError(f"the axis {list(np.ravel(axis))} of a held rotation must be three numbers, not all zero")
+            raise Refusal(f"the axis {list(np.ravel(axis))} of a held rotation must be three numbers, not all zero")
         share = np.asarray(mass @ np.tile([1.0, 0.0, 0.0], len(points)))[::3]
         arm = points - share @ points / share.sum()
         return np.asarray(mass @ np.cross(axis / np.linalg.norm(axis), arm).ravel())
@@ -80,7 +82,7 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
     for clamp in clamps:
         free[clamp.dofs(node_sets)] = False
     if not free.any():
-        raise ValueError("the clamps hold every DOF of the part; leave some node free")
+        raise Refusal("the clamps hold every DOF of the part; leave some node free")
     return np.flatnonzero(free)
 
 
@@ -141,12 +143,12 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) 
     for number, one in enumerate(constraints):
         taken = one.dofs[owner[one.dofs] >= 0]
         if len(taken):
-            raise ValueError(
+            raise Refusal(
                 f"{one.what} and {constraints[owner[taken[0]]].what} both move the same nodes; let one of them take "
                 "the other face first"
             )
         if held[one.dofs].any():
-            raise ValueError(f"{one.what} moves nodes that are clamped; swap its faces, or clamp the other one")
+            raise Refusal(f"{one.what} moves nodes that are clamped; swap its faces, or clamp the other one")
         owner[one.dofs] = number
         rows.append(one.map)
         dofs.append(one.dofs)
@@ -163,7 +165,7 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) 
     else:
         if len(moved) and np.abs(follow[:, moved]).sum():
             names = ", ".join(one.what for one in constraints)
-            raise ValueError(f"the nodes moved by {names} follow each other in a circle; swap the faces of one of them")
+            raise Refusal(f"the nodes moved by {names} follow each other in a circle; swap the faces of one of them")
     left = np.setdiff1d(free, moved)
     follow = csr_matrix(follow[:, left])
     follow.eliminate_zeros()
@@ -213,5 +215,5 @@ def partition(n_dof: int, chosen: np.ndarray, what: str) -> tuple[np.ndarray, np
     """
     chosen = np.unique(np.asarray(chosen, dtype=int))
     if len(chosen) and not 0 <= chosen[0] <= chosen[-1] < n_dof:
-        raise ValueError(f"a {what} lies outside the {n_dof} DOFs of the system; clamped DOFs are no part of it")
+        raise Refusal(f"a {what} lies outside the {n_dof} DOFs of the system; clamped DOFs are no part of it")
     return np.setdiff1d(np.arange(n_dof), chosen), chosen

@@ -15,6 +15,7 @@ from tribodyn.fem.matching import facing_partners, partners
 from tribodyn.fem.mortar import MORTAR, side
 from tribodyn.fem.mortar_contact import mortar_halves
 from tribodyn.fem.surface import Surface, facet_nodes, surface
+from tribodyn.refusal import Refusal
 
 PAIRINGS = ("auto", "nodes", "mortar")
 
@@ -56,13 +57,13 @@ class ContactFaces:
 
     def __post_init__(self) -> None:
         if self.plane is not None and self.opposite is not None:
-            raise ValueError(f"contact '{self.face}': a plane ground and an opposite face exclude each other; drop one")
+            raise Refusal(f"contact '{self.face}': a plane ground and an opposite face exclude each other; drop one")
         if self.inclination and self.plane is None:
-            raise ValueError(f"contact '{self.face}': an inclination needs a plane ground; give its plane")
+            raise Refusal(f"contact '{self.face}': an inclination needs a plane ground; give its plane")
         if not abs(self.inclination) < np.pi / 2:
-            raise ValueError(f"contact '{self.face}': inclination = {self.inclination} rad; keep it below pi / 2")
+            raise Refusal(f"contact '{self.face}': inclination = {self.inclination} rad; keep it below pi / 2")
         if self.pairing not in PAIRINGS:
-            raise ValueError(f"there is no pairing '{self.pairing}': there are {', '.join(PAIRINGS)}")
+            raise Refusal(f"there is no pairing '{self.pairing}': there are {', '.join(PAIRINGS)}")
 
     def build(self, mesh: Any) -> ContactInterface:
         """The interface with B over all 3 n_node DOFs of the mesh, pairs in ascending node order.
@@ -92,7 +93,7 @@ class ContactFaces:
         area = np.linalg.norm(np.cross(corner[:, 2] - corner[:, 0], corner[:, -1] - corner[:, 1]), axis=1) / 2
         if self.turn is not None or abs(area.sum() / nodes.area.sum() - 1) > 0.01:  # of a curved face
             needs = "nodes at the corners of the faces of elements (vertices_only), and both faces in one sector"
-            raise ValueError(f"contact '{self.face}': face_centres needs {needs}")
+            raise Refusal(f"contact '{self.face}': face_centres needs {needs}")
         across = nodes.frames[nodes.faces, 2].mean(axis=1)
         frames = contact_frames(across / np.linalg.norm(across, axis=1, keepdims=True), self.t1)
         mean = csr_matrix((np.full(n_face * k, 1 / k), nodes.faces.ravel(), k * np.arange(n_face + 1)))
@@ -177,7 +178,7 @@ def no_contact(n_dof: int) -> ContactInterface:
 def _gaps(gap: float | np.ndarray, area: np.ndarray) -> np.ndarray:
     """The gap of every pair (n_pair,) [m]."""
     if np.ndim(gap) and np.shape(gap) != area.shape:
-        raise ValueError(f"the contact gap has {np.size(gap)} values for {len(area)} node pairs; give one each")
+        raise Refusal(f"the contact gap has {np.size(gap)} values for {len(area)} node pairs; give one each")
     return np.broadcast_to(np.asarray(gap, dtype=float), area.shape).copy()
 
 

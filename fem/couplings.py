@@ -21,6 +21,7 @@ from tribodyn.fem.mortar import MORTAR, Common, Side, coefficients, common, dual
 from tribodyn.fem.mortar_contact import apart
 from tribodyn.fem.springs import shares
 from tribodyn.fem.surface import tabulate
+from tribodyn.refusal import Refusal
 
 SMALL = 1e-13  # of a coefficient that is left out
 
@@ -47,7 +48,7 @@ class Tie:
         reach = MORTAR.reach * one.length if self.reach is None else self.reach
         shared = common(one, two, reach)
         if not len(shared.weight):
-            raise ValueError(f"{self.what}: {apart(one, two, reach)}")
+            raise Refusal(f"{self.what}: {apart(one, two, reach)}")
         return one, two, shared
 
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
@@ -59,7 +60,7 @@ class Tie:
         gap = float(np.average(np.abs(shared.gap), weights=np.abs(shared.weight)))
         if self.reach is None and gap > MORTAR.apart * one.length:
             who = f"{self.first} and {self.second} are {1e3 * gap:.3g} mm apart on average"
-            raise ValueError(f'{self.what}: {who}: bring them together, or give reach = "{2e3 * gap:.2g} mm"')
+            raise Refusal(f'{self.what}: {who}: bring them together, or give reach = "{2e3 * gap:.2g} mm"')
         n, k = mesh.doflocs.shape[1], one.nodes.shape[1]
         psi, d = dual(one, shared)
         other = tabulate(two.nodes.shape[1], shared.eta)[0]
@@ -106,7 +107,7 @@ class Equation:
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
         """The first displacement in terms of the others; raises ValueError where its factor is zero."""
         if len(self.terms) < 2 or not self.terms[0][2]:
-            raise ValueError(f"{self.what} needs two terms or more, the first with a factor that is not zero")
+            raise Refusal(f"{self.what} needs two terms or more, the first with a factor that is not zero")
         dofs = [3 * int(named(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
         factors = [-factor / self.terms[0][2] for _, _, factor in self.terms[1:]]
         row = coo_matrix((factors, ([0] * len(factors), dofs[1:])), shape=(1, 3 * mesh.doflocs.shape[1]))
@@ -162,7 +163,7 @@ class DistributedCoupling:
         cross = _turning(arm)  # u = theta x arm
         inertia = np.einsum("k,kij,kil->jl", share, cross, cross)
         if not np.linalg.eigvalsh(inertia)[0] > 1e-9 * np.trace(inertia):
-            raise ValueError(f"couplings.{self.point}: the nodes of '{self.face}' lie on one line; give a face")
+            raise Refusal(f"couplings.{self.point}: the nodes of '{self.face}' lie on one line; give a face")
         theta = np.linalg.solve(inertia, np.einsum("k,kij->jki", share, cross).reshape(3, -1))  # 3, k * 3
         mean = np.kron(share, np.eye(3))
         at = mean + _turning((points[place] - centre)[None])[0] @ theta

@@ -23,6 +23,7 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import Prestress
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.geometry.placing import rotation
+from tribodyn.refusal import Refusal
 
 AXIS = (1.0, 0.0, 0.0)
 
@@ -69,10 +70,10 @@ def turned(contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[floa
     after a turn by one pitch about the axis; raises ValueError as `cut_from` does.
     """
     if n_sectors < 2:
-        raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
+        raise Refusal(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     missing = [contact.face for contact in contacts if contact.opposite is None]
     if missing:
-        raise ValueError(f"contact '{missing[0]}' of a cyclic part needs the opposite face, that of the next sector")
+        raise Refusal(f"contact '{missing[0]}' of a cyclic part needs the opposite face, that of the next sector")
     turn = rotation(unit(axis, "the axis of rotation"), 2 * np.pi / n_sectors)
     return [replace(contact, turn=turn) for contact in contacts]
 
@@ -93,7 +94,7 @@ def cut_from(
         opposite face
     """
     if n_sectors < 2:
-        raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
+        raise Refusal(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     turn = rotation(unit(axis, "the axis of rotation"), 2 * np.pi / n_sectors)
     left = part.rows(_left_halves(part, contacts))
     none = np.empty((0, 3), dtype=int)
@@ -116,7 +117,7 @@ def _seams(part: Part, seam: tuple[str, str], turn: np.ndarray) -> tuple[np.ndar
     right, left = (named(part.node_sets, name) for name in seam)
     what = f"the cyclic faces '{seam[0]}' and '{seam[1]}'"
     if len(right) != len(left):
-        raise ValueError(f"{what} have {len(right)} and {len(left)} nodes; mesh both with the same grid")
+        raise Refusal(f"{what} have {len(right)} and {len(left)} nodes; mesh both with the same grid")
     left = left[partners(part.points[right] @ turn.T, part.points[left], what)]
     place = np.full(3 * len(part.points), -1)
     place[part.free] = np.arange(len(part.free))
@@ -124,9 +125,9 @@ def _seams(part: Part, seam: tuple[str, str], turn: np.ndarray) -> tuple[np.ndar
     free = [(d >= 0) for d in dofs]
     whole = free[0].all(axis=1) | ~free[0].any(axis=1)
     if not whole.all() or (free[0] != free[1]).any():
-        raise ValueError(f"{what} are held unequally; clamp nodes on both of them, in all axes")
+        raise Refusal(f"{what} are held unequally; clamp nodes on both of them, in all axes")
     if np.intersect1d(dofs[0][free[0]], dofs[1][free[1]]).size:
-        raise ValueError(f"{what} share nodes; a sector cannot reach the axis of the wheel")
+        raise Refusal(f"{what} share nodes; a sector cannot reach the axis of the wheel")
     kept = free[0][:, 0]
     return dofs[0][kept], dofs[1][kept]
 
@@ -185,7 +186,7 @@ def assemble_wheel(
     n_sectors, system, half = sector.n_sectors, sector.system, sector.interface
     factors = np.ones(n_sectors) if stiffness is None else np.asarray(stiffness, dtype=float)
     if factors.shape != (n_sectors,) or not (factors > 0).all():
-        raise ValueError(f"mistuning needs {n_sectors} positive stiffness factors, one per sector, not {factors.size}")
+        raise Refusal(f"mistuning needs {n_sectors} positive stiffness factors, one per sector, not {factors.size}")
     maps = sector_maps(sector)
 
     def summed(matrix: Any, weights: np.ndarray) -> Any:

@@ -17,6 +17,7 @@ from scipy.sparse import block_diag, csr_matrix, identity, kron
 from tribodyn.fem.assembly import materials_of
 from tribodyn.fem.elements import batches, connectivity, coordinates, scatter
 from tribodyn.fem.material import AnyMaterial, Material
+from tribodyn.refusal import Refusal
 
 HOURGLASS = 0.005  # stiffness of hourglass modes over the shear modulus
 SIGNS = np.array(list(product((-1, 1), repeat=3)), float)  # of the corners of an element
@@ -50,10 +51,10 @@ def _assemble(
     reduced = [isinstance(one, Material) and one.linear_reduced for one in kinds]
     if any(reduced):
         if not all(reduced):
-            raise ValueError('material: elements = "linear_reduced" is for all materials of a mesh, or for none')
+            raise Refusal('material: elements = "linear_reduced" is for all materials of a mesh, or for none')
         return _linear_reduced(mesh, material)
     if nodes.shape[1] == 8:
-        raise ValueError("the hexahedra have eight nodes, which lock in bending: raise the element order, or take them "
+        raise Refusal("the hexahedra have eight nodes, which lock in bending: raise the element order, or take them "
                          'as elements = "linear_reduced"')  # fmt: skip
     if isotropic:
         lam, mu, _ = per_element(mesh, material)
@@ -145,11 +146,11 @@ def of_elements(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) ->
     count, kind = np.zeros((2, n_element), dtype=int)
     for i, name in enumerate(material):
         if name not in members:
-            raise ValueError(f"material: the mesh has no subdomain '{name}'; it has {sorted(members) or 'none'}")
+            raise Refusal(f"material: the mesh has no subdomain '{name}'; it has {sorted(members) or 'none'}")
         count[members[name]] += 1
         kind[members[name]] = i
     if (count != 1).any():
-        raise ValueError(
+        raise Refusal(
             f"material: {np.sum(count == 0)} elements have no material and {np.sum(count > 1)} have more than one; "
             f"name each of the subdomains {sorted(members)} once"
         )
@@ -197,7 +198,7 @@ def reduced_elements(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     """
     nodes = connectivity(mesh)
     if nodes.shape[1] == 10:
-        raise ValueError('material: elements = "linear_reduced" needs hexahedra, and the mesh has tetrahedra')
+        raise Refusal('material: elements = "linear_reduced" needs hexahedra, and the mesh has tetrahedra')
     reference = np.asarray(mesh.elem().doflocs).reshape(-1, 3)
     side = 2 if nodes.shape[1] == 27 else 1  # linear elements along an edge of one of the mesh
     corners = [(np.array(at) + (1 + SIGNS) / 2) / side for at in product(range(side), repeat=3)]

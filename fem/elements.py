@@ -13,6 +13,8 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from skfem import MeshHex1, MeshTet2
 from skfem.quadrature import get_quadrature
 
+from tribodyn.refusal import Refusal
+
 
 def coordinates(mesh: Any) -> np.ndarray:
     """Coordinates of all nodes (n_node, 3) [m]."""
@@ -25,7 +27,7 @@ def connectivity(mesh: Any) -> np.ndarray:
     Raises  ValueError where the mesh is not of 27-node or 8-node hexahedra or 10-node tetrahedra
     """
     if not isinstance(mesh, MeshHex1 | MeshTet2):  # MeshHex2 is a MeshHex1
-        raise ValueError(
+        raise Refusal(
             f"the mesh is a {type(mesh).__name__}, but elasticity needs hexahedra or second-order tetrahedra "
             "(MeshTet2); raise the element order of the geometry"
         )
@@ -63,7 +65,7 @@ def mapped(mesh: Any, order: int = 5, size: int = 256) -> Iterator[tuple[np.ndar
         folded = (np.sign(det) != np.sign(det[:, :1])).any(axis=1) | (det[:, 0] == 0)
         if folded.any():
             where = points[nodes[elements[folded.argmax()]]].mean(axis=0)
-            raise ValueError(f"the mesh has a folded element near ({where[0]:.4g}, {where[1]:.4g}, {where[2]:.4g}) m")
+            raise Refusal(f"the mesh has a folded element near ({where[0]:.4g}, {where[1]:.4g}, {where[2]:.4g}) m")
         yield elements, N, dN, J, np.abs(det) * w
 
 

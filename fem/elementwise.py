@@ -19,6 +19,7 @@ from skfem import ElementHex1, ElementTetP1
 from tribodyn.fem.assembly import materials_of
 from tribodyn.fem.elasticity import at_elements, densities, of_elements, tensor_blocks
 from tribodyn.fem.elements import connectivity, mapped, scatter
+from tribodyn.refusal import Refusal
 
 AT_ONCE = 32  # elements; memory and speed only
 VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  # place of a component of strain or stress
@@ -226,7 +227,7 @@ def matrices(mesh: Any, material: Any) -> tuple[Elementwise, Elementwise]:
     for piece, own in materials_of(mesh, material):
         one, nodes = piece.mesh, connectivity(piece.mesh)
         if nodes.shape[1] == 8 or any(getattr(of, "linear_reduced", False) for of in of_elements(one, own)[0]):
-            raise ValueError('reduction.solver: "multigrid" needs elements of second order, and these are linear ones')
+            raise Refusal('reduction.solver: "multigrid" needs elements of second order, and these are linear ones')
         corner = ElementHex1() if nodes.shape[1] == 27 else ElementTetP1()
         places = np.asarray(one.elem().doflocs).T
         linear = np.stack([corner.lbasis(places, i)[0] for i in range(len(corner.doflocs))], axis=1)

@@ -15,6 +15,7 @@ from scipy.sparse.linalg import LinearOperator, splu
 
 from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.mumps import Mumps
+from tribodyn.refusal import Refusal
 
 # Relative residual of the softest direction that still counts as regular. Measured: a plate 2000 times longer than
 # thick reaches 0.05, a body that can move rigidly 6 to 1000.
@@ -22,7 +23,7 @@ SINGULAR = 0.5
 SOLVERS = ("pardiso", "superlu", "mumps")
 
 
-class SingularStiffness(ValueError):
+class SingularStiffness(Refusal):
     """A body can move rigidly, or the matrix is singular to working precision."""
 
 
@@ -54,7 +55,7 @@ def factorise(
     if solver is None:
         solver = "pardiso" if pardiso_available() else "superlu"
     elif solver not in SOLVERS:
-        raise ValueError(f"no solver '{solver}': there are {', '.join(SOLVERS)}")
+        raise Refusal(f"no solver '{solver}': there are {', '.join(SOLVERS)}")
     try:
         factor: Factor
         if solver == "mumps":

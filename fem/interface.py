@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import block_diag, eye_array, issparse, vstack
 
+from tribodyn.refusal import Refusal
+
 COMPONENTS = ("t1", "t2", "n")
 
 
@@ -57,7 +59,7 @@ def checked_components(components: Sequence[str]) -> tuple[str, ...]:
     """The components; raises ValueError where they are not some of t1, t2, n in this order."""
     found = tuple(components)
     if not found or found != tuple(c for c in COMPONENTS if c in found):
-        raise ValueError(f"contact components {list(found)} must be some of t1, t2, n, in this order")
+        raise Refusal(f"contact components {list(found)} must be some of t1, t2, n, in this order")
     return found
 
 
@@ -74,7 +76,7 @@ def contact_frames(normals: np.ndarray, t1: Sequence[float] | None) -> np.ndarra
     along = direction - (normals @ direction)[:, None] * normals
     length = np.linalg.norm(along, axis=1, keepdims=True)
     if (length < 1e-3).any():
-        raise ValueError(f"the contact direction t1 = {list(t1)} is along the contact normal; give one along the face")
+        raise Refusal(f"the contact direction t1 = {list(t1)} is along the contact normal; give one along the face")
     first = along / length
     return np.stack([first, np.cross(normals, first), normals], axis=1)
 
@@ -86,7 +88,7 @@ def unit(direction: Sequence[float], what: str) -> np.ndarray:
     """
     vector = np.asarray(direction, dtype=float)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
-        raise ValueError(f"{what} must be three numbers that are not all zero, but is {list(np.ravel(direction))}")
+        raise Refusal(f"{what} must be three numbers that are not all zero, but is {list(np.ravel(direction))}")
     return vector / np.linalg.norm(vector)
 
 
@@ -97,7 +99,7 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     Raises  ValueError where they differ in components
     """
     if len({i.components for i in interfaces}) > 1:
-        raise ValueError("the contacts of a structure must be built with the same components")
+        raise Refusal("the contacts of a structure must be built with the same components")
     first = np.cumsum([0] + [i.n_pair for i in interfaces])
     names = ("points", "frames", "area", "gap")
     fields: dict[str, Any] = {name: np.concatenate([getattr(i, name) for i in interfaces]) for name in names}

@@ -13,6 +13,7 @@ from tribodyn.fem.constraints import named
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import unit
 from tribodyn.fem.surface import face_integrals, facet_nodes, outside
+from tribodyn.refusal import Refusal
 
 
 class Load(Protocol):
@@ -59,7 +60,7 @@ class Moment:
         """Force vector (3 n_node,) [N m/N m]; raises ValueError where there is no such point."""
         points = mesh.points if isinstance(mesh, Assembly) else {}
         if self.point not in points:
-            raise ValueError(f"a moment acts on the point of a coupling, but '{self.point}' is none; couple the group")
+            raise Refusal(f"a moment acts on the point of a coupling, but '{self.point}' is none; couple the group")
         moment = np.zeros((mesh.doflocs.shape[1], 3))
         moment[points[self.point][1]] = unit(self.direction, f"the direction of the moment on '{self.point}'")
         return moment.ravel()

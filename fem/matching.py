@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
+from tribodyn.refusal import Refusal
+
 TOLERANCE = 1e-4  # largest distance of two matching nodes, as a part of the length of the first face
 
 
-class Mismatch(ValueError):
+class Mismatch(Refusal):
     """Nodes of two faces that should meet do not."""
 
 

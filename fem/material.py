@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribodyn.geometry.sources.directions import Directions, orthogonal
+from tribodyn.refusal import Refusal
 
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
@@ -27,11 +28,11 @@ class Material:
 
     def __post_init__(self) -> None:
         if not self.E > 0:
-            raise ValueError(f"material: E = {self.E} Pa is not positive; give Young's modulus in pascal")
+            raise Refusal(f"material: E = {self.E} Pa is not positive; give Young's modulus in pascal")
         if not -1 < self.nu < 0.5:
-            raise ValueError(f"material: nu = {self.nu} is outside -1 < nu < 0.5; metals have about 0.3")
+            raise Refusal(f"material: nu = {self.nu} is outside -1 < nu < 0.5; metals have about 0.3")
         if not self.rho > 0:
-            raise ValueError(f"material: rho = {self.rho} kg/m3 is not positive; steel has 7860")
+            raise Refusal(f"material: rho = {self.rho} kg/m3 is not positive; steel has 7860")
 
     @property
     def lame(self) -> tuple[float, float]:
@@ -116,16 +117,16 @@ class Orthotropic(_Turned):
 
     def __post_init__(self) -> None:
         if not (self.rho > 0 and min(self.young) > 0 and min(self.shear) > 0):
-            raise ValueError("material: Young's moduli, shear moduli and density must all be positive")
+            raise Refusal("material: Young's moduli, shear moduli and density must all be positive")
         if not np.linalg.eigvalsh(self.compliance)[0] > 0:
-            raise ValueError(
+            raise Refusal(
                 f"material: Poisson's ratios {list(self.poisson)} do not fit Young's moduli {list(self.young)}: "
                 "the material would gain energy when strained; nu12 is the strain along 2 when pulled along 1"
             )
         if not hasattr(self.axes, "at"):
             first, second = (np.asarray(axis, dtype=float) for axis in self.axes)
             if not np.linalg.norm(np.cross(first, second)) > 1e-3 * np.linalg.norm(first) * np.linalg.norm(second):
-                raise ValueError("material: the two axes must be directions that are not parallel")
+                raise Refusal("material: the two axes must be directions that are not parallel")
 
     @property
     def compliance(self) -> np.ndarray:
@@ -157,7 +158,7 @@ class Anisotropic(_Turned):
 
     def __post_init__(self) -> None:
         if not (self.rho > 0 and np.linalg.eigvalsh(self.D)[0] > 0):
-            raise ValueError("material: density must be positive, and the 21 elastic constants positive definite")
+            raise Refusal("material: density must be positive, and the 21 elastic constants positive definite")
 
     @property
     def stiffness(self) -> np.ndarray:

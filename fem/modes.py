@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.fem.factor import Factor, factorise
 from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.system import dense
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ UNSTABLE = "the structure is unstable at rest"
 CURE = "its speed or its static load is beyond divergence or buckling; lower it"
 
 
-class StaticDivergence(ValueError):
+class StaticDivergence(Refusal):
     """The structure is unstable at rest."""
 
 
@@ -56,7 +57,7 @@ def modes(
     """
     size = K.shape[0]
     if not 1 <= n <= size:
-        raise ValueError(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
+        raise Refusal(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
     if isinstance(K, np.ndarray) or (issparse(K) and (size <= EIGEN.dense_below or 2 * n >= size)):
         values, phi = eigh(dense(K), dense(M), subset_by_index=[0, n - 1])
     else:
@@ -77,7 +78,7 @@ def modes(
                     maxiter=EIGEN.restarts,
                 )
             except ArpackNoConvergence as trouble:
-                raise ValueError(
+                raise Refusal(
                     f"{len(trouble.eigenvalues)} of {n} natural frequencies are found in {EIGEN.restarts} restarts: "
                     "the part is too thin or its elements are badly shaped; mesh it with better shaped ones"
                 ) from None

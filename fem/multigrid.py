@@ -12,6 +12,8 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, lobpcg
 
+from tribodyn.refusal import SolverFailure
+
 if TYPE_CHECKING:
     from tribodyn.fem.elementwise import Elementwise
 
@@ -73,7 +75,7 @@ class Multigrid:
             missed = np.linalg.norm(self._K @ found[:, :n] - pushed, axis=0)
             if (missed <= self.of_modes * np.linalg.norm(pushed, axis=0)).all():
                 return values[:n], found[:, :n]
-        raise RuntimeError(f"{n} modes do not converge: take a direct solver")
+        raise SolverFailure(f"{n} modes do not converge: take a direct solver")
 
     def _some(self, rhs: np.ndarray) -> np.ndarray:
         size = np.linalg.norm(rhs, axis=0)
@@ -94,7 +96,7 @@ class Multigrid:
             r -= pushed
             before = np.maximum(now, np.finfo(float).tiny)
             self.iterations += 1
-        raise RuntimeError(f"conjugate gradients do not converge in {self.most} iterations: take a direct solver")
+        raise SolverFailure(f"conjugate gradients do not converge in {self.most} iterations: take a direct solver")
 
     def _cycle(self, r: np.ndarray, size: np.ndarray) -> np.ndarray:
         """About K^-1 r, in single precision; size : (k,) of the columns of r."""

@@ -16,6 +16,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from tribodyn.refusal import Refusal, SolverFailure
+
 COMMAND = "TRIBODYN_MPI"  # of the environment: how a Python with PETSc is started
 DEFAULT = "/usr/bin/python3"  # Debian's, one process
 WORKER = Path(__file__).with_name("mumps_worker.py")
@@ -57,12 +59,12 @@ class Mumps:
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, text=True, env=own,
             )  # fmt: skip
         except OSError as trouble:
-            raise ValueError(f"the solver mumps cannot start {command[0]} ({trouble.strerror}): {CURE}") from None
+            raise Refusal(f"the solver mumps cannot start {command[0]} ({trouble.strerror}): {CURE}") from None
         words = self._answer()
         if words[:1] == ["trouble"]:
             raise ArithmeticError(f"MUMPS's error {words[1]}")
         if words[:1] != ["ready"]:
-            raise ValueError(f"the solver mumps does not start{self._why()}: {CURE}")
+            raise Refusal(f"the solver mumps does not start{self._why()}: {CURE}")
         self.name = f"MUMPS of PETSc {words[2]}, {words[1]} MPI process{'es' if words[1] != '1' else ''}"
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
@@ -82,7 +84,7 @@ class Mumps:
         except OSError:
             pass  # its last answer has the reason
         if self._answer() != ["solved"]:
-            raise RuntimeError(f"the processes of MUMPS have ended{self._why()}")
+            raise SolverFailure(f"the processes of MUMPS have ended{self._why()}")
         return np.array(found, order="C").reshape(np.shape(rhs))
 
     def _answer(self) -> list[str]:

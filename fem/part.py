@@ -20,6 +20,7 @@ from tribodyn.fem.interface import ContactInterface, join
 from tribodyn.fem.loads import Load
 from tribodyn.fem.springs import Mass
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.refusal import Refusal
 
 
 class Stiff(Protocol):
@@ -58,7 +59,7 @@ class Part:
         wanted = named(self.node_sets, group) * 3 + AXES.index(axis)
         place = np.searchsorted(self.free, wanted)
         if not np.array_equal(self.free[np.minimum(place, len(self.free) - 1)], wanted):
-            raise ValueError(f"a node of '{group}' is clamped along {axis}; choose nodes that can move")
+            raise Refusal(f"a node of '{group}' is clamped along {axis}; choose nodes that can move")
         return place
 
     def field(self, q: np.ndarray) -> np.ndarray:
@@ -115,7 +116,7 @@ def build(
     Raises  ValueError where a name is unknown or a group is empty, one sentence
     """
     if elementwise and constraints:
-        raise ValueError('reduction.solver: "multigrid" cannot do nodes that follow others: take "direct"')
+        raise Refusal('reduction.solver: "multigrid" cannot do nodes that follow others: take "direct"')
     M, K = (matrices if elementwise else assemble)(mesh, material)
     K = sum((spring.matrix(mesh, node_sets) for spring in springs), start=K)
     M = sum((mass.matrix(mesh, node_sets) for mass in masses), start=M)
@@ -153,7 +154,7 @@ def _felt(part: Part, what: str, vector: np.ndarray) -> np.ndarray:
     """A load or output (n_dof,) on the free DOFs; raises ValueError where it is on held ones alone."""
     felt = part.force(vector)
     if vector.any() and not felt.any():
-        raise ValueError(f"{what} is on nodes alone that are held along its direction: name a group that can move")
+        raise Refusal(f"{what} is on nodes alone that are held along its direction: name a group that can move")
     return felt
 
 

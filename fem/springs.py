@@ -15,6 +15,7 @@ from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import unit
 from tribodyn.fem.matching import partners
 from tribodyn.fem.surface import surface
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Spring:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.stiffness) and self.stiffness >= 0):
-            raise ValueError(f"spring at '{self.nodes}': stiffness = {self.stiffness} N/m must be finite and >= 0")
+            raise Refusal(f"spring at '{self.nodes}': stiffness = {self.stiffness} N/m must be finite and >= 0")
 
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
         """Stiffness (3 n_node, 3 n_node) [N/m].
@@ -107,7 +108,7 @@ class Mass:
 
     def __post_init__(self) -> None:
         if not (np.isfinite([self.mass, *self.inertia]).all() and min(self.mass, *self.inertia) >= 0):
-            raise ValueError(f"mass at '{self.at}': mass and inertia must be finite and not negative")
+            raise Refusal(f"mass at '{self.at}': mass and inertia must be finite and not negative")
 
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
         """Mass (3 n_node, 3 n_node) [kg]; [kg m2] at the rotations of a point.
@@ -121,7 +122,7 @@ class Mass:
             diagonal[place], diagonal[turn] = self.mass, self.inertia
         else:
             if any(self.inertia):
-                raise ValueError(f"mass at '{self.at}': only a coupling's point has an inertia; couple the set")
+                raise Refusal(f"mass at '{self.at}': only a coupling's point has an inertia; couple the set")
             nodes, share = shares(mesh, node_sets, self.at)
             diagonal[nodes] = self.mass * share[:, None]
         return csr_matrix(diags_array(diagonal.ravel()))

@@ -12,6 +12,7 @@ from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
 from tribodyn.fem.elements import connectivity, coordinates
+from tribodyn.refusal import Refusal
 
 # The four quads that a nine-node face shows, in its own node order: corners, mid-sides, middle.
 NINE_NODE_QUADS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
@@ -43,7 +44,7 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     """
     facets = np.asarray(facets, dtype=int)
     if len(facets) == 0:
-        raise ValueError("a contact or load surface has no faces; check the geometry that defines it")
+        raise Refusal("a contact or load surface has no faces; check the geometry that defines it")
     outside(mesh, facets)
     face_nodes = facet_nodes(mesh, facets)
     sides = face_nodes.shape[1] == 6 and not vertices_only
@@ -57,7 +58,7 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     local = local.reshape(face_nodes.shape)
     area = np.bincount(local.ravel(), weighted.ravel())
     if (area <= 1e-9 * area.sum()).any():
-        raise ValueError("a face is so curved that areas of its nodes vanish; mesh it finer")
+        raise Refusal("a face is so curved that areas of its nodes vanish; mesh it finer")
     summed = np.stack([np.bincount(local.ravel(), vectors[:, :, i].ravel()) for i in range(3)], axis=1)
     normals = summed / np.linalg.norm(summed, axis=1, keepdims=True)
     if sides:
@@ -115,7 +116,7 @@ def outside(mesh: Any, facets: np.ndarray) -> None:
     piece, facets = piece_of_facets(mesh, facets)
     inside = int(np.sum(piece.mesh.f2t[1, facets] >= 0))
     if inside:
-        raise ValueError(
+        raise Refusal(
             f"a contact or load surface lies inside the body with {inside} of its {len(facets)} facets; give faces of "
             "its boundary"
         )

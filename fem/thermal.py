@@ -17,6 +17,7 @@ import scipy
 
 from tribodyn.fem.assembly import Assembly, materials_of
 from tribodyn.fem.elasticity import at_elements, strained
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Heating:
         names = [body.name for body in mesh.bodies] if isinstance(mesh, Assembly) else [""]
         for name in self.bodies:
             if name not in names:
-                raise ValueError(f"temperature: there is no body '{name}'; there are {', '.join(names)}")
+                raise Refusal(f"temperature: there is no body '{name}'; there are {', '.join(names)}")
         n_node = mesh.doflocs.shape[1]
         values = np.ones(n_node) if self.values is None else self.values
         force = np.zeros((n_node, 3))
@@ -52,7 +53,7 @@ class Heating:
                 own = np.einsum("eq,eij,eqja->eai", weight * at, held_back[elements], gradient, optimize=True)
                 np.add.at(force, nodes + piece.node, own)
         if not force.any():
-            raise ValueError("temperature: no body that is heated expands; give its material an expansion")
+            raise Refusal("temperature: no body that is heated expands; give its material an expansion")
         return force.ravel()
 
 
@@ -65,9 +66,9 @@ def temperature_at(path: Path, points: np.ndarray) -> np.ndarray:
     try:
         table = np.loadtxt(path, delimiter=",", comments="#", skiprows=_header(path), ndmin=2)
     except (OSError, ValueError) as trouble:
-        raise ValueError(f"the field '{path}' cannot be read ({trouble}): give lines x, y, z, value") from None
+        raise Refusal(f"the field '{path}' cannot be read ({trouble}): give lines x, y, z, value") from None
     if table.shape[1] != 4 or not np.isfinite(table).all():
-        raise ValueError(f"the field '{path}' has {table.shape[1]} columns: give x, y, z and the value, all finite")
+        raise Refusal(f"the field '{path}' has {table.shape[1]} columns: give x, y, z and the value, all finite")
     nearest = scipy.interpolate.NearestNDInterpolator(table[:, :3], table[:, 3])(points)
     if len(table) < 5 or np.linalg.matrix_rank(table[:, :3] - table[0, :3]) < 3:
         return np.asarray(nearest)

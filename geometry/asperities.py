@@ -13,6 +13,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import maximum_filter
 
 from tribodyn.geometry.surface import LIMITS, HeightMap, centred, mended, split
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -92,10 +93,10 @@ class Asperities:
         Raises  ValueError: fewer than two rows, or all summits at one height
         """
         if rows < 2:
-            raise ValueError(f"a table of {rows} rows holds no density of asperities: give 2 or more")
+            raise Refusal(f"a table of {rows} rows holds no density of asperities: give 2 or more")
         gap = self.gap
         if not gap.max() > 0:
-            raise ValueError("all summits are at one height: they have no density of gaps")
+            raise Refusal("all summits are at one height: they have no density of gaps")
         at = gap / gap.max() * (rows - 1)
         left = np.minimum(at.astype(int), rows - 2)
         share = at - left
@@ -157,12 +158,12 @@ def summits(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     """
     z = surface.z
     if not np.isfinite(z).all():
-        raise ValueError(f"{surface.name}: it has points without height: fill the holes before summits are looked for")
+        raise Refusal(f"{surface.name}: it has points without height: fill the holes before summits are looked for")
     inner = z[1:-1, 1:-1]
     found = inner > _highest_neighbour(z)
     count = int(found.sum())
     if count < LIMITS.summits:
-        raise ValueError(
+        raise Refusal(
             f"{surface.name}: {count} summits are too few for statistics, {LIMITS.summits} are wanted: "
             "measure a larger area"
         )
@@ -186,7 +187,7 @@ def _refuse_steps(surface: HeightMap) -> None:
     inner, highest, lowest = z[1:-1, 1:-1], _highest_neighbour(z), -_highest_neighbour(-z)
     single, shared = int((inner > highest).sum()), int(((inner == highest) & (inner > lowest)).sum())
     if shared > LIMITS.terraces * max(single, 1):
-        raise ValueError(
+        raise Refusal(
             f"{surface.name}: {shared} points are as high as their highest neighbour and {single} above all of them, "
             "so that its heights come in steps and summits cannot be found: give `shortest`, some steps of the grid"
         )

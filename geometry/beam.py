@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks
+from tribodyn.refusal import Refusal
 
 MESH = ("n_patch", "n_length", "n_height")  # numbers of elements or nodes
 
@@ -40,7 +41,7 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self, ("n_patch",), n_length=2)
         if self.patch_length >= self.length / 2:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.patch_length is {self.patch_length}: keep it below half of geometry.length "
                 f"({self.length / 2}), the loads act at mid-span"
             )

@@ -15,6 +15,7 @@ import numpy as np
 
 from tribodyn.geometry import blocks, checks
 from tribodyn.geometry.platform import Platform, Section, between, platform, unit
+from tribodyn.refusal import Refusal
 
 MESH = ("n_along", "n_up", "n_span", "n_through", "n_side", "n_end", "n_root", "n_disk")  # numbers of elements or nodes
 
@@ -81,13 +82,13 @@ class Parameters:
         )  # fmt: skip
         along_axis = self.contact_length * cos(self.shroud_angle)
         if along_axis >= self.shroud_length:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.shroud_length is {self.shroud_length}: give more than {along_axis:.4g} m, what the contact "
                 "face takes along the axis"
             )
         limit = self.hub_radius - self.root_height
         if not 0 <= self.disk_radius < limit:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.disk_radius is {self.disk_radius}: give 0 for no disk, or a radius below {limit:.4g} m, the "
                 "bottom of the root block"
             )
@@ -170,7 +171,7 @@ def _root(p: Parameters) -> Platform:
     ends, v = np.array([0.0, 1.0]), np.full(2, 0.5)
     x = np.array([-p.root_length / 2, *p.root.at(ends, v)[0], p.root_length / 2])
     if not (np.diff(x) > 0).all():
-        raise ValueError(f"geometry.root_length is {p.root_length}: it must be longer than the airfoil at the hub")
+        raise Refusal(f"geometry.root_length is {p.root_length}: it must be longer than the airfoil at the hub")
     line = np.stack([np.column_stack([x, np.zeros(4), np.full(4, r)]) for r in radii])
     half = p.root_fill * p.pitch / 2
     return platform(p.root, radii, turned(line, half), turned(line, -half))

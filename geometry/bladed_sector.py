@@ -19,6 +19,7 @@ import numpy as np
 from tribodyn.geometry import blade, blocks, checks
 from tribodyn.geometry.blade import turned
 from tribodyn.geometry.platform import Platform, platform, unit
+from tribodyn.refusal import Refusal
 
 OF_BLADE = ("n_along", "n_up", "n_span", "n_through", "n_side", "n_end")
 MESH = (*OF_BLADE, "n_platform", "n_neck", "n_flank", "n_axial", "n_slot", "n_post", "n_disk", "n_damper")
@@ -112,37 +113,37 @@ class Parameters:
         checks.numbers(self, lap=(0.0, 0.5), damper_low=(0.0, 1.0), damper_high=(0.0, 1.0), **own)
         _ = self.upper  # refuses what airfoil and shroud cannot be
         if self.bulb_width <= self.neck_width:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.bulb_width is {self.bulb_width}: give more than geometry.neck_width ({self.neck_width}), or "
                 "the root has no flanks to hang on"
             )
         if self.gap_top >= self.gap_bottom:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.gap_top is {self.gap_top}: give less than geometry.gap_bottom ({self.gap_bottom}), or the "
                 "damper flies out"
             )
         if self.damper_low >= self.damper_high:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.damper_low is {self.damper_low}: give less than geometry.damper_high ({self.damper_high})"
             )
         if self.damper_length > self.platform_length:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.damper_length is {self.damper_length}: give at most geometry.platform_length "
                 f"({self.platform_length})"
             )
         if self.disk_radius >= self.bottom:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.disk_radius is {self.disk_radius}: give a radius below {self.bottom:.4g} m, the bottom of "
                 "the slot"
             )
         if self.slot(self.lap)[1] >= self.post_top:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.neck_height is {self.neck_height}: give more than "
                 f"{self.under - self.post_top - self.lap * self.flank_height:.4g}, or the posts of the disk end below "
                 "the flanks of its slot"
             )
         if self.slot(1 + self.lap)[0] >= 0.9 * self.bottom * np.tan(self.pitch / 2):
-            raise ValueError(
+            raise Refusal(
                 f"geometry.bulb_width is {self.bulb_width}: the disk has no room for it between its seams; give less, "
                 "or fewer geometry.n_blades"
             )
@@ -224,7 +225,7 @@ def _platform(p: Parameters) -> Platform:
     section = p.upper.root
     x = np.array([-p.platform_length / 2, *section.at(np.array([0.0, 1.0]), np.full(2, 0.5))[0], p.platform_length / 2])
     if not (np.diff(x) > 0).all():
-        raise ValueError(f"geometry.platform_length is {p.platform_length}: make it longer than the airfoil at the hub")
+        raise Refusal(f"geometry.platform_length is {p.platform_length}: make it longer than the airfoil at the hub")
     edge = [(p.gap_bottom / 2, p.under), (p.gap_top / 2, p.hub_radius)]
     left, right = (
         np.stack([np.column_stack([x, np.full(4, sign * half), np.full(4, r)]) for half, r in edge]) for sign in (1, -1)

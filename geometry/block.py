@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks
+from tribodyn.refusal import Refusal
 
 MESH = ("n_length", "n_width", "n_height")  # numbers of elements
 
@@ -34,7 +35,7 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self, pad_start=None, pad_end=None)
         if not 0 <= self.pad_start <= self.pad_end <= self.length:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.pad_end is {self.pad_end}: give a strip from geometry.pad_start ({self.pad_start}) to "
                 f"at most geometry.length ({self.length})"
             )

@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tribodyn.geometry.gmsh_session import save, session
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
+from tribodyn.refusal import Refusal
 
 SIDES = ("u-", "u+", "v-", "v+", "w-", "w+")
 _JOIN = 1e-3  # nodes nearer than this fraction of the smallest node distance are one node
@@ -111,7 +112,7 @@ def write(path: str | Path, *bodies: JoinedBlocks) -> None:
     names = [*volumes, *surfaces, *points]
     if len(set(names)) < len(names):
         twice = sorted({name for name in names if names.count(name) > 1})
-        raise ValueError(f"{', '.join(twice)} names groups of different dimension: choose different names")
+        raise Refusal(f"{', '.join(twice)} names groups of different dimension: choose different names")
 
     with session() as gmsh:
         mesh = gmsh.model.mesh
@@ -142,7 +143,7 @@ def _lattice(block: Block) -> tuple[np.ndarray, np.ndarray]:
     for axis, vertices in (("u", block.u), ("v", block.v), ("w", block.w)):
         vertices = np.asarray(vertices, dtype=float)
         if vertices.ndim != 1 or len(vertices) < 2 or (np.diff(vertices) <= 0).any():
-            raise ValueError(f"{axis} of a block in '{block.volume}' does not increase: give positions in order")
+            raise Refusal(f"{axis} of a block in '{block.volume}' does not increase: give positions in order")
         line = np.empty(2 * len(vertices) - 1)
         line[::2] = vertices
         line[1::2] = (vertices[1:] + vertices[:-1]) / 2
@@ -177,7 +178,7 @@ def _cells(positions: np.ndarray, numbers: np.ndarray, offset: int) -> np.ndarra
 def _faces(numbers: np.ndarray, side: str) -> np.ndarray:
     """Nine-node faces (k, 9) on one side of the lattice."""
     if side not in SIDES:
-        raise ValueError(f"a block has no side '{side}': the sides are {', '.join(SIDES)}")
+        raise Refusal(f"a block has no side '{side}': the sides are {', '.join(SIDES)}")
     plane = np.take(numbers, 0 if side[1] == "-" else -1, axis="uvw".index(side[0]))
     m, n = ((k - 1) // 2 for k in plane.shape)
     steps = (2 * REFERENCE_POINTS["quad9"]).astype(int)
@@ -196,19 +197,19 @@ def _join(nodes: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
 def _check_cells(cells: np.ndarray, n_node: int) -> None:
     ordered = np.sort(cells, axis=1)
     if (ordered[:, 1:] == ordered[:, :-1]).any():
-        raise ValueError("a block's mapping collapses cells: keep its positions apart")
+        raise Refusal("a block's mapping collapses cells: keep its positions apart")
     rows = np.repeat(cells[:, 0], 26)
     graph = coo_array((np.ones(len(rows)), (rows, cells[:, 1:].ravel())), shape=(n_node, n_node))
     n_part, _ = connected_components(graph, directed=False)
     if n_part > 1:
-        raise ValueError(f"the blocks of one body fall into {n_part} pieces: let their grids meet node to node")
+        raise Refusal(f"the blocks of one body fall into {n_part} pieces: let their grids meet node to node")
 
 
 def _nodes_at(nodes: np.ndarray, positions: Sequence[float] | np.ndarray, name: str, tolerance: float) -> np.ndarray:
     distance, numbers = scipy.spatial.cKDTree(nodes).query(np.atleast_2d(np.asarray(positions, dtype=float)))
     if distance.max() > tolerance:
         at = ", ".join(f"{x:.6g}" for x in np.atleast_2d(positions)[distance.argmax()])
-        raise ValueError(f"no mesh node lies at point '{name}' ({at}) m: place a grid line there")
+        raise Refusal(f"no mesh node lies at point '{name}' ({at}) m: place a grid line there")
     return numbers
 
 

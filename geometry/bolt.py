@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks, rings
+from tribodyn.refusal import Refusal
 
 MESH = ("n_around", "n_grip", "n_nut", "n_end", "n_head")  # numbers of elements
 
@@ -40,13 +41,13 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self, core=(0.1, 0.7))
         if self.n_around % 12:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.n_around is {self.n_around}: give a multiple of 12, for a hexagon about a square"
             )
         if not self.diameter < self.seat_diameter < self.flats:
-            raise ValueError("geometry.seat_diameter must lie between geometry.diameter and geometry.flats")
+            raise Refusal("geometry.seat_diameter must lie between geometry.diameter and geometry.flats")
         if not self.grip + self.nut_height < self.length:
-            raise ValueError("geometry.length must exceed geometry.grip and geometry.nut_height together")
+            raise Refusal("geometry.length must exceed geometry.grip and geometry.nut_height together")
 
 
 def build(parameters: Parameters, path: str | Path) -> None:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
+from tribodyn.refusal import Refusal
+
 MOST = 2000  # elements or nodes along one edge of a part
 
 
@@ -26,13 +28,13 @@ def numbers(parameters: Any, odd: Sequence[str] = (), /, **limits: float | tuple
             low, high = least if isinstance(least, tuple) else (0.0, math.inf)
             if not number or not low <= value <= high or (value == 0 and high == math.inf):
                 wanted = f"from {low:g} to {high:g}" if high < math.inf else "above zero"
-                raise ValueError(f"geometry.{name} is {value!r}: give a number {wanted}")
+                raise Refusal(f"geometry.{name} is {value!r}: give a number {wanted}")
         elif not number or not isinstance(value, int) or value < least:
-            raise ValueError(f"geometry.{name} is {value!r}: give a whole number of at least {least}")
+            raise Refusal(f"geometry.{name} is {value!r}: give a whole number of at least {least}")
         elif value > MOST:
-            raise ValueError(f"geometry.{name} is {value}: give at most {MOST}, a mesh of more has no use")
+            raise Refusal(f"geometry.{name} is {value}: give at most {MOST}, a mesh of more has no use")
         elif name in odd and value % 2 == 0:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.{name} is {value}: give an odd number of nodes, {value - 1} or {value + 1}, "
                 "because second-order elements share their end nodes"
             )

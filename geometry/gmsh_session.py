@@ -8,10 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tribodyn.refusal import Refusal
+
 SYSTEM_LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
 
 
-class GmshUnavailable(ValueError):
+class GmshUnavailable(Refusal):
     """Gmsh cannot be imported on this machine."""
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks, rings
+from tribodyn.refusal import Refusal
 
 MESH = ("n_side", "n_pad", "n_field", "n_lap", "n_end", "n_length")  # numbers of elements
 
@@ -46,9 +47,9 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self)
         if not self.hole < self.pad < min(self.pitch, self.width):
-            raise ValueError("geometry.pad must lie between geometry.hole and the smaller of geometry.pitch and width")
+            raise Refusal("geometry.pad must lie between geometry.hole and the smaller of geometry.pitch and width")
         if not self.holes * self.pitch < self.lap < self.length:
-            raise ValueError(
+            raise Refusal(
                 "geometry.lap must exceed geometry.holes times geometry.pitch, and geometry.length the lap"
             )
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks
+from tribodyn.refusal import Refusal
 
 MESH = ("n_column", "n_row", "n_web", "n_thickness")  # numbers of elements or nodes
 
@@ -46,19 +47,19 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self, ("n_column", "n_row"), n_column=5, bow=None, pin_height=None, pin_column=0)
         if self.angle >= np.pi:
-            raise ValueError(f"geometry.angle is {self.angle}: keep the sector below pi radians")
+            raise Refusal(f"geometry.angle is {self.angle}: keep the sector below pi radians")
         if self.height >= 2 * self.radius:
-            raise ValueError(f"geometry.height is {self.height}: keep it below twice geometry.radius ({self.radius})")
+            raise Refusal(f"geometry.height is {self.height}: keep it below twice geometry.radius ({self.radius})")
         if 2 * self.pin_column >= self.n_column - 1:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.pin_column is {self.pin_column}: keep it below {(self.n_column - 1) // 2}, "
                 "the middle column, so that there are two pins"
             )
         room = self.height / 2 - self.patch_height - self.pin_width / 2
         if not np.isfinite(self.bow):
-            raise ValueError(f"geometry.bow is {self.bow}: give a finite length (metres)")
+            raise Refusal(f"geometry.bow is {self.bow}: give a finite length (metres)")
         if not abs(self.pin_height) < room:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.pin_height is {self.pin_height}: the seats of the pins must lie between the patches, "
                 f"keep it between {-room:.4g} and {room:.4g}"
             )

@@ -12,6 +12,7 @@ from skfem.quadrature import get_quadrature
 from tribodyn.geometry.sources import read as sources, solid
 from tribodyn.geometry.sources.cad import Sizes
 from tribodyn.geometry.sources.deck import Deck
+from tribodyn.refusal import Refusal
 
 Groups = dict[str, np.ndarray]
 
@@ -36,7 +37,7 @@ def read_with_notes(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, 
     body = solid.build(raw)
     lost = sources.lost(raw, {"": body})
     if lost and raw.deck == Deck() and Path(path).suffix.lower() == ".msh":
-        raise ValueError(f"mesh file '{path}' has {lost[0]}")
+        raise Refusal(f"mesh file '{path}' has {lost[0]}")
     quality(body.mesh)
     kinds = [f.name for f in fields(Deck) if getattr(raw.deck, f.name)]
     left = [f"its {', '.join(kinds)}: bring it as [decks.NAME] to use them"] if kinds else []
@@ -85,7 +86,7 @@ def quality(mesh: Any) -> Quality:
     if not lowest > 0.0:
         centre = ", ".join(f"{1e3 * x:.4g}" for x in mesh.p[:, mesh.t[:, element]].mean(axis=1))
         inverted = int((~(scaled > 0.0)).any(axis=1).sum())
-        raise ValueError(
+        raise Refusal(
             f"{inverted} of {mesh.nelements} mesh elements are inverted or degenerate, the worst at ({centre}) mm: "
             "refine the mesh there or soften the shape"
         )

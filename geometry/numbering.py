@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tribodyn.refusal import Refusal
+
 # The order of meshio, which is VTK's.
 HEX_CORNERS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
@@ -44,5 +46,5 @@ def permutation(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     distance = np.abs(source[None, :, :] - target[:, None, :]).max(axis=2)
     order = distance.argmin(axis=1)
     if len(source) != len(target) or distance.min(axis=1).max() > 1e-9:
-        raise ValueError("the two node numberings do not describe the same element: give both on one reference element")
+        raise Refusal("the two node numberings do not describe the same element: give both on one reference element")
     return order

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks, rings
+from tribodyn.refusal import Refusal
 
 MESH = ("n_around", "n_height")  # numbers of elements
 
@@ -29,11 +30,11 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self)
         if self.n_around % 6:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.n_around is {self.n_around}: give a multiple of 6, for the corners of a hexagon"
             )
         if not self.bore < self.seat_diameter < self.flats:
-            raise ValueError("geometry.seat_diameter must lie between geometry.bore and geometry.flats")
+            raise Refusal("geometry.seat_diameter must lie between geometry.bore and geometry.flats")
 
 
 def build(parameters: Parameters, path: str | Path) -> None:

@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from tribodyn import declare
+from tribodyn.refusal import Refusal
 
 _FOLDER = Path(__file__).parent
 
@@ -31,7 +32,7 @@ def file_of(name: str) -> Path:
     """The file of a part; raises ValueError with the parts that there are."""
     file = _FOLDER / f"{name}.py"
     if file.parent != _FOLDER or not file.is_file() or not _is_part(file):
-        raise ValueError(f"there is no part '{name}': the parts are {', '.join(names())}, or give a file my_part.py")
+        raise Refusal(f"there is no part '{name}': the parts are {', '.join(names())}, or give a file my_part.py")
     return file
 
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import skfem
 
+from tribodyn.refusal import Refusal
+
 MOST = 1000  # elements of a body that are looked at
 SHARE = 0.01  # of them inside another body, from which on the two overlap: a press fit reaches into no middle
 BLOCK = 2_000_000  # points times triangles at once
@@ -41,7 +43,7 @@ def taken(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) -> tuple[
     """
     volumes = mesh.subdomains or {}
     if volume not in volumes:
-        raise ValueError(f"the mesh has no volume '{volume}'; it has {', '.join(sorted(volumes)) or 'none'}")
+        raise Refusal(f"the mesh has no volume '{volume}'; it has {', '.join(sorted(volumes)) or 'none'}")
     elements = np.sort(volumes[volume])
     corners, t = np.unique(mesh.t[:, elements], return_inverse=True)
     first = skfem.MeshTet1 if mesh.elem.refdom.nnodes == 4 else skfem.MeshHex1

@@ -14,6 +14,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from skfem import ElementHex1, ElementTetP1, MeshHex, MeshHex2, MeshTet, MeshTet2
 
+from tribodyn.refusal import Refusal
+
 Groups = dict[str, np.ndarray]
 
 
@@ -35,12 +37,12 @@ def corners_alone(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> 
     Raises  ValueError, which names the body, for tetrahedra or curved elements
     """
     if not isinstance(mesh, MeshHex2):
-        raise ValueError(f"elements = \"linear_reduced\" needs hexahedra, and body '{name}' has tetrahedra")
+        raise Refusal(f"elements = \"linear_reduced\" needs hexahedra, and body '{name}' has tetrahedra")
     n, points = mesh.nvertices, np.asarray(mesh.doflocs)
     middle = points[:, mesh.edges].mean(axis=1)
     off = np.abs(points[:, mesh.dofs.edge_dofs[0]] - middle).max(axis=0)
     if (off > 1e-6 * np.linalg.norm(np.ptp(points[:, mesh.edges], axis=1), axis=0)).any():
-        raise ValueError(
+        raise Refusal(
             f"elements = \"linear_reduced\" needs elements of first order, and body '{name}' has curved ones"
         )
     plain: Any = MeshHex(points[:, :n].copy(), mesh.t, sort_t=False)

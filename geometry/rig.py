@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -105,22 +106,22 @@ class Parameters:
             ("shaker_distance", self.solid_length - 0.01, "the free length without the slot less 10 mm"),
         ):
             if getattr(self, name) > largest:
-                raise ValueError(f"geometry.{name} is {getattr(self, name)}: keep it within {what}, {largest:.4g} m")
+                raise Refusal(f"geometry.{name} is {getattr(self, name)}: keep it within {what}, {largest:.4g} m")
         if self.free_length > checks.MOST * self.longest:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.longest is {self.longest}: the free length of {self.free_length:g} m takes more than "
                 f"{checks.MOST} such elements; give at least {self.free_length / checks.MOST:.4g} m"
             )
         if self.slot_length <= OURS.specimen_side:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.slot_length is {self.slot_length}: the lower specimen needs {OURS.specimen_side} m"
             )
         if self.root_length >= self.column_length:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.root_length is {self.root_length}: keep it below column_length ({self.column_length})"
             )
         if self.slot_height <= self.height / 2:
-            raise ValueError(f"geometry.slot_height is {self.slot_height}: keep it above half of geometry.height")
+            raise Refusal(f"geometry.slot_height is {self.slot_height}: keep it above half of geometry.height")
 
     @property
     def contact_x(self) -> float:

@@ -16,6 +16,8 @@ import scipy
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
+from tribodyn.refusal import Refusal
+
 GAUSS_CONSTANT = np.sqrt(np.log(2) / np.pi)
 """alpha of ISO 16610-21: a wave as long as the cut-off passes with one half of its amplitude."""
 
@@ -65,15 +67,15 @@ class HeightMap:
 
     def __post_init__(self) -> None:
         if self.z.shape != (len(self.x), len(self.y)):
-            raise ValueError(
+            raise Refusal(
                 f"{self.name}: heights have shape {self.z.shape} but the axes {len(self.x)} and {len(self.y)} points"
             )
         if min(self.z.shape) < 4:
-            raise ValueError(f"{self.name}: {self.z.shape[0]} x {self.z.shape[1]} points are too few for a face")
+            raise Refusal(f"{self.name}: {self.z.shape[0]} x {self.z.shape[1]} points are too few for a face")
         for axis, values in (("x", self.x), ("y", self.y)):
             steps = np.diff(values)
             if not (np.isfinite(values).all() and (steps > 0).all() and np.ptp(steps) <= 1e-3 * steps.mean()):
-                raise ValueError(f"{self.name}: {axis} is not growing in equal steps: resample it to a regular grid")
+                raise Refusal(f"{self.name}: {axis} is not growing in equal steps: resample it to a regular grid")
 
     @property
     def spacing(self) -> tuple[float, float]:
@@ -125,26 +127,26 @@ def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) 
     """
     name = surface.name
     if not np.isfinite(surface.z).any():
-        raise ValueError(f"{name}: no point has a height: check the file and its missing-value code")
+        raise Refusal(f"{name}: no point has a height: check the file and its missing-value code")
     for axis, side in zip("xy", surface.size, strict=True):
         if not LIMITS.smallest <= side <= LIMITS.largest:
-            raise ValueError(f"{name}: it is {side:g} m long in {axis}: give the lateral unit, 1e-6 for micrometres")
+            raise Refusal(f"{name}: it is {side:g} m long in {axis}: give the lateral unit, 1e-6 for micrometres")
     if expected_size is not None:
         for axis, side, wanted in zip("xy", surface.size, expected_size, strict=True):
             if not 0.98 * wanted <= side <= 5 * wanted:
-                raise ValueError(
+                raise Refusal(
                     f"{name}: it covers {side:g} m in {axis} but the contact {wanted:g} m: are map and unit right?"
                 )
     slopes = [np.abs(np.diff(surface.z, axis=axis)) / step for axis, step in enumerate(surface.spacing)]
     known = np.concatenate([slope[np.isfinite(slope)] for slope in slopes])
     if known.size and np.median(known) > LIMITS.steepest:
-        raise ValueError(
+        raise Refusal(
             f"{name}: its median slope is {np.median(known):.3g}, steeper than any machined face: "
             "give the height unit, such as 1e-6 for micrometres"
         )
     span = np.nanmax(surface.z) - np.nanmin(surface.z)
     if 0 < span < LIMITS.flattest:
-        raise ValueError(f"{name}: peak to valley is {span:.3g} m, less than an atom: give the height unit")
+        raise Refusal(f"{name}: peak to valley is {span:.3g} m, less than an atom: give the height unit")
 
 
 def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
@@ -163,7 +165,7 @@ def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     if count == 0:
         return surface, []
     if count > LIMITS.spikes * measured.sum():
-        raise ValueError(
+        raise Refusal(
             f"{surface.name}: {count} of {measured.sum()} points are spikes: this is noise, not a face with outliers"
         )
     largest = distance[spikes].max()
@@ -182,7 +184,7 @@ def fill_holes(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     if count == 0:
         return surface, []
     if count > LIMITS.holes * holes.size:
-        raise ValueError(
+        raise Refusal(
             f"{surface.name}: {100 * count / holes.size:.0f} % of its points have no height, more than "
             f"{100 * LIMITS.holes:.0f} %: measure again or crop it"
         )
@@ -233,9 +235,9 @@ def split(surface: HeightMap, cutoff: float) -> tuple[HeightMap, HeightMap]:
         linear fit with the same weights, which keeps planes (moment criterion of ISO 16610-28)
     """
     if not np.isfinite(surface.z).all():
-        raise ValueError(f"{surface.name}: it has points without height: fill the holes before filtering")
+        raise Refusal(f"{surface.name}: it has points without height: fill the holes before filtering")
     if not 2 * max(surface.spacing) <= cutoff <= min(surface.size):
-        raise ValueError(
+        raise Refusal(
             f"{surface.name}: cutoff {cutoff:g} m must lie between two steps of the grid "
             f"({2 * max(surface.spacing):g} m) and the shorter side ({min(surface.size):g} m)"
         )
@@ -271,7 +273,7 @@ def centred(surface: HeightMap) -> HeightMap:
 def mirrored(surface: HeightMap, axis: str) -> HeightMap:
     """The map seen from behind: reversed along "x" or "y", in the same place."""
     if axis not in ("x", "y"):
-        raise ValueError(f"cannot mirror along {axis!r}: give x or y")
+        raise Refusal(f"cannot mirror along {axis!r}: give x or y")
     return replace(surface, z=np.flip(surface.z, 0 if axis == "x" else 1))
 
 
@@ -286,22 +288,22 @@ def onto_nodes(surface: HeightMap, nodes: np.ndarray, cells_across: int = 8) -> 
     """
     nodes = np.asarray(nodes, float).reshape(-1, 2)
     if not np.isfinite(surface.z).all():
-        raise ValueError(f"{surface.name}: it has points without height: fill the holes before it meets the nodes")
+        raise Refusal(f"{surface.name}: it has points without height: fill the holes before it meets the nodes")
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     for k, (axis, step) in enumerate(zip((surface.x, surface.y), surface.spacing, strict=True)):
         if low[k] < axis[0] - step / 2 or high[k] > axis[-1] + step / 2:
-            raise ValueError(
+            raise Refusal(
                 f"{surface.name}: it spans {axis[0]:g} to {axis[-1]:g} m in {'xy'[k]} but the contact nodes "
                 f"{low[k]:g} to {high[k]:g} m: centre it on the patch or measure the whole face"
             )
     try:
         sides = scipy.spatial.ConvexHull(nodes).equations
     except (scipy.spatial.QhullError, ValueError):
-        raise ValueError(f"{surface.name}: {len(nodes)} contact nodes on a line span no area to average over") from None
+        raise Refusal(f"{surface.name}: {len(nodes)} contact nodes on a line span no area to average over") from None
     tree = scipy.spatial.cKDTree(nodes)
     distance = tree.query(nodes, 2)[0][:, 1].min()
     if not distance > 0:
-        raise ValueError(f"{surface.name}: two contact nodes are in the same place")
+        raise Refusal(f"{surface.name}: two contact nodes are in the same place")
     counts = [
         ceil(side / min(step, distance / cells_across) - 1e-9)
         for side, step in zip(high - low, surface.spacing, strict=True)
@@ -326,7 +328,7 @@ def facing_gap(heights_1: np.ndarray, heights_2: np.ndarray, mating_height: floa
     """
     together = np.asarray(heights_1, float) + np.asarray(heights_2, float)
     if not np.isfinite(together).all():
-        raise ValueError("a contact node has no height: fill the holes of both height maps first")
+        raise Refusal("a contact node has no height: fill the holes of both height maps first")
     return together.max() - together - mating_height
 
 
@@ -348,7 +350,7 @@ def synthetic_pair(
     """
     for name, value in (("size", min(size)), ("spacing", spacing)):
         if not value > 0:
-            raise ValueError(f"{name} of the synthetic pair must be positive")
+            raise Refusal(f"{name} of the synthetic pair must be positive")
     random = np.random.default_rng(seed)
     x, y = (np.linspace(-side / 2, side / 2, round(side / spacing) + 1) for side in size)
     across, width = (x[:, None], size[0]) if size[0] <= size[1] else (y[None, :], size[1])

@@ -15,6 +15,7 @@ import numpy as np
 
 from tribodyn.extras import package
 from tribodyn.geometry.surface import HeightMap
+from tribodyn.refusal import Refusal
 
 TEXT_ENDINGS = (".txt", ".xyz", ".csv", ".asc", ".dat", ".tsv", ".prn")
 """Endings read as text; others that are not SDF go to surfalize."""
@@ -41,14 +42,14 @@ def read(
     """
     path = Path(path)
     if not path.is_file():
-        raise ValueError(f"there is no height map {path}: check the name and the folder")
+        raise Refusal(f"there is no height map {path}: check the name and the folder")
     with path.open("rb") as stream:
         head = stream.read(16)
     if not head:
-        raise ValueError(f"{path.name} is empty: export the height map again")
+        raise Refusal(f"{path.name} is empty: export the height map again")
     is_text = path.suffix.lower() in TEXT_ENDINGS and not looks_like_sdf(head)
     if not is_text and (spacing is not None or lateral_unit != 1.0 or height_unit != 1.0):
-        raise ValueError(f"{path.name} carries its own units: leave out spacing, lateral_unit and height_unit")
+        raise Refusal(f"{path.name} carries its own units: leave out spacing, lateral_unit and height_unit")
     if looks_like_sdf(head):
         return read_sdf(path)
     if not is_text:
@@ -56,11 +57,11 @@ def read(
     table = _numbers(path)
     if spacing is None:
         if table.shape[1] != 3:
-            raise ValueError(f"{path.name} has {table.shape[1]} columns, not x y z: give spacing if it is a matrix")
+            raise Refusal(f"{path.name} has {table.shape[1]} columns, not x y z: give spacing if it is a matrix")
         x, y, z = _gridded(table, path.name)
     else:
         if not (len(spacing) == 2 and min(spacing) > 0):
-            raise ValueError(f"spacing of {path.name} is {spacing}: give two positive steps, along x and along y")
+            raise Refusal(f"spacing of {path.name} is {spacing}: give two positive steps, along x and along y")
         z = table.T
         x, y = (np.arange(n) * step for n, step in zip(z.shape, spacing, strict=True))
     return HeightMap(x * lateral_unit, y * lateral_unit, z * height_unit, path.name)
@@ -80,12 +81,12 @@ def _numbers(path: Path) -> np.ndarray:
             rows.append([_number(word) for word in words])
         except ValueError:
             if rows:
-                raise ValueError(f"{path.name} has words in line {number}, after its first heights") from None
+                raise Refusal(f"{path.name} has words in line {number}, after its first heights") from None
     if not rows:
-        raise ValueError(f"{path.name} holds no numbers: is it a height map?")
+        raise Refusal(f"{path.name} holds no numbers: is it a height map?")
     widths = {len(row) for row in rows}
     if len(widths) > 1:
-        raise ValueError(f"{path.name} has lines of {min(widths)} to {max(widths)} numbers: all must be equally long")
+        raise Refusal(f"{path.name} has lines of {min(widths)} to {max(widths)} numbers: all must be equally long")
     return np.array(rows)
 
 
@@ -96,23 +97,23 @@ def _number(word: str) -> float:
 def _gridded(table: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Axes and heights (nx, ny) from scattered rows x y z of a regular grid; points that are not listed are NaN."""
     if not np.isfinite(table[:, :2]).all():
-        raise ValueError(f"{name} has coordinates that are not numbers")
+        raise Refusal(f"{name} has coordinates that are not numbers")
     axes, places = [], []
     for values in table[:, :2].T:
         ordered = np.unique(values)
         if len(ordered) < 2:
-            raise ValueError(f"{name} has a single value in x or y: a height map needs a grid")
+            raise Refusal(f"{name} has a single value in x or y: a height map needs a grid")
         steps = np.diff(ordered)
         step = np.median(steps[steps > 1e-3 * steps.max()])
         count = round((ordered[-1] - ordered[0]) / step) + 1
         place = np.rint((values - ordered[0]) / step).astype(int)
         if np.abs((values - ordered[0]) / step - place).max() > 0.05 or count > 10 * len(table):
-            raise ValueError(f"{name} has points off a regular grid of step {step:g}: resample it to a grid")
+            raise Refusal(f"{name} has points off a regular grid of step {step:g}: resample it to a grid")
         axes.append(np.linspace(ordered[0], ordered[-1], count))
         places.append(place)
     cells = places[0] * len(axes[1]) + places[1]
     if len(np.unique(cells)) < len(cells):
-        raise ValueError(f"{name} lists a point of the grid twice")
+        raise Refusal(f"{name} lists a point of the grid twice")
     z = np.full(len(axes[0]) * len(axes[1]), np.nan)
     z[cells] = table[:, 2]
     return axes[0], axes[1], z.reshape(len(axes[0]), len(axes[1]))
@@ -123,7 +124,7 @@ def _through_surfalize(path: Path) -> HeightMap:
     try:
         surface = surfalize.Surface.load(path)
     except Exception as problem:  # the readers raise what they meet
-        raise ValueError(f"{path.name} cannot be read by surfalize: {problem}") from None
+        raise Refusal(f"{path.name} cannot be read by surfalize: {problem}") from None
     z = np.asarray(surface.data, float).T * 1e-6  # surfalize works in micrometres
     x, y = (np.arange(n) * step * 1e-6 for n, step in zip(z.shape, (surface.step_x, surface.step_y), strict=True))
     return HeightMap(x, y, z, path.name)
@@ -147,7 +148,7 @@ def read_sdf(path: Path) -> HeightMap:
     content = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     magic = MAGIC.match(content)
     if magic is None:
-        raise ValueError(f"{path.name} is not a surface data file: it must begin with aISO-1.0 or its kin")
+        raise Refusal(f"{path.name} is not a surface data file: it must begin with aISO-1.0 or its kin")
     version = magic[2].decode()
     if magic[1] in b"aA":
         header, raw = _text(content, path.name)
@@ -155,13 +156,13 @@ def read_sdf(path: Path) -> HeightMap:
         header, raw = _binary(content, version, path.name)
     n_x, n_y = int(header["numpoints"]), int(header["numprofiles"])
     if raw.size != n_x * n_y:
-        raise ValueError(f"{path.name} holds {raw.size} heights but announces {n_x} x {n_y}: is it complete?")
+        raise Refusal(f"{path.name} holds {raw.size} heights but announces {n_x} x {n_y}: is it complete?")
     if not (header["xscale"] > 0 and header["yscale"] > 0 and header["zscale"] != 0):
-        raise ValueError(f"{path.name} has a scale of zero: a height map needs Xscale, Yscale and Zscale")
+        raise Refusal(f"{path.name} has a scale of zero: a height map needs Xscale, Yscale and Zscale")
     missing = ~np.isfinite(raw)
     stored = TYPES.get(int(header["datatype"]))
     if stored is None:
-        raise ValueError(f"{path.name} has DataType {header['datatype']:g}: the types 0 to 7 are known")
+        raise Refusal(f"{path.name} has DataType {header['datatype']:g}: the types 0 to 7 are known")
     from_above = version.startswith("BC")
     if from_above:
         missing |= raw >= (LARGE.get(stored) or np.iinfo(stored).max)
@@ -177,7 +178,7 @@ def read_sdf(path: Path) -> HeightMap:
 def _text(content: bytes, name: str) -> tuple[Header, np.ndarray]:
     records = re.split(r"^\s*\*\s*$", content.decode("ascii", errors="replace"), flags=re.MULTILINE)
     if len(records) < 2:
-        raise ValueError(f"{name} has no line with a star between header and heights: is it complete?")
+        raise Refusal(f"{name} has no line with a star between header and heights: is it complete?")
     pairs = (line.split(";")[0].partition("=") for line in records[0].splitlines()[1:])
     entries = {key.strip().lower(): value.strip() for key, _, value in pairs}
     header: Header = {}
@@ -185,20 +186,20 @@ def _text(content: bytes, name: str) -> tuple[Header, np.ndarray]:
         try:
             header[key.lower()] = _finite(entries.get(key.lower(), ""))
         except ValueError:
-            raise ValueError(f"{name} lacks a number for {key} in its header") from None
+            raise Refusal(f"{name} lacks a number for {key} in its header") from None
     if header["compression"]:
-        raise ValueError(f"{name} is compressed: write it uncompressed")
+        raise Refusal(f"{name} is compressed: write it uncompressed")
     words = re.sub(r";.*", "", records[1]).upper().replace("BAD", "NAN").split()
     try:
         return header, np.array(words, dtype=float)
     except ValueError:
-        raise ValueError(f"{name} has heights that are not numbers") from None
+        raise Refusal(f"{name} has heights that are not numbers") from None
 
 
 def _finite(word: str) -> float:
     number = float(word)
     if not np.isfinite(number):
-        raise ValueError(f"{word} is no finite number")
+        raise Refusal(f"{word} is no finite number")
     return number
 
 
@@ -206,10 +207,10 @@ def _binary(content: bytes, version: str, name: str) -> tuple[Header, np.ndarray
     count = "I" if version == "ISO-2.0" else "H"
     layout = struct.Struct(f"<8s10s12s12s{count}{count}4d3B")
     if len(content) < layout.size:
-        raise ValueError(f"{name} ends within its header: is it complete?")
+        raise Refusal(f"{name} ends within its header: is it complete?")
     n_x, n_y, x_scale, y_scale, z_scale, _, compression, kind, _ = layout.unpack_from(content)[4:]
     if compression or kind not in TYPES:
-        raise ValueError(f"{name} is compressed or has the unknown DataType {kind}: write it plain, types 0 to 7")
+        raise Refusal(f"{name} is compressed or has the unknown DataType {kind}: write it plain, types 0 to 7")
     available = (len(content) - layout.size) // np.dtype(TYPES[kind]).itemsize
     raw = np.frombuffer(content, TYPES[kind], min(n_x * n_y, available), layout.size).astype(float)
     keys = ("numpoints", "numprofiles", "xscale", "yscale", "zscale", "datatype")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks, rings
+from tribodyn.refusal import Refusal
 
 MESH = ("n_around", "n_across")  # numbers of elements
 
@@ -25,9 +26,9 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self)
         if self.n_around < 4:
-            raise ValueError(f"geometry.n_around is {self.n_around}: give 4 or more")
+            raise Refusal(f"geometry.n_around is {self.n_around}: give 4 or more")
         if not self.bore < self.diameter:
-            raise ValueError("geometry.bore must be less than geometry.diameter")
+            raise Refusal("geometry.bore must be less than geometry.diameter")
 
 
 def build(parameters: Parameters, path: str | Path) -> None:

@@ -27,6 +27,7 @@ from tribodyn.hbm.linear import pair_slopes
 from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
 from tribodyn.hbm.linear.speed_line import LineCompliance, compliance_of
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 
 ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
 NEARLY_ALL = 0.03  # share of the flexibility that products may leave out and still find Newton's directions alone
@@ -105,7 +106,7 @@ class HarmonicBalance:
         Raises  ValueError where joints, loads or frequency do not fit the model
         """
         if not 0 < omega_max < np.inf:
-            raise ValueError(f"the highest frequency is {omega_max} rad/s: give a finite one above zero")
+            raise Refusal(f"the highest frequency is {omega_max} rad/s: give a finite one above zero")
         contact = Contact.of(model, joints)
         if memory is None:
             memory = np.zeros((contact.n_pair, contact.n_state))
@@ -173,7 +174,7 @@ class HarmonicBalance:
         """The same problem with fewer of its harmonics; raises ValueError for unknown ones and ones a load needs."""
         lacking = [h for h in harmonics if h not in self.basis.harmonics]
         if lacking:
-            raise ValueError(f"harmonics {lacking} are not among those of the balance, {self.basis.harmonics}")
+            raise Refusal(f"harmonics {lacking} are not among those of the balance, {self.basis.harmonics}")
         basis = replace(self.basis, harmonics=tuple(harmonics))
         self.excitation.check(basis, {name: None for _, name in self.excitation.loads})
         return replace(self, basis=basis, compliance=self.compliance.restricted(basis))
@@ -323,7 +324,7 @@ class Linearisation:
         """G, the stuck springs (n_contact,) [N/m], the contact cycle at x with its derivative, what `nearly` lacks."""
         jac = cycle.jacobian
         if jac is None:
-            raise ValueError("linearise needs a state evaluated with its contact derivative")
+            raise Refusal("linearise needs a state evaluated with its contact derivative")
         n_pair, n_comp, n_coeff = x.shape
         self.active, self._dg = pair_slopes.departures(jac, stiffness.reshape(n_pair, n_comp))
         self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()

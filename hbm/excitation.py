@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,14 @@ class Excitation:
     def check(self, basis: HarmonicBasis, known: Mapping[str, object]) -> None:
         """Raise ValueError where a load is unknown or no finite number, or its harmonic is not kept."""
         if self.base is not None and not np.all(np.isfinite(self.base)):
-            raise ValueError("the prescribed motion of body 2 must be finite")
+            raise Refusal("the prescribed motion of body 2 must be finite")
         for (h, name), value in self.loads.items():
             if not np.isfinite(value):
-                raise ValueError(f"load '{name}' is {value}: give a finite number")
+                raise Refusal(f"load '{name}' is {value}: give a finite number")
             if name not in known:
-                raise ValueError(f"no load '{name}' in the model: it has {', '.join(sorted(known)) or 'none'}")
+                raise Refusal(f"no load '{name}' in the model: it has {', '.join(sorted(known)) or 'none'}")
             if value != 0 and h not in basis.harmonics:
-                raise ValueError(f"load '{name}' acts in harmonic {h}, which is not kept: keep it in {basis.harmonics}")
+                raise Refusal(f"load '{name}' acts in harmonic {h}, which is not kept: keep it in {basis.harmonics}")
 
     def force(self, h: int, vectors: Mapping[str, np.ndarray], n: int) -> np.ndarray:
         """Amplitude (n,) of the loads of a harmonic [N]; vectors : unit loads (n,) by name, others are left out."""

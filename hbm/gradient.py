@@ -29,6 +29,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.krylov import gmres
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import SolverFailure
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Rules:
 RULES = Rules()
 
 
-class NoDerivative(RuntimeError):
+class NoDerivative(SolverFailure):
     """There is no derivative here; the message says why."""
 
 

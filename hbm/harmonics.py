@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from tribodyn.refusal import Refusal
+
 
 @dataclass(frozen=True)
 class HarmonicBasis:
@@ -24,16 +26,16 @@ class HarmonicBasis:
 
     def __post_init__(self) -> None:
         if not self.harmonics or self.harmonics[0] < 0 or any(np.diff(self.harmonics) <= 0):
-            raise ValueError(f"harmonics must be a strictly increasing set of integers >= 0, not {self.harmonics}")
+            raise Refusal(f"harmonics must be a strictly increasing set of integers >= 0, not {self.harmonics}")
         if self.harmonics == (0,):
-            raise ValueError("harmonics (0,) alone describe no vibration: keep at least one harmonic >= 1")
+            raise Refusal("harmonics (0,) alone describe no vibration: keep at least one harmonic >= 1")
         if self.n_samples <= 2 * self.harmonics[-1]:
-            raise ValueError(
+            raise Refusal(
                 f"{self.n_samples} time samples cannot carry harmonic {self.harmonics[-1]}: "
                 f"take at least {2 * self.harmonics[-1] + 1}"
             )
         if self.transitions not in ("sampled", "located"):
-            raise ValueError(f"transitions must be 'sampled' or 'located', not '{self.transitions}'")
+            raise Refusal(f"transitions must be 'sampled' or 'located', not '{self.transitions}'")
 
     @cached_property
     def has_static(self) -> bool:

@@ -21,6 +21,7 @@ from tribodyn.hbm.linear.mistuned import Alike, MistunedCompliance
 from tribodyn.reduction.cyclic import ReducedSector, travelling_wave
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 
 Change = Callable[[ContactParameters, np.ndarray], ContactParameters]
 """Makes the parameters of a joint of sectors that differ from its own and the sector (n_pair,) of each pair."""
@@ -138,4 +139,4 @@ class MistunedWheel:
 
 
 def _no_system(h: int) -> NoReturn:
-    raise ValueError("sectors that differ have no system of one harmonic: stability and integration in time need one")
+    raise Refusal("sectors that differ have no system of one harmonic: stability and integration in time need one")

@@ -15,6 +15,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal
 
 EXACT = 1e-11  # relative residual of the state at rest
 
@@ -26,7 +27,7 @@ def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None 
     Raises  ValueError where the contact does not settle
     """
     if not balance.basis.has_static:
-        raise ValueError("a preload without friction needs harmonic 0: keep it in harmonics.kept")
+        raise Refusal("a preload without friction needs harmonic 0: keep it in harmonics.kept")
     few = balance if 1 not in balance.basis.harmonics else balance.with_harmonics((0, 1))
     smooth = few.contact.with_parameters(lambda p: p.scaled("friction", 0.0) if "friction" in p.numbers else p)
     still = few.with_contact(smooth).with_load(0.0)
@@ -42,7 +43,7 @@ def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None 
         start[:, balance.contact.components.index("n"), 0] += gap
         solved = solve(still, start)
     if not solved.converged:
-        raise ValueError(f"preload: the contact does not settle without friction ({solved.outcome})")
+        raise Refusal(f"preload: the contact does not settle without friction ({solved.outcome})")
     return solved.state.x[:, :, 0]
 
 

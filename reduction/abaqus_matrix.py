@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from tribodyn.refusal import Refusal
+
 Labels = tuple[tuple[int, int], ...]
 """(node, component 1..6) of each row of a matrix."""
 
@@ -37,13 +39,13 @@ def read(path: Path) -> tuple[sp.csr_matrix, Labels | None]:
     try:
         table = np.loadtxt(rows, ndmin=2)
     except ValueError:
-        raise ValueError(f"{path.name} has lines that are not numbers or not equally many: export it again") from None
+        raise Refusal(f"{path.name} has lines that are not numbers or not equally many: export it again") from None
     if table.shape[1] not in (3, 5):
-        raise ValueError(f"{path.name} has {table.shape[1]} columns: node, dof, node, dof, value or row, column, value")
+        raise Refusal(f"{path.name} has {table.shape[1]} columns: node, dof, node, dof, value or row, column, value")
     whole = (np.abs(table[:, :-1]) < 2**53) & (table[:, :-1] == np.round(table[:, :-1]))
     index = np.where(whole, table[:, :-1], 0).astype(np.int64)
     if not whole.all():
-        raise ValueError(f"{path.name} has node, dof or row numbers that are not whole: is the last column the value?")
+        raise Refusal(f"{path.name} has node, dof or row numbers that are not whole: is the last column the value?")
     labels = None
     if table.shape[1] == 5:
         both = np.concatenate([index[:, :2], index[:, 2:]])
@@ -53,7 +55,7 @@ def read(path: Path) -> tuple[sp.csr_matrix, Labels | None]:
         size = len(labels)
     else:
         if index.min() < 1:
-            raise ValueError(f"{path.name} has row {index.min()}: rows count from 1 in FORMAT=COORDINATE")
+            raise Refusal(f"{path.name} has row {index.min()}: rows count from 1 in FORMAT=COORDINATE")
         row, column = index.T - 1
         size = int(index.max())
     below, above = (row > column).any(), (row < column).any()
@@ -71,7 +73,7 @@ def onto(matrix: sp.csr_matrix, labels: Labels, wanted: Labels, what: str) -> sp
     unknown = [label for label in labels if label not in place]
     if unknown:
         node, component = unknown[0]
-        raise ValueError(f"the {what} has node {node} component {component}, which the stiffness matrix lacks")
+        raise Refusal(f"the {what} has node {node} component {component}, which the stiffness matrix lacks")
     to = np.array([place[label] for label in labels])
     entries = matrix.tocoo()
     return sp.coo_matrix((entries.data, (to[entries.row], to[entries.col])), shape=(len(wanted),) * 2).tocsr()

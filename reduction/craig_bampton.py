@@ -21,6 +21,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.refusal import Refusal
 
 
 def craig_bampton(
@@ -48,7 +49,7 @@ def craig_bampton(
     K, M = csr_matrix(system.stiffness), csr_matrix(system.mass)
     s, m = partition(system.n_dof, master_dofs(system, interface, extra_masters), "master")
     if not len(s):
-        raise ValueError("Craig-Bampton: every DOF is a master, nothing is left to reduce: use the matrices")
+        raise Refusal("Craig-Bampton: every DOF is a master, nothing is left to reduce: use the matrices")
     K_ss, M_ss = K[s][:, s], M[s][:, s]
     factor = factorise(K_ss, solver=solver)
     omega, phi, omitted = fixed_interface_modes(K_ss, M_ss, factor, n_modes, cutoff)
@@ -124,9 +125,9 @@ def fixed_interface_modes(
     """
     n_slave = K_ss.shape[0]
     if (n_modes is None) == (cutoff is None):
-        raise ValueError("Craig-Bampton: give the number of modes or the cutoff frequency, one of the two")
+        raise Refusal("Craig-Bampton: give the number of modes or the cutoff frequency, one of the two")
     if n_modes is not None and not 0 <= n_modes <= n_slave:
-        raise ValueError(f"Craig-Bampton: {n_modes} modes were asked of {n_slave} DOFs that are not masters")
+        raise Refusal(f"Craig-Bampton: {n_modes} modes were asked of {n_slave} DOFs that are not masters")
     wanted, below = 16 if n_modes is None else n_modes, None
     while True:
         omega, phi = modes(K_ss, M_ss, min(wanted + 1, n_slave), factor=factor)
@@ -134,7 +135,7 @@ def fixed_interface_modes(
             break
         expected = len(omega) * np.sqrt(2 * np.pi * cutoff / max(omega[-1], 1e-300))
         if 2 * expected > n_slave:
-            raise ValueError(
+            raise Refusal(
                 f"the cutoff of the reduction, {cutoff:g} Hz, is beyond what the mesh resolves: mode {len(omega)} of "
                 f"{n_slave} has {omega[-1] / (2 * np.pi):.3g} Hz; lower reduction.cutoff, or look at the material"
             )
@@ -143,7 +144,7 @@ def fixed_interface_modes(
             below = eigenvalues_below(K_ss, M_ss, (2 * np.pi * cutoff) ** 2)  # as for a plate there are too many
             if below > most:
                 why = "beyond what the mesh resolves" if 2 * below > n_slave else f"above {LIMITS.most_modes} modes"
-                raise ValueError(
+                raise Refusal(
                     f"the cutoff of the reduction, {cutoff:g} Hz, is {why}: {below} of its "
                     f"{n_slave} modes lie below it; lower reduction.cutoff, or look at the material"
                 )

@@ -25,6 +25,7 @@ from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.refusal import Refusal
 
 WaveIndex = Callable[[int], tuple[SecondOrderSystem, np.ndarray, np.ndarray]]
 """Small system, contact map and way back T (q = T z) of a harmonic index."""
@@ -224,7 +225,7 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     right, left = sector.interface.B @ S, sector.left @ S
     faces = np.flatnonzero(np.abs(right).max(axis=0))
     if np.abs(right @ right.conj().T - np.eye(len(right))).max() > LIMITS.rounding or left[:, faces].any():
-        raise ValueError(
+        raise Refusal(
             "the right contact face of a cyclic part must be of master nodes that lie neither on its left contact face "
             "nor on a cyclic face"
         )

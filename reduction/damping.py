@@ -9,6 +9,7 @@ from scipy.linalg import eigh
 from scipy.linalg.blas import dsyrk, zherk
 
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.refusal import Refusal
 
 
 def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
@@ -19,7 +20,7 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
     Raises  ValueError for a ratio below 0
     """
     if not ratio >= 0:
-        raise ValueError(f"damping: ratio = {ratio}: give a part of critical damping of 0 or more, such as 0.01")
+        raise Refusal(f"damping: ratio = {ratio}: give a part of critical damping of 0 or more, such as 0.01")
     values, phi = eigh(system.stiffness, system.mass)
     # below this an eigenvalue is rounding of a rigid-body mode
     values[values < len(values) * np.finfo(float).eps * values[-1]] = 0.0
@@ -47,7 +48,7 @@ def rayleigh(system: SecondOrderSystem, alpha: float, beta: float) -> np.ndarray
     Raises  ValueError for a negative coefficient
     """
     if not (alpha >= 0 and beta >= 0):
-        raise ValueError(f"damping: alpha = {alpha} and beta = {beta} must not be negative")
+        raise Refusal(f"damping: alpha = {alpha} and beta = {beta} must not be negative")
     return alpha * system.mass + beta * system.stiffness
 
 
@@ -59,12 +60,12 @@ def rayleigh_of_ratios(
     Raises  ValueError where there are no such modes, one does not vibrate, or a coefficient would be negative
     """
     if max(modes) >= len(system.mass):
-        raise ValueError(f"damping.modes: there is no mode {max(modes)}, the system has {len(system.mass)}")
+        raise Refusal(f"damping.modes: there is no mode {max(modes)}, the system has {len(system.mass)}")
     squares = eigh(system.stiffness, system.mass, eigvals_only=True, subset_by_index=(0, max(modes)))[list(modes)]
     if not (squares > 0).all():
-        raise ValueError(f"damping.modes: mode {min(modes)} is a motion as a rigid body: choose modes that vibrate")
+        raise Refusal(f"damping.modes: mode {min(modes)} is a motion as a rigid body: choose modes that vibrate")
     omega = np.sqrt(squares)
     alpha, beta = np.linalg.solve(np.column_stack([0.5 / omega, 0.5 * omega]), ratios)
     if min(alpha, beta) < 0:
-        raise ValueError("damping.ratios: no damping of Rayleigh gives these two modes these ratios: change modes")
+        raise Refusal("damping.ratios: no damping of Rayleigh gives these two modes these ratios: change modes")
     return float(alpha), float(beta)

@@ -23,6 +23,7 @@ import scipy.linalg as sla
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def with_flow(wave: ReducedModel, springs: np.ndarray, flow: Flow) -> ReducedMod
     Raises  ValueError for a model that is no travelling wave
     """
     if wave.per_index is None or wave.info.n_sectors is None or wave.info.engine_order is None:
-        raise ValueError("influence coefficients of a flow are for a travelling wave of a wheel")
+        raise Refusal("influence coefficients of a flow are for a travelling wave of a wheel")
     n, order, any_wave = wave.info.n_sectors, wave.info.engine_order, wave.per_index
     made: dict[int, tuple[SecondOrderSystem, np.ndarray]] = {}
 

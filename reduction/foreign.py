@@ -43,6 +43,7 @@ from tribodyn.fem.system import SecondOrderSystem, dense
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_files
 from tribodyn.reduction.abaqus_matrix import Labels
 from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.refusal import Refusal
 
 NAMES = {"mass": ("M", "MAA", "MAAX"), "stiffness": ("K", "KAA", "KAAX"), "damping": ("C", "BAA", "BAAX")}
 """Variables looked for in a file that holds all matrices, the first that is there."""
@@ -100,15 +101,15 @@ class ForeignMatrices:
         """Row of a DOF given by number or by (node, component)."""
         if isinstance(dof, int | np.integer):
             if not 0 <= dof < self.n_dof:
-                raise ValueError(f"DOF {dof} is outside 0 .. {self.n_dof - 1}: DOF numbers count from 0")
+                raise Refusal(f"DOF {dof} is outside 0 .. {self.n_dof - 1}: DOF numbers count from 0")
             return int(dof)
         if isinstance(dof, str) or len(dof) != 2:
-            raise ValueError(f"{dof!r} is no DOF: give a number from 0 or a pair (node, component)")
+            raise Refusal(f"{dof!r} is no DOF: give a number from 0 or a pair (node, component)")
         if self.labels is None:
-            raise ValueError(f"DOF {tuple(dof)} names a node but the files have no labels: give mapping= or numbers")
+            raise Refusal(f"DOF {tuple(dof)} names a node but the files have no labels: give mapping= or numbers")
         label = (int(dof[0]), _component(dof[1]))
         if label not in self._rows:
-            raise ValueError(f"node {label[0]} has no free component {label[1]} in these matrices")
+            raise Refusal(f"node {label[0]} has no free component {label[1]} in these matrices")
         return self._rows[label]
 
     @cached_property
@@ -184,13 +185,13 @@ class ForeignMatrices:
         second = None if body2 is None else self._table(body2, width, "body2")
         n_pair = len(first)
         if second is not None and len(second) != n_pair:
-            raise ValueError(f"body1 has {n_pair} contact nodes but body2 has {len(second)}: they meet in pairs")
+            raise Refusal(f"body1 has {n_pair} contact nodes but body2 has {len(second)}: they meet in pairs")
         if normal is None:
             frames = np.tile(np.eye(3), (n_pair, 1, 1))
             weights = np.tile(np.diag(_signs(signs, len(kept))), (n_pair, 1, 1))
         else:
             if signs is not None:
-                raise ValueError("signs and normal are both given: the normal already gives what closes the gap")
+                raise Refusal("signs and normal are both given: the normal already gives what closes the gap")
             frames = _frames(normal, t1, n_pair)
             weights = frames[:, [COMPONENTS.index(name) for name in kept]]
         rows = np.repeat(np.arange(n_pair * len(kept)), width)
@@ -221,19 +222,19 @@ class ForeignMatrices:
         kept = checked_components(components)
         motion = sp.csr_matrix(np.atleast_2d(rows) if not sp.issparse(rows) else rows, dtype=float)
         if motion.shape[1] != self.n_dof or motion.shape[0] % len(kept) or not motion.shape[0]:
-            raise ValueError(
+            raise Refusal(
                 f"contact rows are {motion.shape[0]} x {motion.shape[1]}: give {len(kept)} for each pair "
                 f"({', '.join(kept)}), each with a factor for every one of the {self.n_dof} DOFs"
             )
         if not np.isfinite(motion.data).all():
-            raise ValueError("contact rows have entries that are not finite")
+            raise Refusal("contact rows have entries that are not finite")
         frames = np.tile(np.eye(3), (motion.shape[0] // len(kept), 1, 1))
         return _interface(motion, kept, frames, area, gap, points)
 
     def _vector(self, terms: Terms, name: str) -> np.ndarray:
         if isinstance(terms, np.ndarray):
             if terms.shape != (self.n_dof,):
-                raise ValueError(f"{name} has shape {terms.shape}: a vector of {self.n_dof} numbers is needed")
+                raise Refusal(f"{name} has shape {terms.shape}: a vector of {self.n_dof} numbers is needed")
             return terms.astype(float)
         vector = np.zeros(self.n_dof)
         pairs = terms.items() if isinstance(terms, Mapping) else [(terms, 1.0)]
@@ -244,7 +245,7 @@ class ForeignMatrices:
     def _table(self, dofs: Any, width: int, name: str) -> np.ndarray:
         rows = [[self.dof(dof) for dof in row] for row in dofs]
         if not rows or any(len(row) != width for row in rows):
-            raise ValueError(f"{name} needs rows of {width} DOFs, one row for each contact node")
+            raise Refusal(f"{name} needs rows of {width} DOFs, one row for each contact node")
         return np.array(rows)
 
 
@@ -282,7 +283,7 @@ def read_matrices(
     """
     unknown = sorted(set(names or {}) - set(NAMES))
     if unknown:
-        raise ValueError(f"names has the key {unknown[0]}: the keys are mass, stiffness and damping")
+        raise Refusal(f"names has the key {unknown[0]}: the keys are mass, stiffness and damping")
     files = {"mass": mass, "stiffness": stiffness, "damping": damping}
     held = [] if path is None else matrix_files.variables(Path(path))
     wanted = {part: next((name for name in usual if name in held), usual[0]) for part, usual in NAMES.items()}
@@ -290,14 +291,14 @@ def read_matrices(
     if path is not None:
         whole = Path(path)
         if not held:
-            raise ValueError(f"{whole.name} does not hold several matrices: give mass= and stiffness= as one file each")
+            raise Refusal(f"{whole.name} does not hold several matrices: give mass= and stiffness= as one file each")
         for part, variable in wanted.items():
             optional = part == "damping" and "damping" not in (names or {})
             if files[part] is None and (variable in held or not optional):
                 files[part] = whole
     missing = [part for part in ("mass", "stiffness") if files[part] is None]
     if missing:
-        raise ValueError(f"no {missing[0]} matrix is given: give path= or {missing[0]}=")
+        raise Refusal(f"no {missing[0]} matrix is given: give path= or {missing[0]}=")
     read: dict[str, sp.csr_matrix] = {}
     labels: dict[str, Labels | None] = {}
     for part, file in files.items():
@@ -328,11 +329,11 @@ def _checked(read: dict[str, sp.csr_matrix], rows: Labels | None, floats: bool =
     n = made["stiffness"].shape[0]
     for part, matrix in read.items():
         if matrix.shape[0] != n:
-            raise ValueError(f"the {part} matrix has {matrix.shape[0]} rows but the stiffness matrix has {n}")
+            raise Refusal(f"the {part} matrix has {matrix.shape[0]} rows but the stiffness matrix has {n}")
     if rows is not None and len(rows) != n:
-        raise ValueError(f"the mapping has {len(rows)} equations but the matrices have {n} rows: is it theirs?")
+        raise Refusal(f"the mapping has {len(rows)} equations but the matrices have {n} rows: is it theirs?")
     if (made["mass"].diagonal() < 0).any():
-        raise ValueError("the mass matrix has a negative diagonal entry: are mass and stiffness exchanged?")
+        raise Refusal("the mass matrix has a negative diagonal entry: are mass and stiffness exchanged?")
     return _without_constrained(ForeignMatrices(**made, labels=rows))
 
 
@@ -358,7 +359,7 @@ def _without_constrained(matrices: ForeignMatrices, penalty: float = 1e30) -> Fo
     if not held.any():
         return matrices
     if matrices.labels is None:
-        raise ValueError(
+        raise Refusal(
             f"{held.sum()} DOFs have a stiffness of {penalty:g} N/m or more, which is how Abaqus constrains: "
             "export with FORMAT=MATRIX INPUT, whose labels allow leaving them out"
         )
@@ -378,17 +379,17 @@ def _symmetric(matrix: sp.csr_matrix, name: str, rounding: float = 1e-8, zero: b
     rounding : largest asymmetry, over the largest entry, that is rounding of the file
     """
     if matrix.shape[0] != matrix.shape[1]:
-        raise ValueError(f"the {name} is {matrix.shape[0]} x {matrix.shape[1]}: it must be square")
+        raise Refusal(f"the {name} is {matrix.shape[0]} x {matrix.shape[1]}: it must be square")
     largest = abs(matrix).max()
     if largest == 0 and not zero:
-        raise ValueError(f"the {name} is zero: is it the right variable?")
+        raise Refusal(f"the {name} is zero: is it the right variable?")
     difference = abs(matrix - matrix.T).tocoo()
     if difference.nnz and difference.data.max() > rounding * largest:
         if not (sp.tril(matrix, -1).nnz and sp.triu(matrix, 1).nnz):
-            raise ValueError(f"the {name} holds one triangle only: mirror it before saving, A + tril(A, -1).T")
+            raise Refusal(f"the {name} holds one triangle only: mirror it before saving, A + tril(A, -1).T")
         worst = int(difference.data.argmax())
         row, column = int(difference.row[worst]), int(difference.col[worst])
-        raise ValueError(
+        raise Refusal(
             f"the {name} is not symmetric: entry ({row}, {column}) is {matrix[row, column]:g} "
             f"but ({column}, {row}) is {matrix[column, row]:g}"
         )
@@ -408,10 +409,10 @@ def _interface(
     motion.eliminate_zeros()
     if (np.diff(motion.indptr) == 0).any():
         pair = int(np.flatnonzero(np.diff(motion.indptr) == 0)[0]) // len(components)
-        raise ValueError(f"contact pair {pair} has the same DOF on both bodies, or a row of zeros: it can never move")
+        raise Refusal(f"contact pair {pair} has the same DOF on both bodies, or a row of zeros: it can never move")
     areas = np.broadcast_to(np.asarray(area, float) / (n_pair if np.ndim(area) == 0 else 1), n_pair).copy()
     if not (areas > 0).all():
-        raise ValueError("a contact area is not positive: give the area of the patch, or one per pair, in m2")
+        raise Refusal("a contact area is not positive: give the area of the patch, or one per pair, in m2")
     return ContactInterface(
         components=components,
         points=np.zeros((n_pair, 3)) if points is None else np.asarray(points, float).reshape(n_pair, 3),
@@ -432,7 +433,7 @@ def _component(component: int | str) -> int:
             return harwell_boeing.COMPONENT_NAMES.index(name) + 1
     elif 0 <= component <= 6:
         return int(component)
-    raise ValueError(
+    raise Refusal(
         f"component {component!r} is unknown: give 1 to 6, x, y, z or UX, UY, UZ, ROTX, ROTY, ROTZ (0: a scalar point)"
     )
 
@@ -440,7 +441,7 @@ def _component(component: int | str) -> int:
 def _signs(signs: Sequence[float] | None, n_component: int) -> np.ndarray:
     chosen = np.ones(n_component) if signs is None else np.asarray(signs, float)
     if chosen.shape != (n_component,) or not (np.abs(chosen) == 1).all():
-        raise ValueError(f"signs is {signs}: give +1 or -1 for each of the {n_component} components")
+        raise Refusal(f"signs is {signs}: give +1 or -1 for each of the {n_component} components")
     return chosen
 
 
@@ -449,7 +450,7 @@ def _frames(normal: Sequence[float] | np.ndarray, t1: Sequence[float] | None, n_
     direction = np.broadcast_to(np.asarray(normal, float), (n_pair, 3))
     length = np.linalg.norm(direction, axis=1, keepdims=True)
     if not (length > 0).all():
-        raise ValueError("a contact normal is zero: give a direction from body 1 into body 2")
+        raise Refusal("a contact normal is zero: give a direction from body 1 into body 2")
     n = direction / length
     if t1 is not None:
         return contact_frames(n, t1)

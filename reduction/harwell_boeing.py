@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from tribodyn.refusal import Refusal
+
 COMPONENT_NAMES = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 """ANSYS names of the degrees of freedom 1 to 6."""
 
@@ -29,19 +31,19 @@ def read(path: Path) -> sp.csr_matrix:
     """
     lines = path.read_text(encoding="ascii", errors="replace").splitlines()
     if not looks_like(lines):
-        raise ValueError(f"{path.name} has no Harwell-Boeing header: export it with HBMAT in ASCII form")
+        raise Refusal(f"{path.name} has no Harwell-Boeing header: export it with HBMAT in ASCII form")
     try:
         counts = [int(word) for word in lines[1].split()]
     except ValueError:
-        raise ValueError(f"{path.name} counts its lines as '{lines[1].strip()}': whole numbers are expected") from None
+        raise Refusal(f"{path.name} counts its lines as '{lines[1].strip()}': whole numbers are expected") from None
     kind, n_row, n_column, n_entry = lines[2].split()[:4]
     kind = kind.upper()
     if kind[0] != "R" or kind[1] not in "SUR" or kind[2] != "A":
-        raise ValueError(f"{path.name} holds a matrix of type {kind}: only real assembled ones (RSA, RUA) can be read")
+        raise Refusal(f"{path.name} holds a matrix of type {kind}: only real assembled ones (RSA, RUA) can be read")
     first = 5 if len(counts) > 4 and counts[4] > 0 else 4  # one more header line where a right-hand side follows
     ends = np.cumsum([first, *counts[1:4]])
     if len(lines) < ends[-1]:
-        raise ValueError(f"{path.name} ends after {len(lines)} of {ends[-1]} lines: export the matrix again")
+        raise Refusal(f"{path.name} ends after {len(lines)} of {ends[-1]} lines: export the matrix again")
     layouts, sizes = _formats(lines[3], path), (int(n_column) + 1, int(n_entry), int(n_entry))
     pointer, index, value = (
         _fields(lines[ends[k] : ends[k + 1]], layout, size)
@@ -58,14 +60,14 @@ def read(path: Path) -> sp.csr_matrix:
         )
         matrix.check_format()
     except ValueError:
-        raise ValueError(
+        raise Refusal(
             f"{path.name} does not hold the {n_entry} entries in {n_column} columns that its header announces: "
             "export the matrix again"
         ) from None
     if kind[1] != "S":
         return matrix.tocsr()
     if sp.tril(matrix, -1).nnz and sp.triu(matrix, 1).nnz:
-        raise ValueError(f"{path.name} is declared symmetric but stores both triangles: export it as RUA")
+        raise Refusal(f"{path.name} is declared symmetric but stores both triangles: export it as RUA")
     return (matrix + matrix.T - sp.diags(matrix.diagonal())).tocsr()
 
 
@@ -76,19 +78,19 @@ def read_mapping(path: Path) -> tuple[tuple[int, int], ...]:
     Raises  ValueError: no such file, no mapping file
     """
     if not path.is_file():
-        raise ValueError(f"there is no mapping file {path}: check the name and the folder")
+        raise Refusal(f"there is no mapping file {path}: check the name and the folder")
     rows: dict[int, tuple[int, int]] = {}
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():
         words = line.split()
         if len(words) == 3 and words[0].isdigit() and words[1].isdigit():
             name = COMPONENT_NAMES[int(words[2]) - 1] if words[2] in "123456" else words[2].upper()
             if name not in COMPONENT_NAMES:
-                raise ValueError(
+                raise Refusal(
                     f"{path.name} maps equation {words[0]} to {name}: only {', '.join(COMPONENT_NAMES)} are structural"
                 )
             rows[int(words[0])] = (int(words[1]), COMPONENT_NAMES.index(name) + 1)
     if sorted(rows) != list(range(1, len(rows) + 1)) or not rows:
-        raise ValueError(f"{path.name} does not list equations 1, 2, 3 ... with node and DOF: is it a mapping file?")
+        raise Refusal(f"{path.name} does not list equations 1, 2, 3 ... with node and DOF: is it a mapping file?")
     return tuple(rows[k] for k in sorted(rows))
 
 
@@ -96,7 +98,7 @@ def _formats(line: str, path: Path) -> list[tuple[int, int]]:
     """(fields per line, width) of pointers, indices and values from Fortran formats such as (8I10) or (1P,3E25.16)."""
     found = [_FORTRAN.search(bracket) for bracket in re.findall(r"\(([^)]*)\)", line)]
     if len(found) < 3 or None in found[:3]:
-        raise ValueError(f"{path.name} gives its formats as '{line.strip()}': three Fortran formats are expected")
+        raise Refusal(f"{path.name} gives its formats as '{line.strip()}': three Fortran formats are expected")
     return [(int(match[1] or 1), int(match[2])) for match in found[:3] if match]
 
 

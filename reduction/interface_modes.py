@@ -18,6 +18,7 @@ import scipy.linalg as sla
 from tribodyn.fem.modes import modes
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 
 
 def interface_modes(
@@ -36,15 +37,15 @@ def interface_modes(
         a boundary that can move rigidly with the kept DOFs held
     """
     if model.per_harmonic is not None:
-        raise ValueError("interface modes need a model that is the same for all harmonics: leave interface_modes out")
+        raise Refusal("interface modes need a model that is the same for all harmonics: leave interface_modes out")
     masters = model.info.master_dofs
     kept = np.unique(np.asarray([] if keep is None else keep, dtype=int))
     if not np.all(np.isin(kept, masters)):
-        raise ValueError("interface modes: only DOFs that are masters of the reduction can be kept")
+        raise Refusal("interface modes: only DOFs that are masters of the reduction can be kept")
     n_m, n = len(masters), model.system.n_dof
     a, b = np.flatnonzero(np.isin(masters, kept)), np.flatnonzero(~np.isin(masters, kept))
     if not 0 < n_modes <= len(b):
-        raise ValueError(f"interface modes: {n_modes} were asked of {len(b)} contact DOFs; ask for 1 to {len(b)}")
+        raise Refusal(f"interface modes: {n_modes} were asked of {len(b)} contact DOFs; ask for 1 to {len(b)}")
     K = np.asarray(model.system.stiffness)
     omega, phi = modes(K[np.ix_(b, b)], model.system.mass[np.ix_(b, b)], min(n_modes + 1, len(b)))
 
@@ -78,7 +79,7 @@ def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     try:
         return -sla.cho_solve(sla.cho_factor(K[np.ix_(b, b)]), K[np.ix_(b, a)])
     except np.linalg.LinAlgError:
-        raise ValueError(
+        raise Refusal(
             "interface modes: the contact can move rigidly with the kept DOFs held; keep more, or none"
         ) from None
 

@@ -17,6 +17,7 @@ from scipy.io.matlab import MatReadError
 
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, nastran_matrix
 from tribodyn.reduction.abaqus_matrix import Labels
+from tribodyn.refusal import Refusal
 
 MATRIX_MARKET = "%%MatrixMarket"
 NUMBERS = b"0123456789+-.eE \t\r\nnNaAiIfFtTyY"  # what numbers are written with, nan and infinity too
@@ -52,9 +53,9 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
     known = variables(path)
     labels = None
     if variable is not None and known and variable not in known:
-        raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known)}")
+        raise Refusal(f"{path.name} has no variable '{variable}': it holds {', '.join(known)}")
     if known and variable is None:
-        raise ValueError(f"{path.name} holds {', '.join(known)}: name the variable that is wanted")
+        raise Refusal(f"{path.name} holds {', '.join(known)}: name the variable that is wanted")
     with _as_one_sentence(path):
         if path.suffix.lower() == ".npz":
             matrix = _from_npz(path, variable)
@@ -73,7 +74,7 @@ def read_array(path: Path, variable: str) -> np.ndarray:
     """A named array of real numbers, such as a list of DOFs, out of a container; raises ValueError."""
     known = variables(path)
     if variable not in known:
-        raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known) or 'one matrix alone'}")
+        raise Refusal(f"{path.name} has no variable '{variable}': it holds {', '.join(known) or 'one matrix alone'}")
     with _as_one_sentence(path):
         if path.suffix.lower() not in (".npz", ".mat"):
             found = read_matrix(path, variable)[0]
@@ -81,7 +82,7 @@ def read_array(path: Path, variable: str) -> np.ndarray:
             found = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
     array = found.toarray() if sp.issparse(found) else np.asarray(found)
     if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
-        raise ValueError(f"{path.name} {variable} must hold finite real numbers")
+        raise Refusal(f"{path.name} {variable} must hold finite real numbers")
     return array.astype(float)
 
 
@@ -91,7 +92,7 @@ def _as_one_sentence(path: Path) -> Iterator[None]:
     try:
         yield
     except (LookupError, TypeError, EOFError, OSError, RuntimeError, MatReadError, zipfile.BadZipFile, zlib.error):
-        raise ValueError(f"{path.name} is broken, it ends early or contradicts itself: export it again") from None
+        raise Refusal(f"{path.name} is broken, it ends early or contradicts itself: export it again") from None
 
 
 def _from_npz(path: Path, variable: str | None) -> Any:
@@ -103,7 +104,7 @@ def _from_npz(path: Path, variable: str | None) -> Any:
 
 def _opened_npz(path: Path) -> Any:
     if not zipfile.is_zipfile(path):
-        raise ValueError(f"{path.name} is not a numpy archive: write it with numpy.savez or scipy.sparse.save_npz")
+        raise Refusal(f"{path.name} is not a numpy archive: write it with numpy.savez or scipy.sparse.save_npz")
     return np.load(path)
 
 
@@ -111,7 +112,7 @@ def _whosmat(path: Path) -> Any:
     try:
         return scipy.io.whosmat(path)
     except (ValueError, TypeError, OSError):
-        raise ValueError(f"{path.name} is not a MATLAB file: write it with save") from None
+        raise Refusal(f"{path.name} is not a MATLAB file: write it with save") from None
 
 
 def _from_mat(path: Path, variable: str) -> Any:
@@ -137,7 +138,7 @@ def _from_text(path: Path) -> tuple[Any, Labels | None]:
         return harwell_boeing.read(path), None
     if abaqus_matrix.looks_like(head):
         return abaqus_matrix.read(path)
-    raise ValueError(
+    raise Refusal(
         f"{path.name} is in no format known here: give .npz, .mat, Matrix Market, Harwell-Boeing (ASCII) or Abaqus text"
     )
 
@@ -151,19 +152,19 @@ def _from_matrix_market(path: Path) -> Any:
     try:
         n_row, _, entries, kind, field, symmetry = scipy.io.mminfo(path)
         if field not in ("real", "double", "integer", "unsigned-integer") or symmetry == "hermitian":
-            raise ValueError(f"{path.name} holds a {field} {symmetry} matrix: real numbers are needed")
+            raise Refusal(f"{path.name} holds a {field} {symmetry} matrix: real numbers are needed")
         body = _after_sizes(path.read_bytes())
         if kind == "array" and symmetry != "general":
             entries = n_row * (n_row + (1 if symmetry == "symmetric" else -1)) // 2
         if body.translate(None, NUMBERS):
-            raise ValueError("its numbers are not written as 1.0E+03")
+            raise Refusal("its numbers are not written as 1.0E+03")
         if sum(1 for line in body.splitlines() if line.strip()) != entries:
-            raise ValueError(f"it has not the {entries} entries that it announces")
+            raise Refusal(f"it has not the {entries} entries that it announces")
         return scipy.io.mmread(path)
     except (ValueError, OverflowError) as problem:
         if str(problem).startswith(path.name):
             raise
-        raise ValueError(f"{path.name} is a broken Matrix Market file: {' '.join(str(problem).split())}") from None
+        raise Refusal(f"{path.name} is a broken Matrix Market file: {' '.join(str(problem).split())}") from None
 
 
 def _after_sizes(text: bytes) -> bytes:
@@ -180,7 +181,7 @@ def _after_sizes(text: bytes) -> bytes:
 
 def _require(path: Path) -> None:
     if not path.is_file():
-        raise ValueError(f"there is no file {path}: check the name and the folder")
+        raise Refusal(f"there is no file {path}: check the name and the folder")
     ways = {
         ".sub": "in Ansys, *DMAT, K, D, IMPORT, SUB, FILE, STIFF and *EXPORT, K, MMF, k.mtx, and likewise for MASS",
         ".op2": "in Nastran, EXTSEOUT(STIFFNESS, MASS, DMIGPCH), or the matrices by OUTPUT4",
@@ -188,22 +189,22 @@ def _require(path: Path) -> None:
     }
     way = ways.get(path.suffix.lower().replace(".dsub", ".sub"))
     if way is not None:
-        raise ValueError(f"{path.name} is in a format of its program alone: export its matrices ({way})")
+        raise Refusal(f"{path.name} is in a format of its program alone: export its matrices ({way})")
 
 
 def real(matrix: Any, name: str) -> sp.csr_matrix:
     """Double precision compressed rows, or a ValueError for entries that cannot belong to a structure."""
     if not sp.issparse(matrix) and np.ndim(matrix) != 2:
-        raise ValueError(f"{name} has {np.ndim(matrix)} dimensions: a matrix has two")
+        raise Refusal(f"{name} has {np.ndim(matrix)} dimensions: a matrix has two")
     if sp.issparse(matrix) and matrix.format in ("csr", "csc", "bsr"):
         try:
             matrix.check_format(full_check=True)  # scipy reads outside of its arrays otherwise
         except ValueError as problem:
-            raise ValueError(f"{name} is broken, {problem}: export it again") from None
+            raise Refusal(f"{name} is broken, {problem}: export it again") from None
     rows = sp.csr_matrix(matrix)
     if rows.dtype.kind not in "fiub":
-        raise ValueError(f"{name} has entries of type {rows.dtype}: real numbers are needed")
+        raise Refusal(f"{name} has entries of type {rows.dtype}: real numbers are needed")
     rows = rows.astype(float)
     if not np.isfinite(rows.data).all():
-        raise ValueError(f"{name} has entries that are not finite: export it again")
+        raise Refusal(f"{name} has entries that are not finite: export it again")
     return rows

@@ -10,6 +10,7 @@ import numpy as np
 
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.refusal import Refusal
 
 if TYPE_CHECKING:
     from tribodyn.reduction.residual_flexibility import ResidualFlexibility
@@ -68,7 +69,7 @@ class ModelInfo:
     def master_dofs(self) -> np.ndarray:
         """DOFs of the full system that stay coordinates; raises ValueError for a model that knows none."""
         if self.masters is None:
-            raise ValueError("this model does not know which DOFs its coordinates are: reduce the full matrices")
+            raise Refusal("this model does not know which DOFs its coordinates are: reduce the full matrices")
         return self.masters
 
 
@@ -108,7 +109,7 @@ class ReducedModel:
     def require_masters(self, needed_by: str) -> None:
         """Raise ValueError where the coordinates leave out a part of the contact's flexibility."""
         if self.residual is not None:
-            raise ValueError(
+            raise Refusal(
                 f"{needed_by} needs a model that keeps every contact DOF, which this one with its "
                 f'{len(self.interface.B)} does not: set reduction.method = "craig_bampton", on a smaller contact'
             )
@@ -118,7 +119,7 @@ class ReducedModel:
         if self.harmonic_basis is not None:
             return self.harmonic_basis(q, h)
         if self.basis is None:
-            raise ValueError("this model came as matrices: it has no full field to reconstruct")
+            raise Refusal("this model came as matrices: it has no full field to reconstruct")
         return np.tensordot(self.basis, q, axes=1)
 
     def projected(self, basis: np.ndarray) -> ReducedModel:

@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from tribodyn.geometry.sources.nastran import cards_of, lines_of
 from tribodyn.reduction.abaqus_matrix import Labels
 from tribodyn.reduction.harwell_boeing import number
+from tribodyn.refusal import Refusal
 
 DECKS = (".pch", ".bdf", ".nas", ".dat", ".dmig")
 
@@ -44,9 +45,9 @@ def read_op4(path: Path) -> dict[str, sp.csr_matrix]:
             entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))
             found[name] = sp.csr_matrix(sp.coo_matrix(entries, shape=shape))
     except (ValueError, IndexError, StopIteration, OverflowError, RuntimeError):
-        raise ValueError(f"{path.name} is no OUTPUT4 file, or ends early: export it again with OUTPUT4") from None
+        raise Refusal(f"{path.name} is no OUTPUT4 file, or ends early: export it again with OUTPUT4") from None
     if not found:
-        raise ValueError(f"{path.name} holds no matrix: export it again with OUTPUT4")
+        raise Refusal(f"{path.name} holds no matrix: export it again with OUTPUT4")
     return found
 
 
@@ -60,7 +61,7 @@ def _binary(data: bytes, order: str) -> Iterator[Matrix]:
         nonlocal at
         size = int(np.frombuffer(data, f"{order}i4", 1, at)[0])
         if size < 0 or data[at : at + 4] != data[at + 4 + size : at + 8 + size]:
-            raise ValueError("a record without its end")
+            raise Refusal("a record without its end")
         at += 8 + size
         return data[at - 4 - size : at - 4]
 
@@ -73,7 +74,7 @@ def _binary(data: bytes, order: str) -> Iterator[Matrix]:
             place = 3 * word
             end = place + count * word
             if len(body) < end:
-                raise ValueError("a column that is shorter than announced")
+                raise Refusal("a column that is shorter than announced")
             if row > 0:
                 yield column, row, np.frombuffer(body[place:end], real).astype(float)
                 continue
@@ -100,7 +101,7 @@ def _ascii(data: bytes) -> Iterator[Matrix]:
         taken = [next(lines) for _ in range(-(-count // per_line))]
         words = [line[i : i + width] for line in taken for i in range(0, min(per_line * width, len(line)), width)]
         if len(words) < count:
-            raise ValueError("a column that is shorter than announced")
+            raise Refusal("a column that is shorter than announced")
         return np.array([number(word.strip()) for word in words[:count]])
 
     def columns(n_column: int, words: int, big: bool, layout: tuple[int, int]) -> Iterator[Column]:
@@ -139,7 +140,7 @@ def _string(first: int, row: int | None = None) -> tuple[int, int]:
     """Length in words and first row of a string, from its one packed word, or from its two of a BIGMAT."""
     length, row = (first - 1, row) if row is not None else ((first >> 16) - 1, first & 65535)
     if length < 1:
-        raise ValueError("a string without length")
+        raise Refusal("a string without length")
     return length, row
 
 
@@ -156,7 +157,7 @@ def write_op4(path: Path, matrices: Mapping[str, np.ndarray]) -> None:
 
         for name, matrix in matrices.items():
             if not re.fullmatch(r"[A-Z][A-Z0-9]{0,7}", name):
-                raise ValueError(f"{name} is no name for Nastran: a letter and up to seven letters or digits")
+                raise Refusal(f"{name} is no name for Nastran: a letter and up to seven letters or digits")
             n_row, n_column = matrix.shape
             square = n_row == n_column and np.array_equal(matrix, matrix.T)
             form = 6 if square else 1 if n_row == n_column else 2
@@ -192,7 +193,7 @@ def read_dmig(path: Path) -> dict[str, Callable[[], tuple[sp.csr_matrix, Labels]
         elif name in heads:
             columns.setdefault(name, []).append(fields)
         else:
-            raise ValueError(f"{path.name} has columns of DMIG {name} before its first entry, DMIG {name} 0: repair it")
+            raise Refusal(f"{path.name} has columns of DMIG {name} before its first entry, DMIG {name} 0: repair it")
     return {name: partial(_square, name, head, columns.get(name, []), path) for name, head in heads.items()}
 
 
@@ -201,9 +202,9 @@ def _square(name: str, head: list[str], columns: list[list[str]], path: Path) ->
     where = f"DMIG {name} of {path.name}"
     form, kind = ([*head, "", ""][2] or "6"), ([*head, "", "", ""][3] or "1")
     if form not in ("1", "6"):
-        raise ValueError(f"{where} has form {form}: only square (1) and symmetric (6) matrices are read")
+        raise Refusal(f"{where} has form {form}: only square (1) and symmetric (6) matrices are read")
     if kind not in ("1", "2"):
-        raise ValueError(f"{where} has type {kind}: real numbers are needed (1 or 2)")
+        raise Refusal(f"{where} has type {kind}: real numbers are needed (1 or 2)")
     pairs: list[tuple[tuple[int, int], tuple[int, int]]] = []
     values: list[float] = []
     try:
@@ -214,11 +215,11 @@ def _square(name: str, head: list[str], columns: list[list[str]], path: Path) ->
                     pairs.append(((int(fields[k]), int(fields[k + 1] or 0)), column))
                     values.append(number(fields[k + 2]))
     except (ValueError, IndexError):
-        raise ValueError(f"{where} has fields that are not numbers: export it again") from None
+        raise Refusal(f"{where} has fields that are not numbers: export it again") from None
     if not pairs:
-        raise ValueError(f"{where} has no entries: export it again")
+        raise Refusal(f"{where} has no entries: export it again")
     if len({frozenset(pair) if form == "6" else pair for pair in pairs}) < len(pairs):
-        raise ValueError(f"{where} gives an entry twice: export it again")
+        raise Refusal(f"{where} gives an entry twice: export it again")
     labels = tuple(sorted({label for pair in pairs for label in pair}))
     place = {label: k for k, label in enumerate(labels)}
     rows, cols = np.array([[place[row], place[column]] for row, column in pairs]).T

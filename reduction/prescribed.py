@@ -22,6 +22,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel, StaticReaction
+from tribodyn.refusal import Refusal
 
 
 def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndarray | float = 0.0) -> ReducedModel:
@@ -38,11 +39,11 @@ def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndar
     system, B = model.system, np.asarray(model.interface.B)
     free, held = partition(system.n_dof, dofs, "prescribed displacement")
     if len(held) == 0:
-        raise ValueError(f"prescribed displacement '{name}' chooses no coordinate; name a node set that is not clamped")
+        raise Refusal(f"prescribed displacement '{name}' chooses no coordinate; name a node set that is not clamped")
     if name in system.loads:
-        raise ValueError(f"prescribed displacement '{name}' has the name of a load; give it another")
+        raise Refusal(f"prescribed displacement '{name}' has the name of a load; give it another")
     if np.any(B[:, held]):
-        raise ValueError(f"prescribed displacement '{name}' acts on contact nodes; choose nodes outside the contact")
+        raise Refusal(f"prescribed displacement '{name}' acts on contact nodes; choose nodes outside the contact")
     springs = np.empty(len(held))
     springs[np.searchsorted(held, np.asarray(dofs, dtype=int))] = support
 
@@ -50,7 +51,7 @@ def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndar
     try:
         factor = sla.cho_factor(K[np.ix_(free, free)])
     except np.linalg.LinAlgError:
-        raise ValueError(
+        raise Refusal(
             f"with '{name}' held and the contact open the part can still move rigidly; clamp it or add a spring"
         ) from None
     psi = np.zeros((system.n_dof, len(held)))
@@ -96,7 +97,7 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     if len(rows) == 0:
         return model
     if model.basis is None or model.per_harmonic is not None:
-        raise ValueError("motions can be held only in a model that was reduced from one mesh for all harmonics")
+        raise Refusal("motions can be held only in a model that was reduced from one mesh for all harmonics")
     held = rows @ model.basis
     N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
     held_model = model.projected(N)

@@ -15,6 +15,7 @@ from scipy.sparse import csr_matrix, eye_array, kron
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.refusal import Refusal
 
 
 def relative(
@@ -28,13 +29,13 @@ def relative(
     Raises  ValueError where a component is missing, or where a body-1 DOF is held or shared by two pairs
     """
     if interface.components != COMPONENTS:
-        raise ValueError(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
+        raise Refusal(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
     means, interface = interface, interface.nodes or interface
     n, n_pair = system.n_dof, interface.n_pair
     B = csr_matrix(interface.B)
     own, other = body_1_dofs(interface).ravel(), np.ones(n, dtype=bool)
     if len(np.unique(own)) < len(own):
-        raise ValueError("relative coordinates need body-1 nodes of their own, but two pairs share one")
+        raise Refusal("relative coordinates need body-1 nodes of their own, but two pairs share one")
     other[own] = False
     # x = R u_1 - R u_2, so u_1 = R^T x - R^T (B without its body-1 columns) u
     rows, columns = np.repeat(own, 3), np.tile(np.arange(3), 3 * n_pair) + np.repeat(3 * np.arange(n_pair), 9)
@@ -65,6 +66,6 @@ def body_1_dofs(interface: ContactInterface) -> np.ndarray:
             row = slice(image.indptr[pair], image.indptr[pair + 1])
             unit = image.indices[row][image.data[row] > 1 - 1e-9]
             if len(unit) != 1:
-                raise ValueError("relative coordinates need body-1 nodes that are free in x, y and z")
+                raise Refusal("relative coordinates need body-1 nodes that are free in x, y and z")
             found[pair, axis] = unit[0]
     return found

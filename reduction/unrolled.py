@@ -18,6 +18,7 @@ from tribodyn.fem.interface import join
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 
 
 def period(n_sectors: int, engine_order: int) -> int:
@@ -36,7 +37,7 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
     Raises  ValueError for a model that is no travelling wave
     """
     if model.per_index is None or model.info.n_sectors is None or model.info.engine_order is None:
-        raise ValueError("only a travelling wave of a wheel can be unrolled")
+        raise Refusal("only a travelling wave of a wheel can be unrolled")
     N, order = model.info.n_sectors, model.info.engine_order
     step = gcd(N, order)
     n = N // step

@@ -21,6 +21,7 @@ from tribodyn.geometry.placing import rotation
 from tribodyn.geometry.sources.directions import System, orthogonal
 from tribodyn.geometry.sources.keywords import Card, cards
 from tribodyn.geometry.sources.raw import NOTHING, VOLUMES, Cells, RawMesh
+from tribodyn.refusal import Refusal
 
 # first letters and number of nodes of a solid -> meshio's kind
 SOLIDS = {
@@ -150,7 +151,7 @@ def load(path: Path) -> Assembly:
     if flat and not assembly.instances:
         return assembly
     if not assembly.instances:
-        raise ValueError(f"deck '{path}' has parts but no *INSTANCE: write the deck with its assembly")
+        raise Refusal(f"deck '{path}' has parts but no *INSTANCE: write the deck with its assembly")
     return assembly
 
 
@@ -158,9 +159,9 @@ def _instance(card: Card, parts: dict[str, Scope], assembly: Assembly) -> Scope:
     part, name = card.option("PART"), card.option("NAME")
     if part.upper() not in parts:
         known = ", ".join(parts) or "there is none"
-        raise ValueError(f"{card.where} names the part '{part}', which the deck has not ({known}): correct the name")
+        raise Refusal(f"{card.where} names the part '{part}', which the deck has not ({known}): correct the name")
     if any(name.upper() == other.upper() for other in assembly.instances):
-        raise ValueError(f"{card.where} has the name '{name}' of another instance: give each its own")
+        raise Refusal(f"{card.where} has the name '{name}' of another instance: give each its own")
     source = parts[part.upper()]
     own: dict[str, Any] = {
         key: {k: list(items) for k, items in getattr(source, key).items()} for key in ("nsets", "elsets")
@@ -208,10 +209,10 @@ def _nodes(card: Card, scope: Scope) -> None:
     letter = card.option("SYSTEM").upper() or "R"
     kinds = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
     if letter not in kinds:
-        raise ValueError(f"{card.where} has the system '{letter}': it is one of R, C, S")
+        raise Refusal(f"{card.where} has the system '{letter}': it is one of R, C, S")
     labels = [card.whole(line[0]) for line in card.data]
     if not labels:
-        raise ValueError(f"{card.where} has no nodes: write them in the deck, or take an *INCLUDE")
+        raise Refusal(f"{card.where} has no nodes: write them in the deck, or take an *INCLUDE")
     places = np.array([card.floats(line[1:], 3) for line in card.data])
     if letter != "R":
         places = System(kinds[letter], np.zeros(3), np.eye(3)).places(places)
@@ -235,7 +236,7 @@ def _elements(card: Card, scope: Scope) -> None:
             labels.append(str(numbers[0]))
             numbers = []
     if numbers:
-        raise ValueError(f"{card.where} ends inside element {numbers[0]}: the deck is cut off or a line is missing")
+        raise Refusal(f"{card.where} ends inside element {numbers[0]}: the deck is cut off or a line is missing")
     if card.option("ELSET"):
         scope.elsets.setdefault(scope.name(card.option("ELSET")), []).extend(labels)
 
@@ -261,7 +262,7 @@ def _set(card: Card, scope: Scope) -> None:
 
 
 def _generator(card: Card, scope: Scope) -> None:
-    raise ValueError(f"{card.where} generates a mesh: write the deck with its nodes and elements listed")
+    raise Refusal(f"{card.where} generates a mesh: write the deck with its nodes and elements listed")
 
 
 MESH_CARDS: dict[str, Callable[[Card, Scope], None]] = {
@@ -308,7 +309,7 @@ def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int], dict[Node, int
                     ((name, label), [row[name, node] for node in nodes[:count]])
                 )
             except KeyError as missing:
-                raise ValueError(
+                raise Refusal(
                     f"element {label}{f' of {name}' if name else ''} names node {missing.args[0][1]}, which the deck "
                     "has not: the deck is cut off or nodes are missing"
                 ) from None

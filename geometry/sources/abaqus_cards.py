@@ -15,6 +15,7 @@ from tribodyn.geometry.sources.card_table import CardTable, Met
 from tribodyn.geometry.sources.directions import Directions, Listed, System, orthogonal, turned
 from tribodyn.geometry.sources.keywords import Card
 from tribodyn.geometry.sources.raw import VOLUMES, RawMesh
+from tribodyn.refusal import Refusal
 
 # named supports -> axes that they hold
 NAMED_SUPPORTS = {
@@ -122,7 +123,7 @@ class _Cards:
     def _material(self, card: Card) -> None:
         self.material = card.option("NAME").upper()
         if self.material in self.materials:
-            raise ValueError(f"{card.where} defines the material '{card.option('NAME')}' again: give each its own name")
+            raise Refusal(f"{card.where} defines the material '{card.option('NAME')}' again: give each its own name")
         self.materials[self.material] = deck.DeckMaterial(card.option("NAME"))
 
     def _elastic(self, card: Card) -> None:
@@ -167,7 +168,7 @@ class _Cards:
 
     def _give(self, card: Card, **values: object) -> None:
         if self.material not in self.materials:
-            raise ValueError(f"{card.where} stands before any *MATERIAL: move it below its material")
+            raise Refusal(f"{card.where} stands before any *MATERIAL: move it below its material")
         self.materials[self.material] = replace(self.materials[self.material], **values)  # type: ignore[arg-type]
 
     # constraints
@@ -175,7 +176,7 @@ class _Cards:
     def _tie(self, card: Card) -> None:
         for line in card.data:
             if len(line) < 2:
-                raise ValueError(f"{card.where} needs a slave and a master surface: complete the line")
+                raise Refusal(f"{card.where} needs a slave and a master surface: complete the line")
             tolerance = card.option("POSITIONTOLERANCE")
             self.ties.append(
                 deck.Tie(
@@ -196,7 +197,7 @@ class _Cards:
             while len(fields) < 3 * count:
                 more = next(lines, None)
                 if more is None:
-                    raise ValueError(f"{card.where} ends before its {count} terms: the deck is cut off")
+                    raise Refusal(f"{card.where} ends before its {count} terms: the deck is cut off")
                 fields += [text for text in more if text]
             terms = [
                 (fields[i], card.whole(fields[i + 1]) - 1, card.number(fields[i + 2])) for i in range(0, 3 * count, 3)
@@ -222,7 +223,7 @@ class _Cards:
     def _couple(self, kind: str, card: Card) -> None:
         head, self.coupling = self.coupling, None
         if head is None:
-            raise ValueError(f"{card.where} needs a *COUPLING before it: add its head")
+            raise Refusal(f"{card.where} needs a *COUPLING before it: add its head")
         axes = sorted({axis for line in card.data for axis in _axes(card, line)})
         self.couplings.append(
             deck.Coupling(
@@ -273,7 +274,7 @@ class _Cards:
     def _cload(self, card: Card) -> None:
         for line in card.data:
             if len(line) < 3:
-                raise ValueError(f"{card.where} needs node, direction and value: complete the line")
+                raise Refusal(f"{card.where} needs node, direction and value: complete the line")
             axis = card.whole(line[1]) - 1
             if 0 <= axis <= 5:
                 self.forces.append(deck.Force(self._place(line[0], card), axis, card.number(line[2])))
@@ -357,7 +358,7 @@ class _Cards:
             members = self.assembly.nodes(text)
             return sorted(self.row[node] for node in members)
         except KeyError:
-            raise ValueError(
+            raise Refusal(
                 f"{card.where} names '{text}', which is no node and no set of the deck: correct the name or add the set"
             ) from None
 
@@ -381,7 +382,7 @@ class _Cards:
                 rows = self.raw.nodes.get(name)
                 return self.references.get(int(rows[0]), name) if rows is not None and len(rows) == 1 else name
         if face and not self._has(text):
-            raise ValueError(
+            raise Refusal(
                 f"{card.where} names the surface '{text}', which the deck has not: correct the name or add the surface"
             )
         rows_of = self._rows(text, card)
@@ -399,7 +400,7 @@ class _Cards:
     def _reference(self, text: str, card: Card) -> str:
         rows = self._rows(text, card)
         if len(rows) != 1:
-            raise ValueError(f"{card.where} needs one reference node, '{text}' has {len(rows)}: name one node")
+            raise Refusal(f"{card.where} needs one reference node, '{text}' has {len(rows)}: name one node")
         name = self.references.get(rows[0]) or (f"node {text}" if text.replace(".", "").isdigit() else text)
         self.references[rows[0]] = name
         return name
@@ -469,7 +470,7 @@ class _Cards:
                     self._refused(card, "COMPOSITE")
                     continue
                 if material.upper() not in self.materials:
-                    raise ValueError(
+                    raise Refusal(
                         f"*SOLID SECTION of '{elset}' names the material '{material}', which the deck has not: "
                         "correct the name or add the material"
                     )
@@ -489,7 +490,7 @@ class _Cards:
         scope = scope if name.upper() in scope.orientations else self.assembly.top
         card = scope.orientations.get(name.upper())
         if card is None:
-            raise ValueError(f"{section.where} names the orientation '{name}', which the deck has not: add it")
+            raise Refusal(f"{section.where} names the orientation '{name}', which the deck has not: add it")
         if card.option("DEFINITION").upper() not in ("", "COORDINATES") or not card.data:
             self._refused(card, card.option("DEFINITION").upper())
             return None
@@ -498,7 +499,7 @@ class _Cards:
         if len(card.data) > 1 and card.data[1][0]:
             axis, angle = card.floats(card.data[1], 2)
             if axis not in (1.0, 2.0, 3.0):
-                raise ValueError(f"{card.where} turns about axis {axis:g}: give 1, 2 or 3")
+                raise Refusal(f"{card.where} turns about axis {axis:g}: give 1, 2 or 3")
             own = turned(int(axis) - 1, angle)
         table = scope.distributions.get(card.data[0][0].upper())
         if table is not None:
@@ -531,7 +532,7 @@ class _Cards:
                 try:
                     named = self.assembly.elements(line[0], instance)
                 except KeyError:
-                    raise ValueError(f"{card.where} names the elements '{line[0]}', which the deck has not") from None
+                    raise Refusal(f"{card.where} names the elements '{line[0]}', which the deck has not") from None
                 which[[self.number[key] for key in named if key in self.number]] = len(axes)
             axes.append(own @ orthogonal(*points) @ turn.T)
         return Listed(centres[mine], np.array(axes)[which[mine]])

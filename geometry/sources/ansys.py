@@ -16,6 +16,7 @@ from tribodyn.geometry.sources import deck
 from tribodyn.geometry.sources.card_table import CardTable, Met, words
 from tribodyn.geometry.sources.directions import Listed, System, turned
 from tribodyn.geometry.sources.raw import LabelledMesh, RawMesh, Terms
+from tribodyn.refusal import Refusal
 
 # equal corners of a brick I..P -> (kind, its corners, its edge nodes) among the twenty nodes
 _TETRA = ("tetra", [0, 1, 2, 4], [8, 9, 11, 16, 17, 18])
@@ -76,7 +77,7 @@ class _Archive:
                 try:
                     READ[name](self, words + [""] * 12)
                 except ValueError as trouble:
-                    raise ValueError(
+                    raise Refusal(
                         str(trouble)
                         if str(self.path) in str(trouble)
                         else f"'{self.path}' has a broken {name} at line {self.i}: {trouble}: write it again"
@@ -85,7 +86,7 @@ class _Archive:
                 self.mesh.met.other(name)
         for material, system in self.of_solids.values():
             if system and system not in self.systems:
-                raise ValueError(f"'{self.path}' has elements in system {system}, which it has not: add its LOCAL")
+                raise Refusal(f"'{self.path}' has elements in system {system}, which it has not: add its LOCAL")
             self.constants.setdefault(material, {})
         if self.turned:
             places = np.array([self.mesh.points[label] for label in self.turned])
@@ -131,12 +132,12 @@ class _Archive:
                 starts = range(width * count, len(line.rstrip()), wide)
                 self._node(int(line[:width]), [float(line[k : k + wide].strip() or 0) for k in starts])
             except ValueError:
-                raise ValueError(
+                raise Refusal(
                     f"'{self.path}' has a broken node at line {self.i + 1}: '{line.strip()[:40]}': write it again"
                 ) from None
             self.i += 1
         if self.i == len(self.lines):
-            raise ValueError(f"'{self.path}' ends inside its nodes (NBLOCK): the file is cut off")
+            raise Refusal(f"'{self.path}' ends inside its nodes (NBLOCK): the file is cut off")
         self.i += 1
 
     def n(self, words: list[str]) -> None:
@@ -159,7 +160,7 @@ class _Archive:
         while self.i < len(self.lines) and self.lines[self.i].strip() != "-1":
             head = self._numbers(width)
             if len(head) < 11:
-                raise ValueError(f"'{self.path}' has a broken element at line {self.i}: the file is cut off")
+                raise Refusal(f"'{self.path}' has a broken element at line {self.i}: the file is cut off")
             nodes, count = head[11:], head[8]
             while len(nodes) < count and self.i < len(self.lines):
                 nodes += self._numbers(width)
@@ -174,7 +175,7 @@ class _Archive:
             self.of_solids[name] = head[0], head[4]
             self.mesh.solid(shape, head[10], members, name)
         if self.i == len(self.lines):
-            raise ValueError(f"'{self.path}' ends inside its elements (EBLOCK): the file is cut off")
+            raise Refusal(f"'{self.path}' ends inside its elements (EBLOCK): the file is cut off")
         self.i += 1
 
     def _no_solid(self, number: int, kind: int) -> None:
@@ -192,7 +193,7 @@ class _Archive:
         items: list[int] = []
         while len(items) < int(words[3].split()[0]):
             if self.i == len(self.lines):
-                raise ValueError(f"'{self.path}' ends inside a component (CMBLOCK): the file is cut off")
+                raise Refusal(f"'{self.path}' ends inside a component (CMBLOCK): the file is cut off")
             items += self._numbers(width)
         members: list[int] = []
         for item in items:
@@ -204,7 +205,7 @@ class _Archive:
         line = self.lines[self.i].strip() if self.i < len(self.lines) else ""
         found = re.match(r"\((\d+)[iI](\d+)(?:,\s*\d+[eE](\d+))?", line)
         if found is None:
-            raise ValueError(f"'{self.path}' has a block with the format '{line}': expected one as (3i9,6e21.13e3)")
+            raise Refusal(f"'{self.path}' has a block with the format '{line}': expected one as (3i9,6e21.13e3)")
         self.i += 1
         return int(found[2]), int(found[1]), int(found[3] or 0)
 
@@ -215,7 +216,7 @@ class _Archive:
         try:
             return [int(line[k : k + width]) for k in range(0, len(line), width)]
         except ValueError:
-            raise ValueError(f"'{self.path}' has a broken element at line {self.i}: the file is cut off") from None
+            raise Refusal(f"'{self.path}' has a broken element at line {self.i}: the file is cut off") from None
 
     # types, materials, systems
 

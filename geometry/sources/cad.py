@@ -16,6 +16,7 @@ import numpy as np
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.geometry.sources import msh
 from tribodyn.geometry.sources.raw import RawMesh
+from tribodyn.refusal import Refusal
 
 ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
 _NO_NAME = "Open CASCADE"  # how its writer calls what has no name
@@ -57,7 +58,7 @@ def read_drawing(path: Path) -> RawMesh:
             gmsh.model.mesh.generate(3)
             gmsh.model.mesh.setOrder(2)
         except Exception as problem:  # gmsh raises this and nothing finer
-            raise ValueError(f"drawing '{path}' cannot be meshed ({_line(problem)}): correct it in Gmsh") from None
+            raise Refusal(f"drawing '{path}' cannot be meshed ({_line(problem)}): correct it in Gmsh") from None
         return msh.from_gmsh(gmsh)
 
 
@@ -81,10 +82,10 @@ def _solids(gmsh: Any, path: Path) -> dict[str, int]:
         gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
         gmsh.model.occ.synchronize()
     except Exception as problem:
-        raise ValueError(f"CAD file '{path}' cannot be read ({_line(problem)}): export it again as STEP") from None
+        raise Refusal(f"CAD file '{path}' cannot be read ({_line(problem)}): export it again as STEP") from None
     tags = [tag for _, tag in gmsh.model.getEntities(3)]
     if not tags:
-        raise ValueError(f"CAD file '{path}' has no solid: close its surfaces in the CAD program and export solids")
+        raise Refusal(f"CAD file '{path}' has no solid: close its surfaces in the CAD program and export solids")
     names: dict[str, int] = {}
     for tag in tags:
         label = gmsh.model.getEntityName(3, tag).rstrip("/").rpartition("/")[2].strip()
@@ -100,10 +101,10 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         for key in wanted:
             if key not in known:
                 listed = ", ".join(map(str, sorted(known)[:12]))
-                raise ValueError(f"CAD file '{path}' has no {what} {key} to give a size to: it has {listed}")
+                raise Refusal(f"CAD file '{path}' has no {what} {key} to give a size to: it has {listed}")
     if sizes.only is not None:
         if sizes.only not in shapes:
-            raise ValueError(f"CAD file '{path}' has no solid '{sizes.only}': it has {', '.join(shapes)}")
+            raise Refusal(f"CAD file '{path}' has no solid '{sizes.only}': it has {', '.join(shapes)}")
         shapes = {sizes.only: shapes[sizes.only]}
         model.setVisibility(model.getEntities(), 0)
         model.setVisibility([(3, *shapes.values())], 1, recursive=True)
@@ -111,7 +112,7 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
     everywhere = sizes.everywhere or _default_size(model, sizes)
     for values in ((everywhere,), sizes.bodies.values(), sizes.faces.values()):
         if any(not value > 0 for value in values):
-            raise ValueError(f"CAD file '{path}': element sizes must be above zero")
+            raise Refusal(f"CAD file '{path}': element sizes must be above zero")
     fields = []
 
     def constant(size: float, **entities: list[int]) -> None:
@@ -140,7 +141,7 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         model.mesh.generate(3)
         model.mesh.setOrder(2)
     except Exception as problem:
-        raise ValueError(
+        raise Refusal(
             f"CAD file '{path}' cannot be meshed ({_line(problem)}): heal it or give a smaller size"
         ) from None
     for name, tag in shapes.items():

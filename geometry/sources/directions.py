@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from tribodyn.geometry.placing import rotation
+from tribodyn.refusal import Refusal
 
 
 class Directions(Protocol):
@@ -32,7 +33,7 @@ def orthogonal(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     third = np.cross(first, second)
     size = np.linalg.norm(third, axis=-1)
     if not (size > 1e-9 * np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)).all():
-        raise ValueError("two axes of a local system are parallel or zero: correct its points")
+        raise Refusal("two axes of a local system are parallel or zero: correct its points")
     rows = np.stack([first, np.cross(third, first), third], axis=-2)
     return np.asarray(rows / np.linalg.norm(rows, axis=-1, keepdims=True))
 
@@ -92,7 +93,7 @@ class System:
         arm = points - self.origin
         tangent = np.cross(z, arm)
         if not (np.linalg.norm(tangent, axis=1) > 1e-9 * np.linalg.norm(arm, axis=1)).all():
-            raise ValueError("an element with directions of a material lies on its system's axis: mesh around it")
+            raise Refusal("an element with directions of a material lies on its system's axis: mesh around it")
         tangent = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
         if self.kind == "cylindrical":
             rows = np.stack([np.cross(tangent, z), tangent, z], axis=1)

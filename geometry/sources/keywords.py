@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tribodyn.refusal import Refusal
+
 
 @dataclass(frozen=True)
 class Card:
@@ -34,14 +36,14 @@ class Card:
         try:
             return float(text.upper().replace("D", "E") or 0.0)
         except ValueError:
-            raise ValueError(f"{self.where} expects a number, got '{text}': correct the line") from None
+            raise Refusal(f"{self.where} expects a number, got '{text}': correct the line") from None
 
     def whole(self, text: str) -> int:
         """A whole number."""
         try:
             return int(text)
         except ValueError:
-            raise ValueError(f"{self.where} expects a whole number, got '{text}': correct the line") from None
+            raise Refusal(f"{self.where} expects a whole number, got '{text}': correct the line") from None
 
     @property
     def where(self) -> str:
@@ -56,7 +58,7 @@ def cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[Card]:
     Raises  ValueError: an included file that is not there, or data before the first card
     """
     if path.resolve() in within:
-        raise ValueError(f"deck '{path}' includes itself: take the *INCLUDE out")
+        raise Refusal(f"deck '{path}' includes itself: take the *INCLUDE out")
     card: Card | None = None
     pending = ""
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
@@ -73,11 +75,11 @@ def cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[Card]:
             if card.name == "INCLUDE":
                 other = path.parent / card.option("INPUT").strip("\"'")
                 if not other.is_file():
-                    raise ValueError(f"{card.where} names the file '{other.name}', which does not exist: put it beside")
+                    raise Refusal(f"{card.where} names the file '{other.name}', which does not exist: put it beside")
                 yield from cards(other, (*within, path.resolve()))
                 card = None
         elif card is None:
-            raise ValueError(f"deck '{path}' has data at line {number} before any card: it is no deck of Abaqus")
+            raise Refusal(f"deck '{path}' has data at line {number} before any card: it is no deck of Abaqus")
         else:
             card.data.append([field.strip() for field in text.rstrip(",").split(",")])
     if card is not None:

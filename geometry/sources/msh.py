@@ -10,6 +10,7 @@ import numpy as np
 
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.geometry.sources.raw import SURFACES, Cells, RawMesh
+from tribodyn.refusal import Refusal
 
 _ORDER_19 = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]
 _WEDGE_15 = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
@@ -43,7 +44,7 @@ def read(path: Path) -> RawMesh:
         try:
             gmsh.merge(str(path))
         except Exception as problem:
-            raise ValueError(_cannot(path, str(problem))) from None
+            raise Refusal(_cannot(path, str(problem))) from None
         return from_gmsh(gmsh)
 
 
@@ -64,7 +65,7 @@ def from_gmsh(gmsh: Any) -> RawMesh:
         found = []
         for kind, numbers, nodes in zip(*model.mesh.getElements(*entity), strict=True):
             if kind not in _KINDS:
-                raise ValueError(
+                raise Refusal(
                     f"elements {model.mesh.getElementProperties(kind)[0]} are of a kind that is not known: "
                     "write elements of first or second order"
                 )
@@ -110,10 +111,10 @@ def _check(path: Path) -> None:
     """Refuse another file, and one that stops inside a section: Gmsh itself would read on in silence."""
     text = path.read_bytes()
     if not any(line.strip() == b"$MeshFormat" for line in text[:4096].split(b"\n")[:-1]):
-        raise ValueError(_cannot(path, "it does not begin with $MeshFormat"))
+        raise Refusal(_cannot(path, "it does not begin with $MeshFormat"))
     for section in re.findall(rb"(?m)^\$(?!End)([A-Za-z]{5,})\s*$", text):  # binary numbers may look like a shorter one
         if b"$End" + section not in text:
-            raise ValueError(_cannot(path, f"it ends inside ${section.decode()}, so it is not complete"))
+            raise Refusal(_cannot(path, f"it ends inside ${section.decode()}, so it is not complete"))
 
 
 def _cannot(path: Path, why: str) -> str:

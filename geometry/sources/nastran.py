@@ -16,6 +16,7 @@ from tribodyn.geometry.sources import deck
 from tribodyn.geometry.sources.card_table import CardTable, Met
 from tribodyn.geometry.sources.directions import System
 from tribodyn.geometry.sources.raw import LabelledMesh, RawMesh
+from tribodyn.refusal import Refusal
 
 # card -> (kind of first order, kind of second order, where meshio's nodes stand)
 SOLIDS = {
@@ -78,7 +79,7 @@ class _Bulk:
         number = _int(text or "0", "a system")
         if number and number not in self.built:
             if number not in self.systems:
-                raise ValueError(f"'{self.path}' names the system {number}, which it has not: add its CORD card")
+                raise Refusal(f"'{self.path}' names the system {number}, which it has not: add its CORD card")
             name, fields = self.systems.pop(number)  # gone while it is built: one that refers to itself ends there
             if name[4] == "1":
                 three = np.array([self.place(_int(label, name)) for label in fields[:3]])
@@ -92,7 +93,7 @@ class _Bulk:
     def place(self, label: int) -> np.ndarray:
         """A grid point (3,) in the basic system."""
         if label not in self.grids:
-            raise ValueError(f"'{self.path}' names the grid point {label}, which it has not: the file is cut off")
+            raise Refusal(f"'{self.path}' names the grid point {label}, which it has not: the file is cut off")
         fields = self.grids[label]
         own, of = np.array([[_float(text, "GRID") for text in fields[2:5]]]), self.system(fields[1])
         return np.asarray(own if of is None else of.places(own))[0]
@@ -149,7 +150,7 @@ class _Bulk:
         nodes = [_int(x, card) for x in fields[2:] if x]
         low, high, order = SOLIDS[card]
         if len(nodes) < CORNERS[card]:
-            raise ValueError(
+            raise Refusal(
                 f"{card} {fields[0]} of '{self.path}' has {len(nodes)} nodes: the file is cut off or broken"
             )
         whole = len(nodes) >= len(order)
@@ -233,7 +234,7 @@ class _Bulk:
     def spring(self, card: str, fields: list[str]) -> None:
         """A spring between two displacements, or to the ground."""
         if card == "CELAS1" and _int(fields[1] or fields[0], card) not in self.springs:
-            raise ValueError(f"CELAS1 {fields[0]} of '{self.path}' names a PELAS that it has not: add it")
+            raise Refusal(f"CELAS1 {fields[0]} of '{self.path}' names a PELAS that it has not: add it")
         value = _float(fields[1], card) if card == "CELAS2" else self.springs[_int(fields[1] or fields[0], card)]
         ends = zip(fields[2:6:2], fields[3:6:2], (1.0, -1.0), strict=True)
         terms = [(_int(g, card), _axes(c, card)[0], f) for g, c, f in ends if g not in ("", "0")]
@@ -341,13 +342,13 @@ TABLE = CardTable(
 def lines_of(path: Path, within: tuple[Path, ...] = ()) -> Iterator[str]:
     """Lines of a file without comments, those of included files in their place."""
     if path.resolve() in within:
-        raise ValueError(f"'{path}' includes itself: take the INCLUDE out")
+        raise Refusal(f"'{path}' includes itself: take the INCLUDE out")
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         text = line.split("$")[0].rstrip()
         if text.upper().startswith("INCLUDE"):
             other = path.parent / text[7:].strip().strip("\"'")
             if not other.is_file():
-                raise ValueError(f"INCLUDE of '{path}' names '{other.name}', which does not exist: put it there")
+                raise Refusal(f"INCLUDE of '{path}' names '{other.name}', which does not exist: put it there")
             yield from lines_of(other, (*within, path.resolve()))
         elif text:
             yield text
@@ -373,7 +374,7 @@ def _fields(line: str) -> tuple[str, list[str]]:
     if "," in line:
         head, *more = [item.strip() for item in line.split(",")]
         if "*" in head and any(item and item[0] not in "+*" for item in more[4:]):
-            raise ValueError(f"the line '{line[:40]}' has more than the four fields of a star: take the star out")
+            raise Refusal(f"the line '{line[:40]}' has more than the four fields of a star: take the star out")
         count = 4 if "*" in head else 8
         return head, (more + [""] * count)[:count]
     line = line.expandtabs(8)
@@ -415,7 +416,7 @@ def _thru(words: list[str]) -> list[int]:
 def _axes(text: str, card: str) -> tuple[int, ...]:
     """Axes 0..5 of digits 1 to 6."""
     if set(text) - set("123456"):
-        raise ValueError(f"{card} names the directions '{text}': write digits from 1 to 6")
+        raise Refusal(f"{card} names the directions '{text}': write digits from 1 to 6")
     return tuple(int(digit) - 1 for digit in text)
 
 
@@ -423,7 +424,7 @@ def _int(text: str, card: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise ValueError(f"{card} expects a whole number, got '{text}': correct the card") from None
+        raise Refusal(f"{card} expects a whole number, got '{text}': correct the card") from None
 
 
 def _float(text: str, card: str) -> float:
@@ -431,4 +432,4 @@ def _float(text: str, card: str) -> float:
     try:
         return float(_EXPONENT.sub(r"e\1", text.upper().replace("D", "E")) or 0.0)
     except ValueError:
-        raise ValueError(f"{card} expects a number, got '{text}': correct the card") from None
+        raise Refusal(f"{card} expects a number, got '{text}': correct the card") from None

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.refusal import Refusal
+
 SMOOTH = np.cos(np.radians(30.0))  # facets that meet at less belong to one face
 
 
@@ -53,7 +55,7 @@ def picked(mesh: Any, rule: Rule) -> np.ndarray:
     if rule.nearest is not None:
         found.append(nearest(mesh, rule.nearest, *found))
     if not found:
-        raise ValueError("a face needs a rule: give box, nearest, normal or cad")
+        raise Refusal("a face needs a rule: give box, nearest, normal or cad")
     common = found[0]
     for other in found[1:]:
         common = np.intersect1d(common, other)
@@ -70,11 +72,11 @@ def with_faces(
     boundaries, sets = dict(mesh.boundaries or {}), dict(node_sets)
     for name, rule in rules.items():
         if name in sets or name in boundaries:
-            raise ValueError(f"faces.{name} has the name of a group of the mesh: give it another")
+            raise Refusal(f"faces.{name} has the name of a group of the mesh: give it another")
         try:
             boundaries[name] = picked(mesh, rule)
         except ValueError as trouble:
-            raise ValueError(f"faces.{name}: {trouble}") from None
+            raise Refusal(f"faces.{name}: {trouble}") from None
         sets[name] = np.unique(mesh.dofs.get_facet_dofs(boundaries[name]).flatten())
     return (mesh.with_boundaries(boundaries), sets) if rules else (mesh, sets)
 
@@ -93,7 +95,7 @@ def by_normal(mesh: Any, direction: Sequence[float], degrees: float) -> np.ndarr
     facets, _, normal = outline(mesh)
     along = np.asarray(direction, dtype=float)
     if along.shape != (3,) or not along.any():
-        raise ValueError(f"a normal must be three numbers that are not all zero, got {list(direction)}")
+        raise Refusal(f"a normal must be three numbers that are not all zero, got {list(direction)}")
     here = normal @ (along / np.linalg.norm(along)) >= np.cos(np.radians(degrees))
     return _some(facets[here], mesh, f"faces {_place(along.tolist())} to within {degrees:g} degrees")
 
@@ -105,7 +107,7 @@ def by_number(mesh: Any, numbers: Sequence[int]) -> np.ndarray:
     for number in numbers:
         if f"face {number}" not in known:
             listed = ", ".join(name.partition(" ")[2] for name in known)
-            raise ValueError(f"the body has no face {number} of a CAD file: it has {listed or 'none, being a mesh'}")
+            raise Refusal(f"the body has no face {number} of a CAD file: it has {listed or 'none, being a mesh'}")
     return np.unique(np.concatenate([boundaries[f"face {number}"] for number in numbers]))
 
 
@@ -162,5 +164,5 @@ def _some(facets: np.ndarray, mesh: Any, what: str) -> np.ndarray:
     if not len(facets):
         low, high = mesh.p.min(axis=1), mesh.p.max(axis=1)
         extent = " to ".join(_place(corner) for corner in (low, high))
-        raise ValueError(f"no face of the boundary {what}: the body reaches from {extent} m")
+        raise Refusal(f"no face of the boundary {what}: the body reaches from {extent} m")
     return facets

@@ -15,6 +15,7 @@ from tribodyn.geometry.numbering import HEX_EDGES, HEX_FACES, TET_EDGES
 from tribodyn.geometry.sources import deck
 from tribodyn.geometry.sources.card_table import Met
 from tribodyn.geometry.sources.directions import Directions
+from tribodyn.refusal import Refusal
 
 Face = tuple[int, ...]
 
@@ -118,7 +119,7 @@ class LabelledMesh:
         found = []
         for label, axis, factor in terms:
             if label not in self.points:
-                raise ValueError(f"node {label} is named, which the file has not: it is cut off")
+                raise Refusal(f"node {label} is named, which the file has not: it is cut off")
             row = np.eye(3)[axis % 3]
             if label in self.frames:
                 row = self.frames[label].at(np.array([self.points[label]]))[0][axis % 3]
@@ -174,7 +175,7 @@ class LabelledMesh:
             try:
                 table = np.array([[row[node] for node in nodes] for _, nodes in elements])
             except KeyError as lost:
-                raise ValueError(
+                raise Refusal(
                     f"'{path}' has an element with node {lost.args[0]}, which it has not: the file is cut off"
                 ) from None
             number |= {label: len(number) + i for i, (label, _) in enumerate(elements)}

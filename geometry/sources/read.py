@@ -17,6 +17,7 @@ from tribodyn.geometry.sources import abaqus_cards, ansys, cad, msh, nastran, so
 from tribodyn.geometry.sources.deck import Deck, in_si
 from tribodyn.geometry.sources.raw import COMMON_NAMES, SURFACES, VOLUMES, Cells, RawMesh
 from tribodyn.geometry.sources.solid import SolidBody
+from tribodyn.refusal import Refusal
 
 MOST_VALUES = 100  # an array of integers with more different values is a number, not a group
 
@@ -33,7 +34,7 @@ def with_meshio(path: Path) -> RawMesh:
     except (Exception, SystemExit) as problem:  # the readers raise what they meet, and where none fits meshio exits
         why = "" if isinstance(problem, SystemExit) else " ".join(str(problem).split())
         reason = f" ({why})" if why else ""
-        raise ValueError(f"mesh file '{path}' cannot be read{reason}: write it as a Gmsh file, MSH 4.1") from None
+        raise Refusal(f"mesh file '{path}' cannot be read{reason}: write it as a Gmsh file, MSH 4.1") from None
     names: dict[int, list[str]] = getattr(file, "cell_tags", None) or {}
     cells: list[Cells] = []
     faces: dict[str, list[np.ndarray]] = {}
@@ -143,26 +144,26 @@ def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) 
     """The mesh of a file, lengths in metres. Raises ValueError as `read` does."""
     file = Path(path)
     if unit not in UNITS:
-        raise ValueError(f"unit = \"{unit}\" of mesh file '{path}' is no length that is known: give {', '.join(UNITS)}")
+        raise Refusal(f"unit = \"{unit}\" of mesh file '{path}' is no length that is known: give {', '.join(UNITS)}")
     if not file.is_file():
-        raise ValueError(f"mesh file '{path}' does not exist: build the part first or correct the path")
+        raise Refusal(f"mesh file '{path}' does not exist: build the part first or correct the path")
     reader = READERS.get(file.suffix.lower())
     if reader is None:
-        raise ValueError(
+        raise Refusal(
             f"mesh file '{path}' cannot be read, its ending is none of {', '.join(sorted(READERS))}: "
             "write it as a Gmsh file, MSH 4.1"
         )
     if sizes is not None and reader is not cad.read:
-        raise ValueError(f"mesh file '{path}' is meshed already: element sizes are for CAD files")
+        raise Refusal(f"mesh file '{path}' is meshed already: element sizes are for CAD files")
     try:
         raw = reader(file) if sizes is None else cad.read(file, sizes)
     except (IndexError, KeyError) as problem:
         where = f"near {problem.args[0]!r}" if isinstance(problem, KeyError) else "in the middle of a line"
-        raise ValueError(
+        raise Refusal(
             f"mesh file '{path}' cannot be read {where}: it is cut off or broken, write it again"
         ) from None
     if not raw.cells:
-        raise ValueError(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
+        raise Refusal(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
     return scaled(raw, *UNITS[unit])
 
 

@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tribodyn.geometry.numbering import REFERENCE_POINTS, TET_EDGES, permutation
 from tribodyn.geometry.sources.raw import HEXA, PYRAMID, TETRA, VOLUMES, WEDGE, Cells, RawMesh, Solid
+from tribodyn.refusal import Refusal
 
 Groups = dict[str, np.ndarray]
 _REFERENCE_CORNERS = {
@@ -97,7 +98,7 @@ def build(raw: RawMesh, elements: np.ndarray | None = None) -> SolidBody:
     """One body out of elements of a file, all of them by default."""
     far = np.abs(raw.points).max(initial=0.0)
     if not far < 1e12:
-        raise ValueError(f"a node lies at {far:g}: correct its coordinates, or the unit of the file")
+        raise Refusal(f"a node lies at {far:g}: correct its coordinates, or the unit of the file")
     cells, number = _chosen(raw, elements)
     fulls = [full(block, raw.points) for block in cells]
     kinds = {id(VOLUMES[block.kind][0]) for block in cells}
@@ -292,7 +293,7 @@ def _check_between(solid: Solid, positions: np.ndarray, cells: Cells) -> None:
     off = np.linalg.norm(middle - (a + b) / 2, axis=2) > 0.5 * np.linalg.norm(b - a, axis=2)
     if off.any():
         label = cells.labels[off.any(axis=1).argmax()]
-        raise ValueError(
+        raise Refusal(
             f"element {label} ({cells.kind}) has an edge node away from its edge: "
             "the nodes are in another order than the format's, or the mesh is folded"
         )

@@ -12,6 +12,7 @@ from tribodyn.hbm.contact.compiled_law import pointer
 from tribodyn.hbm.contact.events import CycleNotPeriodic
 from tribodyn.hbm.contact.law import ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.refusal import Refusal
 
 PERIODIC_DRIFT = 1e-13  # of the memory over a cycle, relative to its largest size in the cycle: some hundred roundings
 FIRST_CYCLES = 4  # marched before Newton is tried on the memory; most memories repeat after two
@@ -42,7 +43,7 @@ def cycle(
     if basis.transitions == "located":
         if not contact_law.locates(law):
             name = contact_law.called(law)
-            raise ValueError(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
+            raise Refusal(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
         own = getattr(law, "located", None)
         arguments = x, parameters, memory, basis, jacobian
         return events.cycle(law, *arguments) if own is None else own(*arguments)

@@ -24,9 +24,10 @@ from tribodyn.hbm.contact.compiled_law import pointer
 from tribodyn.hbm.contact.law import SEPARATES, ContactCycle, ContactParameters
 from tribodyn.hbm.contact.located import POINTS, WEIGHTS
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.refusal import SolverFailure
 
 
-class CycleNotPeriodic(RuntimeError):
+class CycleNotPeriodic(SolverFailure):
     """The memory of a contact law did not repeat after all cycles allowed."""
 
 

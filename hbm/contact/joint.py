@@ -18,6 +18,7 @@ from tribodyn.hbm.contact import aft, law as contact_law
 from tribodyn.hbm.contact.law import ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -78,30 +79,30 @@ class Contact:
         """
         given = (joints,) if isinstance(joints, Joint) else tuple(joints)
         if not given:
-            raise ValueError("a harmonic balance needs at least one joint")
+            raise Refusal("a harmonic balance needs at least one joint")
         components, n_pair = tuple(model.interface.components), model.interface.n_pair
         names = [joint.name for joint in given]
         if len(set(names)) < len(names):
-            raise ValueError(f"the joints need different names, got {', '.join(names)}")
+            raise Refusal(f"the joints need different names, got {', '.join(names)}")
         placed, owners = [], np.zeros(n_pair, int)
         for joint in given:
             whole = slice(None) if joint.pairs is None else joint.pairs
             try:
                 pairs = np.arange(n_pair)[whole]
             except IndexError:
-                raise ValueError(f"joint '{joint.name}' has pairs beyond the {n_pair} of the contact") from None
+                raise Refusal(f"joint '{joint.name}' has pairs beyond the {n_pair} of the contact") from None
             if len(pairs) != joint.parameters.n_pair:
-                raise ValueError(
+                raise Refusal(
                     f"joint '{joint.name}' covers {len(pairs)} pairs and has parameters of {joint.parameters.n_pair}"
                 )
             seen = joint.parameters.components
             if [c for c in components if c in seen] != list(seen):
-                raise ValueError(f"joint '{joint.name}' has components {seen}, the contact has {components}")
+                raise Refusal(f"joint '{joint.name}' has components {seen}, the contact has {components}")
             np.add.at(owners, pairs, 1)
             placed.append(replace(joint, pairs=pairs, parameters=contact_law.checked(joint.law, joint.parameters)))
         if np.any(owners != 1):
             pair = int(np.flatnonzero(owners != 1)[0])
-            raise ValueError(f"pair {pair} of the contact belongs to {owners[pair]} joints: each needs exactly one")
+            raise Refusal(f"pair {pair} of the contact belongs to {owners[pair]} joints: each needs exactly one")
         return cls(components, n_pair, tuple(placed))
 
     @cached_property
@@ -114,7 +115,7 @@ class Contact:
     def only(self, needed_by: str) -> Joint:
         """The joint that is the whole contact; raises ValueError where there are several, or it sees a part of it."""
         if self._alone is None:
-            raise ValueError(f"{needed_by} serves one joint that covers the whole contact: this one has several laws")
+            raise Refusal(f"{needed_by} serves one joint that covers the whole contact: this one has several laws")
         return self._alone
 
     def merged(self, needed_by: str) -> Joint:
@@ -196,7 +197,7 @@ class Contact:
         for joint in self.joints:
             if joint.name == name:
                 return joint
-        raise ValueError(f"no joint '{name}': there are {', '.join(joint.name for joint in self.joints)}")
+        raise Refusal(f"no joint '{name}': there are {', '.join(joint.name for joint in self.joints)}")
 
     def by_joint(self, of_pairs: np.ndarray) -> dict[str, np.ndarray]:
         """Values (n_pair, ...) of all pairs, joint by joint; for status, energy, forces, wear."""

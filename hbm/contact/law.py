@@ -34,6 +34,7 @@ import numpy as np
 
 from tribodyn import declare
 from tribodyn.found import Kind
+from tribodyn.refusal import Refusal
 
 STICKS, SLIPS, SEPARATES = 1, 2, 4
 
@@ -72,7 +73,7 @@ class ContactParameters:
         """
         k = np.atleast_2d(np.asarray(stiffness, float))
         if k.shape[1] != len(components):
-            raise ValueError(f"contact stiffness has {k.shape[1]} columns for the components {components}")
+            raise Refusal(f"contact stiffness has {k.shape[1]} columns for the components {components}")
 
         def spread(value: np.ndarray | float) -> np.ndarray:
             return np.array(np.broadcast_to(np.asarray(value, float), (len(k),)))
@@ -80,7 +81,7 @@ class ContactParameters:
         made = cls(tuple(components), k, spread(gap), {name: spread(value) for name, value in numbers.items()}, table)
         for name, value, low in (("stiffness", made.stiffness, 0.0), ("gap", made.gap, -np.inf)):
             if not np.all(np.isfinite(value)) or np.any(value < low):
-                raise ValueError(f"contact {name} must be finite{' and >= 0' if low == 0 else ''} at every pair")
+                raise Refusal(f"contact {name} must be finite{' and >= 0' if low == 0 else ''} at every pair")
         return made
 
     @property
@@ -100,7 +101,7 @@ class ContactParameters:
         Raises  ValueError for a number from which the law has tabulated something
         """
         if self.tail is not None and name != "friction":
-            raise ValueError(f"{name} cannot be scaled in a contact law with a table: give it in the scene")
+            raise Refusal(f"{name} cannot be scaled in a contact law with a table: give it in the scene")
         return replace(self, numbers={**self.numbers, name: factor * self.numbers[name]})
 
     @property
@@ -148,7 +149,7 @@ def load(name: str) -> ModuleType:
     """The law module of this name, or of a file of one's own; raises ValueError where there is none."""
     module = KIND.load(name)
     if not isinstance(getattr(module, "COMPONENTS", None), tuple):
-        raise ValueError(f'contact law file \'{name}\' has no COMPONENTS, such as (("t1", "n"),)')
+        raise Refusal(f'contact law file \'{name}\' has no COMPONENTS, such as (("t1", "n"),)')
     return module
 
 
@@ -173,7 +174,7 @@ def require_order(law: ModuleType, parameters: ContactParameters) -> None:
     """Raise ValueError where parameters do not hold a law's own numbers in its order, as `checked` gives them."""
     if tuple(parameters.numbers) != _order(law):
         has, own = ", ".join(parameters.numbers) or "none", ", ".join(_order(law)) or "none"
-        raise ValueError(f"contact law '{called(law)}' has the numbers {own}, in this order, and was given {has}")
+        raise Refusal(f"contact law '{called(law)}' has the numbers {own}, in this order, and was given {has}")
 
 
 def check_components(name: str, components: tuple[str, ...]) -> None:
@@ -181,7 +182,7 @@ def check_components(name: str, components: tuple[str, ...]) -> None:
     accepted = load(name).COMPONENTS
     if components not in accepted:
         known = " or ".join("(" + ", ".join(c) + ")" for c in accepted)
-        raise ValueError(f"contact law '{Path(name).stem}' has components {known}, not {components}")
+        raise Refusal(f"contact law '{Path(name).stem}' has components {known}, not {components}")
 
 
 def checked(name: str, parameters: ContactParameters) -> ContactParameters:
@@ -194,5 +195,5 @@ def checked(name: str, parameters: ContactParameters) -> ContactParameters:
     if hasattr(law, "tabulated"):
         return replace(complete, tail=law.tabulated(complete))
     if parameters.table is not None:
-        raise ValueError(f"contact law '{Path(name).stem}' takes no table: leave it out")
+        raise Refusal(f"contact law '{Path(name).stem}' takes no table: leave it out")
     return complete

@@ -27,6 +27,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from tribodyn.refusal import Refusal
+
 N_STRIPS = 5
 """Strips over half of the shorter side on the coarse mesh; the fine mesh has twice as many."""
 LONGEST = 1e9
@@ -61,12 +63,12 @@ class ElasticPair(NamedTuple):
         """Self, or a ValueError that names the number that cannot be."""
         for name, value in zip(("E1", "E2"), (self.E1, self.E2), strict=True):
             if not value > 0:
-                raise ValueError(f"{name} is {value:g} Pa: Young's modulus must be positive (inf for a rigid body)")
+                raise Refusal(f"{name} is {value:g} Pa: Young's modulus must be positive (inf for a rigid body)")
         for name, value in zip(("nu1", "nu2"), (self.nu1, self.nu2), strict=True):
             if not -1 < value <= 0.5:
-                raise ValueError(f"{name} is {value:g}: Poisson's ratio must lie above -1 and not above 0.5")
+                raise Refusal(f"{name} is {value:g}: Poisson's ratio must lie above -1 and not above 0.5")
         if not (isfinite(self.E1) or isfinite(self.E2)):
-            raise ValueError("E1 and E2 are both infinite: one body must be elastic")
+            raise Refusal("E1 and E2 are both infinite: one body must be elastic")
         return self
 
 
@@ -74,7 +76,7 @@ def require_positive(**lengths: float) -> None:
     """Raise ValueError for the first argument that is not a positive finite number."""
     for name, value in lengths.items():
         if not (value > 0 and isfinite(value)):
-            raise ValueError(f"{name} is {value:g}: it must be a positive finite number (SI units)")
+            raise Refusal(f"{name} is {value:g}: it must be a positive finite number (SI units)")
 
 
 @cache
@@ -100,16 +102,16 @@ def rectangular_punch(
     """
     require_positive(a=a, b=b)
     if max(a, b) > LONGEST * min(a, b):
-        raise ValueError(
+        raise Refusal(
             f"the sides {a:g} and {b:g} m of a punch differ by more than {LONGEST:g} times: check their units, or "
             "give the contact stiffness in numbers"
         )
     pair = ElasticPair(E1, nu1, E2, nu2).checked()
     if not (edge_radius >= 0 and isfinite(edge_radius)):
-        raise ValueError(f"edge_radius is {edge_radius:g} m: it must be zero or a positive finite number")
+        raise Refusal(f"edge_radius is {edge_radius:g} m: it must be zero or a positive finite number")
     if edge_radius > 0:
         if load is None:
-            raise ValueError("edge_radius is given without load: the contact grows onto round edges, so give load")
+            raise Refusal("edge_radius is given without load: the contact grows onto round edges, so give load")
         require_positive(load=load)
         a, b = contact_sides(a, b, load, edge_radius, pair)
     return flat_rectangle(a, b, pair)

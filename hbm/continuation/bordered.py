@@ -20,6 +20,7 @@ from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.newton import NewtonOptions, Solution, relative_residual
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
+from tribodyn.refusal import SolverFailure
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Metric:
         return a * (1.0 / self.norm(a))
 
 
-class BorderFailed(RuntimeError):
+class BorderFailed(SolverFailure):
     """The bordered system could not be solved."""
 
 

@@ -22,6 +22,7 @@ from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.linear.held_output import HeldOutput, HeldPoint
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal
 
 
 def constant_response(balance: HarmonicBalance, output: str, amplitude: float) -> HarmonicBalance:
@@ -32,7 +33,7 @@ def constant_response(balance: HarmonicBalance, output: str, amplitude: float) -
     """
     _require_one_force(balance)
     if not amplitude > 0:
-        raise ValueError(f"the amplitude that is held must be above 0, not {amplitude:g} m")
+        raise Refusal(f"the amplitude that is held must be above 0, not {amplitude:g} m")
     return replace(balance, compliance=HeldOutput.of(balance.compliance, output, amplitude), load_factor=1.0)
 
 
@@ -89,7 +90,7 @@ class PhaseResonance(FreeVibration):
         reached = np.abs((self._output_row() @ shapes) * (shapes.conj().T @ self._load()))[inside]
         if not len(inside) or not reached.max() > 0:
             span = f"{low / (2 * np.pi):.6g} and {high / (2 * np.pi):.6g} Hz"
-            raise ValueError(f"no mode that the loads move the output in lies between {span}: give another range")
+            raise Refusal(f"no mode that the loads move the output in lies between {span}: give another range")
         return super()._reference(int(inside[np.argmax(reached / squares[inside])]), apart)
 
 
@@ -109,7 +110,7 @@ def phase_resonance(
     Returns a Branch in the amplitude, whose load factors are the force levels
     """
     if not (start > 0 and stop > 0 and start != stop):
-        raise ValueError(f"the amplitudes of a phase resonance must be > 0 and differ, not {start:g} and {stop:g}")
+        raise Refusal(f"the amplitudes of a phase resonance must be > 0 and differ, not {start:g} and {stop:g}")
     problem = PhaseResonance(balance, low, high, output)
     a, goal = np.log(np.array([start, stop]) / problem.per_amplitude)
     solved, end = nonlinear_modes.walk(problem, float(a), float(goal), options or BackboneOptions())
@@ -136,7 +137,7 @@ def _require_one_force(balance: HarmonicBalance) -> None:
     acting = {h for (h, _), value in loads.items() if h and value != 0}
     moving = base is not None and base[:, balance.basis.order > 0].any()
     if acting != {1} or moving:
-        raise ValueError("control finds one force: expected vibrating loads in harmonic 1, and in no other")
+        raise Refusal("control finds one force: expected vibrating loads in harmonic 1, and in no other")
 
 
 def _in_phase(balance: HarmonicBalance, branch: Branch, force: np.ndarray) -> Branch:

@@ -24,6 +24,7 @@ from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal, SolverFailure
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class FoldCurve:
         return amplitude(self.response[:, self.output_names.index(output)])
 
 
-class NoFold(RuntimeError):
+class NoFold(SolverFailure):
     """No fold was found near a place."""
 
 
@@ -122,15 +123,15 @@ def track_fold(
     """
     options = options or FoldOptions()
     if path.omega is None:
-        raise ValueError("a fold is followed against a second parameter, such as the load, not against the frequency")
+        raise Refusal("a fold is followed against a second parameter, such as the load, not against the frequency")
     if start == stop:
-        raise ValueError(f"start and stop are the same, {path.say(start)}: there is no fold to follow")
+        raise Refusal(f"start and stop are the same, {path.say(start)}: there is no fold to follow")
     surface = _Surface(path, options, omega, abs(stop - start))
     flat = x.reshape(-1, x.shape[-1])
     try:
         here = surface.first(start, Direction(flat, omega), float(np.sign(stop - start)))
     except NoFold as reason:
-        raise ValueError(f"no fold near {omega / (2 * np.pi):.6g} Hz at {path.say(start)}: {reason}") from None
+        raise Refusal(f"no fold near {omega / (2 * np.pi):.6g} Hz at {path.say(start)}: {reason}") from None
     line, step = [here], options.step
     end: Outcome[BranchEnd] | None = None
     low, high = min(start, stop), max(start, stop)

@@ -23,6 +23,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import SEPARATES, ContactCycle
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.linear.expansion import stuck_modes
+from tribodyn.refusal import Refusal
 
 FEW = 120  # lowest modes among which the reference mode of a turning or a flown-about structure is looked for
 PROPORTIONAL = 1e-6  # of the damping of two modes: less between them is rounding
@@ -142,14 +143,14 @@ class FreeVibration:
         model, self.balance, self.basis, self.mode = balance.model, balance, balance.basis, mode
         model.require_masters("nonlinear modes")
         if model.per_harmonic is not None and model.per_index is None:
-            raise ValueError(
+            raise Refusal(
                 "nonlinear modes need one system for all harmonics: this model has one of its own per harmonic"
             )
         if 1 not in self.basis.harmonics:
-            raise ValueError("nonlinear modes need harmonic 1 among the harmonics")
+            raise Refusal("nonlinear modes need harmonic 1 among the harmonics")
         names = balance.compliance.output_names
         if not names or (output is not None and output not in names):
-            raise ValueError(
+            raise Refusal(
                 f"no output '{output}' to measure the amplitude: the model has {', '.join(names) or 'none'}"
             )
         self.k = balance.compliance.k
@@ -175,7 +176,7 @@ class FreeVibration:
         moved = self.modes[self.first].O @ self.reference
         self.per_amplitude = float(abs(moved[names.index(self.output)]))
         if self.per_amplitude <= 1e-9 * np.abs(self.modes[self.first].O).max():
-            raise ValueError(f"output '{self.output}' does not move in mode {mode}: choose another output")
+            raise Refusal(f"output '{self.output}' does not move in mode {mode}: choose another output")
         self.column, self.row = self.reference, self.reference.conj()
         self.sustained, self.push = 1.0, 1.0 + 0j
 
@@ -188,11 +189,11 @@ class FreeVibration:
         m = self.modes[self.first]
         squares, shapes = self._still = self._at_rest(apart)
         if mode is not None and not 0 <= mode < self.n:
-            raise ValueError(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
+            raise Refusal(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
         system, _ = self.balance.model.at_harmonic(1)
         if mode is not None and system.gyroscopic is None and system.circulatory is None:
             if squares[mode] <= 1e-13 * squares[-1]:
-                raise ValueError(f"mode {mode} is a rigid-body motion at rest: choose one that vibrates")
+                raise Refusal(f"mode {mode} is a rigid-body motion at rest: choose one that vibrates")
             shape, omega = shapes[:, mode], float(np.sqrt(squares[mode]))
             return shape, omega, float(np.real(shape.conj() @ m.damping @ shape)) / (2 * omega)
         few = shapes[:, : min(self.n, FEW)]  # what turns and what flows couples the lowest ones
@@ -228,7 +229,7 @@ class FreeVibration:
         still = self.balance.with_load(0.0)
         solution = newton.solve(still, still.omega_max, still.stuck(still.omega_max))
         if not solution.converged:
-            raise ValueError(f"no static equilibrium for a nonlinear mode to vibrate about: {solution.outcome}")
+            raise Refusal(f"no static equilibrium for a nonlinear mode to vibrate about: {solution.outcome}")
         apart = solution.state.cycle.status & SEPARATES > 0
         return solution.state.x, np.repeat(apart, solution.state.x.shape[1])
 

@@ -23,6 +23,7 @@ from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import SolverFailure
 
 ROUGH = 1e-5  # error of the compliance at the highest harmonic that estimates at single states may have
 _WIDE: WeakKeyDictionary[ContactCompliance, ContactCompliance] = WeakKeyDictionary()
@@ -94,7 +95,7 @@ class HarmonicChoice:
     outcome: str
 
 
-class NotSolved(RuntimeError):
+class NotSolved(SolverFailure):
     """The balance has no solution to estimate the error of; the message says where and why."""
 
 

@@ -24,6 +24,7 @@ from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_integration, time_step
 from tribodyn.hbm.time.period_search import PeriodSearch
 from tribodyn.hbm.time.stepper import Options, TimeStepper
+from tribodyn.refusal import Refusal
 
 INSIDE = 1e-4  # of a motion: growth is the same from 1e-6 to 1e-3, see docs/theory/flutter.md
 
@@ -74,7 +75,7 @@ def limit_cycles(
     """
     options = options or BackboneOptions()
     if not 0 < start < stop:
-        raise ValueError(f"limit cycles need two rising amplitudes above 0, not {start} and {stop}")
+        raise Refusal(f"limit cycles need two rising amplitudes above 0, not {start} and {stop}")
     problem = FreeVibration(balance, mode, output)
     low, high = np.log(np.array([start, stop]) / problem.per_amplitude)
     solved, end = walk(problem, float(low), float(high), options)

@@ -19,6 +19,7 @@ from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,7 @@ def backbone(
     """
     options = options or BackboneOptions()
     if not (start > 0 and stop > 0 and start != stop):
-        raise ValueError(f"the amplitudes of a backbone must be > 0 and differ, not {start} and {stop}")
+        raise Refusal(f"the amplitudes of a backbone must be > 0 and differ, not {start} and {stop}")
     problem = FreeVibration(balance, mode, output)
     a, goal = np.log(np.array([start, stop]) / (1.0 if modal else problem.per_amplitude))
     solved, end = walk(problem, float(a), float(goal), options)

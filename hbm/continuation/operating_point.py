@@ -19,9 +19,10 @@ from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, SolveEnd
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal
 
 
-class NoPeak(ValueError):
+class NoPeak(Refusal):
     """The response has no maximum inside the range that is searched; the message says where it still rises."""
 
 

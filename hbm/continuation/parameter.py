@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.refusal import Refusal
 
 FREQUENCY, LOAD = "frequency", "load factor"
 DIFFERENCE_STEP = 1e-6  # of central differences, in units of `Parameter.scale`: near the cube root of rounding
@@ -82,7 +83,7 @@ def wear(balance: HarmonicBalance, omega: float, depth: np.ndarray) -> Parameter
     depth = np.asarray(depth, float)
     deepest = float(np.abs(depth).max(initial=0.0))
     if deepest == 0.0:
-        raise ValueError("the wear depth to continue in is zero at every pair: give the depth of a worn contact")
+        raise Refusal("the wear depth to continue in is zero at every pair: give the depth of a worn contact")
     initial = balance.contact.gap
     scale = _length(balance, omega) / deepest
     return Parameter("wear fraction", lambda value: balance.with_gap(initial + value * depth), omega, scale)
@@ -107,7 +108,7 @@ def friction(balance: HarmonicBalance, omega: float) -> Parameter:
     """
     contact, name = balance.contact, "friction"
     if not any(name in joint.parameters.numbers for joint in contact.joints):
-        raise ValueError("no contact law here has a coefficient of friction to change")
+        raise Refusal("no contact law here has a coefficient of friction to change")
 
     def make(value: float) -> HarmonicBalance:
         return balance.with_contact(

@@ -26,6 +26,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal, SolverFailure
 
 START_OFFSET = 1e4  # times the largest travel of a slider that the unloaded cycle allows
 # Relative deviation of the vibrating force of a stuck pair from that of its spring: rounding and Newton leave less.
@@ -67,7 +68,7 @@ class ResponseBounds:
 
     def _range(self, value: np.ndarray) -> tuple[float, float]:
         if not self.converged.any():
-            raise RuntimeError(f"none of the three starts led to a solution: {self.solutions[0].outcome}")
+            raise SolverFailure(f"none of the three starts led to a solution: {self.solutions[0].outcome}")
         return float(value[self.converged].min()), float(value[self.converged].max())
 
 
@@ -159,11 +160,11 @@ def _check(balance: HarmonicBalance) -> list[int]:
     for joint in balance.contact.joints:
         own = joint.parameters.tangential
         if joint.n_state != len(own) or not tangential:
-            raise ValueError(f"contact law '{joint.law}' keeps no slider: there is no residual shear to bound")
+            raise Refusal(f"contact law '{joint.law}' keeps no slider: there is no residual shear to bound")
         if [balance.contact.columns(joint)[c] for c in own] != tangential[: len(own)]:
-            raise ValueError(f"joint '{joint.name}' sees {joint.parameters.components}: give it t1 to bound its shear")
+            raise Refusal(f"joint '{joint.name}' sees {joint.parameters.components}: give it t1 to bound its shear")
     if not balance.basis.has_static:
-        raise ValueError("residual shear is a static force: keep harmonic 0 to bound the response")
+        raise Refusal("residual shear is a static force: keep harmonic 0 to bound the response")
     return tangential
 
 

@@ -26,6 +26,7 @@ import scipy.linalg as sla
 from scipy.sparse import csr_matrix
 
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class ExpansionRules:
 RULES = ExpansionRules()
 
 
-class SingularStuckSystem(ValueError):
+class SingularStuckSystem(Refusal):
     """The structure can move as a rigid body even with every contact stuck."""
 
 
@@ -70,7 +71,7 @@ class UnbalancedLoad(SingularStuckSystem):
         self.shapes = shapes
 
 
-class UndampedResonance(ValueError):
+class UndampedResonance(Refusal):
     """The response of the stuck structure is infinite at this frequency."""
 
 

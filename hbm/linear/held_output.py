@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
+from tribodyn.refusal import Refusal
 
 
 class HeldOutput(ContactCompliance):
@@ -57,7 +58,7 @@ class HeldPoint(CompliancePoint):
         self.receptance = complex(y[compliance.row])
         if self.receptance == 0.0:
             name = compliance.output_names[compliance.row]
-            raise ValueError(f"the loads do not move output '{name}' in harmonic 1: its amplitude cannot be held")
+            raise Refusal(f"the loads do not move output '{name}' in harmonic 1: its amplitude cannot be held")
         self._ways = x / self.receptance, y / self.receptance
         missing = compliance.amplitude - self.receptance
         self.x_lin = self._moved(self.x_lin, self._ways[0] * missing)

@@ -27,6 +27,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import Expansion
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 
 ROOM = 2e8  # bytes of matrices of sectors alike that are kept for frequencies met again
 
@@ -49,7 +50,7 @@ class Alike:
         ports: tuple[str, ...],
     ):
         if model.per_index is None or model.info.n_sectors is None or model.info.engine_order is None:
-            raise ValueError("only a travelling wave of a wheel has sectors that can differ")
+            raise Refusal("only a travelling wave of a wheel has sectors that can differ")
         self.n_sectors = N = model.info.n_sectors
         self.k = np.asarray(springs, float).ravel()
         system, _ = model.per_index(0)
@@ -114,7 +115,7 @@ class MistunedCompliance:
         self.alike, self.basis = alike, basis
         self.deviation = np.asarray(deviation, float)
         if self.deviation.shape != (alike.n_sectors,) or not np.all(self.deviation > -1):
-            raise ValueError(f"mistuning needs {alike.n_sectors} deviations of stiffness above -1, one per sector")
+            raise Refusal(f"mistuning needs {alike.n_sectors} deviations of stiffness above -1, one per sector")
         self.k = np.tile(alike.k, alike.n_sectors)
         self.n_contact = len(self.k)
         self.output_names = tuple(of_sector(name, n) for name in alike.outputs for n in range(alike.n_sectors))

@@ -36,6 +36,7 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.stability import perturbed_contact, wave_exponents
 from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal
 
 FOLD = "fold"
 _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
@@ -149,7 +150,7 @@ def stability(balance: HarmonicBalance, state: State, n_modes: int | None = None
     if model.per_index is not None:
         return _of_wave(balance, state, n_modes, top)
     if model.per_harmonic is not None and model.info.reaction is None:
-        raise ValueError(
+        raise Refusal(
             "stability needs one system for all harmonics: perturbations of a stored cyclic part see other systems "
             "than the solution does"
         )
@@ -169,7 +170,7 @@ def mark(
     """
     path = parameter.of(problem)
     if path.name != branch.parameter_name:
-        raise ValueError(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
+        raise Refusal(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
     found: list[Stability | None] = []
     for value, flat, converged in zip(branch.parameter, branch.contact, branch.converged, strict=True):
         here = None

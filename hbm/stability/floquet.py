@@ -20,6 +20,7 @@ from tribodyn.hbm.time.period_search import Period, PeriodSearch, push
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import integrate
 from tribodyn.hbm.time.verify import Verification
+from tribodyn.refusal import Refusal
 
 MULTIPLIERS = "its Floquet multipliers in time"
 HILL = "Hill's method"
@@ -54,7 +55,7 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     stepper = TimeStepper(balance, state.omega, options)
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
     if not motion.periodic:
-        raise ValueError(f"no periodic motion near this state: {motion.outcome}")
+        raise Refusal(f"no periodic motion near this state: {motion.outcome}")
     multipliers = np.linalg.eigvals(monodromy(stepper, motion.slopes))
     multipliers = multipliers[np.abs(multipliers) > RULES.least_multiplier]
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
@@ -114,7 +115,7 @@ def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tup
     search = PeriodSearch(stepper, replace(options, accelerate=True), False)
     period = search.mix(stepper.start_from(state))
     if period.drift > options.tolerance:
-        raise ValueError(f"no periodic motion near this state: drift {period.drift:.1e} at least")
+        raise Refusal(f"no periodic motion near this state: drift {period.drift:.1e} at least")
     plain = PeriodSearch(stepper, replace(options, accelerate=False, max_periods=1 + RULES.most_products), False)
     base = plain.step(period.end)
     size = period_search.RULES.difference * float(np.linalg.norm(base.start))
@@ -148,7 +149,7 @@ def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray
         if miss <= RULES.accuracy * found or (k >= RULES.fewest_products and found + miss < 1):
             return found, np.real(np.array(v).T @ vectors[:, top])
         v.append(w / h[k, k - 1])
-    raise ValueError(f"the largest multiplier did not converge: {found:.3g}, off by up to {miss:.1g}")
+    raise Refusal(f"the largest multiplier did not converge: {found:.3g}, off by up to {miss:.1g}")
 
 
 def _size(stepper: TimeStepper) -> int:
@@ -161,7 +162,7 @@ def monodromy(stepper: TimeStepper, slopes: np.ndarray | None) -> np.ndarray:
     slopes : of `time_step.Record`; raises ValueError for models too large
     """
     if _size(stepper) > RULES.max_states:
-        raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
+        raise Refusal(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
     assert slopes is not None
     linear, A, c = stepper.linear, stepper.contact.A.T, stepper.c
     n, n_contact, n_memory = len(linear.E), len(A), stepper.balance.memory.size

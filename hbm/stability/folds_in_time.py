@@ -22,6 +22,7 @@ from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import PeriodicMotion
+from tribodyn.refusal import Refusal
 
 SEARCH_OPTIONS = Options(steps=512, tolerance=1e-7, max_periods=400)
 MARCH_OPTIONS = replace(SEARCH_OPTIONS, accelerate=False, max_periods=800, patience=800)
@@ -98,7 +99,7 @@ def fold_in_time(
     Raises  ValueError where the point is no fold; IntegrationFailed as time integration does
     """
     if fold not in branch.folds:
-        raise ValueError(f"point {fold} of the branch is no fold, the folds are {list(branch.folds)}")
+        raise Refusal(f"point {fold} of the branch is no fold, the folds are {list(branch.folds)}")
     own, partner = _stable_side(balance, branch, fold)
     elsewhere = [stretch for stretch in _stretches(branch) if stretch not in (own, partner)]
     at_fold = balance.evaluate(branch.omega[fold], balance.shaped(branch.contact[fold]))

@@ -23,6 +23,7 @@ from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_step
+from tribodyn.refusal import Refusal
 
 LEAST = 1e-4  # decrement over 2 pi of the falling cycle, where the damping is below
 
@@ -36,10 +37,10 @@ def decrement(balance: HarmonicBalance, mode: Backbone) -> np.ndarray:
     """
     size = np.log(mode.first_harmonic)
     if len(size) < 3 or not (np.all(np.diff(size) > 0) or np.all(np.diff(size) < 0)):
-        raise ValueError("a decay has one rate per amplitude where the backbone has three points and never turns back")
+        raise Refusal("a decay has one rate per amplitude where the backbone has three points and never turns back")
     problem = FreeVibration(balance.with_load(0.0), mode.number, mode.output)
     if not problem.one_system:
-        raise ValueError("a free decay needs one system for all harmonics: this model has several")
+        raise Refusal("a free decay needs one system for all harmonics: this model has several")
     points = [
         problem.at(mode.contact[i].reshape(problem.rest.shape), mode.omega[i], mode.damping[i], mode.modal_amplitude[i])
         for i in range(len(size))

@@ -19,6 +19,7 @@ from tribodyn.hbm.time.period_search import Period, PeriodSearch, Pushed, push
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.time.time_step import Moving
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class Follower:
         Raises  ValueError for models with no equation of motion in time; IntegrationFailed
         """
         if wave_in_time.is_wave(balance):
-            raise ValueError("means over a motion serve one part or several bodies, not a travelling wave of a wheel")
+            raise Refusal("means over a motion serve one part or several bodies, not a travelling wave of a wheel")
         self._motion = self._at(balance, state.omega).start_from(state)
         self._regular, self._passing = True, False
 

@@ -22,6 +22,7 @@ from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 from tribodyn.hbm.time.time_step import Moving
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -97,11 +98,11 @@ def hammer(
     """
     struck = [name for (h, name), value in balance.excitation.loads.items() if h and value != 0]
     if len(set(struck)) != 1:
-        raise ValueError(f"a blow acts where the one vibrating load does: there are {len(set(struck))}")
+        raise Refusal(f"a blow acts where the one vibrating load does: there are {len(set(struck))}")
     free = balance.with_load(0.0)
     still = newton.solve(free, omega, free.stuck(omega))
     if not still.converged:
-        raise ValueError(f"no static equilibrium to be struck in: {still.outcome}")
+        raise Refusal(f"no static equilibrium to be struck in: {still.outcome}")
     stepper = TimeStepper(free, omega, Options(steps=steps))
     moving = stepper.start_from(still.state, at_rest=True)
     m = stepper.n_dynamic
@@ -137,7 +138,7 @@ def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float, several
     period = 2 * np.pi / (omega * step)
     n = round(RULES.window * period)
     if len(time) < n + period:
-        raise ValueError(
+        raise Refusal(
             f"a decay of {len(time) / period:.1f} periods is too short for its damping: {RULES.window + 1} are needed"
         )
     inside = (np.arange(n) + 0.5) / n - 0.5  # time from the middle, over the window

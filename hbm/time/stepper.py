@@ -19,6 +19,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.time import time_step
 from tribodyn.hbm.time.hold import Hold
 from tribodyn.hbm.time.time_step import Moving, Record
+from tribodyn.refusal import Refusal, SolverFailure
 
 RESOLVED = 1.0  # omega h of a mode from which on its inertia is left out
 
@@ -45,10 +46,10 @@ class Options:
 
     def __post_init__(self) -> None:
         if self.steps < 8:
-            raise ValueError(f"steps per period must be at least 8, not {self.steps}")
+            raise Refusal(f"steps per period must be at least 8, not {self.steps}")
 
 
-class IntegrationFailed(RuntimeError):
+class IntegrationFailed(SolverFailure):
     """The contact iteration of a time step did not converge."""
 
 
@@ -75,7 +76,7 @@ class TimeStepper:
         model = balance.model
         model.require_masters("time integration")
         if model.per_harmonic is not None and model.info.reaction is None:
-            raise ValueError(
+            raise Refusal(
                 "time integration needs one system for all harmonics: a cyclic part alone has no equation of motion in "
                 "time"
             )
@@ -240,7 +241,7 @@ def _free_modes(system: SecondOrderSystem) -> tuple[np.ndarray, np.ndarray]:
     try:
         lam, phi = sla.eigh(np.asarray(system.stiffness), np.asarray(system.mass))
     except np.linalg.LinAlgError:
-        raise ValueError(
+        raise Refusal(
             "time integration needs a positive definite mass matrix: give every coordinate some mass"
         ) from None
     return lam, phi

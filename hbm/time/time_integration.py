@@ -23,6 +23,7 @@ from tribodyn.hbm.time import wave_in_time
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.stepper import RESOLVED, Options, TimeStepper
 from tribodyn.hbm.time.time_step import Moving
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,7 @@ def _rest(stepper: TimeStepper) -> Moving:
     still = stepper.balance.with_load(0.0)
     solution = newton.solve(still, stepper.omega, still.stuck(stepper.omega))
     if not solution.converged:
-        raise ValueError(f"no static equilibrium to start from ({solution.outcome}): start from a balance state")
+        raise Refusal(f"no static equilibrium to start from ({solution.outcome}): start from a balance state")
     return stepper.start_from(solution.state, at_rest=True)
 
 

@@ -19,6 +19,7 @@ from tribodyn.hbm.wear import fewer_harmonics
 from tribodyn.hbm.wear.evolution import WearProblem, WearState, worn_state
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
+from tribodyn.refusal import Refusal
 
 GAMMA = 1 - 1 / np.sqrt(2)
 
@@ -143,7 +144,7 @@ def depth_per_work(problem: WearProblem, state: WearState) -> np.ndarray:
         rate, work = state.rate[pairs], state.work[pairs]
         works = work > 0
         if np.any(rate[~works] > 0):
-            raise ValueError(f'wear law "{wear.law}" wears pairs without friction work: take the thesis\'s rule')
+            raise Refusal(f'wear law "{wear.law}" wears pairs without friction work: take the thesis\'s rule')
         own = problem.numbers(name).get("coefficient", np.ones(len(pairs))) / area[pairs]
         known = works & (own > 0)
         factor = np.mean(rate[known] / (work[known] * own[known])) if known.any() else 1.0

@@ -19,6 +19,7 @@ from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.refusal import Refusal
 
 FADED_SHARE = 1e-3  # share of the first friction work per cycle below which wear may have faded out
 ENDLESS = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
@@ -73,17 +74,17 @@ class WearProblem:
     def __post_init__(self) -> None:
         shares = [duty.share for duty in self.mission]
         if not self.mission or min(shares) < 0 or abs(sum(shares) - 1) > 1e-9:
-            raise ValueError(f"the shares of the mission's duties must be >= 0 and sum to 1, not {shares}")
+            raise Refusal(f"the shares of the mission's duties must be >= 0 and sum to 1, not {shares}")
         for duty in self.mission:
             own = self.balance if duty.balance is None else duty.balance
             if own.basis != self.balance.basis or own.contact.n_pair != self.balance.contact.n_pair:
-                raise ValueError("every duty of a mission needs the same contact pairs and harmonics")
+                raise Refusal("every duty of a mission needs the same contact pairs and harmonics")
         if not self.wearing:
-            raise ValueError("no joint wears: give at least one of them a wear law")
+            raise Refusal("no joint wears: give at least one of them a wear law")
         if self.lost_below_at_rest is not None and (
             "n" not in self.balance.contact.components or not self.balance.basis.has_static
         ):
-            raise ValueError("the preload at rest needs a contact with component n and harmonic 0 among those kept")
+            raise Refusal("the preload at rest needs a contact with component n and harmonic 0 among those kept")
 
     @cached_property
     def wearing(self) -> dict[str, JointWear]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from tribodyn import declare
 from tribodyn.found import Kind
+from tribodyn.refusal import Refusal
 
 if TYPE_CHECKING:
     from tribodyn.hbm.balance import HarmonicBalance, State
@@ -107,7 +108,7 @@ class Exposure:
     def normal_force_times_slip(self) -> np.ndarray:
         """(n_pair,) integral of N |ds| over the cycle, s the slip path in the contact plane [J]."""
         if "n" not in self.components:
-            raise ValueError("a wear law that needs the normal force cannot serve a contact without a normal component")
+            raise Refusal("a wear law that needs the normal force cannot serve a contact without a normal component")
         slider, normal = self._sliders()
         step = np.linalg.norm(np.roll(slider, -1, axis=3) - slider, axis=2)
         # geometric mean: a slider that moved while the pair was apart carried no load on the way
@@ -143,9 +144,9 @@ def depth_rate(name: str, exposure: Exposure) -> np.ndarray:
     try:
         rate = np.asarray(law.depth_rate(exposure), float)
     except Exception as error:  # of a file of one's own: it may be anything
-        raise ValueError(f"wear law file '{name}' cannot be run: {type(error).__name__}: {error}") from error
+        raise Refusal(f"wear law file '{name}' cannot be run: {type(error).__name__}: {error}") from error
     if rate.shape != exposure.area.shape:
-        raise ValueError(f"wear law file '{name}' gives depths of shape {rate.shape} and not {exposure.area.shape}")
+        raise Refusal(f"wear law file '{name}' gives depths of shape {rate.shape} and not {exposure.area.shape}")
     if np.isfinite(exposure.energy).all() and not np.isfinite(rate).all():
-        raise ValueError(f"wear law file '{name}' gives depths that are not finite")
+        raise Refusal(f"wear law file '{name}' gives depths that are not finite")
     return rate

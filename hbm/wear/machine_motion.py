@@ -28,6 +28,7 @@ from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState, wear_of
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.hbm.wear.step_control import Tolerance, expected
+from tribodyn.refusal import Refusal
 
 GAMMA = 1 - 1 / np.sqrt(2)
 # Unknowns of a balance, of all sectors of a wave, up to which all states are looked at: Hill's method takes less than a
@@ -71,7 +72,7 @@ class MachineMotion:
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
         self._serves = fits and not wave_in_time.is_wave(problem.balance)
         if always and not self._serves:
-            raise ValueError(
+            raise Refusal(
                 f"a wheel's wave and a contact of more than {RULES.most_components} components are not worn in time"
             )
         self._moving = np.zeros(0)

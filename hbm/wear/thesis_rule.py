@@ -20,6 +20,7 @@ from tribodyn.hbm.wear.evolution import (
 )
 from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
+from tribodyn.refusal import Refusal
 
 
 @single
@@ -38,7 +39,7 @@ def evolve(
     Returns the history; its `end` says why it stopped, also where a solve failed
     """
     if not step_depth > 0:
-        raise ValueError("the wear step must be a positive depth")
+        raise Refusal("the wear step must be a positive depth")
     rows = rows_to_resume(resume)
     before = state_of(problem, rows[-1]) if rows else None
     depth = rows[-1].depth + rows[-1].worn if rows else np.zeros_like(problem.area)

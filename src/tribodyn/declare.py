@@ -26,6 +26,8 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.refusal import Refusal
+
 
 def number(
     unit: str = "",
@@ -91,7 +93,7 @@ def read(path: Path, kind: str = "Parameters") -> tuple[Number, ...]:
     try:
         tree = ast.parse(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, SyntaxError, ValueError) as error:
-        raise ValueError(f"'{path.name}' cannot be read as Python: {error}") from None
+        raise Refusal(f"'{path.name}' cannot be read as Python: {error}") from None
     found = next((node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == kind), None)
     if found is None:
         return ()
@@ -147,14 +149,14 @@ def checked(numbers: tuple[Number, ...], given: Mapping[str, Any], owner: str) -
     for name in given:
         if name not in known:
             has = f"its numbers are {', '.join(known)}" if known else "it has none"
-            raise ValueError(f"{owner} has no number {name}: {has}")
+            raise Refusal(f"{owner} has no number {name}: {has}")
     values = {}
     for n in numbers:
         if n.name not in given and n.needed:
-            raise ValueError(f"{owner} needs {n.name}: its numbers are {', '.join(known)}")
+            raise Refusal(f"{owner} needs {n.name}: its numbers are {', '.join(known)}")
         values[n.name] = given.get(n.name, n.default)
         if n.fault(values[n.name]):
-            raise ValueError(f"{owner}, {n.name}: {n.fault(values[n.name])}")
+            raise Refusal(f"{owner}, {n.name}: {n.fault(values[n.name])}")
     return values
 
 
@@ -167,7 +169,7 @@ def require_limits(own: Any, owner: str) -> None:
         if "unit" in item.metadata:
             fault = Number(item.name, **item.metadata).fault(getattr(own, item.name))
             if fault:
-                raise ValueError(f"{owner}, {item.name}: {fault}")
+                raise Refusal(f"{owner}, {item.name}: {fault}")
 
 
 @cache
@@ -178,7 +180,7 @@ def run_file(path: Path, what: str, needs: tuple[str, ...]) -> ModuleType:
     Raises  ValueError where there is no such file, it fails, or a function is missing
     """
     if not path.is_file():
-        raise ValueError(f"there is no {what} file '{path}'")
+        raise Refusal(f"there is no {what} file '{path}'")
     name = f"tribodyn_own_{path.stem}_{abs(hash(path.resolve())):x}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
@@ -189,8 +191,8 @@ def run_file(path: Path, what: str, needs: tuple[str, ...]) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:  # a file of one's own may be anything
         del sys.modules[name]
-        raise ValueError(f"{what} file '{path}' cannot be run: {error}") from error
+        raise Refusal(f"{what} file '{path}' cannot be run: {error}") from error
     for function in needs:
         if not callable(getattr(module, function, None)):
-            raise ValueError(f"{what} file '{path}' has no function {function}")
+            raise Refusal(f"{what} file '{path}' has no function {function}")
     return module

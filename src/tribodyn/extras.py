@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+from tribodyn.refusal import Refusal
+
 EXTRA = {
     "distributed": "cluster",
     "emcee": "lives",
@@ -23,6 +25,6 @@ def package(name: str) -> Any:
         return importlib.import_module(name)
     except ImportError:
         root = name.partition(".")[0]
-        raise ValueError(
+        raise Refusal(
             f'this needs the package {root.replace("_", "-")}: install it with pip install "tribodyn[{EXTRA[root]}]"'
         ) from None

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 from tribodyn import declare
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Kind:
             return Path(name)
         if name not in self.names():
             known = ", ".join(self.names())
-            raise ValueError(f"no {self.what} '{name}': there are {known}, or give a file such as my_own.py")
+            raise Refusal(f"no {self.what} '{name}': there are {known}, or give a file such as my_own.py")
         return self.folder / f"{name}.py"
 
     @cache  # noqa: B019  # kinds live as long as the program

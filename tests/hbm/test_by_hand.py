@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from proof.extremes_models import lattice, rigid
 from tests.helpers.pressed_body import wear_problem
 from tests.helpers.verification_models import oscillator, random_structure
-from tests.proof.extremes_models import lattice, rigid
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance

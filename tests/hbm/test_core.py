@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from proof.dense import DenseBalance
 from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body
 from tests.helpers.verification_models import interface
-from tests.proof.dense import DenseBalance
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import natural

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from proof.coexisting import coexisting
 from tests.helpers.continuation_models import Duffing
-from tests.proof.coexisting import coexisting
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import CONVERGED

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from proof.chatter import chatter, sign_changes
 from tests.helpers.verification_models import floating_beam
-from tests.proof.chatter import chatter, sign_changes
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint

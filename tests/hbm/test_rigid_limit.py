@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.proof.extremes_models import rigid
+from proof.extremes_models import rigid
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.newton import NewtonOptions

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.proof.extremes_march import held
-from tests.proof.extremes_models import Setting, lattice
+from proof.extremes_march import held
+from proof.extremes_models import Setting, lattice
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
 
+from proof.dense import DenseBalance
 from tests.helpers import small_wheel as small
-from tests.proof.dense import DenseBalance
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.prestress import coriolis

@@ -143,7 +143,7 @@ def child(files: list[int], arguments: list[str], folder: str, environment: dict
             exec(compile(arguments[1], "<string>", "exec"), main.__dict__)
         else:
             if arguments[:1] == ["prove"]:
-                from tests.proof.__main__ import main as command
+                from proof.__main__ import main as command
             else:
                 from tribodyn.__main__ import main as command
 

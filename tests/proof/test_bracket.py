@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.proof import bracket
+from proof import bracket
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from proof import branches
+from proof.__main__ import main
 from tests.helpers.command import leave
-from tests.proof import branches
-from tests.proof.__main__ import main
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 

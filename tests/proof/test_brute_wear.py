@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.proof import brute_wear
+from proof import brute_wear
 
 
 @pytest.mark.slow

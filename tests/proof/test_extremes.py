@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proof import __main__ as cli, extremes, extremes_march, extremes_wear
+from proof.extremes_judge import judged, sampled_honestly, tried
+from proof.extremes_march import held
+from proof.extremes_models import lattice, rigid
 from tests.helpers.pressed_body import growth_by_few_modes
-from tests.proof import __main__ as cli, extremes, extremes_march, extremes_wear
-from tests.proof.extremes_judge import judged, sampled_honestly, tried
-from tests.proof.extremes_march import held
-from tests.proof.extremes_models import lattice, rigid
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.wear.step_control import step_error
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.proof import fuzz, fuzz_mixed, fuzz_result, fuzz_runs
+from proof import fuzz, fuzz_mixed, fuzz_result, fuzz_runs
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.verdict import Statement, Verdict

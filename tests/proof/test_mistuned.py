@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.proof import mistuned
+from proof import mistuned
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.proof import peers
+from proof import peers
 from tribodyn.hbm import newton
 
 

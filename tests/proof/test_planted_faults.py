@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.proof import planted_faults, planting, reference_runs
-from tests.proof.planted_faults import Fault, Seen
+from proof import planted_faults, planting, reference_runs
+from proof.planted_faults import Fault, Seen
 from tribodyn.hbm.wear.history import cycles_to_share
 from tribodyn.workflows.errors.limit import limit_of
 

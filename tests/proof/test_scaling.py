@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proof import large_contact, large_fe, scaling
+from proof.__main__ import main
 from tests.helpers.command import leave
-from tests.proof import large_contact, large_fe, scaling
-from tests.proof.__main__ import main
 
 
 def test_small_sizes_converge_and_memory_is_their_own(

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.proof import reference, scoreboard, scoreboard_scenes, scoreboard_table
-from tests.proof.scoreboard import Judged, Row
+from proof import reference, scoreboard, scoreboard_scenes, scoreboard_table
+from proof.scoreboard import Judged, Row
 
 SEED = 2
 SCENES = (12, 7)  # a beam and a plate that take a second each

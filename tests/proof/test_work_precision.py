@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proof import __main__ as cli, work_precision as measured, work_precision_table as table
 from tests.helpers.coarse_scenes import BEAM, RIG
-from tests.proof import __main__ as cli, work_precision as measured, work_precision_table as table
 from tribodyn.hbm import newton
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress

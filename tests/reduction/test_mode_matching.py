@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from tests.proof.mode_matching import mac, match_kinds, match_modes
+from proof.mode_matching import mac, match_kinds, match_modes
 
 
 def chain(n: int, heavy: int | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

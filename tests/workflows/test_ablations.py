@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from importlib import import_module
 
-from tests.proof import ablations
+from proof import ablations
 from tribodyn.hbm.continuation import curve
 from tribodyn.hbm.continuation.operating_point import AtPeak
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tests.proof import reference
+from proof import reference
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.workflows.errors import accuracy, in_time, measure, refine, states, verdict
 from tribodyn.workflows.errors.accuracy import Bound

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import tribodyn as td
+from proof.problems import cycle_at
 from tests.helpers.coarse_scenes import BLADE, RIG
 from tests.helpers.fits import fit_by_differences, plain, predict
 from tests.helpers.pages import ROOT, fences
 from tests.helpers.structures import BLOCKS
-from tests.proof.problems import cycle_at
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.run import modelling

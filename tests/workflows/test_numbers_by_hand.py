@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.proof.extremes_march import held
-from tests.proof.extremes_models import lattice, rigid
+from proof.extremes_march import held
+from proof.extremes_models import lattice, rigid
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import operating_point

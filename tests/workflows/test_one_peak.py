@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.proof import bracket
+from proof import bracket
 from tribodyn.workflows.errors import states
 from tribodyn.workflows.result.summary import numbers
 from tribodyn.workflows.run import modelling, pipeline

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from proof import wear_steps
 from tests.helpers.coarse_scenes import BEAM
-from tests.proof import wear_steps
 from tribodyn.workflows.command import main as cli
 
 SMALL = (

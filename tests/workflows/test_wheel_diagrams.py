@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proof.cases.blade.few_sectors import FEW_SECTORS
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
-from tests.proof.cases.blade.few_sectors import FEW_SECTORS
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.pictures import maps, plots, wheel_diagrams
 

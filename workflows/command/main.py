@@ -8,18 +8,20 @@ import os
 import signal
 import sys
 import threading
+import traceback
 from _thread import interrupt_main
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NoReturn
 
 import cyclopts
 
+from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.version import __version__
 
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
-BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 3, 130
+BAD_INPUT, FAILED_SOLVE, DEFECT, INTERRUPTED = 2, 3, 70, 130
 FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))  # Windows has no quota
 READER_LEFT = 128 + 13  # as a shell counts the end by SIGPIPE, which Windows has not
 WORDS = {  # word -> where it is, its help on the page of all of them
@@ -60,7 +62,7 @@ def _run(arguments: Sequence[str] | None) -> None:
         command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
     except cyclopts.UnknownCommandError as error:
         said = str(error).partition(" Available commands:")[0].rstrip(". ")
-        raise ValueError(f"{said}{'' if said.endswith('?') else '.'} Available commands: {', '.join(WORDS)}") from None
+        raise Refusal(f"{said}{'' if said.endswith('?') else '.'} Available commands: {', '.join(WORDS)}") from None
     if not gc.isenabled():
         gc.freeze()  # what is imported now is looked through no more
         gc.enable()
@@ -70,7 +72,8 @@ def _run(arguments: Sequence[str] | None) -> None:
 def guard(command: Callable[[], object]) -> None:
     """Run a command and leave with its exit code: 2 after bad input, 3 after a failed solve, 130 after Ctrl-C.
 
-    In silence where who reads the output has seen enough, as head has, with 141
+    Any other exception is a defect of the program: its traceback and 70. A reader that closes the pipe, as head does,
+    ends it in silence with 141.
     """
     # a shell without job control starts background jobs with Ctrl-C ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -90,11 +93,14 @@ def guard(command: Callable[[], object]) -> None:
         _leave(INTERRUPTED, str(stop) or "stopped")
     except cyclopts.CycloptsError as error:
         _leave(BAD_INPUT, " ".join(str(error).split()))
-    except (ValueError, OSError) as error:
+    except (Refusal, OSError) as error:
         full = isinstance(error, OSError) and error.errno in FULL
         _leave(BAD_INPUT, f"the disk is full, or no more may be written to it ({error})" if full else str(error))
-    except (RuntimeError, MemoryError) as error:
+    except (SolverFailure, MemoryError) as error:
         _leave(FAILED_SOLVE, str(error) or "the memory of this machine is not enough for this scene")
+    except Exception:
+        traceback.print_exc()
+        _leave(DEFECT, f"this is a defect of tribodyn {__version__}: report it with the lines above and the scene")
 
 
 def _interrupt_again(lost: UnraisableHookArgs) -> None:

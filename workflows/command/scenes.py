@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.command.word import QUIET, Flag, Json, Overrides, make_room, word
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
@@ -87,7 +88,7 @@ def run(
         progress.say(f"pictures  {folder / 'pictures'}")
     progress.say(f"next      tribodyn report {folder} makes one page of it, tribodyn show {folder} --verbose says all")
     if bound is not None and not bound.met:
-        raise RuntimeError(f"{bound.sentence}; the result is kept in {path}")
+        raise SolverFailure(f"{bound.sentence}; the result is kept in {path}")
 
 
 def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
@@ -175,7 +176,7 @@ def draw(
     """
     make_room(out)
     if dpi is not None and not 20 <= dpi <= 2400:
-        raise ValueError(f"--dpi {dpi}: give 20 to 2400 dots per inch")
+        raise Refusal(f"--dpi {dpi}: give 20 to 2400 dots per inch")
     loaded, folder = store.load(result), out or store.result_file(result).parent / "pictures"
     if not film:
         _draw(loaded, folder, formats or ("png",), dpi or 200)
@@ -210,7 +211,7 @@ def report(*result: Path, out: Path | None = None) -> None:
         The .html file; report.html beside the first result by default.
     """
     if not result:
-        raise ValueError("report: give the folder or file of a result")
+        raise Refusal("report: give the folder or file of a result")
     make_room(out, (".html",))
     print(scenes.report(result, out or store.result_file(result[0]).parent / "report.html"))
 

@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from cyclopts import Parameter
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress
@@ -112,7 +113,7 @@ class Option:
     def _named(self, text: str) -> tuple[str, float]:
         name, equals, value = text.partition("=")
         if not equals:
-            raise ValueError(f"{self.flag} {text}: give a name and its value, such as name=1")
+            raise Refusal(f"{self.flag} {text}: give a name and its value, such as name=1")
         return name.strip(), quantity(f"{self.flag} {name.strip()}", value.strip(), self.unit or "")
 
 
@@ -262,7 +263,7 @@ def quantity(name: str, text: str, unit: str) -> float:
     try:
         return to_si(text, unit)
     except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+        raise Refusal(f"{name}: {error}") from None
 
 
 def make_room(out: Path | None, endings: Sequence[str] = ()) -> None:
@@ -273,11 +274,11 @@ def make_room(out: Path | None, endings: Sequence[str] = ()) -> None:
     if out is None:
         return
     if endings and out.suffix.lower() not in endings:
-        raise ValueError(f"--out {out}: give a file that ends with {' or '.join(endings)}")
+        raise Refusal(f"--out {out}: give a file that ends with {' or '.join(endings)}")
     if endings and out.is_dir():
-        raise ValueError(f"--out {out}: a folder is there, give a file")
+        raise Refusal(f"--out {out}: a folder is there, give a file")
     folder = out.parent if endings else out
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ValueError(f"--out {out}: no folder can be made at {folder}, {str(error.strerror).lower()}") from None
+        raise Refusal(f"--out {out}: no folder can be made at {folder}, {str(error.strerror).lower()}") from None

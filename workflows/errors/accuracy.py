@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import refine
 from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.result.result import Result
@@ -82,14 +83,14 @@ def parsed(text: str) -> Wanted:
     try:
         error = to_si(PER_CENT.sub("%", number), "")
     except ValueError as wrong:
-        raise ValueError(f'--accuracy "{text}": {wrong}') from None
+        raise Refusal(f'--accuracy "{text}": {wrong}') from None
     if not 0 < error < 1:
-        raise ValueError(f'--accuracy "{text}": give an error above 0 and below 100 %, such as "1 %"')
+        raise Refusal(f'--accuracy "{text}": give an error above 0 and below 100 %, such as "1 %"')
     known = {name: q for q, name in NAMES.items()}
     asked = tuple(re.split(r", and |, | and ", names)) if names else ()
     for name in asked:
         if name not in known:
-            raise ValueError(f'--accuracy "{text}": after "of" expected one of {", ".join(known)}, got "{name}"')
+            raise Refusal(f'--accuracy "{text}": after "of" expected one of {", ".join(known)}, got "{name}"')
     return Wanted(error, tuple(known[name] for name in dict.fromkeys(asked)))
 
 
@@ -114,7 +115,7 @@ def to_accuracy(
         found = loaded(result.verdict)
         of = wanted.quantities or tuple(name for name, one in found.statements.items() if one.value is not None)
         if not of:
-            raise RuntimeError(f"{file.name} has no error: {found.statements['peak_frequency'].reason}")
+            raise SolverFailure(f"{file.name} has no error: {found.statements['peak_frequency'].reason}")
         finer = {name: _finer(current, name, rounds.finer) for name in _large(found, wanted, of, rounds.share)}
         left = tuple(name for name, texts in finer.items() if not texts)
         bound = _bound(found, wanted, of, added, left, number)

@@ -12,6 +12,7 @@ from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
 from tribodyn.hbm.time.stepper import Options as TimeOptions
 from tribodyn.hbm.time.verify import energy_floor
+from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.errors import states
 from tribodyn.workflows.errors.options import Options
 from tribodyn.workflows.errors.states import Answers, State
@@ -119,7 +120,7 @@ def left(state: State) -> Left:
     follower.start(whole, begin)
     found = follower.mean(whole, here.omega, lambda motion: np.array([energy_floor(motion)]))
     if not found.settled:
-        raise RuntimeError(f"the motion does not settle in {found.periods} periods")
+        raise SolverFailure(f"the motion does not settle in {found.periods} periods")
     sectors = len(found.energy) // balance.contact.n_pair
     machine = found.energy.reshape(sectors, -1).mean(axis=0)
     answers = {

@@ -10,6 +10,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from tribodyn.hbm.contact import law
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -68,7 +69,7 @@ class LadderTable(Table):
     @model_validator(mode="after")
     def _as_many(self) -> Self:
         if len(self.sizes) != len(self.set):
-            raise ValueError('a ladder needs sizes = [1, 2] and as many set = [["section.key=value"], []]')
+            raise Refusal('a ladder needs sizes = [1, 2] and as many set = [["section.key=value"], []]')
         return self
 
     def named(self, name: str) -> Ladder:
@@ -107,7 +108,7 @@ def ladders_of(scene: Scene, study: Study, names: Sequence[str] = ()) -> tuple[L
             known.setdefault(name, Ladder(name, tuple(settings), worn_up_to=up_to))
     missing = [name for name in names if name not in known]
     if missing:
-        raise ValueError(f"--setting {missing[0]}: the scene has {', '.join(known)}")
+        raise Refusal(f"--setting {missing[0]}: the scene has {', '.join(known)}")
     chosen = [known[name] for name in names or known]
     return tuple(replace(one, worn_up_to=0.0) if one.name in study.unworn else one for one in chosen)
 

@@ -19,6 +19,7 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
 from tribodyn.hbm.wear.machine_motion import left_aside
 from tribodyn.hbm.wear.step_control import Tolerance, step_error
+from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.errors import refine, states
 from tribodyn.workflows.errors.options import DEFAULT, Options
 from tribodyn.workflows.errors.states import Answers, State, relative
@@ -158,7 +159,7 @@ def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> St
         balance = model.balance.with_load(_load(file))
         point = own.site.next(balance, own.here.state.omega, own.here.state.x)
         if not point.solution.converged:
-            raise RuntimeError(str(point.solution.outcome))
+            raise SolverFailure(str(point.solution.outcome))
     except REFUSALS as refusal:
         table.refuse(Refinement.MODES, str(refusal))
         return None
@@ -263,7 +264,7 @@ def worn_through(file: SceneFile, model: Model, begun: State | None = None) -> t
     worn = wear_run.worn_out(file, model, wear.lost_below, at)
     life = life_of(worn, model, wear)
     if worn.ended.failed or life is None:
-        raise RuntimeError(str(worn.end))
+        raise SolverFailure(str(worn.end))
     return float((worn.depth[-1] + worn.worn[-1]).max()), life
 
 

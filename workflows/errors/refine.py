@@ -8,6 +8,7 @@ import numpy as np
 
 from tribodyn.geometry import parts
 from tribodyn.geometry.sources import cad
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
@@ -19,11 +20,11 @@ HALVED = 2.0  # ratio of element sizes where every element of a given mesh is cu
 Mesh = Geometry | BodyTable | DeckTable
 
 
-class NoMesh(ValueError):
+class NoMesh(Refusal):
     """A scene whose mesh cannot be refined."""
 
 
-class Given(ValueError):
+class Given(Refusal):
     """A mesh that was not made here, whose elements can only be cut."""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, milp
 from threadpoolctl import threadpool_limits
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors import states
 from tribodyn.workflows.errors.ladders import Ladder, Setting, ladders_of, study_of
 from tribodyn.workflows.errors.limit import Limit, limit_of
@@ -107,7 +108,7 @@ class Settlings:
         tables = [table for one in self.ladders if (table := _bounds(one, quantity))]
         flat = [(i, row, error) for i, table in enumerate(tables) for row, error in table]
         if not flat:
-            raise ValueError(f"no setting of {self.scene} changes {NAMES[quantity]}")
+            raise Refusal(f"no setting of {self.scene} changes {NAMES[quantity]}")
         one_each = np.array([[float(at == i) for at, _, _ in flat] for i in range(len(tables))])
         errors = np.array([error for _, _, error in flat])
         found = milp(
@@ -118,7 +119,7 @@ class Settlings:
         )
         if found.x is None:
             least = sum(min(error for _, error in table) for table in tables)
-            raise ValueError(f"{NAMES[quantity]} is known to {least:.2g} at best: it needs finer settings")
+            raise Refusal(f"{NAMES[quantity]} is known to {least:.2g} at best: it needs finer settings")
         taken = [k for k, used in enumerate(found.x) if used > 0.5]
         rows = tuple(flat[k][1] for k in taken)
         return rows, float(errors[taken].sum()), self.seconds * float(np.prod([row.share for row in rows]))

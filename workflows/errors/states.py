@@ -15,6 +15,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.history import LIFE_SHARE
+from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors.options import DEFAULT, Options
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, modelling, settings
@@ -107,12 +108,12 @@ def first_state(file: SceneFile, balance: HarmonicBalance, result: Result) -> St
     Raises  NoPeak; ValueError where there is no contact; RuntimeError where no solution is found
     """
     if not balance.contact.n_pair:
-        raise ValueError("there is no contact")
+        raise Refusal("there is no contact")
     wear = result.wear
     if wear is not None and len(wear.cycles) and file.scene.wear is not None:
         return worn_state(file, balance, result, 0)
     if result.response is None:
-        raise ValueError("there is no response")
+        raise Refusal("there is no response")
     return at_highest(file.scene, balance, result.response)
 
 
@@ -176,7 +177,7 @@ def widened(state: State, top: int) -> State:
 
 def _solved(state: State) -> State:
     if not state.here.solution.converged:
-        raise RuntimeError(str(state.here.solution.outcome))
+        raise SolverFailure(str(state.here.solution.outcome))
     return state
 
 

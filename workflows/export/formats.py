@@ -13,6 +13,7 @@ from scipy.io import savemat
 from tribodyn.fem.system import dense
 from tribodyn.reduction import nastran_matrix
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.export import curves, vtk
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling
@@ -98,7 +99,7 @@ def write_abaqus(result: Result, folder: Path) -> list[Path]:
     model, written, called = reduced_model(result), [], []
     found = _symmetric(arrays(model))
     if np.iscomplexobj(found["K"]):
-        raise ValueError("abaqus: the matrices of a wheel are complex, which Abaqus does not take; export npz")
+        raise Refusal("abaqus: the matrices of a wheel are complex, which Abaqus does not take; export npz")
     words = {"K": "STIFFNESS", "M": "MASS", "C": "VISCOUS DAMPING"}
     for name in words:
         if name not in found:
@@ -144,7 +145,7 @@ def write(result: Result, wanted: Sequence[str], folder: Path, mesh_ending: str 
     """
     for name in wanted:
         if name not in FORMATS:
-            raise ValueError(f"--to {name}: no such format; there are {', '.join(FORMATS)}")
+            raise Refusal(f"--to {name}: no such format; there are {', '.join(FORMATS)}")
     written = []
     for name in dict.fromkeys(wanted):
         place = folder / name

@@ -15,6 +15,7 @@ import numpy as np
 
 from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.view import cycle, grid_of, polygons, swing
 from tribodyn.workflows.result.faces import meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
@@ -37,9 +38,9 @@ def write_mesh(result: Result, path: Path) -> list[Path]:
     import meshio
 
     if result.part is None:
-        raise ValueError("mesh: this result keeps no mesh; run a scene with a part and pictures.renders = true")
+        raise Refusal("mesh: this result keeps no mesh; run a scene with a part and pictures.renders = true")
     if path.suffix not in (*WITH_FIELDS, *MESH_ONLY):
-        raise ValueError(f'mesh: no format "{path.suffix}": take one of {", ".join((*WITH_FIELDS, *MESH_ONLY))}')
+        raise Refusal(f'mesh: no format "{path.suffix}": take one of {", ".join((*WITH_FIELDS, *MESH_ONLY))}')
     grid = part_grid(result, shown_states(result)[-1])
     data: dict[str, Any] = {}
     if path.suffix in WITH_FIELDS:
@@ -50,7 +51,7 @@ def write_mesh(result: Result, path: Path) -> list[Path]:
         meshio.write(path, mesh)
     except (meshio.WriteError, KeyError, AssertionError) as error:
         path.unlink(missing_ok=True)
-        raise ValueError(f"mesh: {path.suffix} cannot hold {kind} elements ({error}); take .xdmf or .vtu") from None
+        raise Refusal(f"mesh: {path.suffix} cannot hold {kind} elements ({error}); take .xdmf or .vtu") from None
     return sorted(path.parent.glob(f"{path.stem}.*"))
 
 
@@ -64,7 +65,7 @@ def write_vtk(result: Result, folder: Path) -> list[Path]:
     Raises  ValueError where the result has neither faces of its contact nor a mesh
     """
     if not len(result.patch.faces) and result.part is None:
-        raise ValueError(
+        raise Refusal(
             "vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it"
         )
     written: list[Path] = []
@@ -134,11 +135,11 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
     Raises  ValueError where the result keeps no mesh or no field at the row
     """
     if result.part is None or result.fields is None:
-        raise ValueError("the result keeps no fields on a mesh: its scene needs a part, [wear] and pictures.renders")
+        raise Refusal("the result keeps no fields on a mesh: its scene needs a part, [wear] and pictures.renders")
     rows = result.fields.row.tolist()
     row = rows[-1] if row is None else row
     if row not in rows:
-        raise ValueError(f"the result has no field at wear row {row}: it has those at {', '.join(map(str, rows))}")
+        raise Refusal(f"the result has no field at wear row {row}: it has those at {', '.join(map(str, rows))}")
     grid, displacement = part_grid(result, state_of(result, row)), result.fields.displacement[rows.index(row)]
     grid.point_data["vibration"] = swing(displacement, result.harmonics)
     grid.point_data["amplitude"] = np.linalg.norm(cycle(displacement, result.harmonics), axis=1).max(axis=1)
@@ -152,10 +153,10 @@ def patch_fields(result: Result, row: int | None = None) -> pv.PolyData:
     """
     wear = result.wear
     if wear is None or not len(wear.cycles) or not len(result.patch.faces):
-        raise ValueError("the result holds no worn patch with faces")
+        raise Refusal("the result holds no worn patch with faces")
     rows = range(len(wear.cycles))
     if row is not None and row not in rows:
-        raise ValueError(f"the result has no wear row {row}: it has 0 to {rows[-1]}")
+        raise Refusal(f"the result has no wear row {row}: it has 0 to {rows[-1]}")
     return contact_surface(result, state_of(result, rows[-1] if row is None else row))
 
 

@@ -15,6 +15,7 @@ from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from tribodyn.hbm.contact.law import SEPARATES
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.style import FORMATS, LAYOUT, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
 
@@ -59,7 +60,7 @@ def save(figure: Figure, stem: Path, formats: Sequence[str] = ("png",), dpi: int
     with mpl.rc_context(STYLE):
         for name in formats:
             if name not in FORMATS:
-                raise ValueError(f'no picture format "{name}": take one of {", ".join(FORMATS)}')
+                raise Refusal(f'no picture format "{name}": take one of {", ".join(FORMATS)}')
             path = stem.with_name(f"{stem.name}.{name}")
             figure.savefig(path, dpi=dpi or LAYOUT.dpi)
             written.append(path)

@@ -23,6 +23,7 @@ from PIL import Image
 
 from tribodyn.extras import package
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures.figures import (
     force_unit,
@@ -91,11 +92,11 @@ def film(
     Raises  ValueError: the result has nothing of the kind to show; RenderingUnavailable
     """
     if images < 2:
-        raise ValueError(f"a film of {images} images: ask for 2 at least")
+        raise Refusal(f"a film of {images} images: ask for 2 at least")
     if not 20 <= dpi <= 400:
-        raise ValueError(f"--dpi {dpi}: give a film 20 to 400 dots per inch")
+        raise Refusal(f"--dpi {dpi}: give a film 20 to 400 dots per inch")
     if over not in ("wear", "cycle"):
-        raise ValueError(f'no film over "{over}": take wear or cycle')
+        raise Refusal(f'no film over "{over}": take wear or cycle')
     check()
     made = WearFilm(result, images, wear) if over == "wear" else CycleFilm(result, row, images, deformation, wear)
     place = Path(folder)
@@ -124,7 +125,7 @@ def encode(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str]) -> 
     """
     for name in formats:
         if name not in FORMATS:
-            raise ValueError(f'no film format "{name}": take {" or ".join(FORMATS)}')
+            raise Refusal(f'no film format "{name}": take {" or ".join(FORMATS)}')
     paths = {name: stem.with_name(f"{stem.name}.{name}") for name in dict.fromkeys(formats)}
     kept, rate = [], LAYOUT.rate
     flow = (image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2] for image in images)  # even, as MP4 needs it
@@ -168,7 +169,7 @@ class WearFilm:
     def __init__(self, result: Result, images: int, wear: float | None = None):
         patch, history = result.patch, result.wear
         if history is None or not result.wear_steps or not book.contacts(result):
-            raise ValueError("the result holds no worn contact with faces: there is no film over wear")
+            raise Refusal("the result holds no worn contact with faces: there is no film over wear")
         last = int(np.flatnonzero(history.cycles <= shown_cycles(history))[-1])
         rows = np.unique(np.linspace(0, last, images).round().astype(int))
         self.contact = book.opened(result, _most_worn(result, rows))
@@ -285,12 +286,12 @@ class CycleFilm:
     ):
         loops, patch = result.loops, result.patch
         if loops is None:
-            raise ValueError("the result keeps no cycle of a contact: its scene needs pictures.plots = true")
+            raise Refusal("the result keeps no cycle of a contact: its scene needs pictures.plots = true")
         states = {state.number: state for state in shown_states(result) if state.number in loops.row.tolist()}
         if row is None:
             row = int(loops.row[np.argmax(loop_size(result).sum(axis=(1, 2)))])
         if row not in states:
-            raise ValueError(f"the result keeps no cycle of row {row}: it has those of {', '.join(map(str, states))}")
+            raise Refusal(f"the result keeps no cycle of row {row}: it has those of {', '.join(map(str, states))}")
         self.state, self.count = states[row], count
         at = loops.row.tolist().index(row)
         self._status = instant_status(result, at)

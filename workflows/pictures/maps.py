@@ -14,6 +14,7 @@ from matplotlib.tri import Triangulation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import (
     area_energy_unit,
     length_unit,
@@ -64,7 +65,7 @@ def status_maps(result: Result, count: int = 8) -> Figure:
     """
     patch, wear = _with_faces(result), result.wear
     if wear is None or not result.wear_steps:
-        raise ValueError("the result holds no worn patch with faces to draw a map on")
+        raise Refusal("the result holds no worn patch with faces to draw a map on")
     last = int(np.flatnonzero(wear.cycles <= shown_cycles(wear))[-1])
     rows = np.unique(np.linspace(0, last, count).round().astype(int))
     columns = min(len(rows), 4)
@@ -89,7 +90,7 @@ def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) 
     """
     patch, wear = _with_faces(result), result.wear
     if wear is None or not result.wear_steps:
-        raise ValueError("the result holds no worn patch with faces to draw a map on")
+        raise Refusal("the result holds no worn patch with faces to draw a map on")
     n = len(wear.cycles)
     rows = np.unique([0, (n - 1) // 2, n - 1]) if rows is None else rows
     basis = HarmonicBasis(result.harmonics, LAYOUT.samples)
@@ -216,7 +217,7 @@ def _grid(patch: Patch, n_row: int, n_column: int) -> tuple[Figure, np.ndarray]:
 
 def _with_faces(result: Result) -> Patch:
     if not len(result.patch.faces):
-        raise ValueError("the result holds no patch with faces to draw a map on")
+        raise Refusal("the result holds no patch with faces to draw a map on")
     return result.patch
 
 

@@ -11,12 +11,13 @@ from importlib import import_module
 from multiprocessing import get_context
 
 from tribodyn.extras import package
+from tribodyn.refusal import SolverFailure
 
 SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
 PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
 
 
-class RenderingUnavailable(RuntimeError):
+class RenderingUnavailable(SolverFailure):
     """Off-screen rendering does not work on this machine; the message names what to install."""
 
 

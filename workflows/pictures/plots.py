@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import maps
 from tribodyn.workflows.pictures.figures import (
     axes_of,
@@ -129,9 +130,9 @@ def wear(result: Result, what: str = "depth") -> Figure:
     Raises  ValueError where nothing was worn, or for another word
     """
     if not result.wear_steps:
-        raise ValueError("the result holds no wear steps: its scene needs [wear] with max_steps above 0")
+        raise Refusal("the result holds no wear steps: its scene needs [wear] with max_steps above 0")
     if what not in COURSES:
-        raise ValueError(f'no wear plot "{what}": there are {", ".join(COURSES)}')
+        raise Refusal(f'no wear plot "{what}": there are {", ".join(COURSES)}')
     return COURSES[what](result)
 
 
@@ -297,12 +298,12 @@ def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
     """
     loops, patch = result.loops, result.patch
     if loops is None:
-        raise ValueError("the result holds no hysteresis loops: its scene needs a contact and pictures.plots = true")
+        raise Refusal("the result holds no hysteresis loops: its scene needs a contact and pictures.plots = true")
     states, size = [state_of(result, int(row)) for row in loops.row], loop_size(result)
     largest = dict.fromkeys(int(np.argmax(one)) for one in size.sum(axis=2))
     pairs = list(largest if pairs is None else pairs)
     if not all(0 <= pair < len(patch.area) for pair in pairs):
-        raise ValueError(f"pairs {pairs}: this contact has pairs 0 to {len(patch.area) - 1}")
+        raise Refusal(f"pairs {pairs}: this contact has pairs 0 to {len(patch.area) - 1}")
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.7 * len(states) + 0.4, 2.3 * len(pairs) + 0.6), layout="constrained")
         grid = figure.subplots(len(pairs), len(states), squeeze=False)

@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, PAPER, RED, WEAR_MAP
 
@@ -166,7 +167,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
     scene : its name, for the title
     """
     if not 0 < slow < fast:
-        raise ValueError(f"a SAFE diagram from {slow:g} to {fast:g} Hz: give two speeds above 0, the lower one first")
+        raise Refusal(f"a SAFE diagram from {slow:g} to {fast:g} Hz: give two speeds above 0, the lower one first")
     most = max(len(values) for values in families.values()) - 1
     top = _top(families)
     with axes_of(7.6, 5.2) as (figure, axes):

@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.extras import package
+from tribodyn.refusal import Refusal
 from tribodyn.version import __version__
 from tribodyn.workflows.pictures import offscreen, plots, render
 from tribodyn.workflows.pictures.style import STYLE
@@ -92,7 +93,7 @@ def write(results: Sequence[tuple[str, Result, Path | None]], path: Path) -> Pat
     html = page(results)
     size = len(html.encode())
     if size > LARGEST:
-        raise ValueError(f"the report would have {size / 1e6:.0f} MB: report fewer results at once")
+        raise Refusal(f"the report would have {size / 1e6:.0f} MB: report fewer results at once")
     path.write_text(html, encoding="utf-8")
     return path
 

@@ -23,6 +23,7 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd, End, Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.stability.exponents import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.result import (
     Fields,
@@ -101,7 +102,7 @@ SCHEMA: dict[str, tuple[type, Arrays]] = {
 }  # fmt: skip
 
 
-class ResultError(ValueError):
+class ResultError(Refusal):
     """A result file cannot be used; the message is one sentence."""
 
 
@@ -182,7 +183,7 @@ def _write_array(
             scales[dimension] = file.create_dataset(dimension, data=np.arange(size))
             scales[dimension].make_scale(dimension)
         if scales[dimension].shape != (size,):
-            raise ValueError(f"dimension {dimension} has {len(scales[dimension])} entries, an array has {size}")
+            raise Refusal(f"dimension {dimension} has {len(scales[dimension])} entries, an array has {size}")
         data.dims[axis].attach_scale(scales[dimension])
 
 

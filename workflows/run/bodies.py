@@ -21,6 +21,7 @@ from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_reader, parts, placing, refine
 from tribodyn.geometry.placing import overlap, rotation
 from tribodyn.geometry.sources import cad, picking
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
 from tribodyn.workflows.scene.body import Meshed, SolidMaterial
@@ -60,7 +61,7 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
                 own = tuple(f"bodies.{name}: {note}" for note in notes)
                 bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), own))
             except ValueError as trouble:
-                raise ValueError(f"bodies.{name}: {trouble}") from None
+                raise Refusal(f"bodies.{name}: {trouble}") from None
         _apart(bodies)
     brought = of_decks(scene, folder)
     bodies += [body for deck in brought.values() for body in deck.bodies]
@@ -68,7 +69,7 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
     whole = Assembly(bodies)
     for name, coupling in scene.couplings.items():
         if name in points:
-            raise ValueError(f"couplings.{name} has the name of a point of a deck: give it another")
+            raise Refusal(f"couplings.{name} has the name of a point of a deck: give it another")
         points[name] = _middle(whole, coupling)
     return Assembly(bodies, points) if points else whole
 
@@ -79,7 +80,7 @@ def _apart(bodies: Sequence[Body]) -> None:
         found = overlap(one.mesh, other.mesh)
         if found is not None:
             share, (x, y, z) = found
-            raise ValueError(
+            raise Refusal(
                 f"bodies.{one.name} overlaps bodies.{other.name}: {share:.0%} of its elements lie in it, about "
                 f"({x:.4g}, {y:.4g}, {z:.4g}) m: move one of them, or correct its unit"
             )
@@ -114,7 +115,7 @@ def _sizes(table: structure.BodyTable) -> cad.Sizes | None:
         return None
     if Path(table.mesh).suffix.lower() not in cad.ENDINGS:
         if table.size is not None or table.face_sizes:
-            raise ValueError(f"size and face_sizes are for CAD files, '{table.mesh}' is meshed already: leave them out")
+            raise Refusal(f"size and face_sizes are for CAD files, '{table.mesh}' is meshed already: leave them out")
         return None
     faces = {int(name.removeprefix("face ")): size / table.unit for name, size in table.face_sizes.items()}
     return cad.Sizes(table.size and table.size / table.unit, faces=faces, only=table.volume)

@@ -14,6 +14,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from tribodyn.hbm.outcome import WearEnd
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Facts
 from tribodyn.workflows.result.result import Result
@@ -55,9 +56,9 @@ def alone_in(folder: Path | None) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout:
-        raise ValueError(f"another run is writing into {folder}: wait for it, or give another folder") from None
+        raise Refusal(f"another run is writing into {folder}: wait for it, or give another folder") from None
     except OSError as error:
-        raise ValueError(f"{folder} cannot be written to: {error.strerror or error}") from None
+        raise Refusal(f"{folder} cannot be written to: {error.strerror or error}") from None
     try:
         yield
     finally:
@@ -91,11 +92,11 @@ def earlier(path: Path, file: SceneFile) -> Result | None:
     result = store.load(path)
     key = same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
     if key:
-        raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
+        raise Refusal(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
     before = json.loads(result.provenance.get("files", "{}"))
     for name, found in digests(file.scene.model_dump(mode="json"), file.folder).items():
         if before.get(name, found) != found:
-            raise ValueError(f"{path} was computed with another content of {name}: run the scene without --resume")
+            raise Refusal(f"{path} was computed with another content of {name}: run the scene without --resume")
     return result
 
 

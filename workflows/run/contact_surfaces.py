@@ -7,6 +7,7 @@ import scipy
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.geometry.surface import centred, facing_gap, onto_nodes, prepare
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.scene.contact_numbers import faces
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -27,7 +28,7 @@ def surface_gap(file: SceneFile, interface: ContactInterface) -> tuple[np.ndarra
     nodes = patch_coordinates(interface, surfaces.axes)
     size = np.ptp(nodes, axis=0)
     if abs(surfaces.mating_height) > size.max():
-        raise ValueError(
+        raise Refusal(
             f'surfaces.mating_height is {surfaces.mating_height:g} m, more than the face is long: give its unit, "3 um"'
         )
 
@@ -70,5 +71,5 @@ def patch_coordinates(interface: ContactInterface, axes: tuple[str, str]) -> np.
     nodes = interface.points @ along.T
     size = float(np.ptp(nodes, axis=0).max())
     if np.ptp(interface.points @ frame[2]) > FLAT * size or np.ptp(interface.frames, axis=0).max() > FLAT:
-        raise ValueError("surfaces: the contact is not flat, so that a height map cannot be laid on it; leave them out")
+        raise Refusal("surfaces: the contact is not flat, so that a height map cannot be laid on it; leave them out")
     return nodes - (nodes.max(axis=0) + nodes.min(axis=0)) / 2

@@ -24,6 +24,7 @@ from tribodyn.fem.springs import ElongationSpring, Mass
 from tribodyn.geometry import refine
 from tribodyn.geometry.sources import between, deck, picking, read
 from tribodyn.geometry.sources.directions import Directions
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.structure import EVERYTHING, DeckTable as Table
 
 UNITS = {metres: name for name, (metres, _) in read.UNITS.items()}
@@ -58,12 +59,12 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
     """
     path = folder / table.file
     if table.unit not in UNITS:
-        raise ValueError(f"decks.{name}.unit: expected one of {', '.join(read.UNITS)}")
+        raise Refusal(f"decks.{name}.unit: expected one of {', '.join(read.UNITS)}")
     try:
         return _Carrying(name, table, materials, source(path, UNITS[table.unit])).done()
     except ValueError as trouble:
         clause = str(trouble)
-        raise ValueError(clause if clause.startswith("decks.") else f"decks.{name}: {clause}") from None
+        raise Refusal(clause if clause.startswith("decks.") else f"decks.{name}: {clause}") from None
 
 
 def source(path: Path, unit: str) -> read.Source:
@@ -128,13 +129,13 @@ class _Carrying:
         """Raise ValueError where the deck has what is not carried over, unless the scene ignores it."""
         refused, ignore = self.source.refused, self.table.ignore
         if unknown := [name for name in ignore if name not in refused]:
-            raise ValueError(
+            raise Refusal(
                 f"ignore: '{unknown[0]}' is not refused, {', '.join(refused) or 'nothing'} is: correct the name"
             )
         if left := [name for name in refused if name not in ignore]:
             listed = ", ".join(refused[name] for name in left)
             names = ", ".join(f'"{name}"' for name in left)
-            raise ValueError(
+            raise Refusal(
                 f"the deck has {listed}, not carried over though stiffness, mass, support or load may change: give it "
                 f"in the scene, and leave it out by decks.{self.name}.ignore = [{names}]"
             )
@@ -147,7 +148,7 @@ class _Carrying:
         for face, rule in self.table.faces.items():
             if rule.body not in self.source.bodies:
                 known = ", ".join(self.source.bodies)
-                raise ValueError(f"faces.{face}: the deck has no body '{rule.body}'; it has {known}")
+                raise Refusal(f"faces.{face}: the deck has no body '{rule.body}'; it has {known}")
             if rule.body == name:
                 rules[face] = rule.rule
         mesh, node_sets = picking.with_faces(found.mesh, found.node_sets, rules)
@@ -168,24 +169,24 @@ class _Carrying:
             what = f"tie '{tie.name}' of deck {self.name}"
             slaves, masters = (self._faces(place, what) for place in (tie.slave, tie.master))
             if len(masters) > 1:
-                raise ValueError(f"{what}: its master lies on {', '.join(masters)}; {self._instead('ties', 'ties')}")
+                raise Refusal(f"{what}: its master lies on {', '.join(masters)}; {self._instead('ties', 'ties')}")
             self.made.constraints += [Tie(what, slave, masters[0], tie.tolerance) for slave in slaves]
 
     def _couplings(self, couplings: Sequence[deck.Coupling]) -> None:
         for one in couplings:
             what = f"coupling '{one.name}' of deck {self.name}"
             if one.point not in self.source.points:
-                raise ValueError(
+                raise Refusal(
                     f"{what}: its reference node belongs to the mesh; give it one of its own, or "
                     f"{self._instead('couplings', 'couplings')}"
                 )
             if not set(one.axes) >= {0, 1, 2}:
-                raise ValueError(f"{what} couples some directions alone; {self._instead('couplings', 'couplings')}")
+                raise Refusal(f"{what} couples some directions alone; {self._instead('couplings', 'couplings')}")
             kind = RigidCoupling if one.kind == "kinematic" else DistributedCoupling
             places = self._groups(one.face, what)
             if len(places) > 1 and kind is DistributedCoupling:
                 listed = ", ".join(places)
-                raise ValueError(f"{what}: its face lies on {listed}; {self._instead('couplings', 'couplings')}")
+                raise Refusal(f"{what}: its face lies on {listed}; {self._instead('couplings', 'couplings')}")
             self.carried.add(one.point)
             self.made.constraints += [kind(one.point, place) for place in places]
 
@@ -209,7 +210,7 @@ class _Carrying:
             elif axis < 3:
                 found.append((self._groups(group, what)[0], axis, factor))
             else:
-                raise ValueError(f"{what} turns a node of a solid, which has no rotation; correct the deck")
+                raise Refusal(f"{what} turns a node of a solid, which has no rotation; correct the deck")
         return tuple(found)
 
     def _masses(self, masses: Sequence[deck.PointMass]) -> None:
@@ -260,7 +261,7 @@ class _Carrying:
                 kind = NodalForce if one.axis < 3 else Moment
                 parts.append((kind(one.group, direction), one.value))
             elif one.axis >= 3:
-                raise ValueError(f"a moment acts on '{one.group}', which has no rotation; couple it to a point")
+                raise Refusal(f"a moment acts on '{one.group}', which has no rotation; couple it to a point")
             else:
                 for place in self._groups(one.group, "a force"):
                     count = self.source.counts[one.group][self.body_of[place]]
@@ -287,18 +288,18 @@ class _Carrying:
 
     def _needs_coupling(self, group: str, what: str) -> None:
         if group in self.source.points and group not in self.carried and group not in self.axes_of:
-            raise ValueError(f"a {what} acts on point '{group}', which is coupled to nothing; couple it to a face")
+            raise Refusal(f"a {what} acts on point '{group}', which is coupled to nothing; couple it to a face")
 
     def _faces(self, place: str, what: str) -> list[str]:
         if place in self.faces:
             return self.faces[place]
         kind = "is a set of nodes that make no face" if place in self.sets else "lies on no body"
-        raise ValueError(f"{what}: '{place}' {kind}; give a surface of element faces")
+        raise Refusal(f"{what}: '{place}' {kind}; give a surface of element faces")
 
     def _groups(self, place: str, what: str) -> list[str]:
         found = self.faces.get(place, []) + self.sets.get(place, [])
         if not found:
-            raise ValueError(f"{what}: '{place}' lies on no body; correct the deck")
+            raise Refusal(f"{what}: '{place}' lies on no body; correct the deck")
         return found
 
     def _instead(self, kind: str, table: str) -> str:
@@ -330,26 +331,26 @@ def material(
                 count[mesh.subdomains[group]] += 1
     if (count > 1).any():
         many = int((count > 1).sum())
-        raise ValueError(f"the sections of body '{name}' overlap in {many} elements: correct them")
+        raise Refusal(f"the sections of body '{name}' overlap in {many} elements: correct them")
     if table.elements == "linear_reduced":
         given = {group: _reduced(one, name) for group, one in given.items()}
     if (count == 1).all():
         return given if len(given) > 1 else next(iter(given.values()))
     if table.material is None:
-        raise ValueError(
+        raise Refusal(
             f"the deck gives {int((count == 0).sum())} of {mesh.nelements} elements of body '{name}' no material: "
             f'name one of the scene with decks.{deck_name}.material = "name"'
         )
     if not given:
         own = materials[table.material]
         return _reduced(own, name) if table.elements == "linear_reduced" else own
-    raise ValueError(f"the deck gives a part of body '{name}' no material: give all its elements a section")
+    raise Refusal(f"the deck gives a part of body '{name}' no material: give all its elements a section")
 
 
 def _reduced(one: AnyMaterial, body: str) -> Material:
     """A material whose elements are linear with reduced integration."""
     if not isinstance(one, Material):
-        raise ValueError(f"elements = \"linear_reduced\" is for isotropic materials, and body '{body}' has another")
+        raise Refusal(f"elements = \"linear_reduced\" is for isotropic materials, and body '{body}' has another")
     return replace(one, linear_reduced=True)
 
 
@@ -361,7 +362,7 @@ def _solid(one: deck.DeckMaterial, group: str, materials: Mapping[str, AnyMateri
         return replace(other, axes=axes) if group in one.directions and not isinstance(other, Material) else other
     instead = f"give [materials.{one.name}] in the scene, which takes its place"
     if one.density is None:
-        raise ValueError(f"material '{one.name}' of the deck has no density: {instead}")
+        raise Refusal(f"material '{one.name}' of the deck has no density: {instead}")
     along = one.expansion or 0.0
     if one.stiffness is not None:
         return Anisotropic(np.array(one.stiffness), one.density, axes, (along,) * 3)
@@ -369,7 +370,7 @@ def _solid(one: deck.DeckMaterial, group: str, materials: Mapping[str, AnyMateri
         e = one.engineering
         return Orthotropic(e[:3], e[3:6], e[6:], one.density, axes, (along,) * 3)
     if one.young is None or one.poisson is None:
-        raise ValueError(f"material '{one.name}' of the deck has no elastic constants that are known: {instead}")
+        raise Refusal(f"material '{one.name}' of the deck has no elastic constants that are known: {instead}")
     return Material(one.young, one.poisson, one.density, along)
 
 

@@ -14,6 +14,7 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import bodies, decks
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
@@ -70,10 +71,10 @@ def elastic(scene: Scene, face: str) -> tuple[float, float]:
     if scene.material is None:
         body = scene.bodies.get(face.partition(".")[0])
         if body is None:
-            raise ValueError(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
+            raise Refusal(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
         solid = None if not isinstance(body.material, str) else bodies.solid(scene.materials[body.material])
     if not isinstance(solid, Material):
-        raise ValueError(f"the punch on '{face}' needs a body of one isotropic material: give its stiffness")
+        raise Refusal(f"the punch on '{face}' needs a body of one isotropic material: give its stiffness")
     return solid.E, solid.nu
 
 

@@ -14,6 +14,7 @@ from tribodyn.reduction.foreign import ForeignMatrices, read_matrices, reduced_m
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.matrix_files import read_array
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.matrix_scene import DofOutput, MatrixFiles, MatrixScene, Variable
 
 OUTPUT = "response"
@@ -45,7 +46,7 @@ def make(scene: MatrixScene, folder: Path) -> ReducedModel:
 
     def take(variable: Variable) -> np.ndarray:
         if scene.model.file is None:
-            raise ValueError(f'variable = "{variable.variable}" needs model.file, the file that holds it')
+            raise Refusal(f'variable = "{variable.variable}" needs model.file, the file that holds it')
         return read_array(folder / scene.model.file, variable.variable)
 
     system = matrices.system(
@@ -76,7 +77,7 @@ def _table(rows: Any, take: Take) -> Any:
         return rows
     table = np.atleast_2d(take(rows))
     if (table != np.round(table)).any():
-        raise ValueError(f'variable = "{rows.variable}" holds numbers that are not whole: DOFs count from 0')
+        raise Refusal(f'variable = "{rows.variable}" holds numbers that are not whole: DOFs count from 0')
     return table.astype(int)
 
 

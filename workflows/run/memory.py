@@ -6,6 +6,8 @@ import os
 import sys
 from pathlib import Path
 
+from tribodyn.refusal import Refusal
+
 # bytes for each DOF, as measured in docs/validation/large.md: of a factor; of elements with a factor of linear ones
 OF_SOLVER = {"direct": 15e3, "mumps": 15e3, "multigrid": 3.4e3}
 
@@ -39,7 +41,7 @@ def check(n_dof: int, solver: str, columns: int = 0) -> None:
     needed = (OF_SOLVER[solver] + 8 * columns) * n_dof
     if needed > machine and solver != "mumps":  # perhaps on other hosts
         less = ', or set reduction.solver = "multigrid", which takes less and far longer' if solver == "direct" else ""
-        raise ValueError(
+        raise Refusal(
             f"the mesh has {n_dof} DOFs, whose factorisation needs some {needed / 1e9:.0f} GB, and this machine has "
             f"{machine / 1e9:.0f} GB: make the mesh coarser{less}"
         )

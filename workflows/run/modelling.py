@@ -31,6 +31,7 @@ from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import hold
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import (
     bodies,
     curve,
@@ -90,10 +91,10 @@ def build(file: SceneFile, progress: Progress, chosen: tuple[int, ...] = ()) -> 
             if part is None or reduced.basis is None:
                 raise
             force = joints.excite(scene, None).force(0, part.system.loads, len(part.free)).real
-            raise ValueError(unbalanced_load(force, part, reduced.basis @ unbalanced.shapes)) from None
+            raise Refusal(unbalanced_load(force, part, reduced.basis @ unbalanced.shapes)) from None
         except SingularStuckSystem as singular:
             remarks = [] if part is None else check_size(np.ptp(part.points, axis=0), "give its numbers a unit")
-            raise ValueError("; ".join([str(singular), *remarks])) from None
+            raise Refusal("; ".join([str(singular), *remarks])) from None
     if model.choice is not None:
         progress.detail(model.choice.outcome)
     return model
@@ -146,7 +147,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
     loads |= rods
     turning = None if scene.geometry is None else scene.geometry.no_turning
     if joined.masses and scene.wheel is not None and scene.wheel.speed:
-        raise ValueError(
+        raise Refusal(
             f"wheel.speed: there is a lumped mass at {joined.masses[0].at}, whose spin softening and Coriolis forces "
             "are not modelled: make it a body, or leave wheel.speed out"
         )
@@ -224,7 +225,7 @@ def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
     if reduced.system.damping is None:
         return reduced.with_damping(partial(damping_matrix, scene, joints.contact_stiffness(scene, reduced)))
     if scene.damping.given:
-        raise ValueError("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
+        raise Refusal("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
     return reduced
 
 
@@ -271,7 +272,7 @@ class Problem:
         basis = HarmonicBasis(harmonics, wanted.samples, joint_transitions(self.joints) if auto else wanted.transitions)
         rounding = 1e-12  # of node positions [m]
         if not basis.has_static and np.any(np.abs(gap) > rounding):
-            raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
+            raise Refusal("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
         base = None
         if isinstance(scene, MeshScene) and self.part is not None:
             base = ground_motion(scene, self.part, basis)
@@ -348,11 +349,11 @@ def ground_motion(scene: MeshScene, part: Part, basis: HarmonicBasis) -> np.ndar
     amplitudes = np.zeros((i.n_pair, len(i.components), len(basis.harmonics)), complex)
     for face, motion in scene.motion.items():
         if face not in part.pairs:
-            raise ValueError(f'motion.{face}: "{face}" is no contact face, the contact has {", ".join(part.pairs)}')
+            raise Refusal(f'motion.{face}: "{face}" is no contact face, the contact has {", ".join(part.pairs)}')
         rows = i.frames[part.pairs[face]][:, [COMPONENTS.index(c) for c in i.components]]
         for h, value in ((0, motion.static), (1, motion.harmonic * np.exp(1j * motion.phase))):
             if value != 0 and h not in basis.harmonics:
-                raise ValueError(f"motion.{face} moves in harmonic {h}: keep it in harmonics.kept")
+                raise Refusal(f"motion.{face} moves in harmonic {h}: keep it in harmonics.kept")
             if h in basis.harmonics:
                 amplitudes[part.pairs[face], :, basis.harmonics.index(h)] = value * (rows @ np.array(motion.direction))
     return basis.to_real(amplitudes).reshape(-1, basis.n_coeff)

@@ -20,6 +20,7 @@ from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.residual_flexibility import residual_flexibility
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import bodies, joints
 from tribodyn.workflows.scene.schema import MeshScene, Scene
 
@@ -63,7 +64,7 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
         return residual_flexibility(system, interface, springs, wanted.modes, wanted.cutoff, solver=own)
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
     if held and len(part.held):
-        raise ValueError("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
+        raise Refusal("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
     relative_dofs = np.zeros(0, int)
     if wanted.relative:
         relative_dofs = body_1_dofs(interface).ravel()
@@ -98,7 +99,7 @@ def without_masters(scene: MeshScene, contact_dofs: int, held: bool) -> bool:
     needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": held}
     needed = [name for name, there in needs.items() if there]
     if method == "residual_flexibility" and needed:
-        raise ValueError(f'reduction.method: "residual_flexibility" cannot do {needed[0]}: take "craig_bampton"')
+        raise Refusal(f'reduction.method: "residual_flexibility" cannot do {needed[0]}: take "craig_bampton"')
     if method != "auto":
         return method == "residual_flexibility"
     return contact_dofs > MOST_MASTERS and not needed and not scene.reduction.needs_masters

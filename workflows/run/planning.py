@@ -18,6 +18,7 @@ from tribodyn.fem.couplings import Tie
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.relative import body_1_dofs
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import bodies, matrix_model, memory as memory_use
 from tribodyn.workflows.run.modelling import make_mesh
 from tribodyn.workflows.run.part_reduction import components, contacts, without_masters
@@ -117,7 +118,7 @@ def plan(file: SceneFile) -> Plan:
         tables = built.bodies.values() if built.geometry is None else [built.geometry]
         for part in (table.part for table in tables):
             if part is not None and is_file(part):
-                raise ValueError(f'part = "{part}" is a file of your own, which a plan does not run: run the scene')
+                raise Refusal(f'part = "{part}" is a file of your own, which a plan does not run: run the scene')
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]

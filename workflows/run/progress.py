@@ -13,6 +13,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress as Bar, TaskProgressColumn, TextColumn
 
+from tribodyn.refusal import Refusal
+
 Advance = Callable[..., None]  # called with the share of long work that is done, a note, and the point it has come to
 NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a bar on
 FORESEEN = 0.02  # share of the work from which on the time left is given: the first steps compile
@@ -169,5 +171,5 @@ def console_progress(quiet: bool = False, log: Path | None = None, details: bool
             log.parent.mkdir(parents=True, exist_ok=True)
             log.open("a").close()
         except OSError as error:
-            raise ValueError(f"--log {log}: cannot be written, {str(error.strerror).lower()}") from None
+            raise Refusal(f"--log {log}: cannot be written, {str(error.strerror).lower()}") from None
     return Progress(None if quiet else Console(), log, details)

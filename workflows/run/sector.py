@@ -31,6 +31,7 @@ from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.reduction.residual_flexibility import residual_flexibility
 from tribodyn.reduction.speed_line import SpeedLine, congruent, reduce_alike
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import joints, part_reduction
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 
@@ -47,14 +48,14 @@ def sector(scene: MeshScene, part: Part) -> Sector:
     cuts = [tuple(name for name in part.node_sets if name.rpartition(".")[2] == side) for side in SEAM]
     if wheel.seam is None and all(cuts):
         (right, *_), (left, *_) = cuts
-        raise ValueError(
+        raise Refusal(
             f"wheel.seam is missing, but the part has {right} and {left}, where its disk would be cut open: "
             f'give wheel.seam = ["{right}", "{left}"]'
         )
     try:
         found = cyclic.cut_from(part, part_reduction.contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
     except Mismatch as miss:
-        raise ValueError(
+        raise Refusal(
             f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
         ) from None
     return spun(scene, part, found) if wheel.speed else found
@@ -68,7 +69,7 @@ def check_sectors(scene: MeshScene) -> None:
     for parameters in given:
         made_for = parameters.get("n_blades", scene.wheel.sectors)
         if made_for != scene.wheel.sectors:
-            raise ValueError(f"wheel.sectors = {scene.wheel.sectors}, but the part is made for n_blades = {made_for}")
+            raise Refusal(f"wheel.sectors = {scene.wheel.sectors}, but the part is made for n_blades = {made_for}")
 
 
 def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
@@ -84,7 +85,7 @@ def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
     except ValueError as trouble:
         if not speed:
             raise
-        raise ValueError(f"at wheel.speed = {60 * speed:.6g} rpm {trouble}, or let it turn slower") from None
+        raise Refusal(f"at wheel.speed = {60 * speed:.6g} rpm {trouble}, or let it turn slower") from None
 
 
 def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
@@ -110,7 +111,7 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
                 kept = (scene.reduction.modes, scene.reduction.cutoff, distributed(scene, turning[0]))
                 ends = reduce_alike(turning, *kept)
         except ValueError as trouble:
-            raise ValueError(f"at {60 * speed:.6g} rpm of the operating line {trouble}") from None
+            raise Refusal(f"at {60 * speed:.6g} rpm of the operating line {trouble}") from None
         if len(turning) == 2:
             springs = joints.contact_stiffness(
                 scene, ReducedModel(ends.sector.system, ends.sector.interface, info=ends.info)
@@ -204,7 +205,7 @@ def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples:
     if not solved.converged:
         solved = solve_along_friction(balance, omega, options) or solved
     if not solved.converged:
-        raise ValueError(f"the contacts do not settle under the static loads: {solved.outcome}")
+        raise Refusal(f"the contacts do not settle under the static loads: {solved.outcome}")
     state = solved.state
     moved = full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), omega)[:, 0]
     return np.asarray(seam_map(sector, 0) @ moved)
@@ -230,7 +231,7 @@ def temperature(scene: MeshScene, part: Part) -> np.ndarray | None:
     found = None
     for name, load in scene.loads.static.items():
         if load.field is not None:
-            raise ValueError(f"loads.static.{name}: in a wheel that turns, heat whole bodies instead of a field")
+            raise Refusal(f"loads.static.{name}: in a wheel that turns, heat whole bodies instead of a field")
         if load.temperature is not None:
             found = np.zeros(len(part.points)) if found is None else found
             heated = [named(part.node_sets, body) for body in load.bodies] or [np.arange(len(found))]

@@ -14,6 +14,7 @@ from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Duty
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import references
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.schema import Scene
@@ -96,7 +97,7 @@ def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
         return step.depth
     delta_max = references.delta_max(scene, approach, area)
     if not (np.isfinite(delta_max) and delta_max > 0):
-        raise ValueError(
+        raise Refusal(
             "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
             'give a depth such as "50 um" and rule = "thesis"'
         )

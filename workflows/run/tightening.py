@@ -20,6 +20,7 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import bodies
 from tribodyn.workflows.run.part_reduction import BOLTS
 from tribodyn.workflows.scene.schema import MeshScene
@@ -44,7 +45,7 @@ def rods(scene: MeshScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> di
             if table.diameter is not None and table.material is not None:
                 solid = bodies.solid(scene.materials[table.material])
                 if not isinstance(solid, Material):
-                    raise ValueError(f"bolts.{name}: its material is orthotropic; give an isotropic one or stiffness")
+                    raise Refusal(f"bolts.{name}: its material is orthotropic; give an isotropic one or stiffness")
                 stiffness = solid.E * np.pi * table.diameter**2 / 4 / rod.length(mesh, node_sets)
         found[name] = Bolt(name, table.first, table.second, stiffness)
     return found
@@ -69,7 +70,7 @@ class BoltsAlone:
         balance = HarmonicBalance.of(self.reduced, self.joints, basis, excitation, self.omega)
         solved = newton.solve(balance, self.omega, balance.stuck(self.omega), newton.NewtonOptions(tolerance=1e-12))
         if not solved.converged:
-            raise ValueError(f"bolts: tightening does not settle ({solved.outcome}); lower the preload or add friction")
+            raise Refusal(f"bolts: tightening does not settle ({solved.outcome}); lower the preload or add friction")
         names = balance.compliance.output_names
         return np.asarray(balance.outputs(solved.state)[[names.index(output(name)) for name in bolts], 0])
 
@@ -109,4 +110,4 @@ def tightened(
         if np.abs(P).max() > largest * target.max():
             break
         loads |= dict(zip(locked, P.tolist(), strict=True))
-    raise ValueError(f"bolts: the preload of {', '.join(locked)} is not reached; check what they clamp")
+    raise Refusal(f"bolts: the preload of {', '.join(locked)} is not reached; check what they clamp")

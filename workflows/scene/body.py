@@ -16,6 +16,7 @@ from pydantic import (
 
 from tribodyn.declare import read
 from tribodyn.geometry import parts
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import (
     Direction,
     Number,
@@ -60,7 +61,7 @@ class Meshed(Table):
         other = {key: value for key, value in table.items() if key not in cls.model_fields}
         if ("part" in own) == ("mesh" in own):
             refuse_slips(other, ["part", "mesh"], list(cls.model_fields))
-            raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
+            raise Refusal('expected either part = "name" or mesh = "file.msh", and not both')
         if not isinstance(own.get("part"), str):
             return own | other  # a mesh file has no parameters: the other keys are unknown ones
         return own | {"parameters": part_parameters(own["part"], other, folder_of(info), cls)}
@@ -97,7 +98,7 @@ def part_parameters(
     general = [name for name in kind.model_fields if name != "parameters"]
     if is_file(part):
         if folder is None:
-            raise ValueError(f'{kind.KEY}part: "{part}" is a file beside a scene, and this scene has no folder')
+            raise Refusal(f'{kind.KEY}part: "{part}" is a file beside a scene, and this scene has no folder')
         return numbers(kind.KEY, read(beside(folder, part, f"{kind.KEY}part")), given, general)
     values = numbers(kind.KEY, read(parts.file_of(part)), given, general)
     return asdict(parts.load(part).Parameters(**values))
@@ -131,9 +132,9 @@ class SolidMaterial(Table):
     def _one_kind(self) -> SolidMaterial:
         three = isinstance(self.young, tuple)
         if three != isinstance(self.poisson, tuple) or three != (self.shear is not None):
-            raise ValueError("expected three values each of young, poisson and shear for an orthotropic material")
+            raise Refusal("expected three values each of young, poisson and shear for an orthotropic material")
         if not three and (self.axes is not None or isinstance(self.expansion, tuple)):
-            raise ValueError("expected axes and three expansions only with three values of young, poisson and shear")
+            raise Refusal("expected axes and three expansions only with three values of young, poisson and shear")
         if three and self.elements != "quadratic":
-            raise ValueError(f'expected no elements = "{self.elements}" with an orthotropic material')
+            raise Refusal(f'expected no elements = "{self.elements}" with an orthotropic material')
         return self

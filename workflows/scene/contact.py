@@ -11,6 +11,7 @@ from pydantic import Field, StrictBool, StrictInt, ValidationInfo, field_validat
 
 from tribodyn import declare
 from tribodyn.hbm.contact import law as contact_law
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
 from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
 
@@ -20,7 +21,7 @@ def rows_of(path: Path) -> list[list[float]]:
     try:
         rows: list[list[float]] = np.loadtxt(path, delimiter=",", ndmin=2).tolist()
     except ValueError as error:
-        raise ValueError(f"'{path.name}' is no table of comma-separated numbers ({error})") from None
+        raise Refusal(f"'{path.name}' is no table of comma-separated numbers ({error})") from None
     return rows
 
 
@@ -43,12 +44,12 @@ class ByTemperature(Table):
     @model_validator(mode="after")
     def _columns(self) -> ByTemperature:
         if any(np.diff(self.temperature) <= 0):
-            raise ValueError("temperature: give the changes of temperature in ascending order")
+            raise Refusal("temperature: give the changes of temperature in ascending order")
         if not self.columns:
-            raise ValueError(f"give at least one of {', '.join(GIVEN)} at each temperature")
+            raise Refusal(f"give at least one of {', '.join(GIVEN)} at each temperature")
         for name, values in self.columns.items():
             if len(values) != len(self.temperature):
-                raise ValueError(f"{name}: give {len(self.temperature)} values, one for each temperature")
+                raise Refusal(f"{name}: give {len(self.temperature)} values, one for each temperature")
         return self
 
     @property
@@ -60,7 +61,7 @@ class ByTemperature(Table):
         """The numbers at a change of temperature [K]; raises ValueError beyond the ends."""
         low, high = self.temperature[0], self.temperature[-1]
         if not low <= temperature <= high:
-            raise ValueError(
+            raise Refusal(
                 f"the contact is at {temperature:g} K, but by_temperature goes from {low:g} to {high:g} K: extend it"
             )
         return {name: float(np.interp(temperature, self.temperature, values)) for name, values in self.columns.items()}
@@ -97,7 +98,7 @@ class ContactTable(LawTable):
             columns = declare.constant(self.law_file, "TABLE")
             if (columns is None) != (self.table is None):
                 verb = "has no meaning" if columns is None else f"is missing ({' and '.join(columns)})"
-                raise ValueError(f"{self.TABLE}.table {verb} for the law '{self.law}'")
+                raise Refusal(f"{self.TABLE}.table {verb} for the law '{self.law}'")
         return self
 
     @property
@@ -117,7 +118,7 @@ class ContactTable(LawTable):
                 verb = "is missing" if need else "has no meaning"
                 what = f"for the components {', '.join(self.components)}"
                 what = "where it follows from a punch or the law" if given and not need else what
-                raise ValueError(f"contact.{name} {verb} {what}")
+                raise Refusal(f"contact.{name} {verb} {what}")
         return self
 
     @property
@@ -173,7 +174,7 @@ class FaceContact(ContactTable):
     @model_validator(mode="after")
     def _temperature_is_for_a_table(self) -> Self:
         if self.temperature is not None and self.by_temperature is None:
-            raise ValueError(f"{self.TABLE}.temperature is for by_temperature, which is not there: leave it out")
+            raise Refusal(f"{self.TABLE}.temperature is for by_temperature, which is not there: leave it out")
         return self
 
     @model_validator(mode="after")
@@ -190,7 +191,7 @@ class FaceContact(ContactTable):
         rows = np.array(rows_of(beside(folder, self.gap_map, f"{self.TABLE}.gap_map")))
         rows = rows[np.isfinite(rows).all(axis=1)]
         if rows.shape[1:] != (4,) or len(rows) < 4:
-            raise ValueError(
+            raise Refusal(
                 f"{self.TABLE}.gap_map: expected four rows or more of x, y, z, opening in '{self.gap_map}'"
             )
         return rows
@@ -258,7 +259,7 @@ class Surfaces(Table):
     @model_validator(mode="after")
     def _one_source(self) -> Surfaces:
         if (self.first is None) == (self.synthetic is None) or (self.first is None and self.second is not None):
-            raise ValueError("expected either first, and perhaps second, or synthetic")
+            raise Refusal("expected either first, and perhaps second, or synthetic")
         if self.axes[0][-1] == self.axes[1][-1]:
-            raise ValueError(f"expected axes along t1 and t2, got {list(self.axes)}")
+            raise Refusal(f"expected axes along t1 and t2, got {list(self.axes)}")
         return self

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from tribodyn import declare
 from tribodyn.hbm.contact import law as contact_law
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ByTemperature, Change, Surfaces
 from tribodyn.workflows.scene.fields import Table
 from tribodyn.workflows.scene.own import is_file
@@ -40,15 +41,15 @@ def with_numbers_when_hot(key: str, contact: Mapping[str, Any], static: Any) -> 
     except ValidationError as error:  # before the numbers that it should have given are missed
         first = error.errors()[0]
         where = ".".join(str(part) for part in (key, *first["loc"]))
-        raise ValueError(f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
+        raise Refusal(f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
     try:
         found = read.by_temperature.at(_warmed(contact, static) if read.temperature is None else read.temperature)
     except ValueError as error:
-        raise ValueError(f"{key}: {error}") from None
+        raise Refusal(f"{key}: {error}") from None
     # a scene that was written out has the numbers beside the table
     twice = [name for name, value in found.items() if contact.get(name, value) not in (None, value)]
     if twice:
-        raise ValueError(f"{key}.{twice[0]}: by_temperature gives it too: leave one of them out")
+        raise Refusal(f"{key}.{twice[0]}: by_temperature gives it too: leave one of them out")
     return {**contact, **found}
 
 
@@ -61,7 +62,7 @@ def _warmed(contact: Mapping[str, Any], static: Any) -> float:
         if not isinstance(load, Mapping) or not {"temperature", "field"} & set(load):
             continue
         if "field" in load:
-            raise ValueError("a field of temperatures heats its bodies: give the contact's own temperature")
+            raise Refusal("a field of temperatures heats its bodies: give the contact's own temperature")
         try:
             change = _Heat.model_validate({"temperature": load["temperature"]}).temperature
         except ValidationError:  # reported where the load is read
@@ -112,7 +113,7 @@ def with_asperities(contact: Mapping[str, Any], surfaces: Surfaces, folder: Path
     try:
         radius, table = _asperities(surfaces, folder)
     except (ValueError, OSError) as error:
-        raise ValueError(f"surfaces: no asperities for the law '{contact['law']}': {error}") from None
+        raise Refusal(f"surfaces: no asperities for the law '{contact['law']}': {error}") from None
     return {"radius": radius, **contact, "table": table}
 
 

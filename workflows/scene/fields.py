@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.units import to_si
 
 IN_UNIT = "in_unit"  # attribute of the validator of a quantity
@@ -35,7 +36,7 @@ class Table(BaseModel):
         return table
 
 
-class UnknownKey(ValueError):
+class UnknownKey(Refusal):
     """A key that a table does not have; known : those that it has."""
 
     def __init__(self, key: str, known: list[str]):
@@ -79,7 +80,7 @@ def parsed_direction(value: object) -> tuple[float, float, float]:
     if isinstance(value, (list, tuple)) and numbers and len(value) == 3 and 0 < np.linalg.norm(value) < np.inf:
         x, y, z = (float(component) for component in np.asarray(value) / np.linalg.norm(value))
         return x, y, z
-    raise ValueError(f'expected an axis such as "x" or "-z", or three numbers that are not all zero, got {value!r}')
+    raise Refusal(f'expected an axis such as "x" or "-z", or three numbers that are not all zero, got {value!r}')
 
 
 Direction = Annotated[tuple[float, float, float], BeforeValidator(parsed_direction)]
@@ -97,4 +98,4 @@ def refuse_slips(given: Iterable[str], needed: list[str], known: list[str]) -> N
     """Raise ValueError where one of the given keys is a slip of the pen for one that is needed."""
     for key in given:
         if key not in known and difflib.get_close_matches(key, needed, n=1):
-            raise ValueError(unknown_key(key, [*needed, *(name for name in known if name not in needed)]))
+            raise Refusal(unknown_key(key, [*needed, *(name for name in known if name not in needed)]))

@@ -11,6 +11,7 @@ from pydantic import (
     model_validator,
 )
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import (
     Angle,
     Direction,
@@ -92,16 +93,16 @@ class StaticLoad(Table):
         if self.field is not None and "temperature" not in given:
             given.append("temperature")
         if len(given) != 1:
-            raise ValueError(f"expected one out of {', '.join(KINDS)}, got {', '.join(given) or 'none'}")
+            raise Refusal(f"expected one out of {', '.join(KINDS)}, got {', '.join(given) or 'none'}")
         directed = given[0] not in ("pressure", "temperature")
         if directed != (self.direction is not None):
-            raise ValueError(f"expected {'a' if directed else 'no'} direction with {given[0]}")
+            raise Refusal(f"expected {'a' if directed else 'no'} direction with {given[0]}")
         if bool(self.group) != (given[0] in ("value", "pressure", "moment")):
-            raise ValueError(f"expected {'no ' if self.group else ''}group with {given[0]}")
+            raise Refusal(f"expected {'no ' if self.group else ''}group with {given[0]}")
         if self.opposite is not None and given[0] != "value":
-            raise ValueError("expected opposite only with value and direction, for a couple of forces")
+            raise Refusal("expected opposite only with value and direction, for a couple of forces")
         if self.bodies and given[0] != "temperature":
-            raise ValueError("expected bodies only with temperature")
+            raise Refusal("expected bodies only with temperature")
         return self
 
     @property
@@ -157,7 +158,7 @@ class Loads(Table, Generic[Static, Harmonic]):
     def _distinct(self) -> Loads[Static, Harmonic]:
         both = sorted(set(self.static) & set(self.harmonic))
         if both:
-            raise ValueError(f'expected one load named "{both[0]}", found it under static and under harmonic')
+            raise Refusal(f'expected one load named "{both[0]}", found it under static and under harmonic')
         if not self.harmonic:
-            raise ValueError("expected at least one harmonic load, for example [loads.harmonic.drive]")
+            raise Refusal("expected at least one harmonic load, for example [loads.harmonic.drive]")
         return self

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ContactTable
 from tribodyn.workflows.scene.fields import Direction, Force, Number, Quantity, Table
 from tribodyn.workflows.scene.loads import Loads, Vibrates
@@ -32,12 +33,12 @@ def _dof(value: object) -> Dof:
         return value
     if isinstance(value, (list, tuple)) and len(value) == 2 and type(value[0]) is int and type(value[1]) in (int, str):
         return value[0], value[1]
-    raise ValueError(f'expected a DOF, such as 17 or [node, "z"], got {value!r}')
+    raise Refusal(f'expected a DOF, such as 17 or [node, "z"], got {value!r}')
 
 
 def _listed(value: object, item: Any, example: str) -> Any:
     if not isinstance(value, (list, tuple)) or not value:
-        raise ValueError(f"expected a list such as {example}, got {value!r}")
+        raise Refusal(f"expected a list such as {example}, got {value!r}")
     return tuple(item(entry) for entry in value)
 
 
@@ -85,7 +86,7 @@ class MatrixFiles(Table):
     @model_validator(mode="after")
     def _both(self) -> MatrixFiles:
         if self.file is None and (self.mass is None or self.stiffness is None):
-            raise ValueError('expected file = "part.npz", or mass and stiffness with one file each')
+            raise Refusal('expected file = "part.npz", or mass and stiffness with one file each')
         return self
 
 
@@ -121,7 +122,7 @@ class DofOutput(Table):
     @model_validator(mode="after")
     def _one_kind(self) -> DofOutput:
         if (self.dofs is None) == (self.vector is None):
-            raise ValueError('expected either dofs = [17] or vector = {variable = "name"}')
+            raise Refusal('expected either dofs = [17] or vector = {variable = "name"}')
         return self
 
 

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 from pydantic import ConfigDict, PrivateAttr, ValidationInfo, model_validator
 
 from tribodyn.declare import Number, read
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Table, unknown_key
 from tribodyn.workflows.scene.units import to_si
 
@@ -33,9 +34,9 @@ def beside(folder: Path, name: str, key: str) -> Path:
     path = Path(name)
     resolved = (folder / path).resolve()
     if path.is_absolute() or len(path.parts) != 1 or resolved.parent != folder.resolve():
-        raise ValueError(f'{key}: "{name}" is not in the scene\'s folder: put the file beside the scene, name it alone')
+        raise Refusal(f'{key}: "{name}" is not in the scene\'s folder: put the file beside the scene, name it alone')
     if not resolved.is_file():
-        raise ValueError(f'{key}: there is no file "{name}" beside the scene')
+        raise Refusal(f'{key}: there is no file "{name}" beside the scene')
     return resolved
 
 
@@ -51,20 +52,20 @@ def numbers(
     found: dict[str, int | float] = {}
     for name, value in given.items():
         if name not in known:
-            raise ValueError(unknown_key(f"{table}{name}", [*others, *known]))
+            raise Refusal(unknown_key(f"{table}{name}", [*others, *known]))
         found[name] = _in_si(f"{table}{name}", known[name], value)
     for name, number in known.items():
         if number.needed and name not in found:
-            raise ValueError(f"{table}{name} is missing: its numbers here are {', '.join(known)}")
+            raise Refusal(f"{table}{name} is missing: its numbers here are {', '.join(known)}")
     return found
 
 
 def _in_si(key: str, number: Number, value: Any) -> int | float:
     if number.whole and type(value) is not int:
-        raise ValueError(f"{key}: expected a whole number, got {value!r}")
+        raise Refusal(f"{key}: expected a whole number, got {value!r}")
     converted = value if number.whole else _converted(key, number, value)
     if fault := number.fault(converted):
-        raise ValueError(f"{key}: {fault}")
+        raise Refusal(f"{key}: {fault}")
     return converted
 
 
@@ -74,13 +75,13 @@ def _converted(key: str, number: Number, value: Any) -> float:
         try:
             return to_si(value, number.unit)
         except ValueError as error:
-            raise ValueError(f"{key}: {error}") from None
+            raise Refusal(f"{key}: {error}") from None
     for unit in ANY_UNIT:
         try:
             return to_si(value, unit)
         except ValueError:
             continue
-    raise ValueError(f"{key}: expected a length, an angle or a number, got {value!r}")
+    raise Refusal(f"{key}: expected a length, an angle or a number, got {value!r}")
 
 
 def folder_of(info: ValidationInfo) -> Path | None:

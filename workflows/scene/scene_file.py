@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import UnknownKey, unknown_key
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import MeshScene, Scene
@@ -23,7 +24,7 @@ MOST_PROBLEMS = 3  # reported in one sentence
 Kind = TypeVar("Kind", bound=BaseModel)
 
 
-class SceneError(ValueError):
+class SceneError(Refusal):
     """A scene asks for something that cannot be; the message is one sentence with the key and the cure."""
 
 

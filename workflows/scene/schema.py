@@ -17,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.body import Geometry, SolidMaterial
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
 from tribodyn.workflows.scene.contact_numbers import takes_asperities, with_asperities, with_numbers_when_hot
@@ -101,7 +102,7 @@ class Scene(Table, ABC):
     @model_validator(mode="after")
     def _wears_under_its_loads(self) -> Scene:
         if self.wears and self.response.control != "force":
-            raise ValueError(f'response.control = "{self.response.control}" is for a contact that does not wear: '
+            raise Refusal(f'response.control = "{self.response.control}" is for a contact that does not wear: '
                              "leave [wear] out, or give wear.max_steps = 0")  # fmt: skip
         return self
 
@@ -222,9 +223,9 @@ class MeshScene(Scene):
     @model_validator(mode="after")
     def _speeds_of_a_wheel(self) -> MeshScene:
         if self.other_speeds and (self.wheel is None or not self.wheel.speed):
-            raise ValueError("wear.mission has a speed: give the speed of the wheel too, in wheel.speed")
+            raise Refusal("wear.mission has a speed: give the speed of the wheel too, in wheel.speed")
         if self.other_speeds and self.wheel is not None and self.wheel.along_speed:
-            raise ValueError(
+            raise Refusal(
                 "wear.mission has a speed, but along an operating line the speed follows from the frequency of the "
                 'duty: leave it out, or set wheel.sweep = "frequency"'
             )
@@ -234,18 +235,18 @@ class MeshScene(Scene):
     def _what_a_sector_is(self) -> MeshScene:
         for name, contact in self.joints.items():
             if self.wheel is None and contact.sector is not None:
-                raise ValueError(f"{name}: sector is for a [wheel], and the scene has none: leave it out")
+                raise Refusal(f"{name}: sector is for a [wheel], and the scene has none: leave it out")
         if self.wheel is None:
             for name, table in (("mistuning", self.mistuning), ("flow", self.flow)):
                 if table is not None:
-                    raise ValueError(f"{name} is for a [wheel], and the scene has none: leave it out")
+                    raise Refusal(f"{name} is for a [wheel], and the scene has none: leave it out")
             return self
         if self.flow is not None:
             self.flow.coefficients(self.wheel.sectors)
         for contact in self.joints.values():
             outward = contact.meets_next or self.geometry is not None
             if outward and (contact.opposite is None or not isinstance(contact.group, str)):
-                raise ValueError("wheel: the contact needs one group, the right face, and its opposite, the left one")
+                raise Refusal("wheel: the contact needs one group, the right face, and its opposite, the left one")
         for key, has in (
             ("contact.plane", any(contact.plane is not None for contact in self.joints.values())),
             ("motion", bool(self.motion)),
@@ -256,67 +257,67 @@ class MeshScene(Scene):
             ("reduction.interface_modes", self.reduction.interface_modes is not None),
         ):
             if has:
-                raise ValueError(f"{key} has no meaning for a sector of a wheel: leave it out")
+                raise Refusal(f"{key} has no meaning for a sector of a wheel: leave it out")
         if CENTRIFUGAL in (*self.loads.static, *self.loads.harmonic):
-            raise ValueError(f"loads: {CENTRIFUGAL} is the load that wheel.speed makes: give yours another name")
+            raise Refusal(f"loads: {CENTRIFUGAL} is the load that wheel.speed makes: give yours another name")
         return self
 
     @model_validator(mode="after")
     def _one_prescribed(self) -> MeshScene:
         if len(self.prescribed) > 1:
-            raise ValueError(f"expected one table under prescribed, got {', '.join(self.prescribed)}")
+            raise Refusal(f"expected one table under prescribed, got {', '.join(self.prescribed)}")
         for name, held in self.prescribed.items():
             if name in (*self.loads.static, *self.loads.harmonic):
-                raise ValueError(f"prescribed.{name} has the name of a load: give it another")
+                raise Refusal(f"prescribed.{name} has the name of a load: give it another")
             for spring in held.springs:
                 if spring not in self.springs:
-                    raise ValueError(unknown_key(f"springs.{spring}", [f"springs.{known}" for known in self.springs]))
+                    raise Refusal(unknown_key(f"springs.{spring}", [f"springs.{known}" for known in self.springs]))
                 if self.springs[spring].group != held.group or self.springs[spring].opposite is not None:
-                    raise ValueError(f"prescribed.{name}: springs.{spring} must hold {held.group} to the ground")
+                    raise Refusal(f"prescribed.{name}: springs.{spring} must hold {held.group} to the ground")
         return self
 
     @model_validator(mode="after")
     def _whole(self) -> MeshScene:
         several = bool(self.bodies or self.decks)
         if not several and (self.geometry is None) != (self.material is None):
-            raise ValueError(f"{'geometry' if self.geometry is None else 'material'} is missing")
+            raise Refusal(f"{'geometry' if self.geometry is None else 'material'} is missing")
         if several == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
-            raise ValueError("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
+            raise Refusal("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
         if self.wear is not None and not self.joints:
-            raise ValueError("contact is missing: [wear] needs [contact] or [contacts.NAME]")
+            raise Refusal("contact is missing: [wear] needs [contact] or [contacts.NAME]")
         if not self.joints and self.response.method != "natural":
-            raise ValueError('response.method: without contact the response is linear: give "natural"')
+            raise Refusal('response.method: without contact the response is linear: give "natural"')
         if self.contact is not None and self.contacts:
-            raise ValueError("expected either [contact] or [contacts.NAME], and not both")
+            raise Refusal("expected either [contact] or [contacts.NAME], and not both")
         for name in self.bodies:
             if "." in name or name == GROUND:
-                raise ValueError(f'bodies.{name}: give a name without a dot that is not "{GROUND}"')
+                raise Refusal(f'bodies.{name}: give a name without a dot that is not "{GROUND}"')
         made_of = [(f"bodies.{name}", one) for name, body in self.bodies.items() for one in body.materials]
         made_of += [(f"decks.{name}", deck.material) for name, deck in self.decks.items() if deck.material is not None]
         made_of += [(f"bolts.{name}", bolt.material) for name, bolt in self.bolts.items() if bolt.material is not None]
         for where, material in made_of:
             if material not in self.materials:
-                raise ValueError(f"{where}: {unknown_key(f'materials.{material}', [*self.materials])}")
+                raise Refusal(f"{where}: {unknown_key(f'materials.{material}', [*self.materials])}")
         taken = [*self.loads.static, *self.loads.harmonic]
         for name in self.bolts:
             if name in taken or name == CENTRIFUGAL:
-                raise ValueError(f"bolts.{name} has the name of a load: give it another")
+                raise Refusal(f"bolts.{name} has the name of a load: give it another")
         for name in self.couplings:
             if name in self.bodies:
-                raise ValueError(f"couplings.{name} has the name of a body: give it another")
+                raise Refusal(f"couplings.{name} has the name of a body: give it another")
         for name, link in self.links.items():
             for coupling in (link.first, link.second):
                 if coupling not in self.couplings:
-                    raise ValueError(f"links.{name}: {unknown_key(f'couplings.{coupling}', [*self.couplings])}")
+                    raise Refusal(f"links.{name}: {unknown_key(f'couplings.{coupling}', [*self.couplings])}")
         for name, tie in self.ties.items():
             if tie.first == tie.second:
-                raise ValueError(f"ties.{name}: first and second are one face: give the face that it is glued to")
+                raise Refusal(f"ties.{name}: first and second are one face: give the face that it is glued to")
         for name, contact in self.contacts.items():
             if contact.opposite in contact.groups:
-                raise ValueError(f"contacts.{name}: first and second are one face: give the face that it touches")
+                raise Refusal(f"contacts.{name}: first and second are one face: give the face that it touches")
             for tied, tie in self.ties.items():
                 if {tie.first, tie.second} == {*contact.groups, contact.opposite}:
-                    raise ValueError(f"contacts.{name} and ties.{tied} join the same two faces: take one of them out")
+                    raise Refusal(f"contacts.{name} and ties.{tied} join the same two faces: take one of them out")
             if contact.wear is not None and self.wear is None:
-                raise ValueError(f"contacts.{name}.wear needs [wear], which sets how far the wear goes")
+                raise Refusal(f"contacts.{name}.wear needs [wear], which sets how far the wear goes")
         return self

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, StrictBool, StrictInt, TypeAdapter, ValidationError, model_validator
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table
 
 
@@ -51,10 +52,10 @@ def operating_line(wheel: dict[str, Any], response: dict[str, Any]) -> dict[str,
     sweep = wheel.get("sweep") or ("frequency" if speed is None else "speed")
     if sweep != "speed":
         if speed is not None:
-            raise ValueError('response.speed is for wheel.sweep = "speed": give response.frequency instead')
+            raise Refusal('response.speed is for wheel.sweep = "speed": give response.frequency instead')
         return {}
     if order == 0:
-        raise ValueError(
+        raise Refusal(
             'wheel.sweep = "speed": the frequency of engine order 0 does not go with the speed; set it to "frequency"'
         )
     try:
@@ -68,10 +69,10 @@ def operating_line(wheel: dict[str, Any], response: dict[str, Any]) -> dict[str,
         return {}
     speeds = np.array(given["speed"] if "speed" in given else given["frequency"]) / (1 if "speed" in given else each)
     if len(given) == 2 and not np.allclose(given["frequency"], each * speeds, rtol=1e-9):
-        raise ValueError("response.speed and response.frequency are both given: leave one of them out")
+        raise Refusal("response.speed and response.frequency are both given: leave one of them out")
     middle = float(speeds.mean())
     if own and not np.isclose(own, middle, rtol=1e-9):
-        raise ValueError(
+        raise Refusal(
             'wheel.speed is given, but with wheel.sweep = "speed" it follows from the response: leave it out'
         )
     hertz = given.get("frequency") or [float(each * s) for s in speeds]
@@ -128,10 +129,10 @@ class FlowTable(Table):
     @model_validator(mode="after")
     def _one_kind(self) -> FlowTable:
         if bool(self.influence) == bool(self.by_diameter):
-            raise ValueError("flow: give either influence or by_diameter")
+            raise Refusal("flow: give either influence or by_diameter")
         for name, rows in (("influence", self.influence), ("by_diameter", self.by_diameter)):
             if len({row[0] for row in rows}) != len(rows):
-                raise ValueError(f"flow.{name}: a row is there twice")
+                raise Refusal(f"flow.{name}: a row is there twice")
         return self
 
     def coefficients(self, sectors: int) -> dict[int, complex]:
@@ -140,7 +141,7 @@ class FlowTable(Table):
             return {k: complex(real, imaginary) for k, real, imaginary in self.influence}
         waves = {j % sectors: complex(real, imaginary) for j, real, imaginary in self.by_diameter}
         if len(waves) != sectors or len(self.by_diameter) != sectors:
-            raise ValueError(
+            raise Refusal(
                 f"flow.by_diameter: give a row for each of the {sectors} waves, such as j = 0 to {sectors - 1}"
             )
         turns = [np.exp(2j * np.pi * np.arange(sectors) * k / sectors) for k in range(sectors)]

@@ -20,6 +20,7 @@ from pydantic import (
 
 from tribodyn.declare import read
 from tribodyn.hbm import continuation
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import (
     Direction,
     Frequency,
@@ -128,11 +129,11 @@ class Response(Table):
             kind = {"force": "no amplitude", "amplitude": 'amplitude = "10 um"'}.get(
                 self.control, 'amplitude = ["1 um", "1 mm"]'
             )
-            raise ValueError(f'expected {kind} with control = "{self.control}"')
+            raise Refusal(f'expected {kind} with control = "{self.control}"')
         if wanted and (not min(a or 0.0 for a in given) > 0 or len(set(given)) < len(given)):
-            raise ValueError(f"expected amplitude above 0, and two that differ, got {self.amplitude}")
+            raise Refusal(f"expected amplitude above 0, and two that differ, got {self.amplitude}")
         if wanted and (self.stability or self.bounds):
-            raise ValueError(f'expected no stability and no bounds with control = "{self.control}"')
+            raise Refusal(f'expected no stability and no bounds with control = "{self.control}"')
         return self
 
     @property
@@ -145,14 +146,14 @@ class Response(Table):
         for key, ends in (("frequency", self.frequency), ("references", self.references)):
             if ends is not None and ends[0] >= ends[1]:
                 got = f"{ends[0]:g} Hz and {ends[1]:g} Hz"
-                raise ValueError(f"expected {key} = [low, high] with low below high, got {got}")
+                raise Refusal(f"expected {key} = [low, high] with low below high, got {got}")
         return self
 
     @property
     def range(self) -> tuple[float, float]:
         """`frequency` where it is needed [Hz]; raises ValueError where it is missing."""
         if self.frequency is None:
-            raise ValueError('response.frequency is missing: give its range, such as ["100 Hz", "200 Hz"]')
+            raise Refusal('response.frequency is missing: give its range, such as ["100 Hz", "200 Hz"]')
         return self.frequency
 
 
@@ -190,15 +191,15 @@ class Reduction(Table):
     @model_validator(mode="after")
     def _whole(self) -> Reduction:
         if self.interface_modes is None and self.interface_keep is not None:
-            raise ValueError("expected interface_keep only with interface_modes")
+            raise Refusal("expected interface_keep only with interface_modes")
         if self.solver == "multigrid" and (self.needs_masters or self.method == "craig_bampton"):
-            raise ValueError(
+            raise Refusal(
                 'expected solver = "direct" with relative = true, interface_modes or method = "craig_bampton"'
             )
         if (self.modes is None) == (self.cutoff is None):
-            raise ValueError("expected either modes = number or cutoff = frequency, and not both")
+            raise Refusal("expected either modes = number or cutoff = frequency, and not both")
         if self.method == "residual_flexibility" and self.needs_masters:
-            raise ValueError('expected method = "craig_bampton" with relative = true or interface_modes')
+            raise Refusal('expected method = "craig_bampton" with relative = true or interface_modes')
         return self
 
     @property
@@ -212,7 +213,7 @@ def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]
         return ()
     kept: tuple[int, ...] = check(value)
     if not kept or list(kept) != sorted(set(kept)) or max(kept) < 1:
-        raise ValueError(f'expected kept as rising harmonic numbers up to 1 or more, or "auto", got {list(kept)}')
+        raise Refusal(f'expected kept as rising harmonic numbers up to 1 or more, or "auto", got {list(kept)}')
     return kept
 
 
@@ -246,10 +247,10 @@ class Harmonics(Table):
     def _resolved(self) -> Harmonics:
         for name in ("tolerance", "highest"):
             if not self.automatic and getattr(self, name) is not None:
-                raise ValueError(f'expected {name} only with kept = "auto"')
+                raise Refusal(f'expected {name} only with kept = "auto"')
         top = 3 * ((self.highest or HIGHEST) + 1) // 2 if self.automatic else max(self.kept)
         if self.samples <= 2 * top:
-            raise ValueError(f"expected more than {2 * top} samples for harmonic {top}, got {self.samples}")
+            raise Refusal(f"expected more than {2 * top} samples for harmonic {top}, got {self.samples}")
         return self
 
 
@@ -273,9 +274,9 @@ class Damping(Table):
     def _one_kind(self) -> Damping:
         rayleigh = self.mass is not None or self.stiffness is not None
         if sum((self.modal is not None, rayleigh, self.ratios is not None)) > 1:
-            raise ValueError("expected either modal, or mass and stiffness, or ratios, and only one of them")
+            raise Refusal("expected either modal, or mass and stiffness, or ratios, and only one of them")
         if (self.ratios is None) != (self.modes is None) or (self.modes and self.modes[0] == self.modes[1]):
-            raise ValueError("expected ratios together with the numbers of two different modes")
+            raise Refusal("expected ratios together with the numbers of two different modes")
         return self
 
     @property
@@ -304,7 +305,7 @@ class NonlinearMode(Table):
     @model_validator(mode="after")
     def _goes_somewhere(self) -> NonlinearMode:
         if self.modal_amplitude[0] == self.modal_amplitude[1]:
-            raise ValueError("modal_amplitude: expected two amplitudes that differ")
+            raise Refusal("modal_amplitude: expected two amplitudes that differ")
         return self
 
 

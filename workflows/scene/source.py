@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 
@@ -43,7 +44,7 @@ def read_scene(source: Source, overrides: Overrides = (), *, folder: str | PathL
 def override_texts(overrides: Overrides) -> tuple[str, ...]:
     """Changes of keys as the texts "section.key=value" of the command line."""
     if isinstance(overrides, str):
-        raise ValueError(f'overrides is "{overrides}": give a list of texts "section.key=value" or a dict')
+        raise Refusal(f'overrides is "{overrides}": give a list of texts "section.key=value" or a dict')
     if not isinstance(overrides, Mapping):
         return tuple(overrides)
     return tuple(

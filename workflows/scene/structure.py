@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from tribodyn.geometry.sources.picking import Rule
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.body import Meshed
 from tribodyn.workflows.scene.contact import FaceContact
 from tribodyn.workflows.scene.fields import (
@@ -50,7 +51,7 @@ class FaceRule(Table):
     @model_validator(mode="after")
     def _something(self) -> FaceRule:
         if self.box is None and self.nearest is None and self.normal is None and not self.cad:
-            raise ValueError("expected a rule: box, nearest, normal or cad")
+            raise Refusal("expected a rule: box, nearest, normal or cad")
         return self
 
     @property
@@ -146,10 +147,10 @@ class BodyTable(Meshed):
     def _sizes(self) -> Self:
         for key in ("size", "face_sizes", "unit") if self.part is not None else ():
             if getattr(self, key) != type(self).model_fields[key].get_default(call_default_factory=True):
-                raise ValueError(f"{key} is for a mesh or a CAD file: a part has parameters of its own")
+                raise Refusal(f"{key} is for a mesh or a CAD file: a part has parameters of its own")
         for name in self.face_sizes:
             if not (name.startswith("face ") and name.removeprefix("face ").isdigit()):
-                raise ValueError(f'face_sizes: expected faces by their numbers, such as "face 6", got "{name}"')
+                raise Refusal(f'face_sizes: expected faces by their numbers, such as "face 6", got "{name}"')
         return self
 
     @property
@@ -177,7 +178,7 @@ class NamedContact(FaceContact):
         if "first" not in table or "second" not in table:
             refuse_slips(table, ["first", "second"], ["first", "second", *cls.model_fields])
             missing = "first" if "first" not in table else "second"
-            raise ValueError(f'{missing} is missing: give first = "body.face", and second the same or "{GROUND}"')
+            raise Refusal(f'{missing} is missing: give first = "body.face", and second the same or "{GROUND}"')
         rest = {key: value for key, value in table.items() if key not in ("first", "second")}
         other = {} if table["second"] == GROUND else {"opposite": table["second"]}
         return {**rest, "group": table["first"], **other}
@@ -215,7 +216,7 @@ class CouplingTable(Table):
     @model_validator(mode="after")
     def _held_if_rigid(self) -> CouplingTable:
         if self.fixed and self.kind == "distributed":
-            raise ValueError('fixed: a point that follows its face cannot be held: give kind = "rigid"')
+            raise Refusal('fixed: a point that follows its face cannot be held: give kind = "rigid"')
         return self
 
 
@@ -232,9 +233,9 @@ class LinkTable(Table):
     @model_validator(mode="after")
     def _known(self) -> LinkTable:
         if len(set(self.free)) == len(AXES):
-            raise ValueError(f"free: expected some of {', '.join(AXES)}, but not all, got {list(self.free)}")
+            raise Refusal(f"free: expected some of {', '.join(AXES)}, but not all, got {list(self.free)}")
         if self.first == self.second:
-            raise ValueError(f"second: expected another coupling than {self.first!r}")
+            raise Refusal(f"second: expected another coupling than {self.first!r}")
         return self
 
 
@@ -275,5 +276,5 @@ class BoltTable(Table):
     def _stiff(self) -> BoltTable:
         shank = self.diameter is not None and self.material is not None
         if self.state == "locked" and shank == (self.stiffness is not None):
-            raise ValueError("a locked bolt needs either diameter and material of its shank, or its stiffness")
+            raise Refusal("a locked bolt needs either diameter and material of its shank, or its stiffness")
         return self

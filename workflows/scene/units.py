@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
+from tribodyn.refusal import Refusal
+
 Dimension = tuple[int, int, int, int, int]  # exponents of kg, m, s, turn, K
 
 PREFIXES = {name: Fraction(10) ** power for name, power in dict(n=-9, u=-6, m=-3, c=-2, k=3, M=6, G=9).items()}
@@ -67,7 +69,7 @@ def parse_unit(text: str) -> Unit:
                 continue
             match = FACTOR.match(item)
             if match is None:
-                raise ValueError(f'"{item}" is not a unit')
+                raise Refusal(f'"{item}" is not a unit')
             scale, exponents = _lookup(match[1])
             power = sign * int(match[2] or 1)
             factor *= scale**power
@@ -81,7 +83,7 @@ def _lookup(name: str) -> tuple[Fraction, Dimension]:
     prefix, base = name[:1], name[1:]
     if base in UNITS and prefix in UNITS[base][2]:
         return PREFIXES[prefix] * UNITS[base][0], UNITS[base][1]
-    raise ValueError(f'"{name}" is not a unit')
+    raise Refusal(f'"{name}" is not a unit')
 
 
 def to_si(value: object, unit: str) -> float:
@@ -97,11 +99,11 @@ def to_si(value: object, unit: str) -> float:
     parse_unit(unit)  # a unit of a file of one's own may be none
     expected = f"expected {_describe(unit)}"
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError(f"{expected}, got {value!r}")
+        raise Refusal(f"{expected}, got {value!r}")
     if not abs(value) < BEYOND:
-        raise ValueError(f"{expected}, got {value}, beyond what a structure has")
+        raise Refusal(f"{expected}, got {value}, beyond what a structure has")
     if 0 < abs(value) < BELOW:
-        raise ValueError(f"{expected}, got {value}: give 0, or more than {BELOW:g}")
+        raise Refusal(f"{expected}, got {value}: give 0, or more than {BELOW:g}")
     return float(value)
 
 
@@ -110,20 +112,20 @@ def _text_to_si(value: str, unit: str) -> float:
     wanted, expected = parse_unit(unit), f"expected {_describe(unit)}"
     match = NUMBER.match(value)
     if match is None:
-        raise ValueError(f'{expected}, got "{value}"')
+        raise Refusal(f'{expected}, got "{value}"')
     if not match[2] and wanted.dimension != (0, 0, 0, 0, 0):
-        raise ValueError(f'{expected}, got "{value}" without a unit')
+        raise Refusal(f'{expected}, got "{value}" without a unit')
     try:
         given = parse_unit(match[2])
     except ValueError as error:
-        raise ValueError(f'{expected}, got "{value}" in which {error}') from None
+        raise Refusal(f'{expected}, got "{value}" in which {error}') from None
     if given.dimension != wanted.dimension:
-        raise ValueError(f'{expected}, got "{value}" which is {_name(given.dimension)}')
+        raise Refusal(f'{expected}, got "{value}" which is {_name(given.dimension)}')
     exact = Fraction(match[1]) * given.factor / wanted.factor
     if not abs(exact) < BEYOND:
-        raise ValueError(f'{expected}, got "{value}", beyond what a structure has')
+        raise Refusal(f'{expected}, got "{value}", beyond what a structure has')
     if 0 < abs(exact) < BELOW:
-        raise ValueError(f'{expected}, got "{value}": give 0, or more than {BELOW:g}')
+        raise Refusal(f'{expected}, got "{value}": give 0, or more than {BELOW:g}')
     return float(exact)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from tribodyn.hbm.wear import law as wear_law
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Frequency, Number, Table
 from tribodyn.workflows.scene.own import LawTable
 from tribodyn.workflows.scene.units import to_si
@@ -30,7 +31,7 @@ def _step(value: object) -> object:
             return WearStep(**{name: to_si(value, unit)})
         except ValueError:
             continue
-    raise ValueError(f'expected a share of delta_max such as "5 %" or a depth such as "50 um", above 0, got {value!r}')
+    raise Refusal(f'expected a share of delta_max such as "5 %" or a depth such as "50 um", above 0, got {value!r}')
 
 
 class Place(Table):
@@ -44,7 +45,7 @@ class Place(Table):
     @model_validator(mode="after")
     def _one_place(self) -> Self:
         if (self.frequency is None) == (self.peak is None):
-            raise ValueError("expected either frequency or peak, and not both")
+            raise Refusal("expected either frequency or peak, and not both")
         return self
 
 
@@ -57,7 +58,7 @@ def _place(value: object) -> object:
             return Place(peak=1.0)
         return Place(peak=to_si(share, "")) if of and not peak else Place(frequency=to_si(value, "Hz"))
     except ValueError:
-        raise ValueError(
+        raise Refusal(
             f'expected "peak", a share of its frequency such as "98 % of peak", or a frequency such as "410 Hz", '
             f"got {value!r}"
         ) from None
@@ -79,7 +80,7 @@ class Sweep(Table):
     @model_validator(mode="after")
     def _rises(self) -> Self:
         if self.stop <= self.start:
-            raise ValueError(f"expected a sweep that rises, got {self.start:g} Hz to {self.stop:g} Hz")
+            raise Refusal(f"expected a sweep that rises, got {self.start:g} Hz to {self.stop:g} Hz")
         return self
 
     def duties(self) -> tuple[MissionDuty, ...]:
@@ -167,12 +168,12 @@ class Wear(JointWearTable):
     @model_validator(mode="after")
     def _whole(self) -> Wear:
         if self.rule == "thesis" and self.step is None:
-            raise ValueError('expected step, such as "5 %" of delta_max, for rule = "thesis"')
+            raise Refusal('expected step, such as "5 %" of delta_max, for rule = "thesis"')
         total = sum(duty.share for duty in self.mission)
         if self.mission and abs(total - 1) > 1e-9:
-            raise ValueError(f"expected shares of the mission that sum to 1, got {total:g}")
+            raise Refusal(f"expected shares of the mission that sum to 1, got {total:g}")
         if self.lost_of == "any" and self.end_at == "at_rest":
-            raise ValueError('expected lost_of = "any" only with end_at = "vibrating"')
+            raise Refusal('expected lost_of = "any" only with end_at = "vibrating"')
         if self.mission and "at" in self.model_fields_set:
-            raise ValueError("expected either at or mission, and not both")
+            raise Refusal("expected either at or mission, and not both")
         return self

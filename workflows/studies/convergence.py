@@ -21,6 +21,7 @@ from matplotlib.ticker import NullFormatter, NullLocator
 from matplotlib.tri import Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors.settling import ANSWERED, Measured, Row, Settling, Settlings, settle
 from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, STYLE
 from tribodyn.workflows.result.summary import plain
@@ -73,7 +74,7 @@ def converge(
     most : settings of each ladder, the coarsest ones
     """
     if most < 1:
-        raise ValueError(f"--most {most}: a ladder needs one setting at least")
+        raise Refusal(f"--most {most}: a ladder needs one setting at least")
     texts, say = override_texts(overrides), reporter(progress).say
     return Converged(settle(fspath(scene), settings, texts, say, most))
 

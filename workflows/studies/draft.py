@@ -17,6 +17,7 @@ import scipy
 from tribodyn.fem.assembly import named_in
 from tribodyn.geometry.sources import cad, read as sources
 from tribodyn.geometry.sources.picking import outline
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.json_schema import json_schema
 from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.study_result import StudyResult
@@ -88,7 +89,7 @@ class Draft(StudyResult):
         """Write the scene and, beside it, the schema by which editors complete and check its keys."""
         scene, schema = folder / f"{self.name}.toml", folder / SCHEMA
         if scene.exists():
-            raise ValueError(f"{scene} is there already: move it, or give another folder with --out")
+            raise Refusal(f"{scene} is there already: move it, or give another folder with --out")
         folder.mkdir(parents=True, exist_ok=True)
         place = Path(os.path.relpath(self.file, folder)).as_posix()
         scene.write_text(self.text.replace(json.dumps(self.file.name), json.dumps(place)), encoding="utf-8")
@@ -105,7 +106,7 @@ def draft(what: AnyPath, *, unit: str | None = None) -> Draft:
     """
     path = Path(what)
     if path.suffix.lower() not in sources.ENDINGS:
-        raise ValueError(f'"{what}" is no mesh, deck or CAD file: its ending is none of {", ".join(sources.ENDINGS)}')
+        raise Refusal(f'"{what}" is no mesh, deck or CAD file: its ending is none of {", ".join(sources.ENDINGS)}')
     raw = sources.read(path, "m" if unit is None else unit)
     why = "as given"
     if unit is None:

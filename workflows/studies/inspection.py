@@ -19,6 +19,7 @@ from tribodyn.fem.modes import modes, stiffest
 from tribodyn.geometry.mesh import area, facts
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources.deck import Deck
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import groups as group_pictures
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.run import decks, modelling, sanity_checks
@@ -134,14 +135,14 @@ def inspect(
     Raises  ValueError: what cannot be, one sentence
     """
     if modes < 0:
-        raise ValueError(f"--modes {modes}: give a number of modes, 0 for none")
+        raise Refusal(f"--modes {modes}: give a number of modes, 0 for none")
     if (young is None) != (density is None):
-        raise ValueError("--young and --density go together: give both or none")
+        raise Refusal("--young and --density go together: give both or none")
     material = None if young is None or density is None else Material(young, poisson, density)
     if Path(what).suffix.lower() in sources.ENDINGS:
         return _of_file(Path(what), unit, elements, material, modes, free, progress or Progress())
     if unit != "m" or material is not None or elements != "quadratic":
-        raise ValueError("--unit, --young, --poisson, --density and --elements are for files: a scene has its own")
+        raise Refusal("--unit, --young, --poisson, --density and --elements are for files: a scene has its own")
     return _of_scene(read_scene(what, overrides), modes, progress or Progress())
 
 
@@ -167,9 +168,9 @@ def _of_file(
     found = replace(found, pairs=pairs, refused=(*ignored, *apart))
     if n_modes:
         if material is None and not any(one.groups for one in source.deck.materials):
-            raise ValueError(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
+            raise Refusal(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
         if lacking:
-            raise ValueError(f"{path}: {lacking}")
+            raise Refusal(f"{path}: {lacking}")
         if free or replace(source.deck, contacts=()) == Deck(materials=source.deck.materials):
             found = replace(found, frequencies=_free_frequencies(solids, n_modes, progress))
         else:

@@ -39,6 +39,7 @@ from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.foreign import ForeignMatrices, Terms
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import Refusal
 
 HZ = 2 * np.pi  # rad/s of one Hz
 
@@ -236,21 +237,21 @@ class Balance:
         """
         if control == "phase":
             if not isinstance(amplitude, tuple):
-                raise ValueError("control of the phase: give the first and the last amplitude [m], as (1e-6, 1e-3)")
+                raise Refusal("control of the phase: give the first and the last amplitude [m], as (1e-6, 1e-3)")
             way = modes.BackboneOptions(points or modes.BackboneOptions.n_points, **options, newton=self.newton)
             low, high = HZ * min(start, stop), HZ * max(start, stop)
             return phase_resonance(self.problem, self._output(output), low, high, *amplitude, way)
         problem = self.problem
         if control == "amplitude":
             if not isinstance(amplitude, (int, float)):
-                raise ValueError("control of the amplitude: give the one amplitude [m] that is held")
+                raise Refusal("control of the amplitude: give the one amplitude [m] that is held")
             problem = constant_response(problem, self._output(output), amplitude)
         module = continuation.load(method)
         chosen = {**({} if points is None else {"n_points": points}), **options, "newton": self.newton}
         try:
             made = module.Options(**chosen)
         except TypeError as wrong:
-            raise ValueError(f"continuation {method}: {wrong}") from None
+            raise Refusal(f"continuation {method}: {wrong}") from None
         branch: Branch = module.follow(problem, HZ * start, HZ * stop, made)
         return driven(problem, branch) if control == "amplitude" else branch
 
@@ -306,7 +307,7 @@ class Balance:
             site = AtFrequency(name, HZ * at, self.newton)
         problem = WearProblem(self.problem, (Duty(site),), law, self.problem.model.interface.area, lost_below)
         if (step is None) == (tolerance is None) or (tolerance is None) != (scale is None):
-            raise ValueError("wear needs either step, or tolerance with the depth scale that it is a share of")
+            raise Refusal("wear needs either step, or tolerance with the depth scale that it is a share of")
         if step is not None:
             return thesis_rule.evolve(problem, step, max_steps, on_row, resume)
         assert tolerance is not None
@@ -317,7 +318,7 @@ class Balance:
     def _output(self, output: str | None) -> str:
         names = self.problem.compliance.output_names
         if output is not None and output not in names:
-            raise ValueError(f"there is no output '{output}': there are {', '.join(names)}")
+            raise Refusal(f"there is no output '{output}': there are {', '.join(names)}")
         return output or names[0]
 
 
@@ -348,7 +349,7 @@ def reduce(
     """
     touching = (contacts,) if isinstance(contacts, Contact) else tuple(contacts)
     if not touching:
-        raise ValueError("a structure needs at least one contact")
+        raise Refusal("a structure needs at least one contact")
     system, interface = matrices.system(loads, outputs), joined([contact.interface for contact in touching])
     if modes is None and cutoff is None:
         model = foreign.reduced_model(system, interface)
@@ -356,7 +357,7 @@ def reduce(
         model = craig_bampton(system, interface, modes, cutoff)
     if damping_ratio is not None:
         if model.system.damping is not None:
-            raise ValueError("the matrices hold a damping matrix: give no damping_ratio besides")
+            raise Refusal("the matrices hold a damping matrix: give no damping_ratio besides")
         model = model.with_damping(lambda system, rows: damping.modal_damping(system, damping_ratio))
     return Structure(model, touching)
 

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors import accuracy as errors
 from tribodyn.workflows.errors.accuracy import Bound
 from tribodyn.workflows.errors.verdict import with_verdict
@@ -67,7 +68,7 @@ def run(
     file = read_scene(source, overrides)
     if folder is None:
         if pictures or resume:
-            raise ValueError(f"{'pictures' if pictures else 'resume'} needs a folder: give run a folder")
+            raise Refusal(f"{'pictures' if pictures else 'resume'} needs a folder: give run a folder")
         return pipeline.run(file, None, reporter(progress), judge=with_verdict)
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
@@ -176,7 +177,7 @@ def report(results: Sequence[AnyPath], path: AnyPath) -> Path:
     from tribodyn.workflows.report import page
 
     if not results:
-        raise ValueError("report: give the folder or file of a result")
+        raise Refusal("report: give the folder or file of a result")
     given = [Path(one) for one in results]
     files, loaded = [store.result_file(one) for one in given], [store.load(one) for one in given]
     names = [str(one.provenance["scene_name"]) for one in loaded]

@@ -16,6 +16,7 @@ import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.laws.impact import loading_work
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import quantity
@@ -34,7 +35,7 @@ def supports_of(scene: Scene) -> dict[str, tuple[float, str]]:
     springs = scene.springs if isinstance(scene, MeshScene) else {}
     grounded = {name: spring for name, spring in springs.items() if spring.opposite is None}
     if not isinstance(scene, MeshScene) or not grounded:
-        raise ValueError("the scene has no spring to the ground: a support is a table such as [springs.left_pin]")
+        raise Refusal("the scene has no spring to the ground: a support is a table such as [springs.left_pin]")
     outputs = {"response": scene.response, **scene.response.others}
     found = {
         name: (spring.stiffness, output)
@@ -44,7 +45,7 @@ def supports_of(scene: Scene) -> dict[str, tuple[float, str]]:
     }
     if not found:
         first, spring = next(iter(grounded.items()))
-        raise ValueError(
+        raise Refusal(
             f"no output observes a support: add [response.others.{first}] with the group and direction of its spring, "
             f'group = "{spring.group}"'
         )
@@ -116,9 +117,9 @@ def supports(
     there, areas, curve = supports_of(scene), areas or {}, result.response
     unknown = [name for name in areas if name not in there]
     if unknown:
-        raise ValueError(f'no support is called "{unknown[0]}", there are {", ".join(there)}')
+        raise Refusal(f'no support is called "{unknown[0]}", there are {", ".join(there)}')
     if curve is None:
-        raise ValueError("the result has no response curve: run its scene")
+        raise Refusal("the result has no response curve: run its scene")
     basis = HarmonicBasis(result.harmonics, max(SAMPLES, 32 * result.harmonics[-1], scene.harmonics.samples))
     work = {
         name: support_work(basis, curve.response[:, curve.output_names.index(output)], stiffness)

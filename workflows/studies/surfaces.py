@@ -13,6 +13,7 @@ import numpy as np
 from tribodyn.geometry import surface_io
 from tribodyn.geometry.asperities import Asperities, identify
 from tribodyn.geometry.surface import HeightMap, mirrored
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
 from tribodyn.workflows.studies.study_result import StudyResult
@@ -98,10 +99,10 @@ def asperities(
     Raises  ValueError: a map that cannot be one, heights in steps, too few summits
     """
     if spacing is not None and len(spacing) != 2:
-        raise ValueError('--spacing: give two steps, along x and y, such as "1um, 1um"')
+        raise Refusal('--spacing: give two steps, along x and y, such as "1um, 1um"')
     for option, unit in (("--lateral-unit", lateral_unit), ("--height-unit", height_unit)):
         if not unit > 0:
-            raise ValueError(f"{option} {unit:g}: give a unit of length such as 1um")
+            raise Refusal(f"{option} {unit:g}: give a unit of length such as 1um")
     steps = None if spacing is None else (spacing[0], spacing[1])
 
     def face(of: Face) -> HeightMap:
@@ -112,6 +113,6 @@ def asperities(
     other = None if second is None else face(second)
     if mirror is not None:
         if other is None:
-            raise ValueError("mirror reverses the second face, and there is one face only: leave it out")
+            raise Refusal("mirror reverses the second face, and there is one face only: leave it out")
         other = mirrored(other, mirror)
     return FaceAsperities(identify(face(first), other, cutoff, shortest), rows)

@@ -22,6 +22,7 @@ from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import LeftAlone, leave_alone
 from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearRow
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.readable import named_lines
@@ -208,7 +209,7 @@ def held_against(
         balance, omega, x = _start(result, scene, unworn, at, row)
         target = omega if at is None else at
         if not 0 < target <= balance.omega_max:
-            raise ValueError(
+            raise Refusal(
                 f"{target / (2 * np.pi):g} Hz is outside what the scene models, up to "
                 f"{balance.omega_max / (2 * np.pi):g} Hz: change response.frequency with --set"
             )
@@ -251,7 +252,7 @@ def _start(
     if row is not None:
         held = 0 if result.wear is None else len(result.wear.cycles)
         if not 0 <= row < held:
-            raise ValueError(f"the result has no wear row {row}: it has {f'0 to {held - 1}' if held else 'none'}")
+            raise Refusal(f"the result has no wear row {row}: it has {f'0 to {held - 1}' if held else 'none'}")
         assert result.wear is not None
         worn: WearRow = result.wear.rows()[row]
         load = settings.mission(scene)[0].load if scene.wear is not None else 1.0
@@ -260,7 +261,7 @@ def _start(
     frf = result.response
     good = [] if frf is None else np.flatnonzero(frf.converged).tolist()
     if frf is None or not good:
-        raise ValueError("the result has no response curve to start from: run its scene first")
+        raise Refusal("the result has no response curve to start from: run its scene first")
     height = frf.amplitude(frf.output_names[0])
     best = max(good, key=lambda i: height[i]) if at is None else min(good, key=lambda i: abs(frf.omega[i] - at))
     return unworn, frf.omega[best], _carried(frf.contact[best], basis, unworn)

@@ -15,6 +15,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import LeftAlone
 from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREEN, ORANGE
 from tribodyn.workflows.result.provenance import rebuilt
@@ -132,11 +133,11 @@ def verify(
     """
     result, report = held(result), reporter(progress)
     if states is not None and (at is not None or row is not None):
-        raise ValueError("expected one of --states, and --at with --row")
+        raise Refusal("expected one of --states, and --at with --row")
     if states is not None and result.wear is None:
-        raise ValueError("the result has no wear run: take a scene with [wear]")
+        raise Refusal("the result has no wear run: take a scene with [wear]")
     if states is not None and states < 1:
-        raise ValueError(f"--states must be at least 1, not {states}")
+        raise Refusal(f"--states must be at least 1, not {states}")
     file = rebuilt(result, override_texts(overrides))
     with limited(file.scene.solver.threads):
         unworn = modelling.build(file, report, result.harmonics).balance

@@ -31,6 +31,7 @@ from tribodyn.hbm.contact.asperity import asperity, tangential_ratio
 from tribodyn.hbm.contact.bed_cycle import ROWS, SPRINGS, TABULATED, bed, look_up, table_of
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.refusal import Refusal
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
 OWN_STIFFNESS = True  # its springs follow from its own numbers
@@ -66,17 +67,17 @@ class Parameters:
 def tabulated(parameters: ContactParameters) -> np.ndarray:
     """(n_pair, ...) what every packed row ends with: deepest tabulated approach [m], then the table of its bed."""
     if parameters.table is None:
-        raise ValueError("contact law 'rough' needs its table of asperities: columns " + " and ".join(TABLE))
+        raise Refusal("contact law 'rough' needs its table of asperities: columns " + " and ".join(TABLE))
     given = np.ascontiguousarray(parameters.table, float)
     if given.ndim != 2 or given.shape[1] != 2 or not np.isfinite(given).all() or (given < 0).any() or not given.any():
-        raise ValueError(f"contact law 'rough': expected two columns without negatives, {' and '.join(TABLE)}")
+        raise Refusal(f"contact law 'rough': expected two columns without negatives, {' and '.join(TABLE)}")
     if (np.diff(given[:, 0]) <= 0).any():
-        raise ValueError("contact law 'rough': the gaps in its table must rise from row to row")
+        raise Refusal("contact law 'rough': the gaps in its table must rise from row to row")
     n = parameters.numbers
     own = np.stack([n[name] for name in ("young", "poisson", "radius", "yield_stress", "tangent_modulus")], axis=1)
     top = np.where(n["deepest"] > 0, n["deepest"], given[:, 0].max())
     if not (top > 0).all():
-        raise ValueError("contact law 'rough': give deepest, where all asperities of the table stand at one height")
+        raise Refusal("contact law 'rough': give deepest, where all asperities of the table stand at one height")
     rows = np.empty((parameters.n_pair, 1 + (ROWS + 1) * 2 * (1 + SPRINGS)))
     for i in range(parameters.n_pair):
         rows[i, 0] = top[i]

@@ -23,6 +23,7 @@ from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Options:
     def __post_init__(self) -> None:
         require_limits(self, "adaptive continuation")
         if not self.min_step <= self.step <= self.max_step:
-            raise ValueError(
+            raise Refusal(
                 f"adaptive steps must obey min_step <= step <= max_step, "
                 f"not {self.min_step:g}, {self.step:g}, {self.max_step:g}"
             )

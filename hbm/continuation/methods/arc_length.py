@@ -28,6 +28,7 @@ from tribodyn.hbm.continuation.stiffening import solve_along_friction, solve_alo
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Options:
     def __post_init__(self) -> None:
         require_limits(self, "continuation by arc length")
         if not self.min_step <= self.step <= self.max_step:
-            raise ValueError(
+            raise Refusal(
                 f"arc length steps must obey min_step <= step <= max_step, "
                 f"not {self.min_step:g}, {self.step:g}, {self.max_step:g}"
             )
@@ -120,10 +121,10 @@ def follow(
 def _begin(path: Parameter, start: float, stop: float, options: Options) -> _Walk:
     """The first point, from which to follow; raises ValueError as `follow` does."""
     if start == stop:
-        raise ValueError(f"start and stop are the same, {path.say(start)}: there is no curve to follow")
+        raise Refusal(f"start and stop are the same, {path.say(start)}: there is no curve to follow")
     bounds = options.bounds or (min(start, stop), max(start, stop))
     if not bounds[0] <= start <= bounds[1]:
-        raise ValueError(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
+        raise Refusal(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
     if options.guess is not None:
         first = newton.solve(*path.place(start), options.guess, options.newton)
     else:

@@ -16,6 +16,7 @@ import numpy as np
 from tribodyn.declare import number
 from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.hbm.wear.law import Exposure
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ def depth_rate(exposure: Exposure) -> np.ndarray:
 def impact_work(exposure: Exposure) -> np.ndarray:
     """(n_pair,) work of the normal force on closing pairs over one cycle, 0 where a pair never opens [J]."""
     if "n" not in exposure.components:
-        raise ValueError("the wear law impact needs a contact law with a normal component: take components with n")
+        raise Refusal("the wear law impact needs a contact law with a normal component: take components with n")
     n = exposure.components.index("n")
     x, force = exposure.history
     return np.where(exposure.status & SEPARATES, loading_work(force[:, n], x[:, n]), 0.0)

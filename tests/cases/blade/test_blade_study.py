@@ -7,12 +7,12 @@ import csv
 import numpy as np
 import pytest
 
+from proof import __main__ as cli
+from proof.cases.blade import study as blade_study
+from proof.cases.blade.few_sectors import FEW_SECTORS
+from proof.cases.blade.study import Extent
 from tests.helpers.coarse_scenes import BLADE as COARSE
 from tests.helpers.pictures import assert_not_blank
-from tests.proof import __main__ as cli
-from tests.proof.cases.blade import study as blade_study
-from tests.proof.cases.blade.few_sectors import FEW_SECTORS
-from tests.proof.cases.blade.study import Extent
 from tribodyn.hbm import newton
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.outcome import CONVERGED

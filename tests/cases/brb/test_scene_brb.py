@@ -12,9 +12,9 @@ import pytest
 import scipy.linalg as sla
 
 import tribodyn as td
+from proof.problems import wear
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tests.helpers.command import leave
-from tests.proof.problems import wear
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.time import ring_down as time_ring_down

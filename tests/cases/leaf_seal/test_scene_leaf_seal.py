@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.helpers.reduced import reduce_part
-from tests.proof.cases.leaf_seal import (
+from proof.cases.leaf_seal import (
     figures as leaf_figures,
     fit as leaf_fit,
     record as leaf_record,
     study as leaf_study,
 )
-from tests.proof.cases.leaf_seal.cases import Case, cases, liner
-from tests.proof.cases.leaf_seal.response import LINER_NODE, respond
-from tests.proof.cases.leaf_seal.study import KEPT
+from proof.cases.leaf_seal.cases import Case, cases, liner
+from proof.cases.leaf_seal.response import LINER_NODE, respond
+from proof.cases.leaf_seal.study import KEPT
+from tests.helpers.reduced import reduce_part
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact.law import SEPARATES, STICKS
 from tribodyn.hbm.linear.recovery import coordinates

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from proof import __main__ as cli
+from proof.cases.rig import fit as rig_fit, published, table as rig_table, time as rig_time
+from proof.cases.rig.cases import apart
+from proof.cases.rig.joints import Modes, joints_of
+from proof.cases.rig.model import Rig
+from proof.cases.rig.time import in_time
+from proof.cases.rig.wear import RigWear, wear_down
 from tests.helpers.coarse_scenes import QUICK_RIG as QUICK, RIG as COARSE
 from tests.helpers.fits import STEP, fit_by_differences as fit
-from tests.proof import __main__ as cli
-from tests.proof.cases.rig import fit as rig_fit, published, table as rig_table, time as rig_time
-from tests.proof.cases.rig.cases import apart
-from tests.proof.cases.rig.joints import Modes, joints_of
-from tests.proof.cases.rig.model import Rig
-from tests.proof.cases.rig.time import in_time
-from tests.proof.cases.rig.wear import RigWear, wear_down
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.reduction.linear import stuck_stiffness

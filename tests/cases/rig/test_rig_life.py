@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from tests.proof import __main__ as cli
-from tests.proof.cases.rig.published import PRELOAD
+from proof import __main__ as cli
+from proof.cases.rig.published import PRELOAD
 
 COARSE = (
     "geometry.n_contact_length=3", "geometry.n_contact_width=5", "reduction.modes=6", "harmonics.kept=[0, 1]",

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import tribodyn as td
+from proof.problems import result_of, wear
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
-from tests.proof.problems import result_of, wear
 from tribodyn.geometry import bladed_sector
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.workflows.result import summary

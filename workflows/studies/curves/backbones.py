@@ -15,6 +15,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import nonlinear_modes
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions
 from tribodyn.hbm.threads import limited
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.maps import backbone_maps
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
@@ -55,7 +56,7 @@ class AmplitudeRange:
         if start is not None and stop is not None:
             return cls(start, stop, mode, points)
         if start is not None or stop is not None or own is None:
-            raise ValueError(
+            raise Refusal(
                 f"--{'to' if start is not None else 'from'} is missing: give both ends of the backbone, "
                 "or backbone.modal_amplitude in the scene"
             )
@@ -254,7 +255,7 @@ def published_backbone(file: SceneFile) -> PublishedBackbone | None:
         columns = [np.array(table[name], float) for name in ("modal_amplitude", "frequency_hz", "damping")]
         source = str(table["source"])
     except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"{path}: [backbone] needs source, modal_amplitude, frequency_hz, damping") from error
+        raise Refusal(f"{path}: [backbone] needs source, modal_amplitude, frequency_hz, damping") from error
     if len({len(c) for c in columns}) > 1 or len(columns[0]) < 2 or (np.diff(columns[0]) <= 0).any():
-        raise ValueError(f"{path}: [backbone] needs columns of one length, modal_amplitude rising")
+        raise Refusal(f"{path}: [backbone] needs columns of one length, modal_amplitude rising")
     return PublishedBackbone(source, *columns)

@@ -18,6 +18,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time import ring_down as time_ring_down
 from tribodyn.hbm.time.decrement import decrement
 from tribodyn.hbm.time.ring_down import RingDown
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.readable import named_lines
@@ -165,7 +166,7 @@ def ring_down(
         return _struck(file, start, mode or 0, points or 40, periods, steps, impulse, report)
     asked = AmplitudeRange.of(file, start, stop, mode, points)
     if not asked.stop > asked.start:
-        raise ValueError("a free decay ends at a smaller amplitude than it begins at: give --from below --to")
+        raise Refusal("a free decay ends at a smaller amplitude than it begins at: give --from below --to")
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, report).balance
         swung = _reached(along(file, balance, asked, report))
@@ -191,7 +192,7 @@ def _struck(
 ) -> Decay:
     """The decay after a blow, beside the backbone through its amplitudes."""
     if least is None or not (impulse > 0 and least > 0):
-        raise ValueError("a blow needs --impulse above 0 and --from, the amplitude at which its decay ends")
+        raise Refusal("a blow needs --impulse above 0 and --from, the amplitude at which its decay ends")
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, report).balance
         with report.stage("free decay"):

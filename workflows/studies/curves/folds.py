@@ -13,6 +13,7 @@ from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.stability.folds_in_time import FoldInTime, fold_in_time
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.stepper import IntegrationFailed
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
@@ -64,10 +65,10 @@ def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), pr
     other waves than its motion
     """
     if not 0 < within < 1:
-        raise ValueError(f"--within {within:g}: give a share between 0 and 100 %")
+        raise Refusal(f"--within {within:g}: give a share between 0 and 100 %")
     file, report = read_scene(scene, overrides), reporter(progress)
     if getattr(file.scene, "wheel", None):
-        raise ValueError(f"{file.name} has a [wheel]: its folds cannot be looked for in time")
+        raise Refusal(f"{file.name} has a [wheel]: its folds cannot be looked for in time")
     low, high = settings.response_range(file.scene)
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, report).balance

@@ -22,6 +22,7 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import limited
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result import store
@@ -118,12 +119,12 @@ def track(
     """
     ends = [_end(option, value, against) for option, value in (("--from", start), ("--to", stop))]
     if ends[0] == ends[1]:
-        raise ValueError("--from and --to are the same: give two values to go from and to")
+        raise Refusal("--from and --to are the same: give two values to go from and to")
     count = points if points is not None else (21 if fold is None else 500)
     if count < 2:
-        raise ValueError(f"--points: a line needs at least 2, not {count}")
+        raise Refusal(f"--points: a line needs at least 2, not {count}")
     if (against == "wear") != (worn is not None):
-        raise ValueError('--worn: give the folder of a worn result with --against "wear", and only there')
+        raise Refusal('--worn: give the folder of a worn result with --against "wear", and only there')
     file, report = read_scene(scene, overrides), reporter(progress)
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, report).balance
@@ -139,7 +140,7 @@ def _end(option: str, value: float | str, against: str) -> float:
     try:
         return to_si(value, "m" if against == "gap" else "")
     except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
+        raise Refusal(f"{option}: {error}") from None
 
 
 def _path(balance: HarmonicBalance, against: str, depth: np.ndarray | None) -> Parameter:
@@ -154,7 +155,7 @@ def _depth(worn: AnyPath, balance: HarmonicBalance) -> np.ndarray:
     """(n_pair,) depth [m] at the end of a result."""
     wear = store.load(worn).wear
     if wear is None or wear.depth.shape[1] != balance.contact.n_pair:
-        raise ValueError(f"--worn: {worn} holds no worn contact of this scene's {balance.contact.n_pair} node pairs")
+        raise Refusal(f"--worn: {worn} holds no worn contact of this scene's {balance.contact.n_pair} node pairs")
     return wear.depth[-1]
 
 
@@ -193,7 +194,7 @@ def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: i
     newton = settings.newton_options(file.scene)
     branch = arc_length.follow(path.make(start), high, low, arc_length.Options(newton=newton))
     if not 1 <= number <= len(branch.folds):
-        raise ValueError(
+        raise Refusal(
             f"--fold: there are {len(branch.folds)} folds at {path.say(start)}, not {number}; the response {branch.end}"
         )
     at = sorted(branch.folds, key=lambda i: -branch.omega[i])[number - 1]

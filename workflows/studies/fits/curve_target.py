@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, StrictBool, ValidationInfo, model_validator
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
@@ -64,7 +65,7 @@ class CurveTarget:
             found = read(table._folder / table.file, table.facts)
             kept = tuple(run for run in found.runs if table.control in (None, run.control))
             if not kept:
-                raise ValueError(f"no run has control = {table.control}")
+                raise Refusal(f"no run has control = {table.control}")
             return cls(name, table, prepared(replace(found, runs=kept), file.scene, table.resonance))
         except ValueError as trouble:
             raise SceneError(f"curves.{name}: {trouble}") from None

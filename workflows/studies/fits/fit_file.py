@@ -24,6 +24,7 @@ from tribodyn.hbm.derivatives import Derivatives
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import joints, kept, modelling, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
@@ -96,7 +97,7 @@ class Asked(Table):
         ):
             given = name in self.model_fields_set
             if (given and not may) or (must and not given):
-                raise ValueError(f'expected {"" if may else "no "}{name} for of = "{self.of}"')
+                raise Refusal(f'expected {"" if may else "no "}{name} for of = "{self.of}"')
         return self
 
 
@@ -129,7 +130,7 @@ class Task(Table):
         if isinstance(table, dict) and table.get("curves"):
             return {"measured": {}, **table}
         if isinstance(table, dict) and table.get("measured") == {}:
-            raise ValueError("measured: give numbers, or curves")
+            raise Refusal("measured: give numbers, or curves")
         return table
 
 
@@ -421,7 +422,7 @@ class Answers:
     def _frequency(self, stuck: bool, mode: int) -> float:
         reduced = self.model.reduced
         if mode > reduced.system.n_dof:
-            raise ValueError(f"there is no mode {mode}: the model has {reduced.system.n_dof}")
+            raise Refusal(f"there is no mode {mode}: the model has {reduced.system.n_dof}")
         springs = joints.contact_stiffness(self.file.scene, reduced) if stuck else None
         return float(linear_modes(reduced, springs, mode)[0][mode - 1])
 

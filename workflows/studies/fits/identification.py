@@ -13,6 +13,8 @@ from itertools import product
 import numpy as np
 from scipy.optimize import least_squares
 
+from tribodyn.refusal import Refusal
+
 AT_BOUND = 1e-3  # of the width of the bounds: nearer than this counts as at the bound
 OPEN = 0.3  # relative standard error beyond which a parameter counts as not determined
 
@@ -35,9 +37,9 @@ class Parameter:
 
     def __post_init__(self) -> None:
         if not (self.low < self.high and all(self.low <= start <= self.high for start in self.starts) and self.starts):
-            raise ValueError(f"parameter {self.name}: give bounds low < high and starts between them")
+            raise Refusal(f"parameter {self.name}: give bounds low < high and starts between them")
         if self.ratio and self.low <= 0:
-            raise ValueError(f"parameter {self.name}: a ratio needs bounds above 0, not {self.low}")
+            raise Refusal(f"parameter {self.name}: a ratio needs bounds above 0, not {self.low}")
 
     def scaled(self, value: float) -> float:
         """Its unknown."""
@@ -165,7 +167,7 @@ def fit(
     parameters, measured = tuple(parameters), tuple(measured)
     target, weight = np.array([[m.value, m.weight] for m in measured]).T
     if not (target > 0).all():
-        raise ValueError("an identification needs measured numbers above 0")
+        raise Refusal("an identification needs measured numbers above 0")
     count = 0
 
     def named(unknowns: np.ndarray) -> dict[str, float]:
@@ -176,7 +178,7 @@ def fit(
         count += 1
         found = np.asarray(predict(named(unknowns)), dtype=float)
         if found.shape != target.shape or not (found > 0).all():
-            raise ValueError(
+            raise Refusal(
                 f"the model predicts {found.tolist()} instead of {len(target)} numbers above 0: narrow the bounds"
             )
         return found

@@ -19,6 +19,7 @@ from matplotlib.ticker import MaxNLocator
 from scipy.stats import qmc
 
 from tribodyn.extras import package
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.style import BLUE, INK, RED, STYLE
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.files import write_files
@@ -149,7 +150,7 @@ def sample(
     errors = np.array([m.error or 0.0 for m in measured])
     if not (errors > 0).all():
         missing = next(m.name for m in measured if not m.error)
-        raise ValueError(
+        raise Refusal(
             f'measured.{missing}.error: a posterior needs the error of every measured number, such as "5 %"'
         )
     box = _Box(tuple(parameters), dict(priors or {}))
@@ -242,7 +243,7 @@ class _Trials:
                 self.failed, self._why = self.failed + 1, str(failure)
                 continue
             if found.shape != (self._width,) or not (found > 0).all():
-                raise ValueError(f"the model predicts {found.tolist()} instead of {self._width} numbers above 0")
+                raise Refusal(f"the model predicts {found.tolist()} instead of {self._width} numbers above 0")
             self.shares.append(share)
             self._numbers.append(np.log(found))
         if 2 * self.failed > self.count:

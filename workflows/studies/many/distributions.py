@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import stats
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import units
 from tribodyn.workflows.scene.fields import Table
 
@@ -61,37 +62,37 @@ class Marginal:
         wants = ", ".join([*sorted(must), *([" or ".join(sorted(one_of, reverse=True))] if one_of else [])])
         if not must <= given or (one_of and len(given & one_of) != 1) or given - must - one_of - may:
             optional = f", and may have {' and '.join(sorted(may, reverse=True))}" if may else ""
-            raise ValueError(f"a {table.distribution} distribution needs {wants}{optional}; this has {_told(given)}")
+            raise Refusal(f"a {table.distribution} distribution needs {wants}{optional}; this has {_told(given)}")
         n = _numbers({name: getattr(table, name) for name in given})
         if "low" in n and "high" in n and not n["low"] < n["high"]:
-            raise ValueError(f"low {table.low} is not below high {table.high}")
+            raise Refusal(f"low {table.low} is not below high {table.high}")
         for name in ("std", "cov"):
             if name in n and not n[name] > 0:
-                raise ValueError(f"{name} {getattr(table, name)} is not above 0")
+                raise Refusal(f"{name} {getattr(table, name)} is not above 0")
         if table.distribution == "uniform":
             return cls(stats.uniform(n["low"], n["high"] - n["low"]))
         if table.distribution == "loguniform":
             if not n["low"] > 0:
-                raise ValueError(f"low {table.low} is not above 0")
+                raise Refusal(f"low {table.low} is not above 0")
             return cls(stats.loguniform(n["low"], n["high"]), logarithmic=True)
         if table.distribution == "triangular":
             width = n["high"] - n["low"]
             if not n["low"] <= n["mode"] <= n["high"]:
-                raise ValueError(f"mode {table.mode} is not between low {table.low} and high {table.high}")
+                raise Refusal(f"mode {table.mode} is not between low {table.low} and high {table.high}")
             return cls(stats.triang((n["mode"] - n["low"]) / width, n["low"], width))
         ends = n.get("low", -math.inf), n.get("high", math.inf)
         if table.distribution == "normal":
             deviation = n["std"] if "std" in n else n["cov"] * abs(n["mean"])
             if not deviation > 0:
-                raise ValueError("a cov of a mean of 0 is no deviation: give std")
+                raise Refusal("a cov of a mean of 0 is no deviation: give std")
             found = cls(stats.norm(n["mean"], deviation), *ends)
         else:
             if not n["median"] > 0:
-                raise ValueError(f"median {table.median} is not above 0")
+                raise Refusal(f"median {table.median} is not above 0")
             # coefficient of variation v of a lognormal variable: v^2 = exp(s^2) - 1
             found = cls(stats.lognorm(math.sqrt(math.log1p(n["cov"] ** 2)), scale=n["median"]), *ends, logarithmic=True)
         if not found.law.cdf(found.high) - found.law.cdf(found.low) > 0:
-            raise ValueError("nothing is left of the distribution between low and high")
+            raise Refusal("nothing is left of the distribution between low and high")
         return found
 
     def at(self, share: np.ndarray) -> np.ndarray:
@@ -114,7 +115,7 @@ def _numbers(given: dict[str, Given]) -> dict[str, float]:
     found = {"cov": units.to_si(given["cov"], "")} if "cov" in given else {}
     unit = {name: unit_of(value) for name, value in given.items() if name != "cov"}
     if len(set(unit.values())) > 1:
-        raise ValueError("its numbers have different units: " + ", ".join(f"{n} {given[n]}" for n in unit))
+        raise Refusal("its numbers have different units: " + ", ".join(f"{n} {given[n]}" for n in unit))
     return found | {name: units.to_si(given[name], of) for name, of in unit.items()}
 
 
@@ -124,12 +125,12 @@ def unit_of(value: Given) -> str:
         return ""
     match = units.NUMBER.match(value)
     if match is None:
-        raise ValueError(f'"{value}" is not a number with a unit')
+        raise Refusal(f'"{value}" is not a number with a unit')
     dimension = units.parse_unit(match[2]).dimension
     for unit in units.EXAMPLES:
         if units.parse_unit(unit).dimension == dimension:
             return unit
-    raise ValueError(f'no key of a scene has the unit of "{value}"')
+    raise Refusal(f'no key of a scene has the unit of "{value}"')
 
 
 def si(value: Any) -> float | None:

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
@@ -168,7 +169,7 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
     if study.settings.design in LISTED:
         raise SceneError(f'{study.name}: lives are drawn, give design = "sobol" and distributions instead of lists')
     if rare is not None and not 0 < rare < 1:
-        raise ValueError(f"rare {rare}: give a share between 0 and 1")
+        raise Refusal(f"rare {rare}: give a share between 0 and 1")
     space, groups = Space.of(study), _scaling(study)
     shares = wanted.shares if rare is None else (rare, *wanted.shares)
     middle = space.run_of(space.values(np.full((1, len(space.keys)), 0.5))[0])

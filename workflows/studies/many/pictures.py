@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy import stats
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED, STYLE
 from tribodyn.workflows.studies.many.task import RUN
@@ -81,7 +82,7 @@ def shown(found: StudyTable) -> dict[str, str]:
 def panes(found: StudyTable) -> Figure:
     """Peak, amplitude, depth and life, as far as there are any, against the keys; rank correlation in each title."""
     if not (there := shown(found)):
-        raise ValueError(f"{found.name}: no run has a peak, a depth or a life, there is nothing to draw")
+        raise Refusal(f"{found.name}: no run has a peak, a depth or a life, there is nothing to draw")
     influence = found.influence()
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(3.4 * len(found.varied) + 0.8, 2.6 * len(there) + 0.3), layout="constrained")

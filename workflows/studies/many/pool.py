@@ -20,6 +20,7 @@ from typing import TypeVar
 from threadpoolctl import threadpool_limits
 
 from tribodyn.extras import package
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.many.task import Row, Task
@@ -126,7 +127,7 @@ def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callabl
     try:
         client = distributed.Client(cluster or address, timeout=WAIT, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise ValueError(f"--scheduler {address}: no scheduler answers there ({error})") from None
+        raise Refusal(f"--scheduler {address}: no scheduler answers there ({error})") from None
     try:
         by_future = {client.submit(solve, task, pure=False, priority=-i): task for i, task in enumerate(tasks)}
         for future in distributed.as_completed(list(by_future), loop=client.loop):

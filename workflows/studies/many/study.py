@@ -11,6 +11,7 @@ from typing import Any
 import tomli_w
 
 from tribodyn.hbm.threads import limited, usable
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress, Report, reporter
@@ -42,7 +43,7 @@ class Runner:
 
     def __post_init__(self) -> None:
         if self.workers is not None and self.workers < 1:
-            raise ValueError(f"workers {self.workers}: give at least 1")
+            raise Refusal(f"workers {self.workers}: give at least 1")
 
 
 def grid(

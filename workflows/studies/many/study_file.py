@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt, model_validator
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError
@@ -42,9 +43,9 @@ class Settings(Table):
     @model_validator(mode="after")
     def _runs_are_drawn(self) -> Settings:
         if self.design in LISTED and self.runs is not None:
-            raise ValueError(f"study.runs: a {self.design} has as many runs as its values make, leave it out")
+            raise Refusal(f"study.runs: a {self.design} has as many runs as its values make, leave it out")
         if self.design not in LISTED and self.runs is None:
-            raise ValueError(f'study.runs: design = "{self.design}" draws, say how many runs')
+            raise Refusal(f'study.runs: design = "{self.design}" draws, say how many runs')
         return self
 
 
@@ -99,10 +100,10 @@ class Limit(Table):
     @model_validator(mode="after")
     def _has_an_end(self) -> Limit:
         if self.low is None and self.high is None:
-            raise ValueError(f"a limit of {self.number} needs low or high")
+            raise Refusal(f"a limit of {self.number} needs low or high")
         for end in (self.low, self.high):
             if end is not None and si(end) is None:
-                raise ValueError(f'"{end}" is not a number with a unit')
+                raise Refusal(f'"{end}" is not a number with a unit')
         return self
 
 

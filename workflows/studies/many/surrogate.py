@@ -13,6 +13,8 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.optimize import minimize
 
+from tribodyn.refusal import Refusal
+
 FEWEST = 8  # numbers, values and derivatives, that a surrogate is fitted to
 BLOCK = 4096  # points at a time
 JITTER = 1e-9  # of the largest variance, on the diagonal of a covariance
@@ -104,7 +106,7 @@ class Surrogate:
         slopes = np.full(points.shape, np.nan) if slopes is None else slopes
         known = len(values) + int(np.isfinite(slopes).sum())
         if known < FEWEST and not few:
-            raise ValueError(f"{known} numbers of runs are known, a surrogate needs {FEWEST} at least")
+            raise Refusal(f"{known} numbers of runs are known, a surrogate needs {FEWEST} at least")
         left = values - sum(law.known(points) for law in laws)
         middle, width = float(np.mean(left)), float(np.std(left)) or 1.0
         k = points.shape[1]

@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.store import replacing, set_aside
 from tribodyn.workflows.studies.many import pictures
 from tribodyn.workflows.studies.many.distributions import si
@@ -59,7 +60,7 @@ class StudyTable(StudyResult):
         """
         lived = number == LIFE and "cycles" in self.columns
         if number not in self.computed and not lived:
-            raise ValueError(f'{self.name} has no number "{number}": there are {", ".join(self.computed) or "none"}')
+            raise Refusal(f'{self.name} has no number "{number}": there are {", ".join(self.computed) or "none"}')
         values = np.asarray(self.columns.get(number, np.full(len(self.columns[RUN]), np.nan)), float)
         bounds = np.full(len(values), np.nan)
         if lived:

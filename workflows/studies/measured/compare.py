@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.readable import named_lines
@@ -231,7 +232,7 @@ def compare(
                 measured.near(file.scene, model.part)
                 found[change] = beside(file, model, measured, report)
     except ValueError as trouble:
-        raise ValueError(f"{measured.source}: {trouble}") from None
+        raise Refusal(f"{measured.source}: {trouble}") from None
     first = found.pop("")
     return Compared(own.name, measured, first, found)
 
@@ -246,7 +247,7 @@ def changed(scene: Source, overrides: Overrides, changes: Sequence[str]) -> dict
 def _named(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals:
-        raise ValueError(f'--fact {text}: give a name and what it is, such as "direction=-z"')
+        raise Refusal(f'--fact {text}: give a name and what it is, such as "direction=-z"')
     return name.strip(), value.strip()
 
 

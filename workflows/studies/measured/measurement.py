@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tribodyn.fem.part import Part
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.loads import HarmonicLoad
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import Scene
@@ -82,7 +83,7 @@ class Measurement:
         """
         outputs = outputs_of(scene)
         if self.output not in outputs:
-            raise ValueError(f'output = "{self.output}": the scene has {", ".join(outputs)}; give output = NAME')
+            raise Refusal(f'output = "{self.output}": the scene has {", ".join(outputs)}; give output = NAME')
         sign = 1.0
         if not isinstance(scene, MatrixScene):
             sign = _along(self.direction, outputs[self.output].direction, f"output {self.output}")
@@ -115,7 +116,7 @@ class Measurement:
             return
         away = float(np.linalg.norm(part.points[nodes] - np.array(self.position), axis=1).min())
         if away > 0.05 * float(np.ptp(part.points, axis=0).max()):
-            raise ValueError(
+            raise Refusal(
                 f"position: measured {1e3 * away:.4g} mm from {group}, where the scene observes {self.output}: "
                 "observe the measured place in [response.others], or correct position"
             )
@@ -127,7 +128,7 @@ def _along(measured: tuple[float, float, float] | None, ours: tuple[float, float
         return 1.0
     cosine = float(np.dot(measured, ours))
     if abs(abs(cosine) - 1.0) > 1e-3:
-        raise ValueError(
+        raise Refusal(
             f"direction: measured along {_said(measured)}, {what} of the scene is along {_said(ours)}: "
             "give the output of that direction, or correct direction"
         )
@@ -150,7 +151,7 @@ def driving_load(scene: Scene) -> tuple[HarmonicLoad, complex]:
     """The one force that drives a scene in harmonic 1, and its F exp(i phase) [N]; raises ValueError otherwise."""
     loads = [load for load in scene.loads.harmonic.values() if load.harmonic == 1 and load.value]
     if len(loads) != 1 or len(scene.loads.harmonic) != 1 or getattr(scene, "motion", None):
-        raise ValueError(
+        raise Refusal(
             "loads.harmonic: a response is compared where one force in harmonic 1 drives the scene, and nothing else"
         )
     return loads[0], complex(loads[0].value * np.exp(1j * loads[0].phase))
@@ -202,7 +203,7 @@ def resonances(measured: Measurement) -> Measurement:
     Raises  ValueError where a run has no force or no phase, or no resonance
     """
     if not measured.phased or any(not np.isfinite(run.force).all() for run in measured.runs) or measured.per_force:
-        raise ValueError("the resonance of a run needs its force and its phase in every row")
+        raise Refusal("the resonance of a run needs its force and its phase in every row")
     found: dict[str, list[Run]] = {}
     for run in measured.runs:
         found.setdefault(run.control, []).append(resonance(run))
@@ -238,7 +239,7 @@ def resonance(run: Run) -> Run:
     which = [0, 1, 1 + powers.shape[1]]
     mass, square, rate = (solved / scale)[which]
     if rank < design.shape[1] or not (square / mass > 0 and rate / mass > 0):
-        raise ValueError(f"run {run.name}: no resonance of one mode is within it")
+        raise Refusal(f"run {run.name}: no resonance of one mode is within it")
     natural = float(np.sqrt(square / mass))
     left = weight * target - design @ solved
     covariance = (

@@ -18,6 +18,7 @@ import numpy as np
 from tribodyn.extras import package
 from tribodyn.hbm.time.ring_down import from_decay
 from tribodyn.hbm.time.stepper import IntegrationFailed
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.export.curves import DataKind, Function
 from tribodyn.workflows.scene.fields import parsed_direction, unknown_key
 from tribodyn.workflows.scene.units import parse_unit, to_si
@@ -49,18 +50,18 @@ def read(path: str | Path, facts: Mapping[str, str] | None = None) -> Measuremen
     path = Path(path)
     readers = {".csv": _of_csv, ".mat": _of_mat, ".uff": _of_uff, ".unv": _of_uff}
     if path.suffix.lower() not in readers:
-        raise ValueError(f"{path}: measurements are read from files {', '.join(readers)}")
+        raise Refusal(f"{path}: measurements are read from files {', '.join(readers)}")
     if not path.is_file():
-        raise ValueError(f"there is no file of a measurement {path}")
+        raise Refusal(f"there is no file of a measurement {path}")
     try:
         given = {name: str(text) for name, text in (facts or {}).items()}
         for name in given:
             if name not in FACTS:
-                raise ValueError(unknown_key(name, [*FACTS]))
+                raise Refusal(unknown_key(name, [*FACTS]))
         said, raw = readers[path.suffix.lower()](path, given)
         return _measurement(raw, {**said, **given}, path.name)
     except (ValueError, KeyError, IndexError, OSError, UnicodeDecodeError) as trouble:
-        raise ValueError(f"{path.name}: {trouble}") from None
+        raise Refusal(f"{path.name}: {trouble}") from None
 
 
 def _of_csv(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
@@ -69,11 +70,11 @@ def _of_csv(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
     for line in lines:
         if line.startswith("#") and (found := re.match(r"#\s*(\w+)\s*=\s*(.*?)\s*$", line)):
             if found[1] not in FACTS:
-                raise ValueError(unknown_key(found[1], [*FACTS]))
+                raise Refusal(unknown_key(found[1], [*FACTS]))
             facts[found[1]] = found[2].strip('"')
     rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
     if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
-        raise ValueError("expected a line of column names and rows of as many values below it")
+        raise Refusal("expected a line of column names and rows of as many values below it")
     return facts, {
         name.strip(): np.array(column) for name, column in zip(rows[0], zip(*rows[1:], strict=True), strict=True)
     }
@@ -85,12 +86,12 @@ def _of_mat(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
     try:
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:
-        raise ValueError("MATLAB files of version 7.3 are not read: save it with -v7") from None
+        raise Refusal("MATLAB files of version 7.3 are not read: save it with -v7") from None
     facts = {name: str(content[name]) for name in FACTS if isinstance(content.get(name), str)}
     structs = {name: table for name, table in content.items() if isinstance(table, dict)}
     if "table" in given:
         if given["table"] not in structs:
-            raise ValueError(f"table = {given['table']}: there is {', '.join(structs) or 'no struct'}")
+            raise Refusal(f"table = {given['table']}: there is {', '.join(structs) or 'no struct'}")
         return facts, structs[given["table"]]
     plain = {name: v for name, v in content.items() if isinstance(v, np.ndarray) and not name.startswith("__")}
     tables = [
@@ -102,7 +103,7 @@ def _of_mat(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
     for table, known in zip(tables, words, strict=True):
         if known & {"frequency", "time"}:
             return facts, table
-    raise ValueError(f"no struct has a column frequency or time: there is {', '.join([*plain, *structs])}")
+    raise Refusal(f"no struct has a column frequency or time: there is {', '.join([*plain, *structs])}")
 
 
 def _of_uff(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
@@ -119,7 +120,7 @@ def _of_uff(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
             return _of_58(chosen, given, length, units)
     if nodal:
         return {}, _of_55(nodal)
-    raise ValueError(
+    raise Refusal(
         "it has no response (dataset 58 over frequency or time, of displacement, velocity or acceleration)"
     )
 
@@ -134,7 +135,7 @@ def _of_58(
     places = sorted({(s["rsp_node"], s["rsp_dir"]) for s in sets})
     if len(places) != 1:
         nodes = ", ".join(sorted({str(s["rsp_node"]) for s in sets})) or "no such"
-        raise ValueError(f"it has {len(places)} measured places, of {nodes} node: give node = NUMBER")
+        raise Refusal(f"it has {len(places)} measured places, of {nodes} node: give node = NUMBER")
     first = sets[0]
     facts = {
         name: f"{'-' if first[key] < 0 else ''}{'xyz'[abs(first[key]) - 1]}"
@@ -157,7 +158,7 @@ def _of_55(sets: list[dict[str, Any]]) -> dict[str, Any]:
     """Natural frequencies and damping of modes, real or complex, one in each set."""
     modes = [s for s in sets if s["analysis_type"] in (2, 3)]
     if not modes:
-        raise ValueError("its datasets 55 hold no modes")
+        raise Refusal("its datasets 55 hold no modes")
     eig = [s["eig"] if s["analysis_type"] == 3 else 2j * np.pi * s["freq"] for s in modes]
     damping = [
         -e.real / abs(e) if s["analysis_type"] == 3 else s["modal_damp_vis"] + s["modal_damp_his"] / 2
@@ -191,9 +192,9 @@ def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) 
             found[word] = np.atleast_1d(np.asarray(column)).astype(float), unit
     what = next((word for word in RESPONSES if word in found), None)
     if "frequency" not in found and "time" not in found:
-        raise ValueError(f"no column frequency or time among {', '.join(raw)}")
+        raise Refusal(f"no column frequency or time among {', '.join(raw)}")
     if what is None and "damping" not in found:
-        raise ValueError(f"no column {' or '.join(RESPONSES)}, with its unit, among {', '.join(raw)}")
+        raise Refusal(f"no column {' or '.join(RESPONSES)}, with its unit, among {', '.join(raw)}")
     n = len(found["frequency" if "frequency" in found else "time"][0])
     frequency = _si(found, "frequency", "Hz", n)
     order, factor, per_force = (0, 1.0, False) if what is None else _kind_of_response(what, found[what][1])
@@ -205,7 +206,7 @@ def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) 
         values = np.abs(values) * np.exp(1j * _si(found, "phase", "rad", n))
     reference = facts.get("phase", "response over force")
     if reference not in ("response over force", "force over response"):
-        raise ValueError(f'phase = "{reference}": expected "response over force" or "force over response"')
+        raise Refusal(f'phase = "{reference}": expected "response over force" or "force over response"')
     if reference == "force over response":
         values = values.conj()
     damping, force = _si(found, "damping", "", n), np.abs(_si(found, "force", "N", n))
@@ -226,7 +227,7 @@ def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) 
         runs.append(Run(name, label[0], frequency[at], x.astype(complex), force[at], damping[at], errors[at]))
     known = [run.frequency for run in runs] if what is None else [run.frequency * run.amplitude for run in runs]
     if not all(np.isfinite(k).all() and (k > 0).all() for k in known):
-        raise ValueError("frequency and response must be numbers above 0 in every row")
+        raise Refusal("frequency and response must be numbers above 0 in every row")
     return Measurement(
         kind, tuple(runs), source, output, order, _direction(facts, "direction"), _direction(facts, "force_direction"),
         _position(facts), per_force, phased, timed, "time" in found,
@@ -237,14 +238,14 @@ def _decayed(name: str, control: str, time: np.ndarray, values: np.ndarray, orde
     """A free decay as the backbone that it follows."""
     step = np.diff(time)
     if len(time) < 8 or np.ptp(step) > 1e-3 * abs(step.mean()):
-        raise ValueError("time: a free decay needs equal steps of time")
+        raise Refusal("time: a free decay needs equal steps of time")
     even = time[0] + step.mean() * np.arange(len(time))
     spectrum = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values))))
     guess = 2 * np.pi * max(int(spectrum.argmax()), 1) / (step.mean() * len(values))
     try:
         found = from_decay(even, values, guess)
     except IntegrationFailed as several:
-        raise ValueError(str(several)) from None
+        raise Refusal(str(several)) from None
     none = np.full((len(found.omega), 2), np.nan)
     x = (found.amplitude / found.omega**order).astype(complex)
     return Run(name, control, found.omega / (2 * np.pi), x, none[:, 0], found.damping, none)
@@ -253,16 +254,16 @@ def _decayed(name: str, control: str, time: np.ndarray, values: np.ndarray, orde
 def _kind_of_response(word: str, unit: str) -> tuple[int, float, bool]:
     """Order of the derivative, factor to SI units, and whether it is per force."""
     if not unit:
-        raise ValueError(f"column {word}: give its unit, such as {word} [m/s2]")
+        raise Refusal(f"column {word}: give its unit, such as {word} [m/s2]")
     given = parse_unit(unit)
     for per_force in (False, True):
         for order, base in enumerate(("m", "m/s", "m/s2")):
             wanted = parse_unit(f"{base}/N" if per_force else base)
             if given.dimension == wanted.dimension:
                 if word in RESPONSES[:3] and word != ("displacement", "velocity", "acceleration")[order]:
-                    raise ValueError(f"column {word}: {unit} is no unit of it")
+                    raise Refusal(f"column {word}: {unit} is no unit of it")
                 return order, float(given.factor / wanted.factor), per_force
-    raise ValueError(f"column {word}: expected a displacement, velocity or acceleration, or one per force, not {unit}")
+    raise Refusal(f"column {word}: expected a displacement, velocity or acceleration, or one per force, not {unit}")
 
 
 def _si(found: Columns, word: str, unit: str, n: int) -> np.ndarray:
@@ -273,7 +274,7 @@ def _si(found: Columns, word: str, unit: str, n: int) -> np.ndarray:
     try:
         return values * to_si(f"1 {given}".strip(), unit)
     except ValueError as trouble:
-        raise ValueError(f"column {word}: {trouble}") from None
+        raise Refusal(f"column {word}: {trouble}") from None
 
 
 def _texts(raw: Mapping[str, Any], key: str, n: int, missing: str) -> list[str]:
@@ -287,7 +288,7 @@ def _direction(facts: Mapping[str, str], key: str) -> tuple[float, float, float]
     try:
         return parsed_direction(text if "," not in text else [float(c) for c in text.split(",")])
     except ValueError as trouble:
-        raise ValueError(f"{key}: {trouble}") from None
+        raise Refusal(f"{key}: {trouble}") from None
 
 
 def _position(facts: Mapping[str, str]) -> tuple[float, float, float] | None:
@@ -296,5 +297,5 @@ def _position(facts: Mapping[str, str]) -> tuple[float, float, float] | None:
     try:
         x, y, z = (to_si(c.strip().strip('"'), "m") for c in facts["position"].strip("()[]").split(","))
     except ValueError:
-        raise ValueError('position: expected three lengths such as "-0.3 m, 0 m, 6 mm"') from None
+        raise Refusal('position: expected three lengths such as "-0.3 m, 0 m, 6 mm"') from None
     return x, y, z

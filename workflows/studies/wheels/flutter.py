@@ -16,6 +16,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic, with_flow
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, RED
 from tribodyn.workflows.run import modelling, settings
@@ -124,7 +125,7 @@ def of_scene(file: SceneFile, start: float | None = None, stop: float | None = N
     if scene.flow is None:
         raise SceneError(f"{file.name} has no [flow]: give its influence coefficients")
     if (start is None) != (stop is None):
-        raise ValueError("--from and --to: give both amplitudes, or none")
+        raise Refusal("--from and --to: give both amplitudes, or none")
     with limited(scene.solver.threads):
         wheel = wheels.build(file)
         flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import film
 from tribodyn.workflows.pictures.render_wheel import MistunedWheelFilm, WheelState
 from tribodyn.workflows.result.facts import Around
@@ -74,7 +75,7 @@ def write_wheel(blades: Blades, states: Sequence[WheelState], folder: Path, form
     mesh, info = part_mesh(blades.part), blades.file.mesh_scene.wheel
     assert info is not None
     if mesh is None:
-        raise ValueError("this part has bodies of different elements: its wheel cannot be drawn")
+        raise Refusal("this part has bodies of different elements: its wheel cannot be drawn")
     wheel = Around(info.sectors, info.engine_order, np.array(info.axis, float))
     harmonics = blades.wheel.wave.basis.harmonics
     made = MistunedWheelFilm(blades.file.name, wheel, mesh, harmonics, states, IMAGES if formats else 1)

@@ -22,6 +22,7 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction.damping import modal_damping_towards
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
@@ -120,9 +121,9 @@ def checked(factors: Sequence[float] | np.ndarray, n_sectors: int) -> np.ndarray
     """Factors as an array; raises ValueError where there is not one above zero for each sector."""
     values = np.asarray(factors, float)
     if values.shape != (n_sectors,):
-        raise ValueError(f"the wheel has {n_sectors} sectors, but there are {values.size} factors: give one for each")
+        raise Refusal(f"the wheel has {n_sectors} sectors, but there are {values.size} factors: give one for each")
     if not (np.isfinite(values).all() and (values > 0).all()):
-        raise ValueError("a factor on the stiffness of a sector must be a number above 0")
+        raise Refusal("a factor on the stiffness of a sector must be a number above 0")
     return values
 
 

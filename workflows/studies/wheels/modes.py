@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import wheel_diagrams
 from tribodyn.workflows.pictures.wheel_diagrams import AGAINST
 from tribodyn.workflows.scene.fields import Frequency
@@ -131,15 +132,15 @@ def modes(
     """
     slow, fast = start, stop
     if slow is not None and fast is None:
-        raise ValueError("--from: give --to, the highest speed, too")
+        raise Refusal("--from: give --to, the highest speed, too")
     if families < 1:
-        raise ValueError(f"--families {families}: ask for 1 at least")
+        raise Refusal(f"--families {families}: ask for 1 at least")
     if fast is not None and (fast <= 0 or (slow is not None and not 0 < slow < fast)):
-        raise ValueError("--from and --to: give speeds above 0, the lower one first")
+        raise Refusal("--from and --to: give speeds above 0, the lower one first")
     if speeds < 2:
-        raise ValueError(f"--speeds {speeds}: a Campbell diagram needs 2 at least")
+        raise Refusal(f"--speeds {speeds}: a Campbell diagram needs 2 at least")
     if 0 in orders:
-        raise ValueError("--order: engine orders are 1 or more, or -1 or less for waves against the rotation")
+        raise Refusal("--order: engine orders are 1 or more, or -1 or less for waves against the rotation")
     file = read_scene(scene, overrides)
     with limited(file.scene.solver.threads):
         wheel = build(file)

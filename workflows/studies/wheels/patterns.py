@@ -27,6 +27,7 @@ from tribodyn.hbm.mistuning import MistunedWheel
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction import mistuning as reduction
 from tribodyn.reduction.cyclic import ReducedSector
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED
 from tribodyn.workflows.result.readable import write_columns
@@ -103,7 +104,7 @@ class Blades:
     def pattern(self, number: int) -> Pattern:
         """The pattern of this number, from 1; it depends on the seed of the scene and its number alone."""
         if number < 1:
-            raise ValueError(f"--pattern {number}: patterns are counted from 1")
+            raise Refusal(f"--pattern {number}: patterns are counted from 1")
         return drawn(asked_of(self.file), self.wheel.n_sectors, number)
 
     @cached_property

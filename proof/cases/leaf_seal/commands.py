@@ -1,0 +1,55 @@
+"""Words of `prove` that serve the leaf seal: prove leaf."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Literal
+
+from proof.words import aside
+from tribodyn.workflows.command.word import Flag, Json, make_room
+
+
+def leaf(
+    work: Literal["fit", "check", "study", "accuracy"],
+    *,
+    out: Path | None = None,
+    resume: Flag = False,
+    as_json: Json = False,
+) -> None:
+    """Of the leaf seal: the fit of its dimensions, its parameter study, its accuracy.
+
+    Parameters
+    ----------
+    work
+        fit looks for the dimensions that give the published frequency ratios, check shows those of the scene; study
+        runs some thirty configurations; accuracy holds 1 to 9 harmonics against time integration.
+    out
+        Folder of tables and pictures; results/leaf_study or results/leaf_accuracy by default.
+    resume
+        Resume a study with what is complete in its folder.
+    as_json
+        Print JSON for machines.
+    """
+    from proof.cases.leaf_seal import accuracy, fit, study
+    from tribodyn.workflows.scene.source import read_scene
+
+    make_room(out)
+    folder = out or Path("results") / f"leaf_{work}"
+    if resume and work != "study":
+        raise ValueError(f"--resume is for leaf study, leaf {work} has nothing to resume: run it without")
+
+    def tell(line: str) -> None:
+        print(line, file=sys.stderr if as_json else sys.stdout, flush=True)
+
+    if work == "study":
+        whole = study.whole(folder, resume, tell)
+        said, record = whole.text(), whole.record()
+    elif work == "accuracy":
+        found = accuracy.compute(folder)
+        said, record = found.text(), found.record()
+    else:
+        one = fit.of_scene(read_scene("leaf_seal_thesis").mesh_scene) if work == "check" else fit.search(aside)
+        said, record = fit.as_text(one), one.record()
+    print(json.dumps(record, indent=2) if as_json else said)

@@ -1,0 +1,362 @@
+"""Damage of several kinds at once: keys two and three together, tables, files of studies and fits, decks, matrices.
+
+Each case is a command with the files that it reads: small scenes are run, other shipped scenes planned, studies,
+searches for an optimum, lives and fits done, decks inspected and run in a scene, matrices run. It ends well, fails or
+is refused with one sentence, or is wrong: another exception, a warning of a library, a number that is not finite, more
+than ten seconds of the processor without a word of progress.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import tomli_w
+from pyyeti.nastran import op4
+
+from proof import fuzz
+from proof.fuzz_runs import GOING, RUN, Command, Job, Runs, Tried
+from tests.helpers import foreign_files
+from tests.helpers.coarse_scenes import BEAM
+from tests.helpers.matrix_scene import SCENE, matrix_folder
+from tests.helpers.pages import ROOT
+from tests.helpers.structures import BLOCKS
+from tribodyn.workflows.scene import scene_file
+
+QUIET = ("verdict.enabled=false", "harmonics.kept=[0, 1]", "harmonics.samples=32", "wear.max_steps=1")
+SMALL = {
+    "beam": (*BEAM, "verdict.enabled=false", "wear.max_steps=1"),
+    "leaf_seal": (
+        "geometry.n_column=9", "geometry.pin_column=2", "geometry.n_web=1", "reduction.modes=4",
+        "verdict.enabled=false", "harmonics.kept=[0, 1]", "response.frequency=['30 Hz', '45 Hz']",
+    ),
+    "blade": ("geometry.n_along=2", "geometry.n_up=2", "reduction.cutoff=3 kHz", "response.points=6", *QUIET),
+}  # fmt: skip
+"""Changes with which a run of a shipped scene takes a second or two of the processor."""
+
+VARY = {"contact.friction": [0.3, 0.5], "loads.static.press.value": ["10 kN", "20 kN"]}
+DRAWN = {
+    "contact.friction": {"distribution": "uniform", "low": 0.3, "high": 0.6},
+    "damping.modal": {"distribution": "loguniform", "low": "0.5 %", "high": "2 %"},
+}
+UNWORN = ["geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "wear=",
+          "harmonics.kept=[0, 1]", "harmonics.samples=32", "response.points=6"]  # fmt: skip
+FIT = {
+    "parameters": {"kt": {"keys": ["contact.tangential_stiffness"], "low": "200 N/um", "high": "900 N/um"}},
+    "measured": {"mode": {"of": "stuck frequency", "mode": 1, "value": "420 Hz"}},
+}
+APART = "          0.,           0.,          10.\n          0.,"  # where the second block stands beside the first one
+BESIDE = "0., -10., 10.\n 0.,"  # where it stands upon it
+DECK = """
+[scene]
+title = "A deck"
+[decks.lap]
+file = "lap.inp"
+unit = "mm"
+[loads.harmonic.shake]
+group = "Block-2"
+direction = "y"
+value = "1 N"
+[response]
+group = "Block-2"
+direction = "y"
+frequency = ["1 kHz", "2 kHz"]
+points = 5
+[reduction]
+modes = 4
+"""
+ROWS = """
+[scene]
+title = "Two DOFs and the ground"
+[model]
+{}
+[contact]
+dofs = [[0, 1, 2]]
+area = "10 mm2"
+tangential_stiffness = "1 N/m"
+normal_stiffness = "1 N/m"
+friction = 0.4
+[loads.static.press]
+dofs = [2]
+value = "1 N"
+[loads.harmonic.shaker]
+dofs = [0]
+value = "0.1 N"
+[response]
+dofs = [0]
+frequency = ["0.1 Hz", "0.4 Hz"]
+points = 5
+"""
+
+
+@dataclass(frozen=True)
+class Base:
+    """What cases are made of: a command, its files, and which of them is damaged.
+
+    tables : whether whole tables of it are damaged too; keys : of a scene, changed by --set
+    """
+
+    what: str
+    words: tuple[str, ...]
+    files: dict[str, bytes]
+    damaged: str
+    tables: bool = False
+    keys: tuple[str, ...] = ()
+    own: dict[str, Any] = field(default_factory=dict)
+
+    def job(self, changes: str = "", content: str | None = None, more: Sequence[str] = ()) -> Job:
+        """The command with changed contents of the file and more changes of keys."""
+        files = self.files if content is None else {**self.files, self.damaged: content.encode("latin-1", "replace")}
+        return Job(self.what, changes, "", (*self.words, *_set(more)), files)
+
+
+def _set(changes: Iterable[str]) -> tuple[str, ...]:
+    return tuple(word for text in changes for word in ("--set", text))
+
+
+def bases(folder: Path) -> list[Base]:
+    """All inputs as they are; folder : keeps files for them."""
+    return [*_scenes(), *_structures(folder), *_studies(), *_decks(folder), *_matrices(folder)]
+
+
+def _scene(what: str, text: str, words: Callable[[str], tuple[str, ...]], changes: Sequence[str], place: Path) -> Base:
+    """A scene in a file of its own, beside the files of a place."""
+    dump = scene_file.parse(text, "own.toml", changes, place).scene.model_dump()
+    beside = {one.name: one.read_bytes() for one in place.iterdir() if one.is_file()}
+    files = {**beside, "own.toml": text.encode()}
+    keys = tuple(sorted(set(fuzz.names_of(dump))))
+    return Base(what, (*words("own.toml"), *_set(changes)), files, "own.toml", True, keys, dump)
+
+
+def _run(name: str) -> tuple[str, ...]:
+    return "run", name, *RUN
+
+
+def _scenes() -> list[Base]:
+    """Shipped scenes: small ones run, all planned."""
+    found = []
+    for name in scene_file.names():
+        place = scene_file.find(name)
+        text = place.read_text(encoding="utf-8")
+        found.append(_scene(f"plan {name}", text, lambda file: ("plan", file), (), place.parent))
+        if name in SMALL:
+            found.append(_scene(f"run {name}", text, _run, SMALL[name], place.parent))
+    return found
+
+
+def _structures(folder: Path) -> list[Base]:
+    """Several bodies, a deck in a scene, and matrices in a scene."""
+    (empty := folder / "empty").mkdir()
+    (decks := folder / "decks").mkdir()
+    (rows := folder / "rows").mkdir()
+    lap = (ROOT / "tests/geometry/decks/lap.inp").read_text(encoding="utf-8")
+    lap = lap.replace(APART, BESIDE)
+    (decks / "lap.inp").write_text(lap, encoding="utf-8")
+    matrix_folder(rows)
+    (rows / "own.toml").unlink()
+    small = (*QUIET[:3], "response.points=5")
+    scene = _scene("run deck", DECK, _run, small, decks)
+    return [
+        _scene("run bodies", BLOCKS, _run, small, empty),
+        scene,
+        replace(scene, what="run deck damaged", files={**scene.files, "lap.inp": lap.encode()}, damaged="lap.inp",
+                tables=False),
+        _scene("run matrices", SCENE, _run, (*QUIET, "response.points=6"), rows),
+    ]  # fmt: skip
+
+
+def _studies() -> list[Base]:
+    """A study, lives, a search for an optimum and a fit of a small beam."""
+    shared = {"scene": "beam", "set": UNWORN}
+    peak = {"number": "peak_m_first"}
+    drawn = {"study": {**shared, "design": "sobol", "runs": 2, "seed": 1}, "vary": DRAWN}
+    best = {"aims": [{**peak, "want": "low"}], "evaluations": 3}
+    tables = {
+        "grid": {"study": {**shared, "design": "grid"}, "vary": VARY},
+        "lives": {**drawn, "study": {**drawn["study"], "runs": 9}, "lives": peak},
+        "optimise": {**drawn, "optimise": best},
+        "fit": FIT,
+    }
+    found = []
+    for word, table in tables.items():
+        text: bytes = tomli_w.dumps(table).encode()
+        words = ("study", word, "own.toml", "--workers", "1", "--out", "out")
+        if word == "fit":
+            words = ("study", "identify", "beam", "own.toml", *_set([*UNWORN, "verdict.enabled=false"]))
+        found.append(Base(f"study {word}", words, {"own.toml": text}, "own.toml", True))
+    return found
+
+
+def _decks(folder: Path) -> list[Base]:
+    """Decks of three programs with modes."""
+    mesh, found = foreign_files.bricks(folder), []
+    texts = {
+        ending: foreign_files.write(mesh, folder / f"deck{ending}", "").read_text()
+        for ending in (".inp", ".bdf", ".cdb")
+    }
+    texts[".cdb"] += "MP,DENS,1,7860.\n"
+    texts["_lap.inp"] = (ROOT / "tests/geometry/decks/lap.inp").read_text(encoding="utf-8").replace(APART, BESIDE)
+    for ending, text in texts.items():
+        words = ["inspect", f"own{ending}", "--unit", "mm", "--modes", "2"]
+        if "lap" not in ending:
+            words += ["--young", "210GPa", "--density", "7860 kg/m3"]
+        found.append(Base(f"inspect {ending}", tuple(words), {f"own{ending}": text.encode()}, f"own{ending}"))
+    return found
+
+
+def _matrices(folder: Path) -> list[Base]:
+    """Matrices of three formats in a scene, the file of the matrices damaged."""
+    K, M = np.diag([2.0, 3.0, 4.0]) - np.eye(3, k=1) - np.eye(3, k=-1), np.eye(3)
+    op4.write(str(folder / "two.op4"), {"k": K, "m": M}, binary=False)
+    entries = [f"DMIG,{name},{j + 1},1,,{i + 1},1,{m[i, j]}" for name, m in (("K", K), ("M", M))
+               for j in range(3) for i in range(j, 3)]  # fmt: skip
+    rows = {name: "".join(f"{i + 1},1,{j + 1},1,{m[i, j]}\n" for i in range(3) for j in range(i + 1))
+            for name, m in (("K", K), ("M", M))}  # fmt: skip
+    texts = {
+        "two.op4": (folder / "two.op4").read_text(),
+        "two.pch": "\n".join(["DMIG,K,0,6,2,0,,,3", "DMIG,M,0,6,2,0,,,3", *entries, ""]),
+        "K.mtx": rows["K"],
+    }
+    found = []
+    for name, text in texts.items():
+        model = 'mass = "M.mtx"\nstiffness = "K.mtx"' if name == "K.mtx" else f'file = "{name}"'
+        files: dict[str, bytes] = {name: text.encode(), "own.toml": ROWS.format(model).encode()}
+        if name == "K.mtx":
+            files["M.mtx"] = rows["M"].encode()
+        words = (*_run("own.toml"), *_set(QUIET[:3]))
+        found.append(Base(f"run {name}", words, files, name))
+    return found
+
+
+def lines_damaged(text: str, rng: np.random.Generator) -> tuple[str, str]:
+    """A text with one to three damages to its lines, and what they are."""
+    done = []
+    for _ in range(rng.integers(1, 4)):
+        lines = text.splitlines(keepends=True)
+        if not lines:
+            break
+        i = int(rng.integers(len(lines)))
+        kind = str(rng.choice(["gone", "doubled", "swapped", "cut off", "number", "character", "moved", "word"]))
+        if kind == "gone":
+            del lines[i]
+        elif kind == "doubled":
+            lines.insert(i, lines[i])
+        elif kind == "swapped":
+            j = int(rng.integers(len(lines)))
+            lines[i], lines[j] = lines[j], lines[i]
+        elif kind == "cut off":
+            lines = [*lines[:i], lines[i][: int(rng.integers(len(lines[i]) + 1))]]
+        elif kind == "number":
+            value = str(rng.choice(["-1", "0", "1e300", "nan", "3.5", "99999999999", "1e-300", "x"]))
+            found = list(re.finditer(r"[-+]?\d[\d.eE+-]*", lines[i]))
+            if found:
+                at = found[int(rng.integers(len(found)))]
+                lines[i] = lines[i][: at.start()] + value + lines[i][at.end() :]
+        elif kind == "character":
+            j = int(rng.integers(len(lines[i])))
+            lines[i] = lines[i][:j] + chr(int(rng.integers(1, 256))) + lines[i][j + 1 :]
+        elif kind == "moved":
+            lines.insert(int(rng.integers(len(lines))), lines.pop(i))
+        else:
+            words = lines[i].split(",")
+            del words[int(rng.integers(len(words)))]
+            lines[i] = ",".join(words).rstrip("\n") + "\n"
+        text = "".join(lines)
+        done.append(f"line {i + 1} {kind}")
+    return text, ", ".join(done)
+
+
+def tables_damaged(text: str, rng: np.random.Generator) -> tuple[str, str]:
+    """A TOML text with a whole table gone, doubled or renamed."""
+    parts = re.split(r"(?m)^(?=\[)", text)
+    i = int(rng.integers(len(parts)))
+    kind = str(rng.choice(["gone", "doubled", "renamed", "emptied"]))
+    changed = {
+        "gone": [],
+        "doubled": [parts[i], parts[i]],
+        "renamed": [re.sub(r"\[(\w)", r"[x\1", parts[i], count=1)],
+        "emptied": [parts[i].split("\n")[0] + "\n"],
+    }
+    return "".join([*parts[:i], *changed[kind], *parts[i + 1 :]]), f"table {parts[i][:30].splitlines()[:1]} {kind}"
+
+
+def case(base: Base, rng: np.random.Generator) -> Job:
+    """An input with two or three keys changed, or with damage to its text and some keys."""
+    content = said = None
+    if not base.keys or rng.random() < 0.4:
+        damage = tables_damaged if base.tables and rng.random() < 0.4 else lines_damaged
+        content, said = damage(base.files[base.damaged].decode(), rng)
+    changes: list[str] = []
+    if base.keys:
+        numbers = [key for key in base.keys if isinstance(_own(base.own, key), bool | int | float)]
+        every = numbers if rng.random() < 0.8 else base.keys
+        keys = rng.choice(every, int(rng.integers(0 if said else 2, 4)), replace=False)
+        changes = [f"{key}={_value(_own(base.own, str(key)), rng)}" for key in keys]
+    return base.job(" ".join([*([said] if said else []), *changes]), content, changes)
+
+
+def _own(dump: Any, key: str) -> Any:
+    """What a scene has at a key, None where it has nothing."""
+    for word in key.split("."):
+        dump = dump.get(word, (dump.get("parameters") or {}).get(word)) if isinstance(dump, dict) else None
+    return dump
+
+
+def _value(own: Any, rng: np.random.Generator) -> str:
+    """A fuzz input for a key, or, more often, its own number somewhat changed or its switch the other way."""
+    if rng.random() < 0.1 or not isinstance(own, bool | int | float):
+        return str(rng.choice(fuzz.INPUTS))
+    if isinstance(own, bool):
+        return str(not own).lower()
+    factor = float(rng.choice([0.0, 0.1, 0.5, 0.9, 1.0, 1.1, 2.0, 10.0]))
+    return str(round(own * factor) if isinstance(own, int) else own * factor)
+
+
+def tries(
+    count: int,
+    seed: int = 0,
+    seconds: float = 10.0,
+    say: Callable[[str], None] = lambda _: None,
+    workers: int = 1,
+    only: str = "",
+    *,
+    command: Command,
+) -> list[Tried]:
+    """So many cases drawn at random, each run.
+
+    seconds : of the processor that each may take without a word of progress; six times as many in all
+    only : the beginning of the names of what is taken
+    command : what `tribodyn` does with the words of a command line; it leaves by SystemExit
+    """
+    rng, found = np.random.default_rng(seed), []
+    with TemporaryDirectory() as name:
+        known = [base for base in bases(Path(name)) if base.what.startswith(only)]
+        jobs = [case(known[int(rng.integers(len(known)))], rng) for _ in range(count)]
+        first = tuple(base.job() for base in known if not base.what.startswith("plan"))
+        for one in Runs(first, seconds, workers, command, 6 * seconds).of(jobs):
+            found.append(one)
+            if not one.good or len(found) % 50 == 0:
+                say(f"{len(found)} of {count}: {one.scene}: {one.key}: {one.end}: {one.said[-300:]}")
+    return found
+
+
+def as_table(tried: Sequence[Tried]) -> str:
+    """A row for each kind of input, and a line for each wrong end."""
+    kinds: dict[str, list[Tried]] = {}
+    for one in tried:
+        kinds.setdefault(one.scene, []).append(one)
+    ends = ("success", "refused", "failed", GOING)
+    rows = [f"| what | cases | {' | '.join(ends)} | wrong | slowest | longest without a word |", "|---" * 9 + "|"]
+    for kind, ours in [*sorted(kinds.items()), ("all", list(tried))]:
+        how = Counter(one.end for one in ours)
+        cells = [str(how[end]) for end in ends]
+        wrong, slow, mute = (sum(not one.good for one in ours), *(max(getattr(one, of) for one in ours)
+                             for of in ("seconds", "silent")))  # fmt: skip
+        rows.append(f"| {kind} | {len(ours)} | {' | '.join(cells)} | {wrong} | {slow:.1f} s | {mute:.1f} s |")
+    return "\n".join(rows + [f"{o.scene}: {o.key}: {o.end}: {o.said[-300:]}" for o in tried if not o.good])
