@@ -6,9 +6,7 @@ import ast
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-WORDS = frozenset(
-    ["again", "alike", "along", "alone", "anew", "apart", "around", "aside", "asked", "away", "begun", "behind", "below", "beside", "beyond", "both", "every", "except", "few", "found", "given", "gone", "had", "held", "her", "here", "his", "how", "its", "kept", "known", "left", "less", "like", "looked", "made", "many", "met", "more", "most", "moved", "much", "near", "new", "noted", "old", "one", "only", "others", "own", "passed", "past", "placed", "rest", "said", "same", "seen", "settled", "several", "so", "some", "such", "taken", "them", "then", "there", "these", "they", "thing", "things", "this", "those", "told", "tried", "two", "until", "usual", "wanted", "what", "when", "which", "while", "whole", "why"]
-)
+WORDS = frozenset(Path(__file__).with_suffix(".txt").read_text(encoding="utf-8").split())
 
 
 def _identifiers(tree: ast.AST) -> Iterator[str]:
