@@ -159,12 +159,6 @@ print(td.studies.derivatives("beam", overrides=UNWORN))
 # td.studies.forces
 print(td.studies.forces("beam", overrides=UNWORN))
 
-# td.studies.supports
-coarse = {"geometry.n_column": 7, "geometry.pin_column": 2, "response.points": 20, "verdict.enabled": False}
-seal = td.run("leaf_seal", overrides=coarse)
-areas = {"left_pin": 9.8e-6, "right_pin": 9.8e-6}  # [m2]
-print(td.studies.supports(seal, areas, 2e-15))
-
 # td.studies.grid
 settings = [f"{key}={json.dumps(value)}" for key, value in UNWORN.items() if value is not None] + ["wear="]
 study = {
@@ -249,9 +243,6 @@ print(td.wheel.mistuned("blade", spread=0.02, overrides=few))
 # td.wheel.patterns
 apart = {**few, "mistuning.frequency": "1 %", "mistuning.patterns": 2}
 print(td.wheel.patterns("blade", "results/patterns", workers=1, overrides=apart))
-
-# td.wheel.pattern_motion
-print(td.wheel.pattern_motion("blade", 1, overrides=apart))
 
 # td.matrices.from_arrays
 matrices = td.matrices.from_arrays(0.5 * np.eye(3), chain)

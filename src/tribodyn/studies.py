@@ -23,7 +23,6 @@ from tribodyn.workflows.studies.many.optimum import Optimum as Optimum, optimise
 from tribodyn.workflows.studies.many.study import grid as grid
 from tribodyn.workflows.studies.many.table import StudyTable as StudyTable
 from tribodyn.workflows.studies.measured.compare import Compared as Compared, compare as compare
-from tribodyn.workflows.studies.supports import Supports as Supports, supports as supports
 from tribodyn.workflows.studies.surfaces import FaceAsperities as FaceAsperities, asperities as asperities
 from tribodyn.workflows.studies.verification import Comparison as Comparison
 from tribodyn.workflows.studies.worn_states import WornStates as WornStates

@@ -1,10 +1,6 @@
 """Wheels: each study takes a scene with a [wheel] and returns its numbers, lines and pictures."""
 
 from tribodyn.workflows.studies.wheels.flutter import Flutter as Flutter, flutter as flutter
-from tribodyn.workflows.studies.wheels.mistuned_motion import (
-    PatternMotion as PatternMotion,
-    pattern_motion as pattern_motion,
-)
 from tribodyn.workflows.studies.wheels.mistuned_wear import MistunedWear as MistunedWear, pattern_wear as pattern_wear
 from tribodyn.workflows.studies.wheels.mistuning import Mistuned as Mistuned, mistuned as mistuned
 from tribodyn.workflows.studies.wheels.modes import WheelModes as WheelModes, modes as modes

@@ -37,7 +37,7 @@ WORDS = {  # word -> where it is, its help on the page of all of them
     "export": ("scenes:export", "Write a result in the formats of other programs."),
     "curve": ("curve:app", "Follow curves: backbone, ring-down, folds, track."),
     "wheel": ("wheel:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
-    "study": ("study:app", "Studies: grid, lives, optimise, identify, converge, supports, asperities and more."),
+    "study": ("study:app", "Studies: grid, lives, optimise, identify, converge, asperities and more."),
 }  # fmt: skip
 
 app = cyclopts.App(

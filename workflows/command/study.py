@@ -13,7 +13,6 @@ from tribodyn.workflows.studies.many.lives import lives
 from tribodyn.workflows.studies.many.optimum import optimise
 from tribodyn.workflows.studies.many.study import grid
 from tribodyn.workflows.studies.measured.compare import compare
-from tribodyn.workflows.studies.supports import supports
 from tribodyn.workflows.studies.surfaces import asperities
 
 app = App(name="study")
@@ -24,7 +23,6 @@ app.command(word(identify, "study identify"))
 app.command(word(posterior, "study posterior", into="asked"))
 app.command(word(derivatives, "study derivatives"))
 app.command(word(converge, "study converge"))
-app.command(word(supports, "study supports", into="beside"))
 app.command(word(forces, "study forces"))
 app.command(word(asperities, "study asperities", into="asked"))
 app.command(word(compare, "study compare"))

@@ -6,7 +6,6 @@ from cyclopts import App
 
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.wheels.flutter import flutter
-from tribodyn.workflows.studies.wheels.mistuned_motion import pattern_motion
 from tribodyn.workflows.studies.wheels.mistuned_wear import pattern_wear
 from tribodyn.workflows.studies.wheels.mistuning import mistuned
 from tribodyn.workflows.studies.wheels.modes import modes
@@ -17,5 +16,4 @@ app.command(word(modes, "wheel modes"))
 app.command(word(flutter, "wheel flutter"))
 app.command(word(mistuned, "wheel mistuned"))
 app.command(word(patterns, "wheel patterns"))
-app.command(word(pattern_motion, "wheel pattern-motion"))
 app.command(word(pattern_wear, "wheel pattern-wear"))

@@ -15,12 +15,12 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES, STICKS
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.stability.exponents import BranchStability, mark as mark_stability
+from tribodyn.hbm.wear.laws.impact import loading_work
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.modelling import build
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.supports import support_work
 
 LINEAR, APART = 0.85, 1.12  # frequencies of the linear points, over those where separation begins and ends
 LINER_NODE = OUTPUT  # the lower corner, which moves most where the leaf chatters
@@ -96,7 +96,8 @@ class LeafResponse:
         work = {}
         for name, stiffness in self.springs.items():
             row = self.branch.response[point, self.branch.output_names.index(name)]
-            work[name] = float(support_work(self.balance.basis, row, stiffness))
+            stretch = self.balance.basis.to_time(row)
+            work[name] = float(loading_work(stiffness * stretch, stretch))
         return work
 
     def wear_rates(self, point: int, coefficient: float = WEAR_COEFFICIENT) -> tuple[np.ndarray, np.ndarray]:

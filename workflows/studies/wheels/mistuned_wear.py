@@ -9,23 +9,29 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.continuation.sites import BesidePeak, Site
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow
-from tribodyn.workflows.pictures.plots import axes_of, length_unit
-from tribodyn.workflows.pictures.render_wheel import WheelState
+from tribodyn.refusal import Refusal
+from tribodyn.workflows.pictures import film
+from tribodyn.workflows.pictures.figures import axes_of, length_unit
+from tribodyn.workflows.pictures.render_wheel import MistunedWheelFilm, WheelState
 from tribodyn.workflows.pictures.style import WEAR_MAP
+from tribodyn.workflows.result.facts import Around
 from tribodyn.workflows.run import references, settings, wear_run
+from tribodyn.workflows.run.description import part_mesh
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import where_it_can_be, write_files
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.wheels.mistuned_motion import nodes, write_wheel
 from tribodyn.workflows.studies.wheels.patterns import Blades, asked_of
+
+IMAGES = 32  # of a film
 
 
 @dataclass(frozen=True, repr=False)
@@ -159,3 +165,29 @@ def _of_output(site: Site, output: str) -> Site:
     if isinstance(site, BesidePeak):
         return replace(site, peak=replace(site.peak, output=output))
     return replace(site, output=output)
+
+
+def write_wheel(blades: Blades, states: Sequence[WheelState], folder: Path, formats: Sequence[str] = ()) -> list[Path]:
+    """Write mistuned_wheel.png, and a film over one cycle in some formats; returns their paths.
+
+    Raises  ValueError for a part that has no mesh of one kind; RenderingUnavailable
+    """
+    mesh, info = part_mesh(blades.part), blades.file.mesh_scene.wheel
+    assert info is not None
+    if mesh is None:
+        raise Refusal("this part has bodies of different elements: its wheel cannot be drawn")
+    wheel = Around(info.sectors, info.engine_order, np.array(info.axis, float))
+    harmonics = blades.wheel.wave.basis.harmonics
+    made = MistunedWheelFilm(blades.file.name, wheel, mesh, harmonics, states, IMAGES if formats else 1)
+    folder.mkdir(parents=True, exist_ok=True)
+    made.figure.savefig(drawing := folder / f"{made.name}.png")
+    films = film.encode(film.drawn(made), folder / made.name, formats) if formats else []
+    return [drawing, *films]
+
+
+def nodes(
+    blades: Blades, balance: HarmonicBalance, displacement: np.ndarray, force: np.ndarray, omega: float
+) -> np.ndarray:
+    """Displacement (N, n_node, 3, n_coeff) of every blade [m]."""
+    full = blades.wheel.full_displacement(blades.reduced, balance, displacement, force, omega)
+    return np.stack([blades.part.field(one) for one in full])
