@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -18,18 +17,16 @@ from proof.cases.leaf_seal.commands import leaf
 from proof.cases.rig.commands import rig
 from proof.words import PICTURE, aside
 from tribodyn.workflows.command.main import guard
-from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room, quantity
+from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room
 
 
 def bench(
     *,
     quick: Flag = False,
-    scaling: Flag = False,
     fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
     way: Annotated[tuple[str, ...], Parameter(name="--way", negative=(), consume_multiple=False)] = (),
     contact: Annotated[tuple[str, ...], Parameter(name="--contact", negative=(), consume_multiple=False)] = (),
     peer: Path | None = None,
-    out: Path = Path("scaling.png"),
     as_json: Json = False,
 ) -> None:
     """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
@@ -37,9 +34,7 @@ def bench(
     Parameters
     ----------
     quick
-        Harmonics 0+1 and 0+3 alone, in under a minute; with --scaling up to 13 x 13 contact nodes.
-    scaling
-        Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
+        Harmonics 0+1 and 0+3 alone, in under a minute.
     fe
         Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
         same library, of cubes ("36k-cubes", "140k-cubes", "1M-cubes", "5M-cubes") by a factor and without one, or of an
@@ -52,8 +47,6 @@ def bench(
         with residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
     peer
         A Python interpreter with pyHarm (pip install pyHarm-os): small problems in both programs instead.
-    out
-        File of the plot of --scaling.
     as_json
         Print JSON for machines.
     """
@@ -75,28 +68,10 @@ def bench(
         sizes = large_contact.run(contact, aside)
         print(json.dumps(large_contact.as_records(sizes), indent=2) if as_json else large_contact.as_text(sizes))
         return
-    if scaling:
-        make_room(out, PICTURE)
-        _scaling(quick, out, as_json)
-        return
     from proof import bench as shown
 
     rows = shown.run(quick, aside)
     print(json.dumps(shown.as_records(rows), indent=2) if as_json else shown.as_text(rows))
-
-
-def _scaling(quick: bool, out: Path, as_json: bool) -> None:
-    from proof import scaling as measured
-    from tribodyn.workflows.run.progress import Progress, console_progress
-
-    progress = Progress() if as_json else console_progress()
-    rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
-    measured.picture(rows).savefig(out)
-    if as_json:
-        print(json.dumps({**measured.as_records(rows), "picture": str(out)}, indent=2))
-    else:
-        print(measured.as_text(rows))
-        print(out)
 
 
 def scoreboard(
@@ -317,36 +292,6 @@ def mistuned(*, count: int = 100, dense: int = 3, as_json: Json = False) -> None
         raise RuntimeError(f"{wrong} of {len(found)} settings of mistuned wheels are wrong, see the table")
 
 
-def motion(
-    scene: str, *, at: str | None = None, overrides: Overrides = (), out: Path | None = None, as_json: Json = False
-) -> None:
-    """Error against seconds of one motion, by more harmonics and by more time steps, and of life by more harmonics.
-
-    Parameters
-    ----------
-    scene
-        Name of a scene or a .toml file.
-    at
-        Frequency, such as "150 Hz"; where the scene wears, or the highest point of its response, by default.
-    out
-        Table to write (.json), its plot beside it (.png); results/NAME/motion.json by default.
-    as_json
-        Print JSON for machines.
-    """
-    from proof import work_precision, work_precision_table as shown
-
-    make_room(out, (".json",))
-    path = out or Path("results") / Path(scene).stem / "motion.json"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    earlier = shown.load(path) if path.exists() else None
-    omega = None if at is None else 2 * math.pi * quantity("--at", at, "Hz")
-    found = work_precision.run(scene, omega, overrides, aside, lambda there: shown.save(there, path), earlier)
-    shown.picture(found).savefig(path.with_suffix(".png"))
-    print(json.dumps(shown.as_records(found), indent=2) if as_json else shown.as_text(found))
-    if not as_json:
-        print(path, path.with_suffix(".png"), sep="\n")
-
-
 def wear_steps(scene: str, *, overrides: Overrides = (), out: Path | None = None, as_json: Json = False) -> None:
     """Cost and error of wear steps by both rules: table 4.2 of the thesis with the life added.
 
@@ -402,7 +347,6 @@ for word in (
     ablations,
     fuzz,
     mistuned,
-    motion,
     wear,
     wear_steps,
     blade,

@@ -18,7 +18,7 @@ PROCESSES = ("subprocess", "multiprocessing")  # a test module that imports one 
 LONG = (  # more than 12 s of processor each, the longest first
     "test_pages", "test_errors", "test_scene_brb", "test_lives", "test_rig", "test_contact_events", "test_turbine",
     "test_blade_study", "test_scene_leaf_seal", "test_wear_rules", "test_run", "test_only_what_is_needed",
-    "test_extremes", "test_pictures", "test_continuation_arc_length", "test_scene_blade", "test_scaling", "test_study",
+    "test_extremes", "test_pictures", "test_continuation_arc_length", "test_scene_blade", "test_large", "test_study",
     "test_cli", "test_fit_file", "test_convergence", "test_operating_line", "test_optimise", "test_report",
     "test_travelling_wave",
 )  # fmt: skip

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from proof.hertz import SphereContact
-from proof.rounded import RoundedPunch
+from tests.helpers.hertz import SphereContact
+from tests.helpers.rounded_punch import RoundedPunch
 from tribodyn.hbm.contact.stiffness import ElasticPair, rectangular_punch
 
 STEEL = (210e9, 0.3, 210e9, 0.3)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import xlogy
 
-from proof.hertz import require_shear_within
+from tests.helpers.hertz import require_shear_within
 from tribodyn.hbm.contact.stiffness import ElasticPair, arc_excess, half_contact, require_positive
 
 
