@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from proof.cases.blade.commands import blade
 from proof.cases.leaf_seal.commands import leaf
 from proof.cases.rig.commands import rig
-from proof.words import PICTURE, aside
+from proof.words import PICTURE, report_progress
 from tribodyn.workflows.command.main import guard
 from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room
 
@@ -53,24 +53,24 @@ def bench(
     if peer is not None:
         from proof import peers
 
-        races = peers.run(peer, aside)
+        races = peers.run(peer, report_progress)
         print(json.dumps(peers.as_records(races), indent=2) if as_json else peers.as_text(races))
         return
     if fe:
         from proof import large_fe
 
-        costs = large_fe.run(fe, aside, way)
+        costs = large_fe.run(fe, report_progress, way)
         print(json.dumps(large_fe.as_records(costs), indent=2) if as_json else large_fe.as_text(costs))
         return
     if contact:
         from proof import large_contact
 
-        sizes = large_contact.run(contact, aside)
+        sizes = large_contact.run(contact, report_progress)
         print(json.dumps(large_contact.as_records(sizes), indent=2) if as_json else large_contact.as_text(sizes))
         return
     from proof import bench as shown
 
-    rows = shown.run(quick, aside)
+    rows = shown.run(quick, report_progress)
     print(json.dumps(shown.as_records(rows), indent=2) if as_json else shown.as_text(rows))
 
 
@@ -105,10 +105,10 @@ def scoreboard(
     from proof import scoreboard as board, scoreboard_table as table
 
     make_room(out)
-    rows = board.run(scenes, seed, out, seconds, aside, wear)
+    rows = board.run(scenes, seed, out, seconds, report_progress, wear)
     table.write(rows, out)
     print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else table.summary(rows))
-    broken = sum(one.violated for row in rows for one in (*row.judged, *row.bound))
+    broken = sum(statement.violated for row in rows for statement in (*row.judged, *row.bound))
     if broken:
         raise RuntimeError(f"{broken} stated errors are violated, see {out / 'scoreboard.csv'}")
 
@@ -130,7 +130,7 @@ def faults(*, tree: Path = Path(), seconds: float = 20.0, out: Path = Path("faul
     from proof import planted_faults
 
     make_room(out)
-    rows = planted_faults.run(tree.resolve(), out.resolve(), aside, seconds)
+    rows = planted_faults.run(tree.resolve(), out.resolve(), report_progress, seconds)
     text = planted_faults.as_markdown(rows)
     (out / "faults.md").write_text(text, encoding="utf-8")
     print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else text)
@@ -140,7 +140,7 @@ def fuzz(
     scene: str | None = None,
     *,
     count: int = 1000,
-    only: str = "",
+    prefix: str = "",
     values: int | None = None,
     runs: int | None = None,
     seed: int = 0,
@@ -184,17 +184,19 @@ def fuzz(
 
     make_room(out)
     if scene is None:
-        tried = fuzz_mixed.tries(count, seed, seconds, aside, workers, only, command=command.main)
+        cases = fuzz_mixed.tries(count, seed, seconds, report_progress, workers, prefix, command=command.main)
     else:
-        tried = measured.fuzz(scene, overrides, values, runs, seed, seconds, workers, aside, out, command=command.main)
-    wrong = [one for one in tried if not one.good and not one.like]
+        cases = measured.fuzz(
+            scene, overrides, values, runs, seed, seconds, workers, report_progress, out, command=command.main
+        )
+    wrong = [case for case in cases if not case.good and not case.same_as]
     if as_json:
-        counts = {} if scene is None else {"counts": measured.counts(tried)}
-        print(json.dumps({**counts, "wrong": [one.record() for one in wrong]}, indent=2))
+        counts = {} if scene is None else {"counts": measured.counts(cases)}
+        print(json.dumps({**counts, "wrong": [case.record() for case in wrong]}, indent=2))
     else:
-        print(fuzz_mixed.as_table(tried) if scene is None else measured.as_text(tried))
+        print(fuzz_mixed.as_table(cases) if scene is None else measured.as_text(cases))
     if wrong:
-        raise RuntimeError(f"{len(wrong)} of {sum(not one.like for one in tried)} values did not end as they may")
+        raise RuntimeError(f"{len(wrong)} of {sum(not case.same_as for case in cases)} values did not end as they may")
 
 
 def branches(*, problems: int = 20, first: int = 0, as_json: Json = False) -> None:
@@ -212,11 +214,11 @@ def branches(*, problems: int = 20, first: int = 0, as_json: Json = False) -> No
     as_json
         Print JSON for machines.
     """
-    from proof import branches as tried
+    from proof import branches as curves
 
-    rows = tried.run(range(first, first + problems), aside)
-    print(json.dumps(tried.as_records(rows), indent=2) if as_json else tried.as_text(rows))
-    wrong = sum(row.outcome == tried.WRONG for row in rows)
+    rows = curves.run(range(first, first + problems), report_progress)
+    print(json.dumps(curves.as_records(rows), indent=2) if as_json else curves.as_text(rows))
+    wrong = sum(row.outcome == curves.WRONG for row in rows)
     if wrong:
         raise RuntimeError(f"{wrong} of {len(rows)} curves are wrong, see the table")
 
@@ -236,7 +238,7 @@ def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: 
     from proof import extremes as table, extremes_picture
 
     make_room(out, PICTURE)
-    rows = table.run(quick, aside)
+    rows = table.run(quick, report_progress)
     extremes_picture.picture(rows).savefig(out)
     print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
     wrong = table.counts(rows)["wrong"]
@@ -262,7 +264,7 @@ def ablations(
     """
     from proof import ablations as proof
 
-    rows = proof.run(rules, problems, scenes, aside)
+    rows = proof.run(rules, problems, scenes, report_progress)
     print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else proof.as_text(rows))
 
 
@@ -285,11 +287,11 @@ def mistuned(*, count: int = 100, dense: int = 3, as_json: Json = False) -> None
 
     if not 1 <= dense <= count:
         raise ValueError(f"--count {count} --dense {dense}: give at least 1 pattern, and at most as many dense")
-    found = proof.run(count, dense, aside)
-    print(json.dumps(proof.as_records(found), indent=2) if as_json else "\n".join(group.line() for group in found))
-    wrong = sum(group.wrong(dense) for group in found)
+    groups = proof.run(count, dense, report_progress)
+    print(json.dumps(proof.as_records(groups), indent=2) if as_json else "\n".join(group.line() for group in groups))
+    wrong = sum(group.wrong(dense) for group in groups)
     if wrong:
-        raise RuntimeError(f"{wrong} of {len(found)} settings of mistuned wheels are wrong, see the table")
+        raise RuntimeError(f"{wrong} of {len(groups)} settings of mistuned wheels are wrong, see the table")
 
 
 def wear_steps(scene: str, *, overrides: Overrides = (), out: Path | None = None, as_json: Json = False) -> None:
@@ -308,7 +310,7 @@ def wear_steps(scene: str, *, overrides: Overrides = (), out: Path | None = None
 
     if out is not None:
         make_room(out, PICTURE)
-    table = shown.compare(scene, aside, overrides)
+    table = shown.compare(scene, report_progress, overrides)
     if out is not None:
         shown.picture(table).savefig(out)
     print(json.dumps(shown.as_records(table), indent=2) if as_json else shown.as_text(table))
@@ -330,7 +332,7 @@ def wear(*, scenes: int = 12, seconds: float = 60.0, as_json: Json = False) -> N
     """
     from proof import brute_wear
 
-    rows = brute_wear.run(scenes, aside, seconds=seconds)
+    rows = brute_wear.run(scenes, report_progress, seconds=seconds)
     records = [{**asdict(row), "outcome": row.outcome} for row in rows]
     print(json.dumps(records, indent=2) if as_json else brute_wear.as_text(rows))
     if broken := sum(row.outcome == "violated" for row in rows):

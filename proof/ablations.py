@@ -54,7 +54,7 @@ SCENES = {
     "blade": coarse_scenes.BLADE,
     "rig": coarse_scenes.QUICK_RIG,
 }  # fmt: skip
-SAME = 1e-9  # relative, of numbers
+RELATIVE_ROUNDING = 1e-9  # relative, of numbers
 
 
 @dataclass(frozen=True)
@@ -74,38 +74,38 @@ def without(place: str, rule: str, neutral: Any) -> Iterator[None]:
     """
     name, _, kind = place.rpartition(".")
     module = import_module(f"tribodyn.hbm.{name}")
-    own = getattr(module, kind)
-    parameters = inspect.signature(own.__init__).parameters.values()
+    owner = getattr(module, kind)
+    parameters = inspect.signature(owner.__init__).parameters.values()
     fields = [p.name for p in parameters if p.default is not p.empty]
-    before, value, made = own.__init__.__defaults__, getattr(own, rule), getattr(module, "RULES", None)
+    before, value, rules = owner.__init__.__defaults__, getattr(owner, rule), getattr(module, "RULES", None)
     after = list(before)
     after[fields.index(rule)] = neutral
     try:
-        own.__init__.__defaults__ = tuple(after)
-        setattr(own, rule, neutral)
-        if isinstance(made, own):
-            module.RULES = own()  # type: ignore[attr-defined]
+        owner.__init__.__defaults__ = tuple(after)
+        setattr(owner, rule, neutral)
+        if isinstance(rules, owner):
+            module.RULES = owner()  # type: ignore[attr-defined]
         yield
     finally:
-        own.__init__.__defaults__ = before
-        setattr(own, rule, value)
-        if made is not None:
-            module.RULES = made  # type: ignore[attr-defined]
+        owner.__init__.__defaults__ = before
+        setattr(owner, rule, value)
+        if rules is not None:
+            module.RULES = rules  # type: ignore[attr-defined]
 
 
 def outcomes(seeds: Sequence[int], scenes: Sequence[str]) -> dict[str, tuple[Any, ...]]:
     """What the branch problems of some seeds and coarse scenes come to, by name."""
-    found: dict[str, tuple[Any, ...]] = {}
+    by_name: dict[str, tuple[Any, ...]] = {}
     for seed in seeds:
         curve = branches.judged(seed)
-        found[f"problem {seed}"] = (curve.outcome, curve.folds)
+        by_name[f"problem {seed}"] = (curve.outcome, curve.folds)
     for name in scenes:
         result = pipeline.run(read(name.split()[0], SCENES[name]), None, Progress())
         wear, response = result.wear, result.response
         assert wear is not None
         size = 0.0 if response is None else float(np.abs(response.response).sum())
-        found[name] = (wear.ended.name, len(wear.cycles), float(wear.cycles[-1]), float(wear.depth[-1].max()), size)
-    return found
+        by_name[name] = (wear.ended.name, len(wear.cycles), float(wear.cycles[-1]), float(wear.depth[-1].max()), size)
+    return by_name
 
 
 def run(chosen: Sequence[str], seeds: int, scenes: Sequence[str], say: Callable[[str], None]) -> list[Ablation]:
@@ -116,19 +116,19 @@ def run(chosen: Sequence[str], seeds: int, scenes: Sequence[str], say: Callable[
             if chosen and rule not in chosen:
                 continue
             with without(place, rule, neutral):
-                there = outcomes(range(seeds), scenes)
+                ablated = outcomes(range(seeds), scenes)
             changed = tuple(
-                f"{name}: {base[name]} -> {there[name]}" for name in base if not _same(base[name], there[name])
+                f"{name}: {base[name]} -> {ablated[name]}" for name in base if not _agree(base[name], ablated[name])
             )
             rows.append(Ablation(f"{place}.{rule}", neutral, changed))
             say(f"{rule}: {len(changed)} of {len(base)} outcomes change")
     return rows
 
 
-def _same(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
+def _agree(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
     numbers = [(x, y) for x, y in zip(a, b, strict=True) if isinstance(x, float)]
-    others = [(x, y) for x, y in zip(a, b, strict=True) if not isinstance(x, float)]
-    return all(x == y for x, y in others) and all(abs(x - y) <= SAME * abs(x) for x, y in numbers)
+    texts = [(x, y) for x, y in zip(a, b, strict=True) if not isinstance(x, float)]
+    return all(x == y for x, y in texts) and all(abs(x - y) <= RELATIVE_ROUNDING * abs(x) for x, y in numbers)
 
 
 def as_text(rows: Sequence[Ablation]) -> str:
@@ -136,5 +136,5 @@ def as_text(rows: Sequence[Ablation]) -> str:
     lines = []
     for row in rows:
         lines.append(f"{row.rule} = {row.neutral:g}: {len(row.changed) or 'no'} outcomes change")
-        lines += [f"    {one}" for one in row.changed]
+        lines += [f"    {sentence}" for sentence in row.changed]
     return "\n".join(lines)

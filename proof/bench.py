@@ -51,7 +51,7 @@ class Timing:
     harmonics : such as "0+3", 0 to 3; unknowns : of the dense algorithm, and of ours at the contact
     seconds : of the whole response curve by the compliance form, the sum of the least times of its points, of the
         processor; newton_steps : of it
-    again : the same from the even and from the odd repeats alone, their relative difference
+    repeat_difference : the same from the even and from the odd repeats alone, their relative difference
     ratio : seconds of the dense algorithm over ours on the same dense_points, None without any; dense_seconds : of
         these; dense_lost : points that it did not converge at in 40 steps, which do not count
     max_difference : of the contact displacement, both refined to rounding, relative to its largest value
@@ -66,7 +66,7 @@ class Timing:
     unknowns: int
     dense_unknowns: int
     seconds: float
-    again: float
+    repeat_difference: float
     newton_steps: int
     ratio: float | None
     dense_points: int
@@ -96,12 +96,12 @@ class Machine:
         large, square = np.ones(8_000_000), np.random.default_rng(0).normal(size=(1000, 1000))
 
         def best(work: Callable[[], object]) -> float:
-            taken = []
+            durations = []
             for _ in range(REPEATS):
                 clock = process_time()
                 work()
-                taken.append(process_time() - clock)
-            return min(taken)
+                durations.append(process_time() - clock)
+            return min(durations)
 
         kinds = [square, square.astype(np.float32)]
         return cls(
@@ -131,12 +131,12 @@ def _work(balance: HarmonicBalance, calls: dict[str, int]) -> tuple[Work, ...]:
     """The products of a curve, as `CompliancePoint.apply` and its `jacobian_product` make them."""
     c, m = balance.compliance, balance.basis.n_coeff
     x, n, cores = c.groups[0][0], c.n_contact, len(balance.basis.dynamic)
-    whole, powers = x.columns[:n], x.single[:n]
+    matrix, powers = x.columns[:n], x.single[:n]
     core, solved = 16 * cores * x.n_mode**2, 8 * cores * x.n_mode**2
-    exact = {8: 2 * m * (whole.size + x.left.size) + solved, 4: 2 * (m - balance.basis.has_static) * powers.size}
+    exact = {8: 2 * m * (matrix.size + x.left.size) + solved, 4: 2 * (m - balance.basis.has_static) * powers.size}
     nearly = {8: solved, 4: 2 * m * (n * n + 2 * n * x.n_mode)}
     return (
-        Work("evaluation", calls["apply"], whole.nbytes + powers.nbytes + x.left.nbytes + core, exact),
+        Work("evaluation", calls["apply"], matrix.nbytes + powers.nbytes + x.left.nbytes + core, exact),
         Work("Krylov product", calls["product"], x.w0_single.nbytes + 2 * x.b_single.nbytes + core, nearly),
     )
 
@@ -184,32 +184,32 @@ def _measure(balance: HarmonicBalance, harmonics: str, windows: tuple[int, int],
     work = _work(balance, calls)
 
     dense = DenseBalance(balance)
-    wanted = np.linspace(high, low, POINTS)
+    targets = np.linspace(high, low, POINTS)
     count, length = windows
     starts = np.linspace(3, POINTS - length - 1, count).astype(int)
     dense_seconds = own_seconds = difference = 0.0
     lost = 0
     for start in starts:
-        q = _refined(balance, dense, branch.omega, branch.contact, wanted[start - 3 : start])
+        q = _refined(balance, dense, branch.omega, branch.contact, targets[start - 3 : start])
         for i in range(start, start + length):
-            taken = []
+            durations = []
             for _ in range(DENSE_REPEATS):
                 clock = process_time()
-                guess = natural.extrapolate(wanted[i - 3 : i], q[-3:], wanted[i])
-                solution = dense.solve(wanted[i], guess, TOLERANCE)
-                taken.append(process_time() - clock)
+                guess = natural.extrapolate(targets[i - 3 : i], q[-3:], targets[i])
+                solution = dense.solve(targets[i], guess, TOLERANCE)
+                durations.append(process_time() - clock)
             if solution.outcome != CONVERGED:  # its time is that of no solution
                 lost += 1
-                q += _refined(balance, dense, branch.omega, branch.contact, wanted[i : i + 1])
+                q += _refined(balance, dense, branch.omega, branch.contact, targets[i : i + 1])
                 continue
-            dense_seconds += min(taken)
+            dense_seconds += min(durations)
             own_seconds += per_point[i - 1]
             q.append(solution.q)
-        last = wanted[start + length - 1]
+        last = targets[start + length - 1]
         if solution.outcome != CONVERGED:
             continue
-        own = branch.contact[int(np.argmin(np.abs(branch.omega - last)))].reshape(solution.x.shape)
-        exact = newton.solve(balance, last, own, NewtonOptions(1e-12)).state.x
+        contact_state = branch.contact[int(np.argmin(np.abs(branch.omega - last)))].reshape(solution.x.shape)
+        exact = newton.solve(balance, last, contact_state, NewtonOptions(1e-12)).state.x
         polished = dense.solve(last, q[-1], 1e-12, max_steps=6).x
         difference = float(np.maximum(difference, np.abs(polished - exact).max() / np.abs(exact).max()))
     p = dense.profile
@@ -220,7 +220,7 @@ def _measure(balance: HarmonicBalance, harmonics: str, windows: tuple[int, int],
         unknowns=balance.n_unknown,
         dense_unknowns=balance.model.system.n_dof * balance.basis.n_coeff,
         seconds=float(per_point.sum()),
-        again=abs(halves[0] - halves[1]) / min(halves),
+        repeat_difference=abs(halves[0] - halves[1]) / min(halves),
         newton_steps=int(branch.newton_steps.sum()),
         ratio=dense_seconds / own_seconds if own_seconds else None,
         dense_points=count * length - lost,
@@ -246,7 +246,7 @@ def _timed(
     for _ in range(REPEATS):
         times = [process_time()]
 
-        def on_point(_done: int, _wanted: int, _point: object, times: list[float] = times) -> None:
+        def on_point(_done: int, _total: int, _point: object, times: list[float] = times) -> None:
             times.append(process_time())
 
         branch = natural.follow(balance, high, low, options, on_point)
@@ -255,15 +255,15 @@ def _timed(
 
 
 def _refined(
-    balance: HarmonicBalance, dense: DenseBalance, omegas: np.ndarray, contact: np.ndarray, wanted: np.ndarray
+    balance: HarmonicBalance, dense: DenseBalance, omegas: np.ndarray, contact: np.ndarray, targets: np.ndarray
 ) -> list[np.ndarray]:
     """Reduced coordinates of the fast solutions at three frequencies, for the dense predictor."""
-    found = []
-    for omega in wanted:
+    coordinates = []
+    for omega in targets:
         nearest = int(np.argmin(np.abs(omegas - omega)))
         x = contact[nearest].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
-        found.append(dense.coordinates_of(omega, newton.solve(balance, omega, x).state.x))
-    return found
+        coordinates.append(dense.coordinates_of(omega, newton.solve(balance, omega, x).state.x))
+    return coordinates
 
 
 def _shares(stats: pstats.Stats) -> tuple[dict[str, float], dict[str, int]]:
@@ -298,7 +298,7 @@ def _line(r: Timing) -> str:
         shares += " (thesis " + "/".join(f"{v:.0f}" for v in published) + ")"
     ratio = "-" if r.ratio is None else f"{r.ratio:.1f}"
     return (
-        f"{r.harmonics:>9} {r.converged:4d}/{r.points:<4d} {r.seconds:8.2f} {r.again:6.0%} "
+        f"{r.harmonics:>9} {r.converged:4d}/{r.points:<4d} {r.seconds:8.2f} {r.repeat_difference:6.0%} "
         f"{r.newton_steps:7d} {ratio:>8} {r.max_difference:19.1e} {thesis:>14}   {shares}"
     )
 
@@ -321,11 +321,13 @@ def _limit(r: Timing) -> str:
 def as_text(rows: list[Timing]) -> str:
     """The rows for people, the thesis's figures beside ours."""
     lines = [
-        "harmonics   points   seconds  again  Newton    ratio  largest difference  thesis 1 core   "
+        "harmonics   points   seconds  spread Newton    ratio  largest difference  thesis 1 core   "
         "contact/balance/direction %",
         *map(_line, rows),
     ]
-    lines.append(f"least of {REPEATS} repeats for each point; again: the same from every second one, the difference")
+    lines.append(
+        f"least of {REPEATS} repeats for each point; spread: the difference of the times from even and from odd repeats"
+    )
     lines.append(
         "ratio: seconds of the dense algorithm over ours on the same points "
         f"({', '.join(f'{r.harmonics}: {r.dense_points}' for r in rows)} points)"

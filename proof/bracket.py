@@ -64,7 +64,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
             corners = [occ.addPoint(0, p.width / 2 + p.hole / 2 * c, z + p.hole / 2 * s) for c, s in _circle(turn)]
             sides = [occ.addLine(a, b) for a, b in pairwise([*corners, corners[0]])]
             face = occ.addPlaneSurface([occ.addCurveLoop(sides)])
-            bore = [one for one in occ.extrude([(2, face)], p.thickness, 0, 0) if one[0] == 3]
+            bore = [entity for entity in occ.extrude([(2, face)], p.thickness, 0, 0) if entity[0] == 3]
             occ.cut([(3, standing)], bore)
         boxes = [(3, occ.addBox(p.thickness, 0, 0, start - p.thickness, p.width, p.thickness))]
         boxes.append((3, occ.addBox(start, 0, 0, p.pad_length, p.width, p.thickness)))

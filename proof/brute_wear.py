@@ -156,11 +156,11 @@ def _march(inverse, by_u, by_v, still, shaken, omega, k_t, k_n, mu, depth, u, v,
             opened[p] += normal == 0.0
             contact[3 * p + 2] = normal
             for c in range(2):
-                held = min(max(k_t * (u[3 * p + c] - slider[p, c]), -mu * normal), mu * normal)
-                moved = u[3 * p + c] - held / k_t
-                work[p] += held * (moved - slider[p, c])
-                slider[p, c] = moved
-                contact[3 * p + c] = held
+                friction = min(max(k_t * (u[3 * p + c] - slider[p, c]), -mu * normal), mu * normal)
+                slid = u[3 * p + c] - friction / k_t
+                work[p] += friction * (slid - slider[p, c])
+                slider[p, c] = slid
+                contact[3 * p + c] = friction
         wave = np.cos(omega * h * (step % steps))
         for i in range(n):
             rate[i] = still[i] + shaken[i] * wave
@@ -174,77 +174,83 @@ def _march(inverse, by_u, by_v, still, shaken, omega, k_t, k_n, mu, depth, u, v,
     return work / cycles, normal_sum / (cycles * steps), opened / (cycles * steps)
 
 
-def _stuck(one: Drawn, still: np.ndarray) -> np.ndarray:
+def _stuck(scene: Drawn, still: np.ndarray) -> np.ndarray:
     """Displacement (n,) [m] under the static load, its friction springs without a slip: what no path has changed."""
     u = still
     for _ in range(2**PAIRS):
         springs = np.zeros(len(u))
         for p in range(PAIRS):
             if u[3 * p + 2] > 0:
-                springs[3 * p : 3 * p + 3] = one.k_t, one.k_t, one.k_n
-        u = np.linalg.solve(one.stiffness + np.diag(springs), still)
+                springs[3 * p : 3 * p + 3] = scene.k_t, scene.k_t, scene.k_n
+        u = np.linalg.solve(scene.stiffness + np.diag(springs), still)
     return u
 
 
-def life(one: Drawn, finer: int = 1) -> Brute:
+def life(scene: Drawn, finer: int = 1) -> Brute:
     """Cycles until LIFE_SHARE of the first preload is left. finer : by how much blocks and time steps are smaller.
 
     Depths go on by the rate of a block and of the one before (Adams and Bashforth's second order).
     """
-    n = len(one.mass)
+    n = len(scene.mass)
     still, shaken = np.zeros(n), np.zeros(n)
-    still[[2, 5]], shaken[8] = one.static / PAIRS, one.shaken
-    dynamic = one.stiffness - one.omega**2 * one.mass + 1j * one.omega * one.damping
-    free = np.linalg.solve(one.stiffness, still) + abs(np.linalg.solve(dynamic, shaken))
+    still[[2, 5]], shaken[8] = scene.static / PAIRS, scene.shaken
+    dynamic = scene.stiffness - scene.omega**2 * scene.mass + 1j * scene.omega * scene.damping
+    free = np.linalg.solve(scene.stiffness, still) + abs(np.linalg.solve(dynamic, shaken))
     reach = float(free[[2, 5]].max())
-    stiff = one.stiffness + np.eye(n) * max(one.k_n, one.k_t)
-    fastest = float(np.sqrt(np.linalg.eigvals(np.linalg.solve(one.mass, stiff)).real.max()))
-    steps = finer * max(400, int(2 * np.pi * fastest / one.omega / 0.15))
-    inverse = np.linalg.inv(one.mass)
-    fixed = (inverse, inverse @ one.stiffness, inverse @ one.damping, inverse @ still, inverse @ shaken)
-    fixed = (*fixed, one.omega, one.k_t, one.k_n, one.mu)
-    depth, u, v, slider = np.zeros(PAIRS), _stuck(one, still), np.zeros(n), np.zeros((PAIRS, 2))
+    stiff = scene.stiffness + np.eye(n) * max(scene.k_n, scene.k_t)
+    fastest = float(np.sqrt(np.linalg.eigvals(np.linalg.solve(scene.mass, stiff)).real.max()))
+    steps = finer * max(400, int(2 * np.pi * fastest / scene.omega / 0.15))
+    inverse = np.linalg.inv(scene.mass)
+    fixed = (inverse, inverse @ scene.stiffness, inverse @ scene.damping, inverse @ still, inverse @ shaken)
+    fixed = (*fixed, scene.omega, scene.k_t, scene.k_n, scene.mu)
+    depth, u, v, slider = np.zeros(PAIRS), _stuck(scene, still), np.zeros(n), np.zeros((PAIRS, 2))
     _march(*fixed, depth, u, v, slider, 4 * SETTLE, steps)
-    cycles, first, before, most, taken = 0.0, 0.0, 0.0, 0.0, 0.0
+    cycles, first, before, opened_most, previous_stride = 0.0, 0.0, 0.0, 0.0, 0.0
     earlier = np.zeros(PAIRS)
     for block in range(finer * BLOCKS):
         _march(*fixed, depth, u, v, slider, SETTLE, steps)
         work, preload, opened = _march(*fixed, depth, u, v, slider, MEAN, steps)
-        most, rate = max(most, float(opened.max())), COEFFICIENT * work / AREA
+        opened_most, rate = max(opened_most, float(opened.max())), COEFFICIENT * work / AREA
         if block == 0:
             first, earlier = preload, rate
         elif preload < LIFE_SHARE * first:
             low = max(preload, 1e-3 * LIFE_SHARE * first)
             part = np.log(before / (LIFE_SHARE * first)) / np.log(before / low)
-            return Brute(float(cycles - taken * (1 - part)), "", first, most, block)
-        if not rate.max() > 1e-9 * COEFFICIENT * one.mu * preload * reach / AREA:
-            left = f"nothing slips any more with {preload / first:.2g} of the preload left"
-            return Brute(None, left, first, most, block)
+            return Brute(float(cycles - previous_stride * (1 - part)), "", first, opened_most, block)
+        if not rate.max() > 1e-9 * COEFFICIENT * scene.mu * preload * reach / AREA:
+            sentence = f"nothing slips any more with {preload / first:.2g} of the preload left"
+            return Brute(None, sentence, first, opened_most, block)
         stride = DEPTH / finer * reach / float(rate.max())
         if block and preload < before:
-            stride = min(stride, FALL / finer * taken / np.log(before / preload))
-        bend = 0.5 * stride / taken if block else 0.0
+            stride = min(stride, FALL / finer * previous_stride / np.log(before / preload))
+        bend = 0.5 * stride / previous_stride if block else 0.0
         depth = depth + stride * np.maximum(rate + bend * (rate - earlier), 0.0)
-        cycles, before, taken, earlier = cycles + stride, preload, stride, rate
-    return Brute(None, f"{before / first:.2g} of the preload is left after {finer * BLOCKS} blocks", first, most, block)
+        cycles, before, previous_stride, earlier = cycles + stride, preload, stride, rate
+    return Brute(
+        None, f"{before / first:.2g} of the preload is left after {finer * BLOCKS} blocks", first, opened_most, block
+    )
 
 
 def run(scenes: int, say: Callable[[str], None], first: int = 0, seconds: float = 60.0) -> list[Row]:
     """Rows of so many scenes; seconds : of the processor, that `run` may take for one, with its errors."""
     rows = []
     for number in range(first, first + scenes):
-        one = draw(number)
-        coarse, brute = life(one), life(one, 2)
-        known = coarse.cycles is not None and brute.cycles is not None
-        row = Row(number, None, None, False, "", brute, abs(coarse.cycles / brute.cycles - 1) if known else None, None)
+        scene = draw(number)
+        coarse, brute = life(scene), life(scene, 2)
+        both_ended = coarse.cycles is not None and brute.cycles is not None
+        row = Row(
+            number, None, None, False, "", brute, abs(coarse.cycles / brute.cycles - 1) if both_ended else None, None
+        )
         with TemporaryDirectory() as place:
-            np.savez(Path(place) / "part.npz", M=one.mass, K=one.stiffness, C=one.damping)
-            file = parse(one.text(), "brute.toml", (), Path(place))
+            np.savez(Path(place) / "part.npz", M=scene.mass, K=scene.stiffness, C=scene.damping)
+            file = parse(scene.text(), "brute.toml", (), Path(place))
             try:
                 with processor_seconds(seconds):
                     result, model = scoreboard.solved(file)
-                    said = verdict.judge(file, model, result, Progress()).statements["life"]
-                row = replace(row, value=said.value, error=said.error, stated=said.stated, reason=said.reason)
+                    statement = verdict.judge(file, model, result, Progress()).statements["life"]
+                row = replace(
+                    row, value=statement.value, error=statement.error, stated=statement.stated, reason=statement.reason
+                )
                 if (worn := result.wear) is not None:
                     followed = float(worn.cycles_in_step[worn.in_time].sum() / worn.cycles_in_step.sum())
                     row = replace(row, preload=float(worn.preload[0]) / brute.first, followed=followed)
@@ -271,6 +277,6 @@ def as_text(rows: list[Row]) -> str:
             f"run {shown(r.value, '.4g')} +- {shown(r.error, '.1%')}, in time for {r.followed:.0%} of its cycles, "
             f"ratio {shown(ratio, '.3f')}, "
             f"first preload {shown(r.preload, '.4f')}, open {r.brute.opened:.2f}, {r.brute.blocks} blocks: {r.outcome}"
-            + "".join(f"; {why}" for why in (r.brute.reason, r.reason) if why)
+            + "".join(f"; {sentence}" for sentence in (r.brute.reason, r.reason) if sentence)
         )
     return "\n".join(lines)

@@ -44,14 +44,14 @@ def coexisting(
     for omega in np.linspace(low, high, frequencies)[1:-1]:
         states = solutions_at(balance, branch, omega)
         hill = [exponents.stability(balance, state) for state in states]
-        if [one.stable for one in hill] != [True, False, True]:
+        if [spectrum.stable for spectrum in hill] != [True, False, True]:
             continue
-        found = []
-        for state, one in zip(states, hill, strict=True):
+        solutions = []
+        for state, spectrum in zip(states, hill, strict=True):
             motion = march(balance, state, omega)
             ours = float(np.linalg.norm(balance.outputs(state)[row, balance.basis.order > 0]))
             theirs = amplitude_in_time(balance, motion, output)
-            growth, stays = float(one.exponents.real.max()), abs(theirs / ours - 1) < DEPARTURE
-            found.append(Coexisting(ours, one.stable, growth, theirs, motion.periods, stays))
-        return float(omega), found
+            growth, stays = float(spectrum.exponents.real.max()), abs(theirs / ours - 1) < DEPARTURE
+            solutions.append(Coexisting(ours, spectrum.stable, growth, theirs, motion.periods, stays))
+        return float(omega), solutions
     return float("nan"), []

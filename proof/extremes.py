@@ -13,7 +13,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from proof import extremes_wear
-from proof.extremes_judge import CONVERGED, REFUSED, WRONG, Verdict, sampled_honestly, tried
+from proof.extremes_judge import CONVERGED, REFUSED, WRONG, Verdict, sampled_honestly, solve_and_judge
 from proof.extremes_models import Body, beam, lattice, rigid, scaled
 
 QUICK = 8  # the quick table has every eighth cell
@@ -101,7 +101,7 @@ def cells(quick: bool) -> Iterator[Cell]:
 
 def _cell(body: Body, varied: str, label: str, **changes: Any) -> Cell:
     setting = replace(body.ordinary, **changes)
-    return body.name, varied, label, lambda: tried(body.balance(setting), setting.omega)[0]
+    return body.name, varied, label, lambda: solve_and_judge(body.balance(setting), setting.omega)[0]
 
 
 def _balances(body: Body, stiffness: Sequence[float]) -> Iterator[Cell]:
@@ -159,7 +159,7 @@ def _bases(body: Body) -> Iterator[Cell]:
 
 def _sampled(body: Body, setting: Any) -> Verdict:
     balance = body.balance(setting)
-    verdict, solution = tried(balance, setting.omega)
+    verdict, solution = solve_and_judge(balance, setting.omega)
     if verdict.outcome != CONVERGED:
         return verdict
     return sampled_honestly(balance, solution.state)
@@ -173,23 +173,23 @@ def _node_counts(counts: tuple[int, ...]) -> Iterator[Cell]:
 
 def _like_one_node(n: int, transitions: str) -> Verdict:
     """A rigid mass on n equal nodes moves as on one, by the dense reference."""
-    one, many = rigid(1), rigid(n)
-    setting = replace(one.ordinary, transitions=transitions)
-    reference, alone = tried(one.balance(setting), setting.omega)
-    balance = many.balance(setting)
-    verdict, solution = tried(balance, setting.omega)
+    single, n_nodes = rigid(1), rigid(n)
+    setting = replace(single.ordinary, transitions=transitions)
+    reference, on_one_node = solve_and_judge(single.balance(setting), setting.omega)
+    balance = n_nodes.balance(setting)
+    verdict, solution = solve_and_judge(balance, setting.omega)
     if verdict.outcome != CONVERGED or reference.outcome != CONVERGED:
         return verdict if verdict.outcome != CONVERGED else reference
-    off = np.abs(solution.state.x - alone.state.x).max() / np.abs(alone.state.x).max()
+    off = np.abs(solution.state.x - on_one_node.state.x).max() / np.abs(on_one_node.state.x).max()
     outcome = CONVERGED if off < 1e-6 else WRONG
     return Verdict(outcome, f"the motion on one node; {verdict.reason}", max(float(off), verdict.deviation))
 
 
 def _in_units(body: Body, length: float, force: float) -> Verdict:
     """The same problem in other units: the same numbers, scaled."""
-    first, ours = tried(body.balance(body.ordinary), body.ordinary.omega)
+    first, ours = solve_and_judge(body.balance(body.ordinary), body.ordinary.omega)
     other = scaled(body, length, force)
-    verdict, theirs = tried(other.balance(other.ordinary), body.ordinary.omega)
+    verdict, theirs = solve_and_judge(other.balance(other.ordinary), body.ordinary.omega)
     if CONVERGED not in (first.outcome, verdict.outcome) or first.outcome != verdict.outcome:
         return Verdict(WRONG, f"{first.outcome} in SI, {verdict.outcome} in other units: {verdict.reason}")
     off = float(np.linalg.norm(theirs.state.x / length - ours.state.x) / np.linalg.norm(ours.state.x))
@@ -233,7 +233,7 @@ def _nonsense(body: Body) -> Iterator[Cell]:
 
 def _must_refuse(body: Body, changes: dict[str, Any]) -> Verdict:
     setting = replace(body.ordinary, **changes)
-    verdict, _ = tried(body.balance(setting), setting.omega)
+    verdict, _ = solve_and_judge(body.balance(setting), setting.omega)
     if verdict.outcome == CONVERGED:
         return Verdict(WRONG, "an answer to a problem that cannot be")
     return verdict
@@ -241,8 +241,8 @@ def _must_refuse(body: Body, changes: dict[str, Any]) -> Verdict:
 
 def counts(rows: tuple[Trial, ...]) -> dict[str, int]:
     """Cells by outcome."""
-    found = Counter(row.outcome for row in rows)
-    return {outcome: found[outcome] for outcome in (CONVERGED, REFUSED, WRONG)}
+    outcomes = Counter(row.outcome for row in rows)
+    return {outcome: outcomes[outcome] for outcome in (CONVERGED, REFUSED, WRONG)}
 
 
 def as_records(rows: tuple[Trial, ...]) -> list[dict[str, object]]:
@@ -265,10 +265,10 @@ def as_text(rows: tuple[Trial, ...]) -> str:
     lines = [f"{'model':38} {'varied':32} {'cells':>5} {'converged':>9} {'refused':>7} {'wrong':>5}  largest deviation"]
     for model, varied in dict.fromkeys((row.model, row.varied) for row in rows):
         group = tuple(row for row in rows if (row.model, row.varied) == (model, varied))
-        found = counts(group)
+        count = counts(group)
         off = max((row.deviation for row in group if np.isfinite(row.deviation)), default=float("nan"))
         lines.append(
-            f"{model:38} {varied:32} {len(group):5d} {found[CONVERGED]:9d} {found[REFUSED]:7d} {found[WRONG]:5d}"
+            f"{model:38} {varied:32} {len(group):5d} {count[CONVERGED]:9d} {count[REFUSED]:7d} {count[WRONG]:5d}"
             + ("" if np.isnan(off) else f"  {off:.1e}")
         )
     for outcome in (REFUSED, WRONG):

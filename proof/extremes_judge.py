@@ -1,4 +1,4 @@
-"""Whether a balance solution may be believed: held against equations that the compliance form never sees.
+"""Whether a balance solution may be believed: march_checks against equations that the compliance form never sees.
 
 Every check has the bound that residuals and conditioning give, none is set by what was found.
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proof.dense import DenseBalance
-from proof.extremes_march import held
+from proof.extremes_march import march_checks
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES, STICKS
@@ -25,7 +25,9 @@ LARGEST_DENSE = 1600  # unknowns up to which the dense reference is solved
 DENSE_TOLERANCE = 1e-9  # of the excitation, that the dense reference leaves
 NEWTON = NewtonOptions().tolerance  # of the displacement, that the solver leaves
 EPSILON = float(np.finfo(float).eps)
-BESIDE = 1e-2  # how far from the solution the dense reference starts where it finds nothing from the free response
+PERTURBATION = (
+    1e-2  # how far from the solution the dense reference starts where it finds nothing from the free response
+)
 LOST_WORK = 1e-10  # by rounding, of force times travel
 WORK_BY_SAMPLING = 8.0  # of force times travel, for one sample in each period of the highest harmonic
 VAGUE = 1e-3  # relative difference that no check may allow
@@ -45,7 +47,7 @@ class Verdict:
     deviation: float = float("nan")
 
 
-def tried(balance: HarmonicBalance, omega: float) -> tuple[Verdict, Solution]:
+def solve_and_judge(balance: HarmonicBalance, omega: float) -> tuple[Verdict, Solution]:
     """Solve from rest, as a user gets it, and judge."""
     solution = arc_length.solve_along_load(balance, omega)
     if not solution.converged:
@@ -76,19 +78,21 @@ def judged(balance: HarmonicBalance, state: State) -> Verdict:
     if gain > 0:
         return Verdict(WRONG, f"a pair gains {gain:.1e} J in each cycle")
     scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(balance.x_lin(state.omega))), 1e-300)
-    marched = [Check(f"{one.name} of a plain march", one.off, one.allowed) for one in held(balance, state)]
+    marched = [
+        Check(f"{march.name} of a plain march", march.off, march.allowed) for march in march_checks(balance, state)
+    ]
     checks = [*marched, _equilibrium(balance, state, scale)]
-    beside = ""
+    remark = ""
     if balance.model.system.n_dof * balance.basis.n_coeff <= LARGEST_DENSE:
         dense = _Dense(balance, state, scale)
         checks += dense.limit()
-        solved, beside = dense.solved()
+        solved, remark = dense.solved()
         checks += solved
     for check in checks:
         if check.failed:
             says = f"{check.name}: off by {check.off:.1e}, {check.allowed:.1e} are allowed"
             return Verdict(WRONG, says, check.off)
-    return Verdict(CONVERGED, ", ".join(c.name for c in checks) + beside, max(c.off for c in checks[len(marched) :]))
+    return Verdict(CONVERGED, ", ".join(c.name for c in checks) + remark, max(c.off for c in checks[len(marched) :]))
 
 
 def _gain(balance: HarmonicBalance, state: State, energy: np.ndarray) -> float:
@@ -100,14 +104,14 @@ def _gain(balance: HarmonicBalance, state: State, energy: np.ndarray) -> float:
     travelled = np.maximum(basis.order, 1) * state.x  # harmonic h goes to and fro h times in a cycle
     force, travel = (np.linalg.norm(v[:, tangential], axis=2) for v in (state.cycle.force, travelled))
     coarse = 0.0 if basis.transitions == "located" else WORK_BY_SAMPLING * (basis.harmonics[-1] / basis.n_samples) ** 2
-    beyond = -energy - (LOST_WORK + coarse) * np.pi * (force * travel).sum(axis=1)
-    return float(beyond.max())
+    excess = -energy - (LOST_WORK + coarse) * np.pi * (force * travel).sum(axis=1)
+    return float(excess.max())
 
 
 def sampled_honestly(balance: HarmonicBalance, state: State) -> Verdict:
     """Whether the estimated error of sampling covers the true one: against located transitions and more samples.
 
-    The estimate is held to a factor. Above DEFAULT.largest no number is reported, and none is checked.
+    The estimate is march_checks to a factor. Above DEFAULT.largest no number is reported, and none is checked.
     """
     estimate = sampling_error(balance, state.omega, state.x)
     if estimate > DEFAULT.largest:
@@ -128,10 +132,12 @@ def _equilibrium(balance: HarmonicBalance, state: State, scale: float) -> Check:
     """Coordinates from M, C, K and the contact forces, harmonic by harmonic: do they move the contact as x says?"""
     shape = (-1, balance.basis.n_coeff)
     x, force = state.x.reshape(shape), state.cycle.force.reshape(shape)
-    found = recovery.coordinates(balance, x, force, state.omega)
+    amplitudes = recovery.coordinates(balance, x, force, state.omega)
     harmonics = balance.basis.harmonics
-    moved = np.stack([balance.model.at_harmonic(h)[1] @ q for h, q in zip(harmonics, found, strict=True)], axis=-1)
-    off = float(np.linalg.norm(balance.basis.to_real(moved) - x) / scale)
+    displacement = np.stack(
+        [balance.model.at_harmonic(h)[1] @ q for h, q in zip(harmonics, amplitudes, strict=True)], axis=-1
+    )
+    off = float(np.linalg.norm(balance.basis.to_real(displacement) - x) / scale)
     return Check("equilibrium of every coordinate", off, 3 * NEWTON + 100 * EPSILON * _condition(balance, state.omega))
 
 
@@ -168,12 +174,12 @@ class _Dense:
         except np.linalg.LinAlgError:
             self._gain = self._shake = float("inf")
         rounding = 10 * EPSILON * float(np.linalg.norm(np.abs(jacobian) @ np.abs(self._q.ravel())))
-        self._left = float(np.linalg.norm(residual)) + rounding
+        self._residual_norm = float(np.linalg.norm(residual)) + rounding
 
     def allowed(self, theirs: float = 0.0, vibration: bool = True) -> float:
         """How far another solution that leaves the residual `theirs` [N] may lie apart, relative; vibration : alone."""
         gain = self._shake if vibration else self._gain
-        return gain * (self._left + theirs) / self._scale + 3 * NEWTON
+        return gain * (self._residual_norm + theirs) / self._scale + 3 * NEWTON
 
     def limit(self) -> list[Check]:
         """Linear limits of the vibration: every pair stuck and closed through the cycle, or none ever touching.
@@ -202,29 +208,29 @@ class _Dense:
     def solved(self) -> tuple[list[Check], str]:
         """The dense Newton from the free response, else from beside the state; and what it says of other solutions."""
         remark = ""
-        for start, where in ((self._free(), "from the free response"), (self._beside(), "from beside it")):
+        for start, where in ((self._free(), "from the free response"), (self._perturbed(), "from beside it")):
             if start is None:
                 continue
-            found = self._solve(start)
-            if found is None:
+            end = self._solve(start)
+            if end is None:
                 remark = remark or "; from the free response the dense Newton finds no solution"
                 continue
-            x, left = found
-            apart = (x - self._state.x).ravel()
-            off, shake = (float(np.linalg.norm(part) / self._scale) for part in (apart, apart[self._dynamic]))
-            allowed = self.allowed(left, vibration=False)
-            whole, vibration = (
+            x, residual = end
+            difference = (x - self._state.x).ravel()
+            off, shake = (float(np.linalg.norm(part) / self._scale) for part in (difference, difference[self._dynamic]))
+            allowed = self.allowed(residual, vibration=False)
+            total, vibration = (
                 Check(f"dense Newton {where}", off, allowed),
-                Check(f"vibration of the dense Newton {where}", shake, self.allowed(left)),
+                Check(f"vibration of the dense Newton {where}", shake, self.allowed(residual)),
             )
-            if not whole.failed:
-                return [whole], remark
+            if not total.failed:
+                return [total], remark
             if not vibration.failed and off <= allowed:
                 return [vibration], f"{remark}; the equations leave its static part open by {off:.1e}"
             if self._is_another(x):
                 remark = "; from the free response the dense Newton finds another solution, which is in balance too"
                 continue
-            return [whole], remark
+            return [total], remark
         return [], remark
 
     def _free(self) -> np.ndarray | None:
@@ -234,25 +240,28 @@ class _Dense:
         except np.linalg.LinAlgError:
             return None
 
-    def _beside(self) -> np.ndarray:
-        return self._q * (1 + BESIDE * np.random.default_rng(1).uniform(-1, 1, self._q.shape))
+    def _perturbed(self) -> np.ndarray:
+        return self._q * (1 + PERTURBATION * np.random.default_rng(1).uniform(-1, 1, self._q.shape))
 
     def _solve(self, start: np.ndarray) -> tuple[np.ndarray, float] | None:
         """Contact displacement and the residual that is left [N]; solved to rounding where that can be."""
         omega, dense = self._state.omega, self._dense
         try:
-            found = dense.solve(omega, start, tolerance=DENSE_TOLERANCE, max_steps=25)
-            if not found.converged:
+            solution = dense.solve(omega, start, tolerance=DENSE_TOLERANCE, max_steps=25)
+            if not solution.converged:
                 return None
-            finer = dense.solve(omega, found.q, tolerance=0.0, max_steps=3)
+            finer = dense.solve(omega, solution.q, tolerance=0.0, max_steps=3)
         except np.linalg.LinAlgError:
             return None
         linear = dense.dynamic_stiffness(omega)
-        ends = [(one.x, float(np.linalg.norm(dense.residual(linear, one.q.ravel())[2]))) for one in (found, finer)]
+        ends = [
+            (candidate.x, float(np.linalg.norm(dense.residual(linear, candidate.q.ravel())[2])))
+            for candidate in (solution, finer)
+        ]
         return min(ends, key=lambda end: end[1])
 
     def _is_another(self, x: np.ndarray) -> bool:
         """Whether the compliance form stays where the dense reference ended, solved to rounding."""
-        again = newton.solve(self._balance, self._state.omega, x, NewtonOptions(tolerance=1e-3 * NEWTON))
-        moved, apart = (float(np.linalg.norm(again.state.x - end)) for end in (x, self._state.x))
-        return again.converged and moved < 1e-2 * apart
+        refined = newton.solve(self._balance, self._state.omega, x, NewtonOptions(tolerance=1e-3 * NEWTON))
+        drift, distance = (float(np.linalg.norm(refined.state.x - end)) for end in (x, self._state.x))
+        return refined.converged and drift < 1e-2 * distance

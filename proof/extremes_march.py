@@ -16,7 +16,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 
 # equidistant instants where the solver locates its transitions; more where too little is known
 FINE = (1024, 4096, 16384)
-KNOWN = 0.9  # of SMALLEST: doubt of a force that is little enough
+PRECISE = 0.9  # of SMALLEST: doubt of a force that is little enough
 CLOSER = 12  # instants beside a transition, each half as far from it as the one before
 LONGEST = 50  # cycles after which the sliders must repeat
 ROUNDING = 1e-11  # of all that adds up to a force
@@ -26,7 +26,7 @@ PAIRS = 128  # marched at a time, for the memory
 
 
 @dataclass(frozen=True)
-class Held:
+class MarchCheck:
     """A quantity beside the marched one: difference relative to it, and what the march itself may be off by.
 
     Both are relative to the size of the quantity. Where that is so small (zero where nothing touches) that the march
@@ -38,21 +38,21 @@ class Held:
     allowed: float
 
 
-def held(balance: HarmonicBalance, state: State) -> list[Held]:
+def march_checks(balance: HarmonicBalance, state: State) -> list[MarchCheck]:
     """Friction forces, normal forces and friction energy of a state beside those of the march.
 
     Each is relative to its own size over the whole contact: an error of 0.1 % of the friction forces is seen also where
     the normal ones, or stiffness times displacement, are a thousand times larger.
     """
     for fine in FINE:
-        found = _held_at(balance, state, fine)
-        known = all(one.off <= one.allowed < KNOWN * SMALLEST for one in found[:2])
-        if known or balance.basis.transitions != "located":
+        checks = _checks_at(balance, state, fine)
+        is_precise = all(check.off <= check.allowed < PRECISE * SMALLEST for check in checks[:2])
+        if is_precise or balance.basis.transitions != "located":
             break
-    return found
+    return checks
 
 
-def _held_at(balance: HarmonicBalance, state: State, fine: int) -> list[Held]:
+def _checks_at(balance: HarmonicBalance, state: State, fine: int) -> list[MarchCheck]:
     force, doubt, work, work_doubt = _marched(balance, state, fine)
     p = balance.contact.only("this check").parameters
     across = np.linalg.norm(state.x, axis=2)
@@ -60,23 +60,25 @@ def _held_at(balance: HarmonicBalance, state: State, fine: int) -> list[Held]:
     spring = p.stiffness * across  # [N] what adds up to a force, and rounds
     theirs = state.cycle.force
     tangential, normal = slice(None, -1), slice(-1, None)
-    found = [
-        _held(name, force[:, part] - theirs[:, part], force[:, part], doubt[:, part], spring[:, part])
+    checks = [
+        _march_check(name, force[:, part] - theirs[:, part], force[:, part], doubt[:, part], spring[:, part])
         for name, part in (("friction", tangential), ("normal", normal))
     ]
     travel = np.maximum(balance.basis.order, 1) * state.x[:, tangential]
     moving = balance.basis.order * state.x[:, tangential]
-    force_of, way, motion = (np.linalg.norm(one, axis=2) for one in (force[:, tangential], travel, moving))
+    force_of, way, motion = (np.linalg.norm(array, axis=2) for array in (force[:, tangential], travel, moving))
     # the solver's forces are of double precision and round with their springs, and the work with them
-    most = np.pi * (force_of * way + EPSILON / ROUNDING * spring[:, tangential] * motion).sum(axis=1)
+    bound = np.pi * (force_of * way + EPSILON / ROUNDING * spring[:, tangential] * motion).sum(axis=1)
     energy = balance.energy(state)
-    return [*found, _held("work", work - energy, work, work_doubt, most)]
+    return [*checks, _march_check("work", work - energy, work, work_doubt, bound)]
 
 
-def _held(name: str, difference: np.ndarray, size: np.ndarray, doubt: np.ndarray, rounds: np.ndarray) -> Held:
+def _march_check(
+    name: str, difference: np.ndarray, size: np.ndarray, doubt: np.ndarray, rounds: np.ndarray
+) -> MarchCheck:
     least = float(np.linalg.norm(doubt)) + ROUNDING * float(np.linalg.norm(rounds))
     size_of = max(float(np.linalg.norm(size)), least / SMALLEST, 1e-300)
-    return Held(name, float(np.linalg.norm(difference)) / size_of, least / size_of)
+    return MarchCheck(name, float(np.linalg.norm(difference)) / size_of, least / size_of)
 
 
 def _marched(
@@ -93,10 +95,10 @@ def _marched(
         return means.astype(float), doubt, work.astype(float), slack
     parts = []
     for first in range(0, len(state.x), PAIRS):
-        some = slice(first, first + PAIRS)
-        here, x = law.of_pairs(some), state.x[some]
-        parts.append(here.through(_instants(here, x, order, fine), x, order, exact=False))
-    force, doubt, work, work_doubt = (np.concatenate(one) for one in zip(*parts, strict=True))
+        pairs = slice(first, first + PAIRS)
+        block, x = law.of_pairs(pairs), state.x[pairs]
+        parts.append(block.through(_instants(block, x, order, fine), x, order, exact=False))
+    force, doubt, work, work_doubt = (np.concatenate(array) for array in zip(*parts, strict=True))
     return force, doubt, work, work_doubt
 
 
@@ -140,11 +142,11 @@ def _instants(law: _Law, x: np.ndarray, order: np.ndarray, fine: int) -> np.ndar
         above = np.einsum("ik,ik->i", curves[pair, curve], _columns(middle, order)) > shift[pair, curve]
         high, low = np.where(above == rising, middle, high), np.where(above == rising, low, middle)
     ahead, back = (np.minimum(way, even[1]) for way in _to_neighbours(pair, high))  # a contact may be this short
-    beside = np.concatenate([0.5 ** np.arange(1, CLOSER), np.arange(1, 8) / 8])
-    parts = np.concatenate([beside, [0.0], -beside])
+    offsets = np.concatenate([0.5 ** np.arange(1, CLOSER), np.arange(1, 8) / 8])
+    parts = np.concatenate([offsets, [0.0], -offsets])
     extra = (high[:, None] + np.where(parts > 0, ahead[:, None], back[:, None]) * parts) % (2 * np.pi)
-    most = np.bincount(pair, minlength=len(x)).max(initial=0)
-    angles = np.zeros((len(x), n + most * len(parts)))  # those that are left over are at 0, steps of no length
+    n_crossings = np.bincount(pair, minlength=len(x)).max(initial=0)
+    angles = np.zeros((len(x), n + n_crossings * len(parts)))  # those that are left over are at 0, steps of no length
     angles[:, :n] = even[:-1]
     place = np.arange(len(pair)) - np.searchsorted(pair, pair)
     angles[pair[:, None], n + place[:, None] * len(parts) + np.arange(len(parts))] = extra
@@ -182,10 +184,12 @@ class _Law:
 
     def extended(self) -> _Law:
         """The same in extended precision, where the machine has it."""
-        return _Law(*(np.asarray(one, np.longdouble) for one in (self.k_t, self.k_n, self.mu, self.gap, self.slider)))
+        return _Law(
+            *(np.asarray(array, np.longdouble) for array in (self.k_t, self.k_n, self.mu, self.gap, self.slider))
+        )
 
-    def of_pairs(self, some: slice) -> _Law:
-        return _Law(self.k_t[some], self.k_n[some], self.mu[some], self.gap[some], self.slider[some])
+    def of_pairs(self, pairs: slice) -> _Law:
+        return _Law(self.k_t[pairs], self.k_n[pairs], self.mu[pairs], self.gap[pairs], self.slider[pairs])
 
     def through(
         self, angle: np.ndarray, x: np.ndarray, order: np.ndarray, exact: bool
@@ -202,8 +206,8 @@ class _Law:
             means = np.einsum("pcn,pnk->pck", force, weighted) / angle.shape[1]
             return means, np.zeros(force.shape[:2]), work, np.zeros(len(work))
         means, work, kinks, slack = self._integrals(angle, u, force, slider, weighted)
-        every = (angle[:, ::2], u[..., ::2], force[..., ::2], slider[..., ::2], weighted[:, ::2])
-        rough, rough_work, _, _ = self._integrals(*every)
+        second_samples = (angle[:, ::2], u[..., ::2], force[..., ::2], slider[..., ::2], weighted[:, ::2])
+        rough, rough_work, _, _ = self._integrals(*second_samples)
         doubt, slack = 2 * np.linalg.norm(means - rough, axis=2) + kinks, 2 * np.abs(work - rough_work) + slack
         return means, doubt, work, slack  # twice: where a kink lies in its step is chance
 
@@ -220,18 +224,18 @@ class _Law:
         slip = np.roll(slider, -1, axis=2) - slider
         drag = self.k_t[:, :, None] * (np.roll(u[:, :-1], -1, axis=2) - slider)
         way = np.where(slip >= 0, 1.0, -1.0)
-        most = self.mu[:, None, None] * force[:, -1:]
-        rest, excess = most - way * f, way * drag - np.roll(most, -1, axis=2)
-        begins = (rest > 0) & (excess > 0) & (after != 0)
-        share = np.where(begins, rest / np.where(begins, rest + excess, 1.0), 0.0)
+        limit = self.mu[:, None, None] * force[:, -1:]
+        margin, excess = limit - way * f, way * drag - np.roll(limit, -1, axis=2)
+        begins = (margin > 0) & (excess > 0) & (after != 0)
+        share = np.where(begins, margin / np.where(begins, margin + excess, 1.0), 0.0)
         kink = f + share * (drag - f)
         lift = 0.5 * (kink - f - share * (after - f)) * step[:, None]  # of the area under the force
-        work, more = 0.5 * (f + after) * slip, 0.5 * (kink - f) * slip
+        work, correction = 0.5 * (f + after) * slip, 0.5 * (kink - f) * slip
         means = np.einsum("pcn,pnk->pck", force * weight[:, None], columns)
         means[:, :-1] += np.einsum("pcn,pnk->pck", lift, columns)
         kinks = np.zeros(force.shape[:2])
         kinks[:, :-1] = np.abs(lift).sum(axis=2) / np.pi
-        return means / (2 * np.pi), (work + more).sum(axis=(1, 2)), kinks, np.abs(more).sum(axis=(1, 2))
+        return means / (2 * np.pi), (work + correction).sum(axis=(1, 2)), kinks, np.abs(correction).sum(axis=(1, 2))
 
     def _march(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces (n_pair, n_component, n) [N] of a cycle that repeats under displacements u of the same shape [m].
@@ -247,12 +251,12 @@ class _Law:
             before = slider.copy()
             for j in range(u.shape[2]):
                 drag = self.k_t * (u[:, :-1, j] - slider)
-                most = (self.mu * normal[:, j])[:, None]
-                held = np.clip(drag, -most, most)
-                slips = np.abs(drag) > most
-                force[:, :-1, j] = held
+                limit = (self.mu * normal[:, j])[:, None]
+                friction = np.clip(drag, -limit, limit)
+                slips = np.abs(drag) > limit
+                force[:, :-1, j] = friction
                 with np.errstate(divide="ignore", invalid="ignore"):
-                    slid = np.where(slips, u[:, :-1, j] - held / self.k_t, slider)
+                    slid = np.where(slips, u[:, :-1, j] - friction / self.k_t, slider)
                 slider = np.where(touches[:, j, None], slid, u[:, :-1, j])
                 sliders[..., j] = slider
             if np.abs(slider - before).max() <= 1e-13 * np.abs(u).max():

@@ -86,13 +86,13 @@ def lattice(nx: int, ny: int, suspended: bool = True) -> Body:
     points = np.concatenate([np.c_[grid, np.zeros(len(grid))], np.c_[grid, np.full(len(grid), 3e-3)]])
     n_pair, n = len(grid), 3 * len(points)
     stiffness = np.zeros((n, n))
-    for i, here in enumerate(points):
+    for i, point in enumerate(points):
         for j in range(i + 1, len(points)):
-            length = np.linalg.norm(points[j] - here)
+            length = np.linalg.norm(points[j] - point)
             if length < 3.8e-3:
                 rows = np.r_[3 * i : 3 * i + 3, 3 * j : 3 * j + 3]
-                along = np.r_[points[j] - here, here - points[j]] / length
-                stiffness[np.ix_(rows, rows)] += 4e6 * np.outer(along, along)
+                direction = np.r_[points[j] - point, point - points[j]] / length
+                stiffness[np.ix_(rows, rows)] += 4e6 * np.outer(direction, direction)
     if suspended:
         stiffness[np.arange(n // 2, n), np.arange(n // 2, n)] += np.tile([2e6, 2e6, 1e5], n_pair) / n_pair
     press, shake, edge = np.zeros((3, n))
@@ -126,7 +126,7 @@ def scaled(body: Body, length: float, force: float) -> Body:
     The motion of the scaled body is the scaled motion, so that a pair of solves checks one by the other.
     """
     stiffness, system = force / length, body.model.system
-    moved = replace(
+    scaled_system = replace(
         system,
         mass=stiffness * system.mass,
         stiffness=stiffness * system.stiffness,
@@ -140,7 +140,7 @@ def scaled(body: Body, length: float, force: float) -> Body:
         force=force * o.force,
         gap=length * o.gap,
     )
-    return Body(body.name, replace(body.model, system=moved), ordinary)
+    return Body(body.name, replace(body.model, system=scaled_system), ordinary)
 
 
 def _interface(b: np.ndarray, points: np.ndarray, components: tuple[str, ...]) -> ContactInterface:

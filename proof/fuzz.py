@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from proof.fuzz_runs import ACCEPTED, REFUSED, Case, Command, Runs, Tried, scene_job
+from proof.fuzz_runs import ACCEPTED, REFUSED, Case, Command, FuzzEnd, Runs, scene_job
 from proof.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.scene import scene_file
 
@@ -32,7 +32,7 @@ INPUTS = (
 
 ROWS = "rows.jsonl"  # of a folder that keeps runs
 
-Row = TypeVar("Row", "_Meant", "Tried")
+Row = TypeVar("Row", "_Meant", "FuzzEnd")
 
 
 def keys(scene: str, overrides: Sequence[str] = ()) -> list[str]:
@@ -43,20 +43,20 @@ def keys(scene: str, overrides: Sequence[str] = ()) -> list[str]:
 def names_of(table: dict[str, Any], above: str = "") -> Iterator[str]:
     """Every section and key of the tables of a scene."""
     for name, value in table.items():
-        own = name == "parameters"  # of a part: keys of the table around them
-        if not own:
+        is_part = name == "parameters"  # of a part: keys of the table around them
+        if not is_part:
             yield f"{above}{name}"
         if isinstance(value, dict):
-            yield from names_of(value, above if own else f"{above}{name}.")
+            yield from names_of(value, above if is_part else f"{above}{name}.")
 
 
 def cases(scene: str, overrides: Sequence[str], count: int | None = None, seed: int = 0) -> list[Case]:
     """Pairs of a key and a value, all of them or some drawn at random."""
-    every = [(key, value) for key in keys(scene, overrides) for value in INPUTS]
-    if count is None or count >= len(every):
-        return every
-    chosen = np.random.default_rng(seed).choice(len(every), count, replace=False)
-    return [every[i] for i in sorted(chosen)]
+    pairs = [(key, value) for key in keys(scene, overrides) for value in INPUTS]
+    if count is None or count >= len(pairs):
+        return pairs
+    chosen = np.random.default_rng(seed).choice(len(pairs), count, replace=False)
+    return [pairs[i] for i in sorted(chosen)]
 
 
 def fuzz(
@@ -71,7 +71,7 @@ def fuzz(
     folder: Path | None = None,
     *,
     command: Command,
-) -> list[Tried]:
+) -> list[FuzzEnd]:
     """Try fuzz inputs for the keys of a scene, one at a time: all are read, and the scenes that come out of it are run.
 
     overrides : that make the scene small, so that a run takes a second; values : how many pairs of key and value, all
@@ -91,15 +91,15 @@ def fuzz(
     missing = [case for case in drawn if case not in rows.run or not rows.run[case].good]
     runner = Runs((scene_job(scene, overrides),), seconds, workers, command)
     todo = [scene_job(scene, overrides, *case) for case in missing]
-    for left, one in zip(reversed(range(len(missing))), runner.of(todo) if todo else (), strict=True):
-        rows.add(one)
-        if left % 20 == 0 or not one.good:
-            say(f"{scene}: {len(drawn) - left} runs of {len(drawn)}, {one.key}={one.value}: {one.end}")
-    found = [*refused, *(rows.run[case] for case in unclear)]
-    for who, *others in scenes:
-        first = rows.run.get(who, Tried(scene, *who, ACCEPTED, "", 0.0))
-        found += [first, *(replace(first, key=k, value=v, like="=".join(who)) for k, v in others)]
-    return sorted(found, key=lambda one: (one.key, INPUTS.index(one.value)))
+    for remaining, outcome in zip(reversed(range(len(missing))), runner.of(todo) if todo else (), strict=True):
+        rows.add(outcome)
+        if remaining % 20 == 0 or not outcome.good:
+            say(f"{scene}: {len(drawn) - remaining} runs of {len(drawn)}, {outcome.key}={outcome.value}: {outcome.end}")
+    ends = [*refused, *(rows.run[case] for case in unclear)]
+    for who, *repeats in scenes:
+        first = rows.run.get(who, FuzzEnd(scene, *who, ACCEPTED, "", 0.0))
+        ends += [first, *(replace(first, key=k, value=v, same_as="=".join(who)) for k, v in repeats)]
+    return sorted(ends, key=lambda outcome: (outcome.key, INPUTS.index(outcome.value)))
 
 
 def _read_all(
@@ -109,7 +109,7 @@ def _read_all(
     seconds: float,
     say: Callable[[str], None],
     rows: _Rows,
-) -> tuple[list[Tried], list[list[Case]], list[Case]]:
+) -> tuple[list[FuzzEnd], list[list[Case]], list[Case]]:
     """What reading refuses; the cases of each scene that it accepts; and those where it does neither."""
     refused, unclear = [], []
     meaning: dict[str, list[Case]] = {}
@@ -120,7 +120,7 @@ def _read_all(
         if meant is None or not (meant.refusal or meant.digest):
             meant = rows.add(_read(scene, overrides, key, value, seconds))
         if meant.refusal:
-            refused.append(Tried(scene, key, value, REFUSED, f"tribodyn: {meant.refusal}", meant.seconds))
+            refused.append(FuzzEnd(scene, key, value, REFUSED, f"tribodyn: {meant.refusal}", meant.seconds))
         elif meant.digest:
             meaning.setdefault(meant.digest, []).append((key, value))
         else:
@@ -148,7 +148,7 @@ class _Rows:
     def __init__(self, folder: Path | None, scene: str, overrides: Sequence[str]):
         self._path = None if folder is None else folder / ROWS
         self.read: dict[Case, _Meant] = {}
-        self.run: dict[Case, Tried] = {}
+        self.run: dict[Case, FuzzEnd] = {}
         of = {"scene": scene, "overrides": list(overrides)}
         if self._path is None:
             return
@@ -158,7 +158,7 @@ class _Rows:
         if first != of:
             raise ValueError(f"{folder} keeps runs of {first['scene']} with other changes: give another folder")
         for line in lines:
-            self._take(Tried(**line) if "end" in line else _Meant(**line))
+            self._take(FuzzEnd(**line) if "end" in line else _Meant(**line))
 
     def add(self, row: Row) -> Row:
         """Keep a row and give it back."""
@@ -167,8 +167,8 @@ class _Rows:
             self._write(asdict(row))
         return row
 
-    def _take(self, row: _Meant | Tried) -> None:
-        if isinstance(row, Tried):
+    def _take(self, row: _Meant | FuzzEnd) -> None:
+        if isinstance(row, FuzzEnd):
             self.run[row.key, row.value] = row
         else:
             self.read[row.key, row.value] = row
@@ -195,36 +195,37 @@ def _read(scene: str, overrides: Sequence[str], key: str, value: str, seconds: f
     return _Meant(key, value, digest, refusal, time.process_time() - clock)
 
 
-def counts(tried: Sequence[Tried]) -> dict[str, dict[str, Any]]:
+def counts(cases: Sequence[FuzzEnd]) -> dict[str, dict[str, Any]]:
     """Numbers by scene: keys, values, those that reading refuses, scenes that come out of the others, ends of runs."""
-    found = {}
-    for scene in dict.fromkeys(one.scene for one in tried):
-        ours = [one for one in tried if one.scene == scene]
-        own = [one for one in ours if one.end != REFUSED and not one.like]
-        ran = [one for one in own if one.end != ACCEPTED]
-        found[scene] = {
-            "keys": len({one.key for one in ours}),
+    by_scene = {}
+    for scene in dict.fromkeys(case.scene for case in cases):
+        ours = [case for case in cases if case.scene == scene]
+        accepted = [case for case in ours if case.end != REFUSED and not case.same_as]
+        ran = [case for case in accepted if case.end != ACCEPTED]
+        by_scene[scene] = {
+            "keys": len({case.key for case in ours}),
             "values": len(ours),
-            REFUSED: sum(one.end == REFUSED for one in ours),
-            "scenes": len(own),
+            REFUSED: sum(case.end == REFUSED for case in ours),
+            "scenes": len(accepted),
             "runs": len(ran),
-            "ends": dict(Counter(one.end for one in ran)),
-            "slowest": max((one.seconds for one in ran), default=0.0),
+            "ends": dict(Counter(case.end for case in ran)),
+            "slowest": max((case.seconds for case in ran), default=0.0),
         }
-    return found
+    return by_scene
 
 
-def as_text(tried: Sequence[Tried]) -> str:
+def as_text(cases: Sequence[FuzzEnd]) -> str:
     """A line for each scene, and one for each wrong end."""
     lines = []
-    for scene, of in counts(tried).items():
+    for scene, of in counts(cases).items():
         ends = ", ".join(f"{count} {end}" for end, count in sorted(of["ends"].items(), reverse=True))
         lines.append(
             f"{scene}: {of['keys']} keys, {of['values']} values: {of[REFUSED]} {REFUSED}, the others make "
             f"{of['scenes']} scenes; {of['runs']} of these run: {ends or 'none'}; the slowest {of['slowest']:.1f} s"
         )
-    wrong = [one for one in tried if not one.good and not one.like]
+    wrong = [case for case in cases if not case.good and not case.same_as]
     lines += [
-        f"{one.scene} {one.key}={one.value}: {one.end} after {one.seconds:.1f} s: {one.said[-300:]}" for one in wrong
+        f"{case.scene} {case.key}={case.value}: {case.end} after {case.seconds:.1f} s: {case.output[-300:]}"
+        for case in wrong
     ]
     return "\n".join(lines)

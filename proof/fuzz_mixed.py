@@ -21,7 +21,7 @@ import tomli_w
 from pyyeti.nastran import op4
 
 from proof import fuzz
-from proof.fuzz_runs import GOING, RUN, Command, Job, Runs, Tried
+from proof.fuzz_runs import GOING, RUN, Command, FuzzEnd, Job, Runs
 from tests.helpers import foreign_files
 from tests.helpers.coarse_scenes import BEAM
 from tests.helpers.matrix_scene import SCENE, matrix_folder
@@ -51,8 +51,10 @@ FIT = {
     "parameters": {"kt": {"keys": ["contact.tangential_stiffness"], "low": "200 N/um", "high": "900 N/um"}},
     "measured": {"mode": {"of": "stuck frequency", "mode": 1, "value": "420 Hz"}},
 }
-APART = "          0.,           0.,          10.\n          0.,"  # where the second block stands beside the first one
-BESIDE = "0., -10., 10.\n 0.,"  # where it stands upon it
+SEPARATE = (
+    "          0.,           0.,          10.\n          0.,"  # where the second block stands beside the first one
+)
+STACKED = "0., -10., 10.\n 0.,"  # where it stands upon it
 DECK = """
 [scene]
 title = "A deck"
@@ -102,18 +104,18 @@ class Base:
     tables : whether whole tables of it are damaged too; keys : of a scene, changed by --set
     """
 
-    what: str
+    kind: str
     words: tuple[str, ...]
     files: dict[str, bytes]
     damaged: str
     tables: bool = False
     keys: tuple[str, ...] = ()
-    own: dict[str, Any] = field(default_factory=dict)
+    values: dict[str, Any] = field(default_factory=dict)
 
-    def job(self, changes: str = "", content: str | None = None, more: Sequence[str] = ()) -> Job:
+    def job(self, changes: str = "", content: str | None = None, overrides: Sequence[str] = ()) -> Job:
         """The command with changed contents of the file and more changes of keys."""
         files = self.files if content is None else {**self.files, self.damaged: content.encode("latin-1", "replace")}
-        return Job(self.what, changes, "", (*self.words, *_set(more)), files)
+        return Job(self.kind, changes, "", (*self.words, *_set(overrides)), files)
 
 
 def _set(changes: Iterable[str]) -> tuple[str, ...]:
@@ -125,13 +127,13 @@ def bases(folder: Path) -> list[Base]:
     return [*_scenes(), *_structures(folder), *_studies(), *_decks(folder), *_matrices(folder)]
 
 
-def _scene(what: str, text: str, words: Callable[[str], tuple[str, ...]], changes: Sequence[str], place: Path) -> Base:
+def _scene(kind: str, text: str, words: Callable[[str], tuple[str, ...]], changes: Sequence[str], place: Path) -> Base:
     """A scene in a file of its own, beside the files of a place."""
     dump = scene_file.parse(text, "own.toml", changes, place).scene.model_dump()
-    beside = {one.name: one.read_bytes() for one in place.iterdir() if one.is_file()}
-    files = {**beside, "own.toml": text.encode()}
+    neighbours = {path.name: path.read_bytes() for path in place.iterdir() if path.is_file()}
+    files = {**neighbours, "own.toml": text.encode()}
     keys = tuple(sorted(set(fuzz.names_of(dump))))
-    return Base(what, (*words("own.toml"), *_set(changes)), files, "own.toml", True, keys, dump)
+    return Base(kind, (*words("own.toml"), *_set(changes)), files, "own.toml", True, keys, dump)
 
 
 def _run(name: str) -> tuple[str, ...]:
@@ -140,14 +142,14 @@ def _run(name: str) -> tuple[str, ...]:
 
 def _scenes() -> list[Base]:
     """Shipped scenes: small ones run, all planned."""
-    found = []
+    inputs = []
     for name in scene_file.names():
         place = scene_file.find(name)
         text = place.read_text(encoding="utf-8")
-        found.append(_scene(f"plan {name}", text, lambda file: ("plan", file), (), place.parent))
+        inputs.append(_scene(f"plan {name}", text, lambda file: ("plan", file), (), place.parent))
         if name in SMALL:
-            found.append(_scene(f"run {name}", text, _run, SMALL[name], place.parent))
-    return found
+            inputs.append(_scene(f"run {name}", text, _run, SMALL[name], place.parent))
+    return inputs
 
 
 def _structures(folder: Path) -> list[Base]:
@@ -156,7 +158,7 @@ def _structures(folder: Path) -> list[Base]:
     (decks := folder / "decks").mkdir()
     (rows := folder / "rows").mkdir()
     lap = (ROOT / "tests/geometry/decks/lap.inp").read_text(encoding="utf-8")
-    lap = lap.replace(APART, BESIDE)
+    lap = lap.replace(SEPARATE, STACKED)
     (decks / "lap.inp").write_text(lap, encoding="utf-8")
     matrix_folder(rows)
     (rows / "own.toml").unlink()
@@ -165,7 +167,7 @@ def _structures(folder: Path) -> list[Base]:
     return [
         _scene("run bodies", BLOCKS, _run, small, empty),
         scene,
-        replace(scene, what="run deck damaged", files={**scene.files, "lap.inp": lap.encode()}, damaged="lap.inp",
+        replace(scene, kind="run deck damaged", files={**scene.files, "lap.inp": lap.encode()}, damaged="lap.inp",
                 tables=False),
         _scene("run matrices", SCENE, _run, (*QUIET, "response.points=6"), rows),
     ]  # fmt: skip
@@ -183,31 +185,31 @@ def _studies() -> list[Base]:
         "optimise": {**drawn, "optimise": best},
         "fit": FIT,
     }
-    found = []
+    inputs = []
     for word, table in tables.items():
         text: bytes = tomli_w.dumps(table).encode()
         words = ("study", word, "own.toml", "--workers", "1", "--out", "out")
         if word == "fit":
             words = ("study", "identify", "beam", "own.toml", *_set([*UNWORN, "verdict.enabled=false"]))
-        found.append(Base(f"study {word}", words, {"own.toml": text}, "own.toml", True))
-    return found
+        inputs.append(Base(f"study {word}", words, {"own.toml": text}, "own.toml", True))
+    return inputs
 
 
 def _decks(folder: Path) -> list[Base]:
     """Decks of three programs with modes."""
-    mesh, found = foreign_files.bricks(folder), []
+    mesh, inputs = foreign_files.bricks(folder), []
     texts = {
         ending: foreign_files.write(mesh, folder / f"deck{ending}", "").read_text()
         for ending in (".inp", ".bdf", ".cdb")
     }
     texts[".cdb"] += "MP,DENS,1,7860.\n"
-    texts["_lap.inp"] = (ROOT / "tests/geometry/decks/lap.inp").read_text(encoding="utf-8").replace(APART, BESIDE)
+    texts["_lap.inp"] = (ROOT / "tests/geometry/decks/lap.inp").read_text(encoding="utf-8").replace(SEPARATE, STACKED)
     for ending, text in texts.items():
         words = ["inspect", f"own{ending}", "--unit", "mm", "--modes", "2"]
         if "lap" not in ending:
             words += ["--young", "210GPa", "--density", "7860 kg/m3"]
-        found.append(Base(f"inspect {ending}", tuple(words), {f"own{ending}": text.encode()}, f"own{ending}"))
-    return found
+        inputs.append(Base(f"inspect {ending}", tuple(words), {f"own{ending}": text.encode()}, f"own{ending}"))
+    return inputs
 
 
 def _matrices(folder: Path) -> list[Base]:
@@ -223,15 +225,15 @@ def _matrices(folder: Path) -> list[Base]:
         "two.pch": "\n".join(["DMIG,K,0,6,2,0,,,3", "DMIG,M,0,6,2,0,,,3", *entries, ""]),
         "K.mtx": rows["K"],
     }
-    found = []
+    inputs = []
     for name, text in texts.items():
         model = 'mass = "M.mtx"\nstiffness = "K.mtx"' if name == "K.mtx" else f'file = "{name}"'
         files: dict[str, bytes] = {name: text.encode(), "own.toml": ROWS.format(model).encode()}
         if name == "K.mtx":
             files["M.mtx"] = rows["M"].encode()
         words = (*_run("own.toml"), *_set(QUIET[:3]))
-        found.append(Base(f"run {name}", words, files, name))
-    return found
+        inputs.append(Base(f"run {name}", words, files, name))
+    return inputs
 
 
 def lines_damaged(text: str, rng: np.random.Generator) -> tuple[str, str]:
@@ -254,9 +256,9 @@ def lines_damaged(text: str, rng: np.random.Generator) -> tuple[str, str]:
             lines = [*lines[:i], lines[i][: int(rng.integers(len(lines[i]) + 1))]]
         elif kind == "number":
             value = str(rng.choice(["-1", "0", "1e300", "nan", "3.5", "99999999999", "1e-300", "x"]))
-            found = list(re.finditer(r"[-+]?\d[\d.eE+-]*", lines[i]))
-            if found:
-                at = found[int(rng.integers(len(found)))]
+            numbers = list(re.finditer(r"[-+]?\d[\d.eE+-]*", lines[i]))
+            if numbers:
+                at = numbers[int(rng.integers(len(numbers)))]
                 lines[i] = lines[i][: at.start()] + value + lines[i][at.end() :]
         elif kind == "character":
             j = int(rng.integers(len(lines[i])))
@@ -288,34 +290,34 @@ def tables_damaged(text: str, rng: np.random.Generator) -> tuple[str, str]:
 
 def case(base: Base, rng: np.random.Generator) -> Job:
     """An input with two or three keys changed, or with damage to its text and some keys."""
-    content = said = None
+    content = damages = None
     if not base.keys or rng.random() < 0.4:
         damage = tables_damaged if base.tables and rng.random() < 0.4 else lines_damaged
-        content, said = damage(base.files[base.damaged].decode(), rng)
+        content, damages = damage(base.files[base.damaged].decode(), rng)
     changes: list[str] = []
     if base.keys:
-        numbers = [key for key in base.keys if isinstance(_own(base.own, key), bool | int | float)]
-        every = numbers if rng.random() < 0.8 else base.keys
-        keys = rng.choice(every, int(rng.integers(0 if said else 2, 4)), replace=False)
-        changes = [f"{key}={_value(_own(base.own, str(key)), rng)}" for key in keys]
-    return base.job(" ".join([*([said] if said else []), *changes]), content, changes)
+        numbers = [key for key in base.keys if isinstance(_value_at(base.values, key), bool | int | float)]
+        candidates = numbers if rng.random() < 0.8 else base.keys
+        keys = rng.choice(candidates, int(rng.integers(0 if damages else 2, 4)), replace=False)
+        changes = [f"{key}={_value(_value_at(base.values, str(key)), rng)}" for key in keys]
+    return base.job(" ".join([*([damages] if damages else []), *changes]), content, changes)
 
 
-def _own(dump: Any, key: str) -> Any:
+def _value_at(dump: Any, key: str) -> Any:
     """What a scene has at a key, None where it has nothing."""
     for word in key.split("."):
         dump = dump.get(word, (dump.get("parameters") or {}).get(word)) if isinstance(dump, dict) else None
     return dump
 
 
-def _value(own: Any, rng: np.random.Generator) -> str:
+def _value(value: Any, rng: np.random.Generator) -> str:
     """A fuzz input for a key, or, more often, its own number somewhat changed or its switch the other way."""
-    if rng.random() < 0.1 or not isinstance(own, bool | int | float):
+    if rng.random() < 0.1 or not isinstance(value, bool | int | float):
         return str(rng.choice(fuzz.INPUTS))
-    if isinstance(own, bool):
-        return str(not own).lower()
+    if isinstance(value, bool):
+        return str(not value).lower()
     factor = float(rng.choice([0.0, 0.1, 0.5, 0.9, 1.0, 1.1, 2.0, 10.0]))
-    return str(round(own * factor) if isinstance(own, int) else own * factor)
+    return str(round(value * factor) if isinstance(value, int) else value * factor)
 
 
 def tries(
@@ -324,39 +326,39 @@ def tries(
     seconds: float = 10.0,
     say: Callable[[str], None] = lambda _: None,
     workers: int = 1,
-    only: str = "",
+    prefix: str = "",
     *,
     command: Command,
-) -> list[Tried]:
+) -> list[FuzzEnd]:
     """So many cases drawn at random, each run.
 
     seconds : of the processor that each may take without a word of progress; six times as many in all
     only : the beginning of the names of what is taken
     command : what `tribodyn` does with the words of a command line; it leaves by SystemExit
     """
-    rng, found = np.random.default_rng(seed), []
+    rng, cases = np.random.default_rng(seed), []
     with TemporaryDirectory() as name:
-        known = [base for base in bases(Path(name)) if base.what.startswith(only)]
-        jobs = [case(known[int(rng.integers(len(known)))], rng) for _ in range(count)]
-        first = tuple(base.job() for base in known if not base.what.startswith("plan"))
-        for one in Runs(first, seconds, workers, command, 6 * seconds).of(jobs):
-            found.append(one)
-            if not one.good or len(found) % 50 == 0:
-                say(f"{len(found)} of {count}: {one.scene}: {one.key}: {one.end}: {one.said[-300:]}")
-    return found
+        inputs = [base for base in bases(Path(name)) if base.kind.startswith(prefix)]
+        jobs = [case(inputs[int(rng.integers(len(inputs)))], rng) for _ in range(count)]
+        first = tuple(base.job() for base in inputs if not base.kind.startswith("plan"))
+        for outcome in Runs(first, seconds, workers, command, 6 * seconds).of(jobs):
+            cases.append(outcome)
+            if not outcome.good or len(cases) % 50 == 0:
+                say(f"{len(cases)} of {count}: {outcome.scene}: {outcome.key}: {outcome.end}: {outcome.output[-300:]}")
+    return cases
 
 
-def as_table(tried: Sequence[Tried]) -> str:
+def as_table(cases: Sequence[FuzzEnd]) -> str:
     """A row for each kind of input, and a line for each wrong end."""
-    kinds: dict[str, list[Tried]] = {}
-    for one in tried:
-        kinds.setdefault(one.scene, []).append(one)
+    kinds: dict[str, list[FuzzEnd]] = {}
+    for case in cases:
+        kinds.setdefault(case.scene, []).append(case)
     ends = ("success", "refused", "failed", GOING)
     rows = [f"| what | cases | {' | '.join(ends)} | wrong | slowest | longest without a word |", "|---" * 9 + "|"]
-    for kind, ours in [*sorted(kinds.items()), ("all", list(tried))]:
-        how = Counter(one.end for one in ours)
-        cells = [str(how[end]) for end in ends]
-        wrong, slow, mute = (sum(not one.good for one in ours), *(max(getattr(one, of) for one in ours)
+    for kind, ours in [*sorted(kinds.items()), ("all", list(cases))]:
+        counts = Counter(case.end for case in ours)
+        cells = [str(counts[end]) for end in ends]
+        wrong, slow, mute = (sum(not case.good for case in ours), *(max(getattr(case, of) for case in ours)
                              for of in ("seconds", "silent")))  # fmt: skip
         rows.append(f"| {kind} | {len(ours)} | {' | '.join(cells)} | {wrong} | {slow:.1f} s | {mute:.1f} s |")
-    return "\n".join(rows + [f"{o.scene}: {o.key}: {o.end}: {o.said[-300:]}" for o in tried if not o.good])
+    return "\n".join(rows + [f"{o.scene}: {o.key}: {o.end}: {o.output[-300:]}" for o in cases if not o.good])

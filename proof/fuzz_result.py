@@ -48,11 +48,11 @@ def _numbers(result: Result) -> Iterator[tuple[str, Any]]:
 
 def _within(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(value, dict):
-        for key, one in value.items():
-            yield from _within(f"{name}.{key}", one)
+        for key, item in value.items():
+            yield from _within(f"{name}.{key}", item)
     elif isinstance(value, (list, tuple)):
-        for one in value:
-            yield from _within(name, one)
+        for item in value:
+            yield from _within(name, item)
     elif isinstance(value, (float, complex)) or (isinstance(value, np.ndarray) and value.dtype.kind in "fc"):
         yield name, value
 
@@ -60,24 +60,24 @@ def _within(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def _of_verdict(verdict: Verdict, summed: dict[str, Any]) -> str:
     """What a verdict says that cannot be, or that the summary of its result contradicts."""
     frequency = summed["peak_hz"][0] if summed["wear_steps"] else None
-    told = {"life": None if summed["joints"] else summed["life_cycles"], "peak_frequency": frequency}
-    for name, said in verdict.statements.items():
-        value, error = said.value, said.error
-        other = told.get(name)
-        same = value is None or other is None or isclose(value, other, rel_tol=0.01)
+    summarised = {"life": None if summed["joints"] else summed["life_cycles"], "peak_frequency": frequency}
+    for name, statement in verdict.statements.items():
+        value, error = statement.value, statement.error
+        other = summarised.get(name)
+        agrees = value is None or other is None or isclose(value, other, rel_tol=0.01)
         trouble = (
-            (said.stated and value is None, "is stated without a value"),
-            (value is not None and said.stated and error is None, "is stated without an error"),
+            (statement.stated and value is None, "is stated without a value"),
+            (value is not None and statement.stated and error is None, "is stated without an error"),
             (value is not None and not np.isfinite(value), "is no number"),
             (value is not None and value < 0 and name not in MAY_BE_NEGATIVE, "is negative"),
             (error is not None and not 0 <= error < np.inf, "has an error that is no number"),
             (
-                said.stated and error is not None and error > DEFAULT.largest,
+                statement.stated and error is not None and error > DEFAULT.largest,
                 f"is stated with an error above {DEFAULT.largest:.0%}",
             ),
-            (not same, "is not what the summary tells"),
+            (not agrees, "is not what the summary tells"),
         )
-        for found, what in trouble:
-            if found:
-                return f"verdict: {name} {what}"
+        for is_wrong, trouble_text in trouble:
+            if is_wrong:
+                return f"verdict: {name} {trouble_text}"
     return ""

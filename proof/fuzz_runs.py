@@ -40,7 +40,7 @@ Command = Callable[[list[str]], None]
 
 
 @dataclass(frozen=True)
-class Tried:
+class FuzzEnd:
     """One value of one key.
 
     end : success, refused or failed (with one sentence), else what is wrong with it; without a run how reading ended
@@ -53,9 +53,9 @@ class Tried:
     key: str
     value: str
     end: str
-    said: str
+    output: str
     seconds: float
-    like: str = ""
+    same_as: str = ""
     silent: float = 0.0
 
     @property
@@ -100,7 +100,7 @@ class _Running:
     place: Path
     since: float
     worked: float = 0.0
-    said: int = 0
+    output: int = 0
     at: float = 0.0
     silent: float = 0.0
 
@@ -109,8 +109,8 @@ class _Running:
         if (worked := _worked(pid)) > self.worked:
             self.worked, self.since = worked, time.monotonic()
         file = self.place / PRINTED
-        if file.exists() and (said := file.stat().st_size) > self.said:
-            self.said, self.at = said, self.worked
+        if file.exists() and (size := file.stat().st_size) > self.output:
+            self.output, self.at = size, self.worked
         self.silent = max(self.silent, self.worked - self.at)
 
 
@@ -132,22 +132,22 @@ class Runs:
     command: Command
     longest: float | None = None
 
-    def of(self, todo: Sequence[Job]) -> Iterator[Tried]:
+    def of(self, todo: Sequence[Job]) -> Iterator[FuzzEnd]:
         """Run jobs; they come as they end.
 
         Raises  RuntimeError where an input as it is does not end well
         """
         fork = get_context("fork")
-        told, tells = fork.Pipe(duplex=False)
+        receiver, tells = fork.Pipe(duplex=False)
         warm = fork.Process(target=self._warm, args=(tells, todo))
         warm.start()
         tells.close()
         try:
             while True:
-                one = told.recv()
-                if isinstance(one, str):
-                    raise RuntimeError(f"{one}; try it with tribodyn")
-                yield one
+                message = receiver.recv()
+                if isinstance(message, str):
+                    raise RuntimeError(f"{message}; try it with tribodyn")
+                yield message
         except EOFError:
             warm.join()
         finally:
@@ -171,10 +171,10 @@ class Runs:
                 if (end := _end(code, place)) not in GOOD:
                     tells.send(f"{job.scene} as it is does not end well: {end}")
                     return
-            for one in self._forked(folder, todo):
-                tells.send(one)
+            for message in self._forked(folder, todo):
+                tells.send(message)
 
-    def _forked(self, folder: Path, todo: Sequence[Job]) -> Iterator[Tried]:
+    def _forked(self, folder: Path, todo: Sequence[Job]) -> Iterator[FuzzEnd]:
         active: _Active = {}
         for number, job in enumerate(todo):
             while len(active) >= self.workers:
@@ -187,13 +187,13 @@ class Runs:
         while active:
             yield from self._ended(active)
 
-    def _ended(self, active: _Active) -> list[Tried]:
+    def _ended(self, active: _Active) -> list[FuzzEnd]:
         """Wait for a process to end; those that have are taken from `active`, those that sleep too long are killed.
 
         A busy machine makes a run late, not wrong: only the clock of a process that does not work runs.
         """
         connection.wait([process.sentinel for process in active], timeout=1.0)
-        found = []
+        ends = []
         for process, running in list(active.items()):
             running.look(process.pid)
             mute = self.longest is not None and running.silent > self.seconds
@@ -204,20 +204,20 @@ class Runs:
                 continue
             process.join()
             del active[process]
-            found.append(self._how(running, process.exitcode, mute))
+            ends.append(self._end_of(running, process.exitcode, mute))
             shutil.rmtree(running.place)
-        return found
+        return ends
 
-    def _how(self, running: _Running, code: int | None, mute: bool) -> Tried:
+    def _end_of(self, running: _Running, code: int | None, mute: bool) -> FuzzEnd:
         job, place = running.job, running.place
-        end, printed = _end(code, place), _told(place)
+        end, printed = _end(code, place), _printed(place)
         if end == LONG and self.longest is not None:
-            end = SILENT if mute or not running.said else GOING
+            end = SILENT if mute or not running.output else GOING
         spent = float((place / SPENT).read_text()) if (place / SPENT).exists() else running.worked
         mark = "tribodyn:" if end in GOOD else "Warning" if end == WARNED else ""
         lines = [line for line in printed.splitlines() if mark in line]
         silent = max(running.silent, spent - running.at)
-        return Tried(job.scene, job.key, job.value, end, "\n".join(lines)[-2000:], spent, silent=silent)
+        return FuzzEnd(job.scene, job.key, job.value, end, "\n".join(lines)[-2000:], spent, silent=silent)
 
     def _leave(self, job: Job, place: Path) -> None:
         """The command as what this process is: it ends with its exit code."""
@@ -234,8 +234,8 @@ class Runs:
         with chdir(place), _printing(place / PRINTED):
             try:
                 self.command([*job.words])
-            except SystemExit as left:
-                return left.code
+            except SystemExit as leaving:
+                return leaving.code
             except BaseException:  # as the interpreter shows it
                 sys.excepthook(*sys.exc_info())
                 return 1
@@ -250,7 +250,7 @@ def _printing(file: Path) -> Iterator[None]:
     streams = sys.stdout, sys.stderr
     for stream in streams:
         stream.flush()
-    kept = os.dup(1), os.dup(2)
+    copies = os.dup(1), os.dup(2)
     with file.open("w") as printed:
         os.dup2(printed.fileno(), 1)
         os.dup2(printed.fileno(), 2)
@@ -260,12 +260,12 @@ def _printing(file: Path) -> Iterator[None]:
         finally:
             printed.flush()
             sys.stdout, sys.stderr = streams
-            for number, own in zip((1, 2), kept, strict=True):
-                os.dup2(own, number)
-                os.close(own)
+            for number, copy in zip((1, 2), copies, strict=True):
+                os.dup2(copy, number)
+                os.close(copy)
 
 
-def _told(place: Path) -> str:
+def _printed(place: Path) -> str:
     file = place / PRINTED
     return file.read_text(errors="replace") if file.exists() else ""
 
@@ -273,23 +273,23 @@ def _told(place: Path) -> str:
 def _worked(pid: int | None) -> float:
     """Processor seconds of a process, 0 where the system does not tell (Linux does, in /proc)."""
     try:
-        told = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
         return 0.0
-    return (int(told[11]) + int(told[12])) / os.sysconf("SC_CLK_TCK")
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _end(code: int | None, place: Path) -> str:
     """How a run ended that left an exit code and a folder."""
-    printed = _told(place)
+    printed = _printed(place)
     if code is not None and code < 0:
         return LONG if "Fatal" not in printed else f"killed by signal {-code}"
     if "Traceback" in printed or code not in ENDS:
         return "traceback"
     if "Warning" in printed:
         return WARNED
-    if code == 0 and (place / RESULT).exists() and (what := fuzz_result.wrong(place / RESULT)):
-        return what
+    if code == 0 and (place / RESULT).exists() and (trouble := fuzz_result.wrong(place / RESULT)):
+        return trouble
     if code and sum(line.startswith("tribodyn:") for line in printed.splitlines()) != 1:
         return "no sentence"
     return ENDS[code]

@@ -37,11 +37,11 @@ class JointSprings:
     model: ReducedModel
     springs: Mapping[str, np.ndarray]
     contact: np.ndarray
-    given: Mapping[str, float]
+    declared: Mapping[str, float]
 
     def stiffness(self, springs: Mapping[str, float], contact: np.ndarray | None = None) -> np.ndarray:
         """Stiffness matrix (n, n) [N/m]; springs : by name [N/m], the scene's by default; contact : stuck, or none."""
-        chosen = {**self.given, **springs}
+        chosen = {**self.declared, **springs}
         K = self.model.system.stiffness + sum(chosen[name] * unit for name, unit in self.springs.items())
         return K if contact is None else stuck_stiffness(K, self.model.interface.B, contact)
 
@@ -69,11 +69,11 @@ def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None 
     if not scene.springs:
         raise ValueError(f"{file.name} has no springs whose stiffness could change: add a table such as [springs.seat]")
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-    others = scene.response.others
+    outputs = scene.response.others
     if probes is not None:
-        others = {name: Output(group=group, direction=axes[axis]) for name, (group, axis) in probes.items()}
+        outputs = {name: Output(group=group, direction=axes[axis]) for name, (group, axis) in probes.items()}
     changes: dict[str, Any] = {"springs": {}, "prescribed": {}}
-    bare = scene.model_copy(update={**changes, "response": scene.response.model_copy(update={"others": others})})
+    bare = scene.model_copy(update={**changes, "response": scene.response.model_copy(update={"others": outputs})})
     with TemporaryDirectory() as folder:
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
     part = modelling.make_part(bare, mesh, node_sets)
@@ -91,5 +91,5 @@ def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None 
     for name, (rows, share) in stretch.items():
         e = np.asarray(rows @ basis)
         units[name] = e.T @ (share[:, None] * e)
-    given = {name: spring.stiffness for name, spring in scene.springs.items()}
-    return JointSprings(model, units, joints.contact_stiffness(scene, model), given)
+    stiffnesses = {name: spring.stiffness for name, spring in scene.springs.items()}
+    return JointSprings(model, units, joints.contact_stiffness(scene, model), stiffnesses)

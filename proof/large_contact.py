@@ -108,8 +108,8 @@ def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[ContactCost]:
             if way == "craig_bampton" and size not in DENSE:
                 continue
             say(f"{size} contact DOFs, {way}")
-            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
-                row, forces = alone.submit(measure, *SIZES[size], way, modes).result()
+            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+                row, forces = pool.submit(measure, *SIZES[size], way, modes).result()
             if theirs is not None and len(theirs) == len(forces):
                 off = np.abs(forces - theirs).max(axis=(1, 2, 3)) / np.abs(theirs).max(axis=(1, 2, 3))
                 row = replace(row, force_difference=float(off.max()))
@@ -143,8 +143,8 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
         with watched(spent):
             branch = natural.follow(balance, first, last, options)
         clock.append(time.process_time())
-        peak, rest = memory.peak(), reduced.residual
-        parts = () if rest is None else _parts(balance, spent, len(branch.omega))  # before its factor is let go
+        peak, remainder = memory.peak(), reduced.residual
+        parts = () if remainder is None else _parts(balance, spent, len(branch.omega))  # before its factor is let go
     row = ContactCost(
         way=way,
         contact_dofs=balance.compliance.n_contact,
@@ -157,8 +157,8 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
         converged=int(branch.converged.sum()),
         newton_steps=int(branch.newton_steps.sum()),
         peak_bytes=peak,
-        compliance_error=np.nan if rest is None else compliance_error(rest, 2 * np.pi * PROBE_HZ),
-        left_out=0.0 if rest is None else rest.left_out,
+        compliance_error=np.nan if remainder is None else compliance_error(remainder, 2 * np.pi * PROBE_HZ),
+        left_out=0.0 if remainder is None else remainder.left_out,
         parts=parts,
     )
     return row, _forces(balance, branch)
@@ -168,13 +168,13 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
 def watched(spent: dict[str, list[float]]) -> Iterator[None]:
     """Adds calls and seconds of each of WATCHED."""
 
-    def counting(plain: Callable[..., Any], own: list[float]) -> Callable[..., Any]:
+    def counting(plain: Callable[..., Any], entry: list[float]) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
             clock = time.process_time()
-            found = plain(*arguments, **options)
-            own[0] += 1
-            own[1] += time.process_time() - clock
-            return found
+            result = plain(*arguments, **options)
+            entry[0] += 1
+            entry[1] += time.process_time() - clock
+            return result
 
         return call
 
@@ -189,10 +189,10 @@ def _parts(balance: HarmonicBalance, spent: dict[str, list[float]], points: int)
     """The parts of a curve of so many points, `rest` and `modes` shared out to factor and modes."""
     n, m, r = balance.compliance.n_contact, balance.basis.n_coeff, balance.compliance.groups[0][0].n_mode
     assert balance.model.residual is not None
-    rest = balance.model.residual
-    read = 4 * len(np.unique(rest.B.indices)) ** 2  # of the factor, each of two times
-    if isinstance(rest.factor, Pardiso) and not rest.factor._few:
-        read = 1024 * int(rest.factor._solver.get_iparm(Pardiso.SIZE))
+    remainder = balance.model.residual
+    read = 4 * len(np.unique(remainder.B.indices)) ** 2  # of the factor, each of two times
+    if isinstance(remainder.factor, Pardiso) and not remainder.factor._few:
+        read = 1024 * int(remainder.factor._solver.get_iparm(Pardiso.SIZE))
     blocks, calls = (
         balance.contact.n_pair * (n // balance.contact.n_pair * m) ** 2,
         {k: c for k, (c, _) in spent.items()},
@@ -235,11 +235,11 @@ def compliance_error(residual: ResidualFlexibility, omega: float) -> float:
     root = np.sqrt(residual.stiffness)[:, None]
     force = root * np.random.default_rng(1).standard_normal((len(root), PROBES))
     modal = residual.at_contact.T @ force
-    found = residual.apply(force) + residual.at_contact @ (modal / (residual.squares - omega**2)[:, None])
+    displacement = residual.apply(force) + residual.at_contact @ (modal / (residual.squares - omega**2)[:, None])
     residual.__dict__.pop("factor")  # makes room for the other one
     factor = factorise(residual.matrix - omega**2 * residual.mass, definite=False)
     exact = residual.B @ factor.solve(np.asfortranarray(residual.B.T @ force))
-    return float(np.max(np.linalg.norm(root * (found - exact), axis=0) / np.linalg.norm(root * exact, axis=0)))
+    return float(np.max(np.linalg.norm(root * (displacement - exact), axis=0) / np.linalg.norm(root * exact, axis=0)))
 
 
 def powers(rows: Sequence[ContactCost]) -> dict[str, float]:
@@ -262,21 +262,21 @@ def as_text(rows: Sequence[ContactCost]) -> str:
     """The rows for people, with exponents where a way has several sizes."""
     lines = []
     for r in rows:
-        more = "" if np.isnan(r.compliance_error) else f", compliance off by {r.compliance_error:.1e}"
-        more += "" if np.isnan(r.force_difference) else f", forces differ by {r.force_difference:.1e}"
+        remarks = "" if np.isnan(r.compliance_error) else f", compliance off by {r.compliance_error:.1e}"
+        remarks += "" if np.isnan(r.force_difference) else f", forces differ by {r.force_difference:.1e}"
         each = r.response_seconds / r.points
         lines.append(
             f"{r.contact_dofs:6d} contact DOFs of {r.full_dofs:7d}, {r.way:20} {r.model_dofs:5d} coordinates "
             f"{r.peak_bytes / 1e9:6.2f} GB: assembly {r.assembly_seconds:.1f} s, set-up {r.setup_seconds:.1f} s, "
             f"{r.converged}/{r.points} points in {r.response_seconds:.1f} s ({each:.2f} s each, "
-            f"{r.newton_steps} Newton steps){more}"
+            f"{r.newton_steps} Newton steps){remarks}"
         )
         lines += _roofline(r)
     for way in dict.fromkeys(row.way for row in rows):
-        own = [row for row in rows if row.way == way]
-        if len({row.contact_dofs for row in own}) > 1:
-            told = ", ".join(f"{name} {power:.2f}" for name, power in powers(own).items())
-            lines.append(f"{way}: powers of the contact DOFs: {told}")
+        of_way = [row for row in rows if row.way == way]
+        if len({row.contact_dofs for row in of_way}) > 1:
+            exponents = ", ".join(f"{name} {power:.2f}" for name, power in powers(of_way).items())
+            lines.append(f"{way}: powers of the contact DOFs: {exponents}")
     return "\n".join(lines)
 
 

@@ -45,8 +45,8 @@ PRODUCTS = {  # ways of the product -> how the scene asks for it
     "multigrid": ("reduction.method=residual_flexibility", "reduction.solver=multigrid"),
 }
 WAYS = ("product", "by hand")
-OTHERS = {"1M": ("flexibility",), "5M-cubes": ("multigrid",)}  # constraint modes do not fit 24 GB, nor a factor
-OTHERS |= dict.fromkeys(("36k-cubes", "140k-cubes", "1M-cubes"), ("flexibility", "multigrid"))
+WAYS_OF_SIZE = {"1M": ("flexibility",), "5M-cubes": ("multigrid",)}  # constraint modes do not fit 24 GB, nor a factor
+WAYS_OF_SIZE |= dict.fromkeys(("36k-cubes", "140k-cubes", "1M-cubes"), ("flexibility", "multigrid"))
 STAGES = {  # function of a reduction -> what its seconds are told as
     "factorise": "factor", "fixed_interface_modes": "modes", "constraint_modes": "constraint modes",
     "_congruent": "projection", "_ritz": "static shapes",
@@ -76,19 +76,19 @@ def run(sizes: Sequence[str], say: Callable[[str], None], ways: Sequence[str] = 
     ways : those that fit the size by default
     Raises  ValueError for a size or a way that is not known
     """
-    known = dict.fromkeys([*PRODUCTS, *WAYS])
+    ways_by_name = dict.fromkeys([*PRODUCTS, *WAYS])
     for way in ways:
-        if way not in known:
-            raise ValueError(f'no way "{way}": there are {", ".join(known)}')
+        if way not in ways_by_name:
+            raise ValueError(f'no way "{way}": there are {", ".join(ways_by_name)}')
     rows = []
     for size in sizes:
         if size not in SIZES | ASSEMBLIES:
             raise ValueError(f'no size "{size}": there are {", ".join(SIZES | ASSEMBLIES)}')
-        for way in ways or OTHERS.get(size, WAYS):
+        for way in ways or WAYS_OF_SIZE.get(size, WAYS):
             say(f"{size}{' DOFs' if size in SIZES else ''}, {way}")
-            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
-                job = alone.submit(measure, SIZES[size], way) if size in SIZES else None
-                rows.append((job or alone.submit(measure_assembly, ASSEMBLIES[size], way)).result())
+            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+                job = pool.submit(measure, SIZES[size], way) if size in SIZES else None
+                rows.append((job or pool.submit(measure_assembly, ASSEMBLIES[size], way)).result())
     return rows
 
 
@@ -132,13 +132,13 @@ def _measured(scene_of: Callable[[Path], scene_file.SceneFile], way: str, files:
             clock.seconds["rest"] -= sum(of_stages.values())
             masters = 0 if reduced.residual is not None else len(reduced.info.master_dofs)
             frequency = np.zeros(0) if reduced.info.free_frequency is None else reduced.info.free_frequency
-            found = FeCost(
+            cost = FeCost(
                 way, part.system.n_dof, masters, clock.seconds | of_stages, memory.peak(),
                 first_hz=float(frequency[0]),
             )  # fmt: skip
         else:
-            found = _by_hand(part, clock)
-    return found
+            cost = _by_hand(part, clock)
+    return cost
 
 
 def assembly(folder: Path, size: tuple[int, int, int, int]) -> scene_file.SceneFile:
@@ -231,18 +231,19 @@ def as_text(rows: Sequence[FeCost]) -> str:
     """The rows for people, with exponents of seconds and memory over DOFs where there are several sizes."""
     lines = []
     for row in rows:
-        told = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in row.seconds.items())
-        more = "" if np.isnan(row.first_hz) else f"; first frequency {row.first_hz:.9g} Hz"
+        stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in row.seconds.items())
+        frequency = "" if np.isnan(row.first_hz) else f"; first frequency {row.first_hz:.9g} Hz"
         lines.append(
-            f"{row.dofs:9d} DOFs, {row.masters} masters, {row.way:16} {row.peak_bytes / 1e9:6.2f} GB: {told}{more}"
+            f"{row.dofs:9d} DOFs, {row.masters} masters, {row.way:16} {row.peak_bytes / 1e9:6.2f} GB: {stages}"
+            f"{frequency}"
         )
     for way in dict.fromkeys(row.way for row in rows):
-        own = [row for row in rows if row.way == way]
-        if len({row.dofs for row in own}) > 1:
-            size = np.log([row.dofs for row in own])
+        of_way = [row for row in rows if row.way == way]
+        if len({row.dofs for row in of_way}) > 1:
+            size = np.log([row.dofs for row in of_way])
             powers = [
                 np.polyfit(size, np.log(y), 1)[0]
-                for y in ([sum(r.seconds.values()) for r in own], [r.peak_bytes for r in own])
+                for y in ([sum(r.seconds.values()) for r in of_way], [r.peak_bytes for r in of_way])
             ]
             lines.append(f"{way}: seconds grow with the power {powers[0]:.2f} of the DOFs, memory with {powers[1]:.2f}")
     return "\n".join(lines)

@@ -62,40 +62,42 @@ def chain(n: int, harmonics: int) -> tuple[HarmonicBalance, dict[str, Any]]:
     damping, zero, rows = 0.01 * stiffness, np.zeros((n, n)), np.zeros((2 * n, 2 * n))
     rows[np.arange(0, 2 * n, 2), np.arange(n)] = rows[np.arange(1, 2 * n, 2), n + np.arange(n)] = 1.0
     loads = {"force": np.eye(2 * n)[0], "press": np.concatenate([np.zeros(n), np.ones(n)])}
-    both = [np.block([[a, zero], [zero, np.eye(n)]]) for a in (np.eye(n), stiffness, damping)]
-    system = SecondOrderSystem(*both, loads, {"first": np.eye(2 * n)[0]})
+    matrices = [np.block([[a, zero], [zero, np.eye(n)]]) for a in (np.eye(n), stiffness, damping)]
+    system = SecondOrderSystem(*matrices, loads, {"first": np.eye(2 * n)[0]})
     parameters = ContactParameters.of(("t1", "n"), np.tile([SPRING, NORMAL], (n, 1)), friction=1.0)
     excitation = Excitation.of({"press": LIMIT * (1 + NORMAL) / NORMAL}, {1: {"force": 0.1}})
     basis = HarmonicBasis(tuple(range(harmonics + 1)), SAMPLES, "sampled")
     model = ReducedModel(system, interface(rows, ("t1", "n")))
     balance = HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, 2.5)
     element = {"type": "Jenkins", "k": SPRING, "mu": 1.0, "N0": LIMIT}
-    told = {"stiffness": stiffness.tolist(), "damping": damping.tolist(), "force": 0.1, "range": [0.05, 2.5]}
-    return balance, {**told, "element": element, "harmonics": harmonics}
+    description = {"stiffness": stiffness.tolist(), "damping": damping.tolist(), "force": 0.1, "range": [0.05, 2.5]}
+    return balance, {**description, "element": element, "harmonics": harmonics}
 
 
 def duffing(harmonics: int) -> tuple[HarmonicBalance, dict[str, Any]]:
     """One mass on a cubic spring."""
-    told = {"stiffness": [[1.0]], "damping": [[0.04]], "force": 0.3, "range": [0.5, 5.0], "harmonics": harmonics}
+    description = {"stiffness": [[1.0]], "damping": [[0.04]], "force": 0.3, "range": [0.5, 5.0], "harmonics": harmonics}
     balance = Duffing().balance(tuple(range(harmonics + 1)), SAMPLES)
-    return balance, {**told, "element": {"type": "CubicSpring", "k": 1.0}}
+    return balance, {**description, "element": {"type": "CubicSpring", "k": 1.0}}
 
 
 def run(python: Path, say: Callable[[str], None]) -> list[Race]:
     """Both programs in turn; python : an interpreter with pyHarm."""
     rows = []
-    for name, (balance, told) in {
+    for name, (balance, description) in {
         "Duffing oscillator": duffing(7),
         "one mass with friction": chain(1, 7),
         "three masses with friction": chain(3, 3),
         "five masses with friction": chain(5, 3),
     }.items():
         say(name)
-        branch, seconds = _ours(balance, told["range"])
-        theirs = _theirs(python, told, len(branch.omega))
+        branch, seconds = _ours(balance, description["range"])
+        theirs = _theirs(python, description, len(branch.omega))
         differs = max(_difference(balance, w, np.array(x)) for w, x in zip(theirs["omega"], theirs["x"], strict=True))
         points = len(theirs["omega"])
-        rows.append(Race(name, told["harmonics"], len(branch.omega), seconds, points, theirs["seconds"], differs))
+        rows.append(
+            Race(name, description["harmonics"], len(branch.omega), seconds, points, theirs["seconds"], differs)
+        )
     return rows
 
 
@@ -110,29 +112,31 @@ def _ours(balance: HarmonicBalance, over: list[float]) -> tuple[Branch, float]:
     return branch, min(seconds)
 
 
-def _theirs(python: Path, told: dict[str, Any], points: int) -> dict[str, Any]:
+def _theirs(python: Path, problem: dict[str, Any], points: int) -> dict[str, Any]:
     """Their curve with the longest steps that give as many points; raises RuntimeError with what they say."""
-    one = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+    single_thread = {
+        name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+    }
 
-    def asked(step: float, repeat: int, seconds: float | None = None) -> dict[str, Any]:
-        told_all = {**told, "samples": SAMPLES, "tolerance": TOLERANCE, "step": step, "repeat": repeat}
+    def answer(step: float, repeat: int, seconds: float | None = None) -> dict[str, Any]:
+        told_all = {**problem, "samples": SAMPLES, "tolerance": TOLERANCE, "step": step, "repeat": repeat}
         script = Path(__file__).with_name("peers_pyharm.py")
         done = subprocess.run(
             [python.absolute(), script.resolve()], input=json.dumps([told_all]), timeout=seconds, capture_output=True,
-            text=True, env={**os.environ, **one}, cwd=gettempdir(),  # where it writes a file of its own
+            text=True, env={**os.environ, **single_thread}, cwd=gettempdir(),  # where it writes a file of its own
         )  # fmt: skip
         if done.returncode:
             raise RuntimeError(f"pyHarm ended with: {done.stderr.strip().splitlines()[-1]}")
-        found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])[0]
-        return found
+        answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])[0]
+        return answer
 
     def enough(step: float) -> bool:
         try:
-            return len(asked(step, 1, PATIENCE)["omega"]) >= points
+            return len(answer(step, 1, PATIENCE)["omega"]) >= points
         except subprocess.TimeoutExpired:  # it halves steps without an end
             return False
 
-    return asked(next(filter(enough, STEPS), STEPS[-1]), 3)
+    return answer(next(filter(enough, STEPS), STEPS[-1]), 3)
 
 
 def _difference(balance: HarmonicBalance, omega: float, x: np.ndarray) -> float:

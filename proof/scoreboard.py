@@ -30,7 +30,7 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 ROWS = "rows.jsonl"
 ROUNDING = 1e-8  # relative difference that says nothing
 BOUNDED = 14  # every so many scenes an error bound is asked for too
-WANTED = "20 % of peak frequency, amplitude, energy, preload"
+ACCURACY = "20 % of peak frequency, amplitude, energy, preload"
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Judged:
     @property
     def counted(self) -> bool:
         """Whether there is a stated error and a reference to hold it against; not where the scene gives the number."""
-        known = self.stated and self.error is not None and self.true is not None
-        return known and max(self.error or 0.0, self.true or 0.0) > ROUNDING
+        is_comparable = self.stated and self.error is not None and self.true is not None
+        return is_comparable and max(self.error or 0.0, self.true or 0.0) > ROUNDING
 
     @property
     def violated(self) -> bool:
@@ -91,7 +91,7 @@ def row_of(line: str) -> Row:
     """A row from its line of JSON."""
     data = json.loads(line)
     for name in ("judged", "bound"):
-        data[name] = tuple(Judged(**one) for one in data[name])
+        data[name] = tuple(Judged(**record) for record in data[name])
     data["changes"], data["seconds"] = tuple(data["changes"]), tuple(data["seconds"])
     return Row(**data)
 
@@ -119,17 +119,17 @@ def run(
     wearing : scenes that all wear, of which no error bound is asked for
     """
     folder.mkdir(parents=True, exist_ok=True)
-    kept = [row for row in rows_in(folder) if (row.seed, row.wearing) == (seed, wearing)]
-    done = {row.number for row in kept}
+    rows = [row for row in rows_in(folder) if (row.seed, row.wearing) == (seed, wearing)]
+    done = {row.number for row in rows}
     for number in (n for n in range(scenes) if n not in done):
         row = measured(number, seed, seconds, wearing)
         with (folder / ROWS).open("a", encoding="utf-8") as file:
             file.write("\n" * _torn(folder) + row.record() + "\n")
-        kept.append(row)
-        violated = ", ".join(one.quantity for one in (*row.judged, *row.bound) if one.violated)
-        spent = "/".join(f"{one:.0f}" for one in row.seconds)
+        rows.append(row)
+        violated = ", ".join(entry.quantity for entry in (*row.judged, *row.bound) if entry.violated)
+        spent = "/".join(f"{entry:.0f}" for entry in row.seconds)
         say(f"{row.family} {number}: {row.outcome}, {spent} s{f'; VIOLATED: {violated}' if violated else ''}")
-    return sorted((row for row in kept if not scenes or row.number < scenes), key=lambda row: row.number)
+    return sorted((row for row in rows if not scenes or row.number < scenes), key=lambda row: row.number)
 
 
 def measured(number: int, seed: int, seconds: float, wearing: bool = False) -> Row:
@@ -151,7 +151,7 @@ def measured(number: int, seed: int, seconds: float, wearing: bool = False) -> R
         except (ValueError, RuntimeError) as refusal:
             return replace(row, outcome=f"refused: {refusal}", seconds=(process_time() - clock, 0.0, 0.0))
         ran = process_time() - clock
-        said = verdict.judge(file, model, result, Progress())
+        stated = verdict.judge(file, model, result, Progress())
         clock = process_time()
         truth, outcome = reference.solved(file, seconds)
         referred = process_time() - clock
@@ -160,11 +160,11 @@ def measured(number: int, seed: int, seconds: float, wearing: bool = False) -> R
             outcome=outcome,
             n_pair=model.balance.contact.n_pair,
             harmonics=max(result.harmonics),
-            judged=tuple(_judged(name, said, truth) for name in QUANTITIES),
+            judged=tuple(_judged(name, stated, truth) for name in QUANTITIES),
             bound=_bound(file, seconds) if number % BOUNDED == 1 and not wearing else (),
-            changes=tuple(asdict(one) for one in said.changes),
-            ratio=said.ratio,
-            seconds=(ran, said.seconds, referred),
+            changes=tuple(asdict(change) for change in stated.changes),
+            ratio=stated.ratio,
+            seconds=(ran, stated.seconds, referred),
         )
 
 
@@ -174,27 +174,29 @@ def solved(file: SceneFile) -> tuple[Result, modelling.Model]:
     return result, modelling.build(file, Progress(), result.harmonics)
 
 
-def _judged(name: str, said: Verdict, truth: reference.Values) -> Judged:
-    one, right = said.statements[name], truth[name]
-    true = None if one.value is None or right is None else relative(one.value, right)
-    return Judged(name, one.value, one.error, one.dominated_by, one.stated, right, true, one.reason)
+def _judged(name: str, judgement: Verdict, truth: reference.Values) -> Judged:
+    statement, right = judgement.statements[name], truth[name]
+    true = None if statement.value is None or right is None else relative(statement.value, right)
+    return Judged(
+        name, statement.value, statement.error, statement.dominated_by, statement.stated, right, true, statement.reason
+    )
 
 
 def _bound(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
     """What `run --accuracy` bounds of the unworn response, against a reference that is finer than its last round."""
     start = process_time()
 
-    def round_of(one: SceneFile, number: int) -> Result:
+    def round_of(scene_file: SceneFile, number: int) -> Result:
         if process_time() - start > seconds:
             raise RuntimeError(f"the bound takes above {seconds:g} s")
-        result, model = solved(one)
-        return verdict.with_verdict(one, model, result, Progress())
+        result, model = solved(scene_file)
+        return verdict.with_verdict(scene_file, model, result, Progress())
 
     try:
-        result, bound = accuracy.to_accuracy(file, WANTED, round_of, lambda sentence: None)
+        result, bound = accuracy.to_accuracy(file, ACCURACY, round_of, lambda sentence: None)
     except (ValueError, RuntimeError):
         return ()
     truth, _ = reference.solved(file.changed("wear=", *bound.overrides), seconds, reference.FINER.refined_elements)
-    said = loaded(result.verdict)
-    met = [name for name, why in bound.reasons.items() if not why]
-    return tuple(replace(_judged(name, said, truth), error=bound.wanted.error) for name in met)
+    stated = loaded(result.verdict)
+    names = [name for name, reason in bound.reasons.items() if not reason]
+    return tuple(replace(_judged(name, stated, truth), error=bound.wanted.error) for name in names)

@@ -33,7 +33,7 @@ WORN = 0.5  # share of the scenes that are worn
 DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
 LOST = 0.05  # share of the preload where a life ends: the rest lasts two to four times as long, on every mesh otherwise
 # frequencies at which they wear, over the resonance of the free part: half of them well below, where more motions stay
-BESIDE = ((0.4, 0.6), (0.4, 0.6), (0.85, 0.95), (1.05, 1.15))
+SPREADS = ((0.4, 0.6), (0.4, 0.6), (0.85, 0.95), (1.05, 1.15))
 # where all scenes wear
 IN_TIME: Table = {"rule": "error_controlled", "tolerance": 0.03, "motion": "time", "max_steps": 400}
 TOPS = (1, 1, 2, 3, 3, 5)  # highest harmonic kept
@@ -75,9 +75,9 @@ def draw(number: int, seed: int, folder: Path, wearing: bool = False) -> Drawn:
     guess: Table = {"frequency": [1.0, 1e5], "points": 10}
     text = as_toml(table | {"response": table["response"] | guess})
     balance = modelling.build(parse(text, "drawn.toml", (), folder), Progress()).balance
-    worn, at = bool(rng.uniform() < WORN) or wearing, float(rng.uniform(*BESIDE[int(rng.integers(len(BESIDE)))]))
+    worn, at = bool(rng.uniform() < WORN) or wearing, float(rng.uniform(*SPREADS[int(rng.integers(len(SPREADS)))]))
     drive = float(10 ** rng.uniform(*(WEARING if worn else DRIVE)))
-    low, high, place, force = _placed(balance, drive, at if worn else None)
+    low, high, place, force = _operating_range(balance, drive, at if worn else None)
     table["response"] |= {"frequency": [low, high], "points": int(rng.choice([30, 50]))}
     table["loads"]["harmonic"]["shake"]["value"] = force
     if worn:
@@ -120,14 +120,14 @@ def _lengths(rng: np.random.Generator, **bounds: tuple[float, float]) -> dict[st
     return {name: round(float(rng.uniform(*pair)), 5) for name, pair in bounds.items()}
 
 
-def _pressed(top: str, driven: str, seen: str, direction: str, rng: np.random.Generator) -> Table:
+def _pressed(top: str, driven: str, output: str, direction: str, rng: np.random.Generator) -> Table:
     """Loads and response of a part that is pressed on the ground at its end and shaken along a direction."""
     return {
         "loads": {
             "static": {"press": {"group": top, "direction": "-z", "value": float(10 ** rng.uniform(2, 4))}},
             "harmonic": {"shake": {"group": driven, "direction": direction, "value": 1.0}},
         },
-        "response": {"group": seen, "direction": direction},
+        "response": {"group": output, "direction": direction},
     }
 
 
@@ -212,11 +212,11 @@ def _rig(rng: np.random.Generator) -> Table:
     pad = {"pad_start": base["length"] - mover["length"], "pad_end": base["length"]}
     pressed = float(10 ** rng.uniform(2, 3.7))
     spring = float(10 ** rng.uniform(5, 6.5))
-    many = {"n_length": round(fine * base["length"] / mover["length"]), "n_width": 1, "n_height": 1}
+    divisions = {"n_length": round(fine * base["length"] / mover["length"]), "n_width": 1, "n_height": 1}
     spring_of = {"group": "mover.z_max", "stiffness": spring}
     return {
         "bodies": {
-            "base": {"part": "block", "material": "steel", "fixed": ["x_min"], **base, **pad, **many},
+            "base": {"part": "block", "material": "steel", "fixed": ["x_min"], **base, **pad, **divisions},
             "mover": {
                 "part": "block", "material": "steel", **mover, "n_length": fine, "n_width": 1, "n_height": 1,
                 "translation": [pad["pad_start"], 0.0, base["height"]],
@@ -239,21 +239,23 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Table]] = {
 }  # fmt: skip
 
 
-def _placed(balance: HarmonicBalance, drive: float, at: float | None) -> tuple[float, float, float, float]:
+def _operating_range(balance: HarmonicBalance, drive: float, at: float | None) -> tuple[float, float, float, float]:
     """Range of the response [Hz], its lower and upper end, a frequency in it [Hz], and the force [N].
 
     drive : tangential force of the stuck contact over what friction can carry, at that frequency
     at : the frequency over the resonance of the free part; None: the highest resonance of the stuck one
     """
     system, b = balance.model.at_harmonic(1)
-    free, held = (
+    free, stuck_modes = (
         np.sqrt(np.abs(sla.eigh(k, system.mass, eigvals_only=True, subset_by_index=(0, MODES - 1))))
         for k in (system.stiffness, stuck_stiffness(system.stiffness, b, balance.contact.stiffness))
     )
-    curves = references.linear_references(balance, settings.OUTPUT, 0.5 * float(held[0]), 1.1 * float(held[-1]))
+    curves = references.linear_references(
+        balance, settings.OUTPUT, 0.5 * float(stuck_modes[0]), 1.1 * float(stuck_modes[-1])
+    )
     stuck = float(curves.omega[int(np.argmax(curves.stuck))])
-    below = free[free < stuck]
-    loose = float(below[-1]) if len(below) and below[-1] > stuck / WIDEST else stuck / 1.5
+    lower = free[free < stuck]
+    loose = float(lower[-1]) if len(lower) and lower[-1] > stuck / WIDEST else stuck / 1.5
     place = stuck if at is None else at * loose
     at_rest, moving = balance.x_lin(place), balance.contact.stiffness.ravel()
     x = np.abs(at_rest.reshape(len(moving), -1))
@@ -273,12 +275,12 @@ def as_toml(table: Table) -> str:
     """A table of tables as TOML; lists and scalars as JSON writes them, which is TOML too."""
     lines: list[str] = []
 
-    def put(path: tuple[str, ...], here: Table) -> None:
-        own = {key: value for key, value in here.items() if not isinstance(value, dict)}
-        if own:
+    def put(path: tuple[str, ...], current: Table) -> None:
+        values = {key: value for key, value in current.items() if not isinstance(value, dict)}
+        if values:
             lines.append(f"[{'.'.join(path)}]")
-            lines.extend(f"{key} = {json.dumps(value)}" for key, value in own.items())
-        for key, value in here.items():
+            lines.extend(f"{key} = {json.dumps(value)}" for key, value in values.items())
+        for key, value in current.items():
             if isinstance(value, dict):
                 put((*path, key), value)
 

@@ -91,9 +91,9 @@ def compare(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] =
         rows = [_measure(problem, delta, "thesis", step, say) for step in (*THESIS_STEPS, *FINER_STEPS)]
         rows += [_measure(problem, delta, "error_controlled", tolerance, say) for tolerance in TOLERANCES]
     # second order in the step, whose square the tolerance bounds: errors are proportional to the tolerance
-    beyond = REFERENCE_TOLERANCES[1] / (REFERENCE_TOLERANCES[0] - REFERENCE_TOLERANCES[1])
-    depth = fine[1].depth_m + beyond * (fine[1].depth_m - fine[0].depth_m)
-    life = fine[1].life_cycles + beyond * (fine[1].life_cycles - fine[0].life_cycles)
+    extrapolation = REFERENCE_TOLERANCES[1] / (REFERENCE_TOLERANCES[0] - REFERENCE_TOLERANCES[1])
+    depth = fine[1].depth_m + extrapolation * (fine[1].depth_m - fine[0].depth_m)
+    life = fine[1].life_cycles + extrapolation * (fine[1].life_cycles - fine[0].life_cycles)
     reference = replace(fine[1], depth_m=depth, life_cycles=life, step=0.0)
 
     def judged(row: WearStepRow) -> WearStepRow:
@@ -152,15 +152,15 @@ def roughness(points: np.ndarray, depth: np.ndarray) -> float:
     """
     spread = np.argsort(np.ptp(points, axis=0))[-2:]
     worst = 0.0
-    for along, across in (spread, spread[::-1]):
+    for direction, across in (spread, spread[::-1]):
         lines: dict[float, list[int]] = {}
         for i, point in enumerate(points):
             lines.setdefault(round(float(point[across]), 9), []).append(i)
         for line in lines.values():
-            order = sorted(line, key=lambda i: points[i, along])
+            order = sorted(line, key=lambda i: points[i, direction])
             if len(order) < 3:
                 continue
-            s, w = points[order, along], depth[order]
+            s, w = points[order, direction], depth[order]
             share = (s[1:-1] - s[:-2]) / (s[2:] - s[:-2])
             straight = w[:-2] + share * (w[2:] - w[:-2])
             worst = max(worst, float(np.abs(w[1:-1] - straight).max()))
@@ -177,7 +177,7 @@ def picture(table: WearStepTable) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9, 3.8), layout="constrained")
         panes = figure.subplots(1, 2, sharex=True)
-        for pane, name, asked in zip(panes, ("life", "depth"), (1e-2, 1e-3), strict=True):
+        for pane, name, target in zip(panes, ("life", "depth"), (1e-2, 1e-3), strict=True):
             for rule, colour in (("thesis", ORANGE), ("error_controlled", BLUE)):
                 rows = sorted((r for r in table.rows if r.rule == rule), key=lambda r: r.hbm_solves)
                 error = [abs(getattr(r, f"{name}_error")) for r in rows]
@@ -185,7 +185,7 @@ def picture(table: WearStepTable) -> Figure:
                 for row, height in zip(rows, error, strict=True):
                     at = (row.hbm_solves, height)
                     pane.annotate(f"{100 * row.step:g} %", at, (3, 4), textcoords="offset points", fontsize=7)
-            pane.axhline(asked, color=GREY, linestyle=":", linewidth=1)
+            pane.axhline(target, color=GREY, linestyle=":", linewidth=1)
             pane.set(title=f"{table.scene}: error in {name}", xlabel="harmonic balance solves")
             pane.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             pane.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
@@ -220,8 +220,8 @@ def as_text(table: WearStepTable) -> str:
         for row in table.rows
         if row.rule == "error_controlled" and row.life_error is not None and (times := _times(table, row))
     ]
-    left = f"{100 * LIFE_SHARE:g} % of the first preload is left"
-    lines.append(f"life and depth where {left}; the thesis's depth where the contact has separated")
+    share = f"{100 * LIFE_SHARE:g} % of the first preload is left"
+    lines.append(f"life and depth where {share}; the thesis's depth where the contact has separated")
     return "\n".join(lines)
 
 
@@ -232,8 +232,8 @@ def _times(table: WearStepTable, row: WearStepRow) -> str:
     if not errors:
         return ""
     enough = [n for n, e in errors.items() if e <= abs(row.life_error)]
-    most = min(enough, default=max(errors))
-    return f"the thesis's rule {'' if enough else 'more than '}{most}: {most / row.hbm_solves:.0f} times"
+    solves = min(enough, default=max(errors))
+    return f"the thesis's rule {'' if enough else 'more than '}{solves}: {solves / row.hbm_solves:.0f} times"
 
 
 def _bracket(value: float | None, form: str) -> str:

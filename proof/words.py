@@ -11,7 +11,7 @@ Changes = Annotated[tuple[str, ...], Parameter(name="--change", negative=(), con
 PICTURE = (".png", ".pdf", ".svg")
 
 
-def aside(sentence: str, share: float | None = None) -> None:
+def report_progress(sentence: str, share: float | None = None) -> None:
     """Progress of a proof, beside what it prints; shares of a stage are not shown."""
     if share is None:
         print(sentence, file=sys.stderr, flush=True)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from proof.extremes_march import held
+from proof.extremes_march import march_checks
 from proof.extremes_models import Setting, lattice
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
@@ -53,7 +53,7 @@ def _holds(balance: HarmonicBalance, setting: Setting, solution: Solution) -> No
         dynamic = system.stiffness + s * system.damping + s * s * system.mass
         expected = b @ np.linalg.solve(dynamic, loads[h] - b.T @ force[:, h])
         np.testing.assert_allclose(x[:, h], expected, atol=1e-6 * np.abs(expected).max())
-    assert [one.name for one in held(balance, state) if one.off > one.allowed] == []
+    assert [one.name for one in march_checks(balance, state) if one.off > one.allowed] == []
 
 
 def test_the_limit_of_stiff_springs_is_come_to() -> None:

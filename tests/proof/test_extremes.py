@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from proof import __main__ as cli, extremes, extremes_march, extremes_wear
-from proof.extremes_judge import judged, sampled_honestly, tried
-from proof.extremes_march import held
+from proof.extremes_judge import judged, sampled_honestly, solve_and_judge
+from proof.extremes_march import march_checks
 from proof.extremes_models import lattice, rigid
 from tests.helpers.pressed_body import growth_by_few_modes
 from tribodyn.hbm.balance import HarmonicBalance, State
@@ -41,7 +41,7 @@ def test_the_full_table_has_at_least_300_cells() -> None:
 def test_a_solution_that_is_slightly_off_is_seen(transitions: str) -> None:
     body = lattice(2, 2)
     balance = body.balance(replace(body.ordinary, transitions=transitions))
-    verdict, solution = tried(balance, body.ordinary.omega)
+    verdict, solution = solve_and_judge(balance, body.ordinary.omega)
     assert verdict.outcome == "converged"
     assert "friction of a plain march, normal of a plain march, work of a plain march, equilibrium" in verdict.reason
     x = solution.state.x.copy()
@@ -56,10 +56,10 @@ def test_a_contact_force_or_an_energy_off_by_a_thousandth_is_seen(transitions: s
     """The march shares nothing with the solver's law, which all other checks believe."""
     body = lattice(2, 2)
     balance = body.balance(replace(body.ordinary, transitions=transitions, **changes))
-    state = tried(balance, body.ordinary.omega)[1].state
+    state = solve_and_judge(balance, body.ordinary.omega)[1].state
 
     def told(found: State) -> set[str]:
-        return {one.name for one in held(balance, found) if one.off > one.allowed}
+        return {one.name for one in march_checks(balance, found) if one.off > one.allowed}
 
     assert not told(state)
     for part, name in ((np.s_[:, :-1], "friction"), (np.s_[:, -1:], "normal")):
@@ -72,10 +72,10 @@ def test_a_contact_force_or_an_energy_off_by_a_thousandth_is_seen(transitions: s
 def test_a_friction_work_off_by_a_thousandth_is_seen(transitions: str, monkeypatch: pytest.MonkeyPatch) -> None:
     body = lattice(3, 3)
     balance = body.balance(replace(body.ordinary, transitions=transitions))
-    state = tried(balance, body.ordinary.omega)[1].state
+    state = solve_and_judge(balance, body.ordinary.omega)[1].state
     energy = HarmonicBalance.energy
     monkeypatch.setattr(HarmonicBalance, "energy", lambda self, state: 1.001 * energy(self, state))
-    assert [one.name for one in held(balance, state) if one.off > one.allowed] == ["work"]
+    assert [one.name for one in march_checks(balance, state) if one.off > one.allowed] == ["work"]
 
 
 def test_the_march_finds_the_loop_of_a_jenkins_element() -> None:
@@ -113,7 +113,7 @@ def test_the_estimate_of_sampling_covers_its_error(samples: int, force: float) -
     """Also where a first step from it, relative to what was solved, tells 30 % of 43 and 24 % of 33."""
     body = rigid(3)
     balance = body.balance(replace(body.ordinary, samples=samples, transitions="sampled", force=force))
-    verdict = sampled_honestly(balance, tried(balance, body.ordinary.omega)[1].state)
+    verdict = sampled_honestly(balance, solve_and_judge(balance, body.ordinary.omega)[1].state)
     assert verdict.outcome == "converged"
     assert verdict.deviation > 0
 
@@ -121,7 +121,7 @@ def test_the_estimate_of_sampling_covers_its_error(samples: int, force: float) -
 def test_a_response_that_the_samples_spoil_is_refused() -> None:
     body = rigid(1)
     balance = body.balance(replace(body.ordinary, samples=4, transitions="sampled"))
-    verdict = sampled_honestly(balance, tried(balance, body.ordinary.omega)[1].state)
+    verdict = sampled_honestly(balance, solve_and_judge(balance, body.ordinary.omega)[1].state)
     assert verdict.outcome == "refused"
     assert "the error estimate of the samples is above 50%" in verdict.reason
 
@@ -131,7 +131,7 @@ def test_a_contact_that_sticks_does_not_wear() -> None:
     body = lattice(3, 3)
     gentle = replace(body.ordinary, force=12.0)
     balance = body.balance(gentle)
-    _, solution = tried(balance, gentle.omega)
+    _, solution = solve_and_judge(balance, gentle.omega)
     assert np.all(solution.state.cycle.status == 1)
     assert not balance.energy(solution.state).any()
 

@@ -38,8 +38,8 @@ def test_every_run_ends_as_a_run_may(tmp_path: Path) -> None:
         raise AssertionError(words)
 
     kept = fuzz.fuzz("beam", TINY, values=150, runs=3, seed=1, folder=tmp_path, command=never)
-    assert [(one.key, one.value, one.end, one.said) for one in kept] == [
-        (one.key, one.value, one.end, one.said) for one in tried
+    assert [(one.key, one.value, one.end, one.output) for one in kept] == [
+        (one.key, one.value, one.end, one.output) for one in tried
     ]
     with pytest.raises(ValueError, match="keeps runs of beam with other changes"):
         fuzz.fuzz("beam", TINY[1:], values=1, folder=tmp_path, command=never)

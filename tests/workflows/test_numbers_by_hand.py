@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from proof.extremes_march import held
+from proof.extremes_march import march_checks
 from proof.extremes_models import lattice, rigid
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm.balance import HarmonicBalance, State
@@ -63,7 +63,7 @@ def test_work_is_force_times_velocity_over_the_cycle() -> None:
 
 
 def test_forces_and_friction_work_are_those_of_a_plain_march(solved: tuple[HarmonicBalance, State]) -> None:
-    assert [one.name for one in held(*solved) if one.off > one.allowed] == []
+    assert [one.name for one in march_checks(*solved) if one.off > one.allowed] == []
 
 
 def test_outputs_and_preload_follow_from_the_coordinates(solved: tuple[HarmonicBalance, State]) -> None:
@@ -216,7 +216,7 @@ def test_forces_over_gaps_are_those_of_a_plain_march(transitions: str) -> None:
     balance = body.balance(replace(body.ordinary, gap=-2e-6, transitions=transitions))
     solution = arc_length.solve_along_load(balance, body.ordinary.omega)
     assert solution.converged
-    assert [one.name for one in held(balance, solution.state) if one.off > one.allowed] == []
+    assert [one.name for one in march_checks(balance, solution.state) if one.off > one.allowed] == []
 
 
 def test_the_derivative_of_the_contact_forces_is_the_difference(solved: tuple[HarmonicBalance, State]) -> None:

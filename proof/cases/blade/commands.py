@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from proof.words import aside
+from proof.words import report_progress
 from tribodyn.workflows.command.word import Overrides, make_room, quantity
 
 
@@ -40,7 +40,7 @@ def blade(
     make_room(out)
     folder = out or Path("results") / f"blade_{work}"
     if work == "study":
-        written = blade_study.run(scene, overrides, folder, highest, aside, blade_study.Extent())
+        written = blade_study.run(scene, overrides, folder, highest, report_progress, blade_study.Extent())
     else:
         found = mistuned(scene, overrides=(*FEW_SECTORS, *overrides))
         written = found.write(folder)

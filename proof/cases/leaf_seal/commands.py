@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Literal
 
-from proof.words import aside
+from proof.words import report_progress
 from tribodyn.workflows.command.word import Flag, Json, make_room
 
 
@@ -50,6 +50,8 @@ def leaf(
         found = accuracy.compute(folder)
         said, record = found.text(), found.record()
     else:
-        one = fit.of_scene(read_scene("leaf_seal_thesis").mesh_scene) if work == "check" else fit.search(aside)
+        one = (
+            fit.of_scene(read_scene("leaf_seal_thesis").mesh_scene) if work == "check" else fit.search(report_progress)
+        )
         said, record = fit.as_text(one), one.record()
     print(json.dumps(record, indent=2) if as_json else said)

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Literal
 
-from proof.words import Changes, aside
+from proof.words import Changes, report_progress
 from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room
 
 
@@ -48,15 +48,15 @@ def rig(
     if change and work != "life":
         raise ValueError(f"--change is for rig life; for rig {work} use --set")
     if work == "life":
-        rows = rig_life.run(scene, overrides, change, aside)
+        rows = rig_life.run(scene, overrides, change, report_progress)
         print(json.dumps(rig_life.as_records(rows), indent=2) if as_json else rig_life.as_text(rows))
         return
     if work == "fit":
-        fits = rig_fit.run(scene, overrides, column, wear, aside)
+        fits = rig_fit.run(scene, overrides, column, wear, report_progress)
         print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
         return
     make_room(out)
-    table, paths = rig_study.run(scene, overrides, out or Path("results") / "rig_study", aside)
+    table, paths = rig_study.run(scene, overrides, out or Path("results") / "rig_study", report_progress)
     if as_json:
         print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
     else:
