@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 import tribodyn as td
-from tribodyn.workflows.studies import scenes
+from tribodyn.workflows.studies import front_door
 
 HERE = Path(__file__).parent
 PICTURES = HERE / "gallery" / "pictures"
@@ -84,7 +84,7 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
         old.unlink()  # its contacts may have other names now
     with TemporaryDirectory() as place:
         start, spent = time.perf_counter(), time.process_time()
-        written, missing = scenes.draw(result, Path(place), dpi=DPI)
+        written, missing = front_door.draw(result, Path(place), dpi=DPI)
         if missing:
             print(f"  {missing}")
         seconds, processor = time.perf_counter() - start, time.process_time() - spent
@@ -98,7 +98,7 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
         for over in ("wear", "cycle"):
             if over == "cycle" or result.wear_steps:
                 spent = time.process_time()
-                (film,) = scenes.animate(
+                (film,) = front_door.animate(
                     result, Path(place), over, formats=("gif",), images=FILM_IMAGES, dpi=FILM_DPI,
                     row=0 if over == "cycle" and result.wear_steps else None,
                 )  # fmt: skip

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from proof.extremes import Trial, counts
 from proof.extremes_judge import CONVERGED, REFUSED, WRONG
-from tribodyn.workflows.pictures.style import BLUE, ORANGE, RED, STYLE
+from tribodyn.workflows.pictures.theme import BLUE, ORANGE, RED, STYLE
 
 COLOUR = {CONVERGED: BLUE, REFUSED: ORANGE, WRONG: RED}
 

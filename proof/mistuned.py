@@ -15,7 +15,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.wheels import patterns, wheel as wheels
+from tribodyn.workflows.studies.wheels import patterns, wheel_model as wheels
 
 DAMPING = ("0.05 %", "0.1 %", "0.5 %")
 DIFFER = '\n[mistuning]\nfrequency = "1 %"\nfamilies = 3\nleft_out = 1e-6\n'

@@ -23,7 +23,7 @@ from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.wheels import wheel as wheels
+from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
 
 def cycle_at(file: SceneFile, balance: HarmonicBalance, frequency: float) -> State:

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from proof.scoreboard import ROUNDING, Judged, Row
-from tribodyn.workflows.pictures.style import BLUE, RED, STYLE
+from tribodyn.workflows.pictures.theme import BLUE, RED, STYLE
 from tribodyn.workflows.result.verdict import NAMES, QUANTITIES
 
 COLUMNS = ("scene", "family", "pairs", "harmonics", "quantity", "value", "stated error", "true error", "dominated by")

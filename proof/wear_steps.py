@@ -17,7 +17,7 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.hbm.wear.step_control import Tolerance
-from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE, STYLE
+from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE, STYLE
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection

@@ -8,8 +8,7 @@ from tribodyn.workflows.run.failure import SolveFailed as SolveFailed
 from tribodyn.workflows.run.modelling import Model as Model
 from tribodyn.workflows.scene.scene_file import SceneError as SceneError, SceneFile as SceneFile
 from tribodyn.workflows.scene.source import read_scene as read_scene
-from tribodyn.workflows.studies.inspection import inspect as inspect
-from tribodyn.workflows.studies.scenes import (
+from tribodyn.workflows.studies.front_door import (
     build as build,
     export as export,
     plan as plan,
@@ -18,6 +17,7 @@ from tribodyn.workflows.studies.scenes import (
     run_to_accuracy as run_to_accuracy,
     scene_names as scene_names,
 )
+from tribodyn.workflows.studies.inspection import inspect as inspect
 from tribodyn.workflows.studies.worn_states import verify as verify
 
 def _show_results_in(shell: object) -> None: ...

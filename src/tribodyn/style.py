@@ -1,6 +1,6 @@
 """Colours, colour maps and fonts that all pictures share, for figures of one's own beside them."""
 
-from tribodyn.workflows.pictures.style import (
+from tribodyn.workflows.pictures.theme import (
     BLUE,
     GREEN,
     GREY,

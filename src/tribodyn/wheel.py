@@ -2,12 +2,12 @@
 
 from tribodyn.workflows.studies.wheels.flutter import Flutter as Flutter, flutter as flutter
 from tribodyn.workflows.studies.wheels.mistuned_wear import MistunedWear as MistunedWear, pattern_wear as pattern_wear
-from tribodyn.workflows.studies.wheels.mistuning import Mistuned as Mistuned, mistuned as mistuned
-from tribodyn.workflows.studies.wheels.modes import WheelModes as WheelModes, modes as modes
 from tribodyn.workflows.studies.wheels.patterns import Patterns as Patterns, patterns as patterns
-from tribodyn.workflows.studies.wheels.wheel import (
+from tribodyn.workflows.studies.wheels.unequal_sectors import Mistuned as Mistuned, mistuned as mistuned
+from tribodyn.workflows.studies.wheels.wheel_model import (
     Wheel as Wheel,
     build as build,
     campbell as campbell,
     critical_speeds as critical_speeds,
 )
+from tribodyn.workflows.studies.wheels.wheel_modes import WheelModes as WheelModes, modes as modes

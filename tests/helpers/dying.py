@@ -6,7 +6,7 @@ import os
 import signal
 import time
 
-from tribodyn.workflows.studies.many.task import Row, Task
+from tribodyn.workflows.studies.many.run_task import Row, Task
 
 
 def at_two(one: Task) -> Row:

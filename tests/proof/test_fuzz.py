@@ -14,7 +14,7 @@ from proof import fuzz, fuzz_mixed, fuzz_result, fuzz_runs
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.verdict import Statement, Verdict
-from tribodyn.workflows.studies import scenes
+from tribodyn.workflows.studies import front_door
 
 TINY = (
     "harmonics.kept=[0, 1]", "wear.tolerance=2 %", "wear.at=peak", "wear.motion=machine",
@@ -88,7 +88,7 @@ def test_a_scene_that_does_not_end_well_as_it_is_is_no_scene_to_fuzz() -> None:
 
 
 def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    result = scenes.run("beam", overrides=TINY)
+    result = front_door.run("beam", overrides=TINY)
     wear = result.wear
     assert wear is not None
     told = {"depth": Statement(1.0, 0.1, "mesh and contact grid", "reported", "measured")}

@@ -17,7 +17,7 @@ from tribodyn.reduction.limits import ReductionLimits
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.wheels import wheel as wheels
+from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.02], ids=["rigid disk", "flexible disk"])

@@ -21,7 +21,7 @@ from tribodyn.workflows.command.main import BAD_INPUT, INTERRUPTED, READER_LEFT,
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import readable, store, summary
 from tribodyn.workflows.result.facts import Stage
-from tribodyn.workflows.studies.many.task import numbers_of
+from tribodyn.workflows.studies.many.run_task import numbers_of
 
 ROOT = Path(__file__).parents[2]
 

@@ -21,7 +21,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.varying import Varying, geometry_keys, keys
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.derivatives import of_summary
+from tribodyn.workflows.studies.response_derivatives import of_summary
 
 LOCATED = "harmonics.transitions=located"
 COARSE = {

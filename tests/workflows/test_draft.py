@@ -19,7 +19,7 @@ from tests.helpers.pages import ROOT
 from tribodyn.fem.assembly import named_in
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.workflows.pictures import offscreen
-from tribodyn.workflows.pictures.style import BLUE, RED
+from tribodyn.workflows.pictures.theme import BLUE, RED
 from tribodyn.workflows.run import modelling, sanity_checks
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file

@@ -16,7 +16,7 @@ from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import leave_alone
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.wheels import flutter, wheel as wheels
+from tribodyn.workflows.studies.wheels import flutter, wheel_model as wheels
 
 SCENE = WHEEL.replace("friction = 5.0", "friction = 0.3").replace('"2 %"', '"0.1 %"') + FLOW
 BY_DIAMETER = "[[-2, 0, 0.01], [-1, 0, 0.01], [0, 0, 0.01], [1, 0, -0.01], [2, 0, -0.02], [3, 0, 0.0]]"

@@ -15,7 +15,7 @@ from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.studies.wheels import flutter, wheel as wheels
+from tribodyn.workflows.studies.wheels import flutter, wheel_model as wheels
 
 COEFFICIENTS = {0: 0.012j, 1: 0.012 + 0.002j, -1: -0.012 + 0.002j}
 

@@ -18,11 +18,11 @@ from scipy.stats import qmc
 import tribodyn as td
 from tests.helpers.command import leave
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many import pool, quantiles, study as studies, study_file
+from tribodyn.workflows.studies.many import pool, quantiles, study_file, study_pictures
+from tribodyn.workflows.studies.many.parameter_space import Space
 from tribodyn.workflows.studies.many.quantiles import Sample, influences
-from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.run_task import Row, Task, slope_column, solve
 from tribodyn.workflows.studies.many.surrogate import Surrogate, covariance
-from tribodyn.workflows.studies.many.task import Row, Task, slope_column, solve
 
 PRESS, FRICTION, DAMPING = "loads.static.press.value", "contact.friction", "damping.modal"
 VARY = {
@@ -38,7 +38,7 @@ MEDIAN = 1e8
 def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """They take longer than all the rest."""
     if "command" not in request.node.name:
-        monkeypatch.setattr(studies.pictures, "shown", lambda found: ())
+        monkeypatch.setattr(study_pictures, "shown", lambda found: ())
         monkeypatch.setattr(td.studies.Lives, "plot", lambda self: Figure())
 
 

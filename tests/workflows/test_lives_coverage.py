@@ -9,8 +9,8 @@ import pytest
 
 import tribodyn as td
 from tribodyn.workflows.studies.many import quantiles, study_file
+from tribodyn.workflows.studies.many.parameter_space import Space
 from tribodyn.workflows.studies.many.quantiles import Sample
-from tribodyn.workflows.studies.many.space import Space
 from tribodyn.workflows.studies.many.surrogate import Surrogate
 
 CHEAP = (

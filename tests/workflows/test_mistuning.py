@@ -13,7 +13,7 @@ from tribodyn.hbm import derivatives as exact, newton
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.wheels import mistuning, wheel as wheels
+from tribodyn.workflows.studies.wheels import unequal_sectors, wheel_model as wheels
 
 
 @pytest.fixture(scope="module")
@@ -24,13 +24,13 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_drawn_factors_have_the_mean_and_the_spread_asked_for() -> None:
-    factors = mistuning.deviations(12, 0.03, 4)
+    factors = unequal_sectors.deviations(12, 0.03, 4)
     assert factors.mean() == pytest.approx(1.0)
     assert factors.std() == pytest.approx(0.03)
-    np.testing.assert_array_equal(factors, mistuning.deviations(12, 0.03, 4))
-    assert not np.allclose(factors, mistuning.deviations(12, 0.03, 5))
+    np.testing.assert_array_equal(factors, unequal_sectors.deviations(12, 0.03, 4))
+    assert not np.allclose(factors, unequal_sectors.deviations(12, 0.03, 5))
     with pytest.raises(ValueError, match="above 0"):
-        mistuning.deviations(12, 0.9, 4)
+        unequal_sectors.deviations(12, 0.9, 4)
 
 
 def test_factors_that_move_on_by_a_sector_move_the_amplitudes_on(scene: Path) -> None:
@@ -48,7 +48,7 @@ def test_factors_that_move_on_by_a_sector_move_the_amplitudes_on(scene: Path) ->
 
 
 def test_sectors_alike_are_amplified_by_nothing(scene: Path) -> None:
-    found = mistuning.mistuned(scene, np.ones(6))
+    found = unequal_sectors.mistuned(scene, np.ones(6))
     assert found.amplification == pytest.approx(1.0, rel=5e-3)
     assert "it has no derivatives by the factors: the response is highest at an end" in found.lines()[-1]
     assert found.record()["derivatives"] is None
@@ -62,8 +62,11 @@ def test_derivatives_by_the_factors_are_those_of_other_wheels(scene: Path, dampi
     """Of a wheel that slips at its peak, along a direction in which every sector has a part of its own."""
     near = ("contact.friction=0.3", "harmonics.transitions=located", "response.frequency=['822 Hz', '834 Hz']")
     overrides = (*near, f"damping={{{damping}}}")
-    factors, way = mistuning.deviations(6, 0.02, 1), np.array([0.4, -1.0, 0.7, 0.9, -0.3, -0.6])
-    wheel, solved = wheels.build(scene_file.read(str(scene), overrides)), mistuning.mistuned(scene, overrides=overrides)
+    factors, way = unequal_sectors.deviations(6, 0.02, 1), np.array([0.4, -1.0, 0.7, 0.9, -0.3, -0.6])
+    wheel, solved = (
+        wheels.build(scene_file.read(str(scene), overrides)),
+        unequal_sectors.mistuned(scene, overrides=overrides),
+    )
     found, output = solved.peak.found, f"response@{solved.record()['worst_sector']}"
     assert found.names[3] == "energy"
     assert found.values[3] > 0
@@ -76,7 +79,7 @@ def test_derivatives_by_the_factors_are_those_of_other_wheels(scene: Path, dampi
 
 def test_a_wheel_shows_the_derivatives_of_its_peak(scene: Path, tmp_path: Path) -> None:
     overrides = ("response.frequency=['640 Hz', '680 Hz']",)
-    found = mistuning.mistuned(scene, spread=0.02, overrides=overrides)
+    found = unequal_sectors.mistuned(scene, spread=0.02, overrides=overrides)
     rows = found.record()["derivatives"]["elasticities"]
     size = [abs(row["amplitude"]) for row in rows.values()]
     assert size == sorted(size, reverse=True)
@@ -90,7 +93,7 @@ def test_a_wheel_shows_the_derivatives_of_its_peak(scene: Path, tmp_path: Path) 
 
 def test_damping_by_two_modes_of_a_wheel_has_no_derivatives(scene: Path) -> None:
     two = ("response.frequency=['640 Hz', '680 Hz']", "damping={ratios=['2 %', '2 %'], modes=[0, 6]}")
-    found = mistuning.mistuned(scene, overrides=two)
+    found = unequal_sectors.mistuned(scene, overrides=two)
     assert found.lines()[-1].endswith("give damping.modal, or mass and stiffness")
 
 
@@ -98,12 +101,12 @@ def test_the_command_takes_any_wheel(scene: Path, tmp_path: Path, capsys: pytest
     cli.app(["wheel", "mistuned", str(scene), "--spread", "3 %", "--seed", "2", "--out", str(tmp_path), "--json"],
             result_action="return_value")  # fmt: skip
     said = json.loads(capsys.readouterr().out)
-    np.testing.assert_allclose(said["stiffness"], mistuning.deviations(6, 0.03, 2))
+    np.testing.assert_allclose(said["stiffness"], unequal_sectors.deviations(6, 0.03, 2))
     assert (tmp_path / "mistuned.csv").read_text(encoding="utf-8").startswith("frequency_Hz,sector_0_m")
 
 
 def test_what_cannot_be_is_one_sentence(scene: Path) -> None:
     with pytest.raises(ValueError, match=r"beam has no \[wheel\]"):
-        mistuning.mistuned("beam")
+        unequal_sectors.mistuned("beam")
     with pytest.raises(ValueError, match="6 sectors, but there are 2 factors"):
-        mistuning.mistuned(scene, [1.0, 1.1])
+        unequal_sectors.mistuned(scene, [1.0, 1.1])

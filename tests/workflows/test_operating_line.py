@@ -18,8 +18,8 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.run.sanity_checks import check_speed
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many import space, study, study_file, task
-from tribodyn.workflows.studies.wheels import wheel
+from tribodyn.workflows.studies.many import parameter_space, run_task, study_file, study_runs
+from tribodyn.workflows.studies.wheels import wheel_model
 
 EXACT = newton.NewtonOptions(tolerance=1e-11)
 LINE = ('wheel.sweep="speed"', "reduction.modes=24", "contact.friction=0.3", 'loads.harmonic.wave.value="300 N"')
@@ -58,7 +58,7 @@ def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz, law)
     one = line(sectors, order, *span)
     for f in (0.5 * (low + high), high - 1.0):
         own = (*LINE[1:], f"wheel.engine_order={order}", f'wheel.speed="{f / abs(order)} Hz"', *span)
-        whole = wheel.build(scene(sectors, *own)).whole()
+        whole = wheel_model.build(scene(sectors, *own)).whole()
         mine, theirs = (arc_length.solve_along_load(b, 2 * np.pi * f, EXACT) for b in (one, whole))
         assert mine.converged
         assert theirs.converged
@@ -84,7 +84,7 @@ def test_the_peak_of_a_line_is_where_it_meets_a_mode():
         assert beside.converged
         heights.append(np.linalg.norm(one.outputs(beside.state)[0, 1:]))
     assert heights[1] == max(heights)
-    there = wheel.build(scene(5, *LINE[1:], f'wheel.speed="{omega / (4 * np.pi)} Hz"'))
+    there = wheel_model.build(scene(5, *LINE[1:], f'wheel.speed="{omega / (4 * np.pi)} Hz"'))
     free, stuck = (float(there.diagram([-2], 1, state)[0, 0]) for state in (False, True))
     assert 2 * np.pi * free < omega < 2 * np.pi * stuck
     ends = 2 * np.pi * 240, 2 * np.pi * 280
@@ -132,10 +132,10 @@ def test_a_study_follows_each_engine_order_at_its_own_frequencies(tmp_path: Path
         "study": {"scene": "wheel.toml", "design": "list", "set": quick}, "vary": {"wheel.engine_order": [-1, -2, -3]}
     }  # fmt: skip
     asked = study_file.parse(tables, "orders.toml", tmp_path)
-    tasks, refused = study._tasks(asked, space.runs(asked))
+    tasks, refused = study_runs._tasks(asked, parameter_space.runs(asked))
     assert not refused
     for order, one in zip((1, 2, 3), tasks, strict=True):
         assert one.scene().scene.response.frequency == pytest.approx((100 * order, 125 * order))
-    row = task.solve(tasks[1])
+    row = run_task.solve(tasks[1])
     assert row.status == "complete"
     assert 230 < row.numbers["peak_hz_first"] < 240

@@ -15,8 +15,8 @@ from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import study_file
 from tribodyn.workflows.studies.many.optimum import Known, best_trades, promised, propose
-from tribodyn.workflows.studies.many.table import StudyTable
-from tribodyn.workflows.studies.many.task import numbers_of
+from tribodyn.workflows.studies.many.run_task import numbers_of
+from tribodyn.workflows.studies.many.study_table import StudyTable
 
 LINEAR = {
     "scene": "beam", "design": "sobol", "runs": 3, "seed": 3,

@@ -20,7 +20,7 @@ from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.pictures import film, maps, offscreen, plots, render, view
 from tribodyn.workflows.pictures.film import CycleFilm, WearFilm
-from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, RED, STATUS
+from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, RED, STATUS
 from tribodyn.workflows.result.states import shown_states
 
 COARSE = 60  # dots per inch: what is drawn is the same, in a tenth of the time

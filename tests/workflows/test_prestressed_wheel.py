@@ -17,15 +17,15 @@ from tribodyn.fem.prestress import geometric_stiffness
 from tribodyn.geometry.placing import rotation
 from tribodyn.workflows.run import part_reduction
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.wheels import wheel
+from tribodyn.workflows.studies.wheels import wheel_model
 
 FIVE = WHEEL.replace("n_blades = 6", "n_blades = 5").replace("sectors = 6", "sectors = 5")
 N, AXIS = 5, (1.0, 0.0, 0.0)
 
 
-def turning(rpm: float, gap: str) -> wheel.Wheel:
+def turning(rpm: float, gap: str) -> wheel_model.Wheel:
     overrides = (f'wheel.speed="{rpm} rpm"', f"contact.gap={gap}", "wheel.coriolis=false")
-    return wheel.build(scene_file.parse(FIVE, "w.toml", overrides, Path()))
+    return wheel_model.build(scene_file.parse(FIVE, "w.toml", overrides, Path()))
 
 
 @pytest.mark.parametrize("rpm", [4000, 10000])

@@ -24,9 +24,9 @@ from tests.helpers.command import leave
 from tribodyn.hbm.linear import compliance
 from tribodyn.workflows.run import kept, modelling
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many import pictures, pool, space, study_file
-from tribodyn.workflows.studies.many.table import Journal
-from tribodyn.workflows.studies.many.task import Row, Task, solve
+from tribodyn.workflows.studies.many import parameter_space, pool, study_file, study_pictures
+from tribodyn.workflows.studies.many.run_task import Row, Task, solve
+from tribodyn.workflows.studies.many.study_table import Journal
 
 TINY = [
     "harmonics.kept=[0, 1]",
@@ -46,7 +46,7 @@ TABLES: dict[str, Any] = {
 
 def drawn(kind: str, runs: int, vary: dict[str, Any], **more: Any) -> list[dict[str, Any]]:
     tables = {"study": {"scene": "beam", "design": kind, "runs": runs, "seed": 3}, "vary": vary, **more}
-    return space.runs(study_file.parse(tables, "mine.toml", Path()))
+    return parameter_space.runs(study_file.parse(tables, "mine.toml", Path()))
 
 
 @pytest.mark.parametrize("kind", ["sobol", "latin_hypercube"])
@@ -277,5 +277,5 @@ def test_runs_without_a_peak_have_nothing_to_draw() -> None:
     """Complete runs, none of which has a number that is drawn."""
     runs = {"run": np.arange(2.0), FRICTION: np.array([0.2, 0.3]), "status": np.array(["complete"] * 2)}
     bare = {**runs, "peak_hz_first": np.full(2, np.nan)}
-    assert not pictures.shown(SimpleNamespace(columns=bare))  # type: ignore[arg-type]
-    assert pictures.shown(SimpleNamespace(columns={**runs, "peak_hz_first": np.array([np.nan, 900.0])}))  # type: ignore[arg-type]
+    assert not study_pictures.shown(SimpleNamespace(columns=bare))  # type: ignore[arg-type]
+    assert study_pictures.shown(SimpleNamespace(columns={**runs, "peak_hz_first": np.array([np.nan, 900.0])}))  # type: ignore[arg-type]

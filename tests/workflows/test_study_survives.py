@@ -16,7 +16,7 @@ import pytest
 
 import tribodyn as td
 from tribodyn.workflows.studies.many import pool
-from tribodyn.workflows.studies.many.table import Journal
+from tribodyn.workflows.studies.many.study_table import Journal
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.faults

@@ -16,7 +16,7 @@ from tribodyn.hbm.continuation.methods import arc_length, natural
 from tribodyn.workflows.run import modelling, sanity_checks
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many.task import numbers_of
+from tribodyn.workflows.studies.many.run_task import numbers_of
 
 QUICK = ("verdict.enabled=false", 'damping.modal="0.5 %"')
 FIVE = WHEEL.replace("n_blades = 6", "n_blades = 5").replace("sectors = 6", "sectors = 5")

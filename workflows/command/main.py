@@ -25,19 +25,19 @@ BAD_INPUT, FAILED_SOLVE, DEFECT, INTERRUPTED = 2, 3, 70, 130
 FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))  # Windows has no quota
 READER_LEFT = 128 + 13  # as a shell counts the end by SIGPIPE, which Windows has not
 WORDS = {  # word -> where it is, its help on the page of all of them
-    "cases": ("scenes:cases", "List the scenes that come with the program."),
-    "new": ("scenes:new", "Begin a scene from a mesh, a deck or a CAD file."),
-    "run": ("scenes:run", "Run a scene and leave its result and pictures in a folder."),
-    "inspect": ("scenes:inspect", "Show what a mesh, a deck, a CAD file or a scene holds."),
-    "plan": ("scenes:plan", "Show what a scene will model, and what it will cost, before running it."),
-    "show": ("scenes:show", "Show what a result holds."),
-    "draw": ("scenes:draw", "Draw pictures or films of a result."),
-    "verify": ("verify:verify", "Check a result against direct time integration."),
-    "report": ("scenes:report", "Write one HTML file that shows results."),
-    "export": ("scenes:export", "Write a result in the formats of other programs."),
-    "curve": ("curve:app", "Follow curves: backbone, ring-down, folds, track."),
-    "wheel": ("wheel:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
-    "study": ("study:app", "Studies: grid, lives, optimise, identify, converge, asperities and more."),
+    "cases": ("scene_words:cases", "List the scenes that come with the program."),
+    "new": ("scene_words:new", "Begin a scene from a mesh, a deck or a CAD file."),
+    "run": ("scene_words:run", "Run a scene and leave its result and pictures in a folder."),
+    "inspect": ("scene_words:inspect", "Show what a mesh, a deck, a CAD file or a scene holds."),
+    "plan": ("scene_words:plan", "Show what a scene will model, and what it will cost, before running it."),
+    "show": ("scene_words:show", "Show what a result holds."),
+    "draw": ("scene_words:draw", "Draw pictures or films of a result."),
+    "verify": ("verify_word:verify", "Check a result against direct time integration."),
+    "report": ("scene_words:report", "Write one HTML file that shows results."),
+    "export": ("scene_words:export", "Write a result in the formats of other programs."),
+    "curve": ("curve_words:app", "Follow curves: backbone, ring-down, folds, track."),
+    "wheel": ("wheel_words:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
+    "study": ("study_words:app", "Studies: grid, lives, optimise, identify, converge, asperities and more."),
 }  # fmt: skip
 
 app = cyclopts.App(

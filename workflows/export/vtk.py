@@ -65,9 +65,7 @@ def write_vtk(result: Result, folder: Path) -> list[Path]:
     Raises  ValueError where the result has neither faces of its contact nor a mesh
     """
     if not len(result.patch.faces) and result.part is None:
-        raise Refusal(
-            "vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it"
-        )
+        raise Refusal("vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it")
     written: list[Path] = []
     if result.wear is not None and len(result.wear.cycles):
         states = [state_of(result, row) for row in range(len(result.wear.cycles))]

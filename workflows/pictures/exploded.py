@@ -13,7 +13,7 @@ from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, scale_bar
 from tribodyn.workflows.pictures.opened import Field
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, trimmed, with_room
-from tribodyn.workflows.pictures.style import BODIES, LAYOUT, PRESSURE_MAP, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.theme import BODIES, LAYOUT, PRESSURE_MAP, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states

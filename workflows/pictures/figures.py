@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.style import FORMATS, LAYOUT, STATUS, STYLE
+from tribodyn.workflows.pictures.theme import FORMATS, LAYOUT, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
 
 

@@ -38,7 +38,7 @@ from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.plots import cycle_axis, loop_of, loop_size
 from tribodyn.workflows.pictures.render import Moving
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
-from tribodyn.workflows.pictures.style import (
+from tribodyn.workflows.pictures.theme import (
     BLUE,
     INK,
     LAYOUT,

@@ -13,7 +13,7 @@ from tribodyn.fem.assembly import Body, pieces
 from tribodyn.fem.part import Part
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.shots import SHADE
-from tribodyn.workflows.pictures.style import BODIES, BODY, CYCLE, GREY, INK, LAYOUT, PAPER, RED
+from tribodyn.workflows.pictures.theme import BODIES, BODY, CYCLE, GREY, INK, LAYOUT, PAPER, RED
 from tribodyn.workflows.pictures.view import polygons
 from tribodyn.workflows.scene.schema import MeshScene
 

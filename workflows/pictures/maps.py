@@ -24,7 +24,7 @@ from tribodyn.workflows.pictures.figures import (
     status_legend,
     titled,
 )
-from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Patch, Result
 from tribodyn.workflows.result.states import shown_cycles, shown_states, state_of
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from tribodyn.extras import package
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
-from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, LAYOUT, STATUS
+from tribodyn.workflows.pictures.theme import BODY, BODY_2, EDGE, LAYOUT, STATUS
 from tribodyn.workflows.pictures.view import grid_of, polygons
 from tribodyn.workflows.result.faces import Face, Meeting, bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Patch, Result

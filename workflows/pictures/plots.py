@@ -25,7 +25,7 @@ from tribodyn.workflows.pictures.figures import (
     status_name,
     titled,
 )
-from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.theme import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import has_states, shown_cycles, state_of
 from tribodyn.workflows.result.summary import LARGEST_BEND, order_of_line, size_of

@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 from tribodyn.workflows.pictures import exploded, maps, offscreen, opened as book, render_wheel, view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
-from tribodyn.workflows.pictures.style import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.theme import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, has_states, shown_states

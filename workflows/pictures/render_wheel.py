@@ -21,7 +21,7 @@ from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, named, scale_bar
 from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, with_room
-from tribodyn.workflows.pictures.style import BLUE, INK, LAYOUT, MOTION_MAP, ORANGE, STYLE
+from tribodyn.workflows.pictures.theme import BLUE, INK, LAYOUT, MOTION_MAP, ORANGE, STYLE
 from tribodyn.workflows.result.facts import Around
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.extras import package
-from tribodyn.workflows.pictures.style import BLUE, BODY, EDGE, GREEN, LAYOUT, PAPER, RED
+from tribodyn.workflows.pictures.theme import BLUE, BODY, EDGE, GREEN, LAYOUT, PAPER, RED
 
 SHADE = {"ambient": 0.45, "diffuse": 0.6, "specular": 0.0}
 OF_AXES = (RED, GREEN, BLUE)

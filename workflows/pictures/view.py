@@ -11,7 +11,7 @@ import numpy as np
 
 from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.workflows.pictures.style import LAYOUT
+from tribodyn.workflows.pictures.theme import LAYOUT
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 
 

@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, named
-from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, PAPER, RED, WEAR_MAP
+from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, PAPER, RED, WEAR_MAP
 
 Families = Mapping[str, np.ndarray]
 """Frequencies (n_diameter, family) [Hz] of the nodal diameters from 0 on, by the state of the contact."""

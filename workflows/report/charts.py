@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from tribodyn.workflows.pictures.exploded import apart
 from tribodyn.workflows.pictures.figures import status_name
 from tribodyn.workflows.pictures.plots import loop_size, pair_name, with_gaps
-from tribodyn.workflows.pictures.style import CYCLE, GREY, INK, STATUS
+from tribodyn.workflows.pictures.theme import CYCLE, GREY, INK, STATUS
 from tribodyn.workflows.pictures.view import grid_of, looking, wear_scale
 from tribodyn.workflows.result.faces import bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import Result

@@ -21,7 +21,7 @@ from tribodyn.extras import package
 from tribodyn.refusal import Refusal
 from tribodyn.version import __version__
 from tribodyn.workflows.pictures import offscreen, plots, render
-from tribodyn.workflows.pictures.style import STYLE
+from tribodyn.workflows.pictures.theme import STYLE
 from tribodyn.workflows.report import text
 from tribodyn.workflows.report.charts import charts, solid
 from tribodyn.workflows.result.result import Result

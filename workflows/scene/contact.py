@@ -191,9 +191,7 @@ class FaceContact(ContactTable):
         rows = np.array(rows_of(beside(folder, self.gap_map, f"{self.TABLE}.gap_map")))
         rows = rows[np.isfinite(rows).all(axis=1)]
         if rows.shape[1:] != (4,) or len(rows) < 4:
-            raise Refusal(
-                f"{self.TABLE}.gap_map: expected four rows or more of x, y, z, opening in '{self.gap_map}'"
-            )
+            raise Refusal(f"{self.TABLE}.gap_map: expected four rows or more of x, y, z, opening in '{self.gap_map}'")
         return rows
 
     @property

@@ -72,9 +72,7 @@ def operating_line(wheel: dict[str, Any], response: dict[str, Any]) -> dict[str,
         raise Refusal("response.speed and response.frequency are both given: leave one of them out")
     middle = float(speeds.mean())
     if own and not np.isclose(own, middle, rtol=1e-9):
-        raise Refusal(
-            'wheel.speed is given, but with wheel.sweep = "speed" it follows from the response: leave it out'
-        )
+        raise Refusal('wheel.speed is given, but with wheel.sweep = "speed" it follows from the response: leave it out')
     hertz = given.get("frequency") or [float(each * s) for s in speeds]
     return {"wheel": {**wheel, "sweep": "speed", "speed": middle}, "response": {**response, "frequency": hertz}}
 

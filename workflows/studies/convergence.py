@@ -23,7 +23,7 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors.settling import ANSWERED, Measured, Row, Settling, Settlings, settle
-from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, STYLE
+from tribodyn.workflows.pictures.theme import BLUE, GREEN, GREY, INK, ORANGE, STYLE
 from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.result.verdict import NAMES, QUANTITIES
 from tribodyn.workflows.run.progress import Report, reporter

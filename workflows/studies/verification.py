@@ -24,7 +24,7 @@ from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
-from tribodyn.workflows.pictures.style import BLUE, ORANGE
+from tribodyn.workflows.pictures.theme import BLUE, ORANGE
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import settings

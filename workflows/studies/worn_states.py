@@ -17,7 +17,7 @@ from tribodyn.hbm.time.time_integration import LeftAlone
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
-from tribodyn.workflows.pictures.style import BLUE, GREEN, ORANGE
+from tribodyn.workflows.pictures.theme import BLUE, GREEN, ORANGE
 from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.run import modelling

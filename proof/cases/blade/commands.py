@@ -34,7 +34,7 @@ def blade(
     """
     from proof.cases.blade import study as blade_study
     from proof.cases.blade.few_sectors import FEW_SECTORS
-    from tribodyn.workflows.studies.wheels.mistuning import mistuned
+    from tribodyn.workflows.studies.wheels.unequal_sectors import mistuned
 
     highest = None if speed is None else quantity("--speed", speed, "Hz")
     make_room(out)

@@ -26,7 +26,7 @@ from tribodyn.workflows.result.result import References
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.wheels.wheel import Wheel, build as build_wheel, campbell, critical_speeds
+from tribodyn.workflows.studies.wheels.wheel_model import Wheel, build as build_wheel, campbell, critical_speeds
 
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4

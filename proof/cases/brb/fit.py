@@ -18,7 +18,7 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.measured.beside import beside
+from tribodyn.workflows.studies.measured.computed_runs import beside
 from tribodyn.workflows.studies.measured.measurement import prepared
 from tribodyn.workflows.studies.measured.reading import read
 

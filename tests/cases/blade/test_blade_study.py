@@ -17,7 +17,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.wheels.wheel import build, critical_speeds
+from tribodyn.workflows.studies.wheels.wheel_model import build, critical_speeds
 
 SHORT = Extent(
     orders=(1, 20), loads=(0.02, 1.0), tolerance=0.02, steps=(0.6, 0.4), shown=0.4, frames=2, speeds=2

@@ -17,7 +17,7 @@ from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.own import folder_of
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.studies.fits.identification import Measured
-from tribodyn.workflows.studies.measured.beside import beside
+from tribodyn.workflows.studies.measured.computed_runs import beside
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run, prepared
 from tribodyn.workflows.studies.measured.reading import read
 

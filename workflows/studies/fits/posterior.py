@@ -20,7 +20,7 @@ from scipy.stats import qmc
 
 from tribodyn.extras import package
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.style import BLUE, INK, RED, STYLE
+from tribodyn.workflows.pictures.theme import BLUE, INK, RED, STYLE
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter
@@ -150,9 +150,7 @@ def sample(
     errors = np.array([m.error or 0.0 for m in measured])
     if not (errors > 0).all():
         missing = next(m.name for m in measured if not m.error)
-        raise Refusal(
-            f'measured.{missing}.error: a posterior needs the error of every measured number, such as "5 %"'
-        )
+        raise Refusal(f'measured.{missing}.error: a posterior needs the error of every measured number, such as "5 %"')
     box = _Box(tuple(parameters), dict(priors or {}))
     names = dict(predicted or {})
     target = np.log([m.value for m in measured])

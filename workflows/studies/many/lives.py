@@ -21,14 +21,14 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many import pictures, quantiles, study as studies, study_file
+from tribodyn.workflows.studies.many import quantiles, study_file, study_pictures, study_runs as studies
+from tribodyn.workflows.studies.many.parameter_space import Space
 from tribodyn.workflows.studies.many.quantiles import RARE, Influence, Sample, influences
-from tribodyn.workflows.studies.many.space import Space
-from tribodyn.workflows.studies.many.study import Runner
+from tribodyn.workflows.studies.many.run_task import solve
 from tribodyn.workflows.studies.many.study_file import LISTED, Study
+from tribodyn.workflows.studies.many.study_runs import Runner
+from tribodyn.workflows.studies.many.study_table import LIFE, Journal, StudyTable
 from tribodyn.workflows.studies.many.surrogate import Law, Surrogate
-from tribodyn.workflows.studies.many.table import LIFE, Journal, StudyTable
-from tribodyn.workflows.studies.many.task import solve
 from tribodyn.workflows.studies.study_result import StudyResult
 
 COEFFICIENT = "wear.coefficient"
@@ -135,7 +135,7 @@ class Lives(StudyResult):
 
     def plot(self) -> Figure:
         """The distribution with its quantiles, and what it depends on."""
-        return pictures.picture_of_lives(self)
+        return study_pictures.picture_of_lives(self)
 
 
 def lives(
@@ -190,7 +190,7 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
         points = quantiles.next_runs(sample, found.surrogate, shares[0], min(BATCH, wanted.most - done))
         added += [space.run_of(point) for point in points]
     folder = runner.folder
-    if pictures.shown(table):
+    if study_pictures.shown(table):
         table.plot().savefig(folder / "study.png")
     error, source = _model_error(study, middle, table, folder, runner.progress)
     distribution = _result(study, table, found, sample, shares, error, source)

@@ -28,14 +28,14 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many import pictures, study as studies, study_file
+from tribodyn.workflows.studies.many import study_file, study_pictures, study_runs as studies
 from tribodyn.workflows.studies.many.distributions import Marginal, si
-from tribodyn.workflows.studies.many.space import Space
-from tribodyn.workflows.studies.many.study import Runner
+from tribodyn.workflows.studies.many.parameter_space import Space
+from tribodyn.workflows.studies.many.run_task import RUN
 from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
+from tribodyn.workflows.studies.many.study_runs import Runner
+from tribodyn.workflows.studies.many.study_table import SENTENCE, StudyTable
 from tribodyn.workflows.studies.many.surrogate import FEWEST, Surrogate
-from tribodyn.workflows.studies.many.table import SENTENCE, StudyTable
-from tribodyn.workflows.studies.many.task import RUN
 from tribodyn.workflows.studies.study_result import StudyResult
 
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive and of its range else, that one run more is worth
@@ -110,7 +110,7 @@ class Optimum(StudyResult):
 
     def plot(self) -> Figure:
         """The trade of the first two aims, or how the one aim got better."""
-        return pictures.picture(self)
+        return study_pictures.picture(self)
 
 
 def optimise(

@@ -23,7 +23,7 @@ from tribodyn.extras import package
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.studies.many.task import Row, Task
+from tribodyn.workflows.studies.many.run_task import Row, Task
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
 LOCAL = "local"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.parameter_space import Space
 from tribodyn.workflows.studies.many.surrogate import Surrogate
 
 EXPONENT = 14  # of two: points that a distribution is made of

@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 from tribodyn.hbm.threads import limited
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
-from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
+from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
-from tribodyn.workflows.studies.measured.beside import Beside, beside
+from tribodyn.workflows.studies.measured.computed_runs import Beside, beside
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run, prepared
 from tribodyn.workflows.studies.measured.reading import read
 from tribodyn.workflows.studies.study_result import StudyResult

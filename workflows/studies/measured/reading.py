@@ -120,9 +120,7 @@ def _of_uff(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
             return _of_58(chosen, given, length, units)
     if nodal:
         return {}, _of_55(nodal)
-    raise Refusal(
-        "it has no response (dataset 58 over frequency or time, of displacement, velocity or acceleration)"
-    )
+    raise Refusal("it has no response (dataset 58 over frequency or time, of displacement, velocity or acceleration)")
 
 
 def _of_58(

@@ -18,7 +18,7 @@ from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic, with_flow
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.plots import axes_of
-from tribodyn.workflows.pictures.style import BLUE, GREY, RED
+from tribodyn.workflows.pictures.theme import BLUE, GREY, RED
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Length
@@ -26,7 +26,7 @@ from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.wheels import wheel as wheels
+from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
 MARCH = Options(steps=128, accelerate=False, max_periods=50)  # of a limit cycle: docs/theory/flutter.md
 

@@ -29,7 +29,7 @@ from tribodyn.reduction import mistuning as reduction
 from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.plots import axes_of
-from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED
+from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED
 from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.checkpoint import alone_in
@@ -41,10 +41,10 @@ from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
-from tribodyn.workflows.studies.many.study import Runner, finish
-from tribodyn.workflows.studies.many.task import Row, Status, Task
+from tribodyn.workflows.studies.many.run_task import Row, Status, Task
+from tribodyn.workflows.studies.many.study_runs import Runner, finish
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.wheels import wheel as wheels
+from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
 FURTHEST = 3.0  # standard deviations at which what is drawn is cut off
 SHORTEST, LONGEST = 1e-4, 0.15  # steps of a scan, of its range: beyond a jump it continues

@@ -6,13 +6,13 @@ from cyclopts import App
 
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.convergence import converge
-from tribodyn.workflows.studies.derivatives import derivatives
 from tribodyn.workflows.studies.fits.fit_file import identify, posterior
 from tribodyn.workflows.studies.forces import forces
 from tribodyn.workflows.studies.many.lives import lives
 from tribodyn.workflows.studies.many.optimum import optimise
-from tribodyn.workflows.studies.many.study import grid
+from tribodyn.workflows.studies.many.study_runs import grid
 from tribodyn.workflows.studies.measured.compare import compare
+from tribodyn.workflows.studies.response_derivatives import derivatives
 from tribodyn.workflows.studies.surfaces import asperities
 
 app = App(name="study")

@@ -16,9 +16,9 @@ from scipy import stats
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.store import replacing, set_aside
-from tribodyn.workflows.studies.many import pictures
+from tribodyn.workflows.studies.many import study_pictures
 from tribodyn.workflows.studies.many.distributions import si
-from tribodyn.workflows.studies.many.task import ENDS, RUN, SINGLE, Row
+from tribodyn.workflows.studies.many.run_task import ENDS, RUN, SINGLE, Row
 from tribodyn.workflows.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class StudyTable(StudyResult):
 
     def plot(self) -> Figure:
         """Response against each of the keys that vary, see `many.pictures`."""
-        return pictures.panes(self)
+        return study_pictures.panes(self)
 
 
 def table(

@@ -7,7 +7,7 @@ from cyclopts import App
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.curves.backbones import backbone
 from tribodyn.workflows.studies.curves.decay import ring_down
-from tribodyn.workflows.studies.curves.folds import folds
+from tribodyn.workflows.studies.curves.fold_study import folds
 from tribodyn.workflows.studies.curves.tracking import track
 
 app = App(name="curve")

@@ -19,7 +19,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import console_progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import draft, inspection, scenes
+from tribodyn.workflows.studies import draft, front_door, inspection
 
 Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
 Targets = Annotated[tuple[str, ...], Parameter(name="--to", negative=(), consume_multiple=True)]
@@ -74,9 +74,9 @@ def run(
     path = folder / "result.h5"
     try:
         if accuracy is not None:
-            result, bound = scenes.run_to_accuracy(file, accuracy, folder, progress=progress, resume=resume)
+            result, bound = front_door.run_to_accuracy(file, accuracy, folder, progress=progress, resume=resume)
         else:
-            result, bound = scenes.run(file, folder, progress=progress, resume=resume), None
+            result, bound = front_door.run(file, folder, progress=progress, resume=resume), None
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
     except SolveFailed as failure:
@@ -115,9 +115,9 @@ def plan(scene: str, *, overrides: Overrides = (), picture: Path | None = None) 
         A .png file to draw the scene in: bodies, contacts in colour, what is held, loads as arrows.
     """
     make_room(picture, (".png",))
-    print(*named_lines(scenes.plan(scene, overrides).lines()), sep="\n")
+    print(*named_lines(front_door.plan(scene, overrides).lines()), sep="\n")
     if picture is not None:
-        print(scenes.picture(scene, picture, overrides))
+        print(front_door.picture(scene, picture, overrides))
 
 
 def _print(result: Result, verbose: bool) -> None:
@@ -182,7 +182,7 @@ def draw(
         _draw(loaded, folder, formats or ("png",), dpi or 200)
     for over in film:
         given = {"row": row, "formats": formats or ("mp4",), "images": images, "dpi": dpi or 100}
-        print(*scenes.animate(loaded, folder, over, **given), sep="\n")  # type: ignore[arg-type]
+        print(*front_door.animate(loaded, folder, over, **given), sep="\n")  # type: ignore[arg-type]
 
 
 def _draw(
@@ -193,7 +193,7 @@ def _draw(
     report: Callable[[str], None] = print,
     complain: Callable[[str], None] = print,
 ) -> None:
-    written, missing = scenes.draw(result, folder, formats, dpi)
+    written, missing = front_door.draw(result, folder, formats, dpi)
     if missing:
         complain(missing)
     for path in written:
@@ -213,7 +213,7 @@ def report(*result: Path, out: Path | None = None) -> None:
     if not result:
         raise Refusal("report: give the folder or file of a result")
     make_room(out, (".html",))
-    print(scenes.report(result, out or store.result_file(result[0]).parent / "report.html"))
+    print(front_door.report(result, out or store.result_file(result[0]).parent / "report.html"))
 
 
 def export(result: Path, *, to: Targets, out: Path | None = None, mesh_ending: str = ".xdmf") -> None:
@@ -232,5 +232,5 @@ def export(result: Path, *, to: Targets, out: Path | None = None, mesh_ending: s
         Format of the mesh by its ending, such as .vtu, .exo, .msh or .bdf.
     """
     make_room(out)
-    for written in scenes.export(result, to, out or store.result_file(result).parent / "export", mesh_ending):
+    for written in front_door.export(result, to, out or store.result_file(result).parent / "export", mesh_ending):
         print(written)

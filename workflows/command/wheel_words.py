@@ -7,9 +7,9 @@ from cyclopts import App
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.wheels.flutter import flutter
 from tribodyn.workflows.studies.wheels.mistuned_wear import pattern_wear
-from tribodyn.workflows.studies.wheels.mistuning import mistuned
-from tribodyn.workflows.studies.wheels.modes import modes
 from tribodyn.workflows.studies.wheels.patterns import patterns
+from tribodyn.workflows.studies.wheels.unequal_sectors import mistuned
+from tribodyn.workflows.studies.wheels.wheel_modes import modes
 
 app = App(name="wheel")
 app.command(word(modes, "wheel modes"))

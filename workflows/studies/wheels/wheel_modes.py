@@ -18,7 +18,7 @@ from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.wheels.wheel import build, campbell, critical_speeds
+from tribodyn.workflows.studies.wheels.wheel_model import build, campbell, critical_speeds
 
 FAMILIES = 3  # of a Campbell diagram, where more cross each other
 

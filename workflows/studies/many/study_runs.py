@@ -18,11 +18,11 @@ from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many import pictures, pool, space, study_file
+from tribodyn.workflows.studies.many import parameter_space, pool, study_file, study_pictures
 from tribodyn.workflows.studies.many.pool import Work
+from tribodyn.workflows.studies.many.run_task import Row, Task, solve
 from tribodyn.workflows.studies.many.study_file import Study
-from tribodyn.workflows.studies.many.table import Journal, StudyTable, table, write
-from tribodyn.workflows.studies.many.task import Row, Task, solve
+from tribodyn.workflows.studies.many.study_table import Journal, StudyTable, table, write
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def run(
     """
     if not (runner.scheduler or inside):
         pool.prepared()  # imports while the runs are read
-    folder, varied = runner.folder, [*space.runs(study), *more]
+    folder, varied = runner.folder, [*parameter_space.runs(study), *more]
     tasks, refused = _tasks(study, varied)
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
@@ -101,7 +101,7 @@ def run(
             if found is not None:
                 write(found, folder)
         assert found is not None
-        if drawn and pictures.shown(found):
+        if drawn and study_pictures.shown(found):
             found.plot().savefig(folder / "study.png")
     return found
 

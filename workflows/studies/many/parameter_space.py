@@ -14,8 +14,8 @@ from scipy.stats import qmc
 
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many.distributions import Marginal
+from tribodyn.workflows.studies.many.run_task import slope_column
 from tribodyn.workflows.studies.many.study_file import Study
-from tribodyn.workflows.studies.many.task import slope_column
 
 MOST_RUNS = 1_000_000
 INSIDE = 1e-12  # shares stay this far from 0 and 1, where a quantile may be infinite

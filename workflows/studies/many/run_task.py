@@ -22,7 +22,7 @@ from tribodyn.workflows.run.varying import Varying
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies import derivatives
+from tribodyn.workflows.studies import response_derivatives
 
 Status = Literal["complete", "failed", "refused", "lost"]
 RUN = "run"  # the column of their numbers
@@ -92,7 +92,7 @@ def solve(task: Task) -> Row:
             result = pipeline.run(file, None, Progress(), row_only=True, judge=with_verdict)
             numbers = numbers_of(result)
             if task.slopes and not numbers.get("peak_at_end"):
-                slopes = derivatives.of_summary(Varying(file, Progress()), result, task.slopes)
+                slopes = response_derivatives.of_summary(Varying(file, Progress()), result, task.slopes)
                 numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
         except np.linalg.LinAlgError as error:
             return ended("failed", error)

@@ -12,13 +12,13 @@ from scipy import stats
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
-from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED, STYLE
-from tribodyn.workflows.studies.many.task import RUN
+from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED, STYLE
+from tribodyn.workflows.studies.many.run_task import RUN
 
 if TYPE_CHECKING:
     from tribodyn.workflows.studies.many.lives import Lives
     from tribodyn.workflows.studies.many.optimum import Optimum
-    from tribodyn.workflows.studies.many.table import StudyTable
+    from tribodyn.workflows.studies.many.study_table import StudyTable
 
 WIDE_SCALE = 30.0  # largest over least value, from which on a scale is logarithmic
 SHOWN = {

@@ -25,7 +25,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.workflows.pictures.figures import axes_of, named
-from tribodyn.workflows.pictures.style import CYCLE, GREY
+from tribodyn.workflows.pictures.theme import CYCLE, GREY
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, pipeline, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed

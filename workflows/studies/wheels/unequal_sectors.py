@@ -24,14 +24,14 @@ from tribodyn.hbm.threads import limited
 from tribodyn.reduction.damping import modal_damping_towards
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
-from tribodyn.workflows.pictures.style import INK, WEAR_MAP
+from tribodyn.workflows.pictures.theme import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Number, quantity
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.derivatives import ResponseDerivatives, of_branch
 from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.response_derivatives import ResponseDerivatives, of_branch
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.wheels import wheel as wheels
+from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
 TOLERANCE = 3e-3  # of the curves between their points
 
