@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-import importlib
 import json
 import re
 import textwrap
@@ -48,7 +47,7 @@ def write(folder: Path) -> None:
     pages = {
         "scene_with_a_mesh": scene_keys(MeshScene),
         "scene_of_matrices": scene_keys(MatrixScene, without=MeshScene),
-        "parts": parameters_of(f"tribodyn.geometry.{name}" for name in parts.names()),
+        "parts": parameters_of(map(parts.load, parts.names())),
         "continuations": numbers_of(continuation.KIND),
         "contact_laws": numbers_of(contact_law.KIND),
         "wear_laws": numbers_of(wear_law.KIND),
@@ -163,10 +162,10 @@ def _default(field: Any) -> str:
 # Parameters that a file declares
 
 
-def parameters_of(modules: Iterable[str]) -> str:
+def parameters_of(modules: Iterable[ModuleType]) -> str:
     """A section for each module that declares a dataclass of parameters, with defaults and meanings."""
     lines: list[str] = []
-    for module in map(importlib.import_module, modules):
+    for module in modules:
         kind = module.Parameters
         lines += [f"## `{module.__name__.rpartition('.')[2]}`", "", _paragraph(_head(module)), ""]
         meanings = _meanings(kind)

@@ -1,9 +1,10 @@
 """Find a part by the name of its file.
 
-A part is a file in this folder that defines `class Parameters` (a frozen dataclass in SI units that validates itself)
-and `def build(parameters, path)` (writes a second-order .msh with physical groups). It may list in `MESH` which of its
-parameters are numbers of elements or nodes, so that its mesh can be made coarser to measure what it costs. Nothing else
-lists it.
+A part is a file in this folder, or in the folder of a case, that defines `class Parameters` (a frozen dataclass in SI
+units that validates itself) and `def build(parameters, path)` (writes a second-order .msh with physical groups). It may
+list in `MESH` which of its parameters are numbers of elements or nodes, so that its mesh can be made coarser to measure
+the mesh error. Nothing else lists it: the folders of the cases are searched by file, no case is imported before a scene
+names its part.
 """
 
 from __future__ import annotations
@@ -19,34 +20,40 @@ from typing import Any
 from tribodyn import declare
 from tribodyn.refusal import Refusal
 
-_FOLDER = Path(__file__).parent
+_PACKAGE = Path(declare.__file__).parent
+_GENERAL, _CASES = "geometry/*.py", "workflows/cases/*/*.py"
 
 
 @cache
+def _files() -> dict[str, Path]:
+    """Name -> file of every part, sorted; no part is imported."""
+    files = [file for pattern in (_GENERAL, _CASES) for file in _PACKAGE.glob(pattern) if _is_part(file)]
+    return {file.stem: file for file in sorted(files, key=lambda file: file.stem)}
+
+
 def names() -> tuple[str, ...]:
-    """Return the names of all parts, sorted; no part is imported for it."""
-    return tuple(sorted(file.stem for file in _FOLDER.glob("*.py") if _is_part(file)))
+    """Return the names of all parts, sorted."""
+    return tuple(_files())
 
 
 def file_of(name: str) -> Path:
-    """The file of a part; raises ValueError with the parts that there are."""
-    file = _FOLDER / f"{name}.py"
-    if file.parent != _FOLDER or not file.is_file() or not _is_part(file):
+    """The file of a part; raises Refusal with the names of all parts."""
+    if name not in _files():
         raise Refusal(f"there is no part '{name}': the parts are {', '.join(names())}, or give a file my_part.py")
-    return file
+    return _files()[name]
 
 
 def load(name: str) -> ModuleType:
     """Import a part.
 
-    name : its file name without .py, or the path of a file of one's own, which ends with .py
+    name : its file name without .py, or the path of a user's file, which ends with .py
     Returns the module, with `Parameters` and `build`
-    Raises ValueError: there is no such part
+    Raises Refusal: there is no such part
     """
     if name.endswith(".py"):
         return declare.run_file(Path(name), "part", ("build", "Parameters"))
-    file_of(name)
-    return importlib.import_module(f"tribodyn.geometry.{name}")
+    module = file_of(name).relative_to(_PACKAGE).with_suffix("")
+    return importlib.import_module(".".join(("tribodyn", *module.parts)))
 
 
 def rescaled(part: ModuleType, parameters: Any, ratio: float) -> dict[str, int]:
@@ -58,19 +65,18 @@ def rescaled(part: ModuleType, parameters: Any, ratio: float) -> dict[str, int]:
     changed: dict[str, int] = {}
     for name in getattr(part, "MESH", ()):
         count = getattr(parameters, name)
-        wanted = max(1, round(count * ratio))
-        others = range(1, count) if ratio < 1 else range(count + 1, 2 * wanted)
-        for candidate in sorted(others, key=lambda n: (abs(n - wanted), n)):
+        target = max(1, round(count * ratio))
+        candidates = range(1, count) if ratio < 1 else range(count + 1, 2 * target)
+        for candidate in sorted(candidates, key=lambda n: (abs(n - target), n)):
             try:
                 parameters = replace(parameters, **{name: candidate})
-            except ValueError:
+            except ValueError:  # a user's part may raise its own
                 continue
             changed[name] = candidate
             break
     return changed
 
 
-@cache
 def _is_part(file: Path) -> bool:
     body = ast.parse(file.read_text(encoding="utf-8")).body
     classes = {node.name for node in body if isinstance(node, ast.ClassDef)}

@@ -10,10 +10,11 @@ from tribodyn.fem.constraints import Clamp, NoMeanRotation
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.material import Material
 from tribodyn.fem.springs import Spring
-from tribodyn.geometry import leaf_seal, mesh as mesh_file
+from tribodyn.geometry import mesh as mesh_file
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.prescribed import hold
+from tribodyn.workflows.cases.leaf_seal import leaf_seal
 
 STEEL = Material(210e9, 0.3, 7860.0)
 PARAMETERS = leaf_seal.Parameters(n_column=9, n_web=1, pin_column=1)

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribodyn.geometry import bolt, lap_beam, mesh, nut, washer
+from tribodyn.geometry import bolt, mesh, nut, washer
+from tribodyn.workflows.cases.brb import lap_beam
 
 HEXAGON = np.sqrt(3) / 2 * 12.7e-3**2  # area by the width across flats
 

@@ -8,7 +8,7 @@ from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import NodalForce, Sum
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import build
-from tribodyn.geometry import blade, mesh as mesh_file
+from tribodyn.geometry import mesh as mesh_file
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
@@ -17,6 +17,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.reduction.cyclic import reduce_sector, travelling_wave, wheel_model
 from tribodyn.reduction.damping import modal_damping
+from tribodyn.workflows.cases.blade import blade
 
 N = 8
 STEEL = Material(210e9, 0.3, 7860.0)

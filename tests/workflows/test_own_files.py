@@ -25,7 +25,7 @@ PART = """
 from dataclasses import dataclass
 from pathlib import Path
 from tribodyn.declare import number
-from tribodyn.geometry import beam
+from tribodyn.workflows.cases.beam import beam
 
 @dataclass(frozen=True)
 class Parameters:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 TREE = Path(__file__).parents[2]  # of the rooms, in the repository as in an installed package
-COMPUTES = ("geometry", "fem", "reduction", "hbm", "workflows/run", "workflows/scene")
+COMPUTES = ("geometry", "fem", "reduction", "hbm", "workflows/run", "workflows/scene", "workflows/cases")
 LENGTH = 16  # hexadecimal digits of a digest that are kept
 
 

@@ -11,8 +11,8 @@ import pytest
 import tribodyn as td
 from proof.problems import result_of, wear
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
-from tribodyn.geometry import bladed_sector
 from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.workflows.cases.turbine import bladed_sector
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.studies.forces import BodyForces
 

@@ -1,7 +1,7 @@
 """Sector of a turbine wheel as it is built: disk with a dovetail slot, blade with root, platform and shroud, damper.
 
 Three bodies that touch but are not joined: "disk", "blade" and "damper", each a volume of the mesh. The wheel turns
-about x, the blade stands along z; left is the side of positive rotation, as in geometry.blade, whose airfoil and shroud
+about x, the blade stands along z; left is the side of positive rotation, as in cases.blade, whose airfoil and shroud
 the blade has. Its root hangs on two flanks that look outwards; its platforms and their neighbours leave a gap between
 them that narrows outwards, in which the damper lies like a wedge. The dimensions are ours.
 """
@@ -16,10 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry import blade, blocks, checks
-from tribodyn.geometry.blade import turned
-from tribodyn.geometry.platform import Platform, platform, unit
+from tribodyn.geometry import blocks, checks
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.cases.blade import blade
+from tribodyn.workflows.cases.blade.airfoil_platform import Platform, platform, unit
+from tribodyn.workflows.cases.blade.blade import turned
 
 OF_BLADE = ("n_along", "n_up", "n_span", "n_through", "n_side", "n_end")
 MESH = (*OF_BLADE, "n_platform", "n_neck", "n_flank", "n_axial", "n_slot", "n_post", "n_disk", "n_damper")
@@ -27,7 +28,7 @@ SHARED = (
     *("n_blades", "hub_radius", "span", "root_chord", "tip_chord", "root_thickness", "tip_thickness"),
     *("camber", "edge", "root_stagger", "tip_stagger", "contact_length", "contact_height", "shroud_angle"),
     *("shroud_length", "clearance", *OF_BLADE),
-)  # with geometry.blade
+)  # with cases.blade
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ class Parameters:
     n_damper: int = 3
 
     def __post_init__(self) -> None:
-        own = dict.fromkeys(("camber", "root_stagger", "tip_stagger", "shroud_angle"))  # limits of geometry.blade
+        own = dict.fromkeys(("camber", "root_stagger", "tip_stagger", "shroud_angle"))  # limits of cases.blade
         checks.numbers(self, lap=(0.0, 0.5), damper_low=(0.0, 1.0), damper_high=(0.0, 1.0), **own)
         _ = self.upper  # refuses what airfoil and shroud cannot be
         if self.bulb_width <= self.neck_width:

@@ -7,7 +7,8 @@ import skfem
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
-from tribodyn.geometry import beam, mesh as mesh_file
+from tribodyn.geometry import mesh as mesh_file
+from tribodyn.workflows.cases.beam import beam
 
 
 def read(tmp_path, **changes):

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry import blocks, checks
-from tribodyn.geometry.platform import Platform, Section, between, platform, unit
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.cases.blade.airfoil_platform import Platform, Section, between, platform, unit
 
 MESH = ("n_along", "n_up", "n_span", "n_through", "n_side", "n_end", "n_root", "n_disk")  # numbers of elements or nodes
 

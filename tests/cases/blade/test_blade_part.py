@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tribodyn.fem.surface import surface
-from tribodyn.geometry import blade, mesh as mesh_file
+from tribodyn.geometry import mesh as mesh_file
+from tribodyn.workflows.cases.blade import blade
 
 
 def turned(points, angle):

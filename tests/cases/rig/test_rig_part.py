@@ -9,8 +9,9 @@ from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.surface import surface
-from tribodyn.geometry import mesh as mesh_file, rig
+from tribodyn.geometry import mesh as mesh_file
 from tribodyn.reduction.linear import linear_modes
+from tribodyn.workflows.cases.rig import rig
 
 
 def read(tmp_path, **changes):

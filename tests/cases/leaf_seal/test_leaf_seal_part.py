@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tribodyn.fem.contact import ContactFaces
-from tribodyn.geometry import leaf_seal, mesh as mesh_file
+from tribodyn.geometry import mesh as mesh_file
+from tribodyn.workflows.cases.leaf_seal import leaf_seal
 
 
 def read(tmp_path, **changes):
