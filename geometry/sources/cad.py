@@ -1,4 +1,4 @@
-"""Shapes of CAD programs (STEP, IGES, BREP) and drawings of Gmsh (.geo) -> tetrahedra of second order.
+"""Shapes of CAD programs (STEP, IGES, BREP) -> tetrahedra of second order.
 
 Solids become bodies under the names that the STEP file gives them. Faces are groups "face N" by their number in the CAD
 file. Solids that touch stay apart, each with its own mesh, so that a contact can lie between them.
@@ -50,18 +50,6 @@ def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
         return _meshed(gmsh, path, shapes, sizes or Sizes())
 
 
-def read_drawing(path: Path) -> RawMesh:
-    """Mesh a drawing in Gmsh's language, which has its own sizes. Raises ValueError as `read` does."""
-    with session() as gmsh:
-        try:
-            gmsh.open(str(path))
-            gmsh.model.mesh.generate(3)
-            gmsh.model.mesh.setOrder(2)
-        except Exception as problem:  # gmsh raises this and nothing finer
-            raise Refusal(f"drawing '{path}' cannot be meshed ({_line(problem)}): correct it in Gmsh") from None
-        return msh.from_gmsh(gmsh)
-
-
 def default_size(path: Path) -> float:
     """Size of the elements where none is asked for, in the unit of the file; raises ValueError as `read` does."""
     with session() as gmsh:
@@ -82,7 +70,7 @@ def _solids(gmsh: Any, path: Path) -> dict[str, int]:
         gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
         gmsh.model.occ.synchronize()
     except Exception as problem:
-        raise Refusal(f"CAD file '{path}' cannot be read ({_line(problem)}): export it again as STEP") from None
+        raise Refusal(f"CAD file '{path}' cannot be read ({one_line(problem)}): export it again as STEP") from None
     tags = [tag for _, tag in gmsh.model.getEntities(3)]
     if not tags:
         raise Refusal(f"CAD file '{path}' has no solid: close its surfaces in the CAD program and export solids")
@@ -142,7 +130,7 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         model.mesh.setOrder(2)
     except Exception as problem:
         raise Refusal(
-            f"CAD file '{path}' cannot be meshed ({_line(problem)}): heal it or give a smaller size"
+            f"CAD file '{path}' cannot be meshed ({one_line(problem)}): heal it or give a smaller size"
         ) from None
     for name, tag in shapes.items():
         model.addPhysicalGroup(3, [tag], name=name)
@@ -151,5 +139,5 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
     return replace(raw, notes=(note,))
 
 
-def _line(problem: Exception) -> str:
+def one_line(problem: Exception) -> str:
     return " ".join(str(problem).split())

@@ -5,95 +5,33 @@ The kind of a file is recognised by its ending; each reader gives a `RawMesh`, a
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field, replace
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry.sources import abaqus_cards, ansys, cad, msh, nastran, solid
+from tribodyn.geometry.sources import cad, solid
 from tribodyn.geometry.sources.deck import Deck, in_si
-from tribodyn.geometry.sources.raw import COMMON_NAMES, SURFACES, VOLUMES, Cells, RawMesh
+from tribodyn.geometry.sources.raw import COMMON_NAMES, VOLUMES, RawMesh
 from tribodyn.geometry.sources.solid import SolidBody
 from tribodyn.refusal import Refusal
-
-MOST_VALUES = 100  # an array of integers with more different values is a number, not a group
-
-
-def with_meshio(path: Path) -> RawMesh:
-    """Read a file by its ending. Raises ValueError: it is none, or broken."""
-    import meshio  # 85 modules, of which few scenes need one
-    from meshio._mesh import topological_dimension
-
-    topological_dimension.update({kind: 3 for kind in VOLUMES})  # meshio 5.3.5 forgets wedge15 and pyramid13
-    try:
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
-            file = meshio.read(path)
-    except (Exception, SystemExit) as problem:  # the readers raise what they meet, and where none fits meshio exits
-        why = "" if isinstance(problem, SystemExit) else " ".join(str(problem).split())
-        reason = f" ({why})" if why else ""
-        raise Refusal(f"mesh file '{path}' cannot be read{reason}: write it as a Gmsh file, MSH 4.1") from None
-    names: dict[int, list[str]] = getattr(file, "cell_tags", None) or {}
-    cells: list[Cells] = []
-    faces: dict[str, list[np.ndarray]] = {}
-    unused: list[str] = []
-    start = 0
-    numbers: dict[str, list[np.ndarray]] = {}
-    for i, block in enumerate(file.cells):
-        nodes = np.asarray(block.data, dtype=int)
-        solid = block.type in VOLUMES
-        if solid:
-            cells.append(Cells(block.type, nodes, np.arange(start + 1, start + 1 + len(nodes))))
-        elif block.type not in SURFACES:
-            unused.append(f"{len(nodes)} elements of kind {block.type}")
-            continue
-        for key, arrays in file.cell_data.items():
-            values = np.asarray(arrays[i])
-            if values.ndim != 1 or not np.issubdtype(values.dtype, np.integer):
-                continue
-            if len(np.unique(values)) > MOST_VALUES:
-                continue
-            for value in np.unique(values).tolist():
-                members = np.flatnonzero(values == value)
-                for name in names.get(value, []) if key == "cell_tags" else [f"{key} {value}"]:
-                    if solid:
-                        numbers.setdefault(name, []).append(members + start)
-                    else:
-                        faces.setdefault(name, []).append(nodes[members][:, : SURFACES[block.type]])
-        start += len(nodes) if solid else 0
-    volumes = {name: np.unique(np.concatenate(parts)) for name, parts in numbers.items()}
-    of_nodes: dict[str, np.ndarray] = {}
-    point_names: dict[int, list[str]] = getattr(file, "point_tags", None) or {}
-    tags = file.point_data.get("point_tags")
-    if tags is not None and point_names:
-        for value, given in point_names.items():
-            for name in given:
-                of_nodes[name] = np.union1d(of_nodes.get(name, np.empty(0, dtype=int)), np.flatnonzero(tags == value))
-    for key, values in file.point_data.items():
-        values = np.asarray(values)
-        if values.ndim == 1 and np.issubdtype(values.dtype, np.integer) and set(np.unique(values)) == {0, 1}:
-            of_nodes[key] = np.flatnonzero(values)
-    points = np.asarray(file.points, dtype=float)
-    labels = np.arange(1, len(points) + 1)
-    of_nodes = {name: rows.astype(int) for name, rows in of_nodes.items()}
-    return RawMesh(points, labels, cells, volumes, faces, of_nodes, skins=frozenset(of_nodes), unused=unused)
-
 
 # unit of length -> [m], and the force [N] that decks in it count in
 UNITS = {
     "m": (1.0, 1.0), "cm": (1e-2, 1.0), "mm": (1e-3, 1.0), "um": (1e-6, 1.0),
     "in": (0.0254, 4.4482216152605), "ft": (0.3048, 4.4482216152605),
 }  # fmt: skip
-READERS: dict[str, Callable[[Path], RawMesh]] = {
-    ".msh": msh.read,
-    ".inp": abaqus_cards.read,
-    **dict.fromkeys((".bdf", ".nas", ".dat"), nastran.read),
-    ".cdb": ansys.read,
-    **dict.fromkeys((".vtk", ".vtu", ".med"), with_meshio),
-    **dict.fromkeys(cad.ENDINGS, cad.read),
-    ".geo": cad.read_drawing,
+# ending -> the module of its reader, which is imported when a file is read
+READERS = {
+    ".msh": "msh",
+    ".inp": "abaqus_cards",
+    **dict.fromkeys((".bdf", ".nas", ".dat"), "nastran"),
+    ".cdb": "ansys",
+    **dict.fromkeys((".vtk", ".vtu", ".med"), "meshio_files"),
+    **dict.fromkeys(cad.ENDINGS, "cad"),
+    ".geo": "drawing",
 }
 ENDINGS = tuple(READERS)
 
@@ -147,16 +85,16 @@ def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) 
         raise Refusal(f"unit = \"{unit}\" of mesh file '{path}' is no length that is known: give {', '.join(UNITS)}")
     if not file.is_file():
         raise Refusal(f"mesh file '{path}' does not exist: build the part first or correct the path")
-    reader = READERS.get(file.suffix.lower())
-    if reader is None:
+    ending = file.suffix.lower()
+    if ending not in READERS:
         raise Refusal(
             f"mesh file '{path}' cannot be read, its ending is none of {', '.join(sorted(READERS))}: "
             "write it as a Gmsh file, MSH 4.1"
         )
-    if sizes is not None and reader is not cad.read:
+    if sizes is not None and ending not in cad.ENDINGS:
         raise Refusal(f"mesh file '{path}' is meshed already: element sizes are for CAD files")
     try:
-        raw = reader(file) if sizes is None else cad.read(file, sizes)
+        raw = _reader(ending)(file) if sizes is None else cad.read(file, sizes)
     except (IndexError, KeyError) as problem:
         where = f"near {problem.args[0]!r}" if isinstance(problem, KeyError) else "in the middle of a line"
         raise Refusal(
@@ -165,6 +103,13 @@ def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) 
     if not raw.cells:
         raise Refusal(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
     return scaled(raw, *UNITS[unit])
+
+
+def _reader(ending: str) -> Callable[[Path], RawMesh]:
+    """The function that reads files of an ending; `read` of its module."""
+    module = importlib.import_module(f"tribodyn.geometry.sources.{READERS[ending]}")
+    function: Callable[[Path], RawMesh] = module.read
+    return function
 
 
 def scaled(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
