@@ -1,0 +1,13 @@
+"""Vibration cycles that the run has passed."""
+
+from __future__ import annotations
+
+from tribodyn.hbm.quantity import WearQuantity, WornContact
+
+
+def value(worn: WornContact) -> float:
+    """Cycles at the end of the run."""
+    return worn.cycles
+
+
+QUANTITY = WearQuantity("cycles of the run", "cycles", value, rank=22)

@@ -1,0 +1,21 @@
+"""Damping ratio of a nonlinear mode at an amplitude."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribodyn.hbm.continuation.free_vibration import Point
+from tribodyn.hbm.quantity import ModeQuantity
+
+
+def value(point: Point) -> float:
+    """Damping ratio."""
+    return point.zeta
+
+
+def tangent(point: Point, change: np.ndarray) -> float:
+    """Change of the ratio with that of the unknowns."""
+    return float(change[-2])
+
+
+QUANTITY = ModeQuantity("damping ratio of the nonlinear mode", "", value, rank=2, tangent=tangent)

@@ -1,0 +1,14 @@
+"""Cycles until a pair first opens in a part of the cycle that was closed all through it."""
+
+from __future__ import annotations
+
+from tribodyn.hbm.quantity import WearQuantity, WornContact
+from tribodyn.hbm.wear.history import events, first
+
+
+def value(worn: WornContact) -> float | None:
+    """Cycles; None where none opens."""
+    return first(events(worn.history, worn.components, worn.gap, worn.basis)[0])
+
+
+QUANTITY = WearQuantity("cycles until a pair first lifts", "cycles", value, rank=24)

@@ -1,0 +1,14 @@
+"""Cycles until a pair first touches no more."""
+
+from __future__ import annotations
+
+from tribodyn.hbm.quantity import WearQuantity, WornContact
+from tribodyn.hbm.wear.history import events, first
+
+
+def value(worn: WornContact) -> float | None:
+    """Cycles; None where every pair still touches."""
+    return first(events(worn.history, worn.components, worn.gap, worn.basis)[1])
+
+
+QUANTITY = WearQuantity("cycles until a pair first loses contact", "cycles", value, rank=25)

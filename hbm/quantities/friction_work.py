@@ -1,0 +1,13 @@
+"""Friction work over all cycles of the run."""
+
+from __future__ import annotations
+
+from tribodyn.hbm.quantity import WearQuantity, WornContact
+
+
+def value(worn: WornContact) -> float:
+    """Work of the pairs [J]."""
+    return float(worn.history.work[:, worn.pairs].sum())
+
+
+QUANTITY = WearQuantity("accumulated friction work", "J", value, by_joint=True, rank=31)

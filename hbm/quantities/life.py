@@ -1,0 +1,35 @@
+"""Cycles until the preload has fallen to a share of its first value: where the contact is lost."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribodyn.hbm.quantity import EndOfLife, ErrorKind, WearQuantity, WornContact
+from tribodyn.hbm.wear.history import cycles_to_preload, cycles_to_share
+
+
+def value(worn: WornContact) -> float | None:
+    """Cycles, None where it has not fallen so far; of a joint, and where one lost joint ends it, by its own preload."""
+    history = worn.history
+    if worn.joint:
+        return cycles_to_share(history.cycles, history.normal_force[:, worn.pairs].sum(axis=1), worn.life_share)
+    if not worn.any_joint:
+        return cycles_to_preload(history, worn.life_share)
+    lives = (value(worn.of_joint(name)) for name in worn.joints if len(worn.area[worn.joints[name]]))
+    return min((life for life in lives if life is not None), default=None)
+
+
+def at_end_of_life(end: EndOfLife) -> float:
+    """The life itself."""
+    return end.life
+
+
+def tangent(end: EndOfLife) -> np.ndarray:
+    """Its derivatives."""
+    return end.by_life
+
+
+QUANTITY = WearQuantity(
+    "life", "cycles", value, by_joint=True, error=ErrorKind.DURATION, rank=21,
+    at_end_of_life=at_end_of_life, tangent=tangent,
+)  # fmt: skip

@@ -1,0 +1,21 @@
+"""Frequency of a nonlinear mode at an amplitude."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribodyn.hbm.continuation.free_vibration import Point
+from tribodyn.hbm.quantity import ModeQuantity
+
+
+def value(point: Point) -> float:
+    """Frequency [Hz]."""
+    return point.omega / (2 * np.pi)
+
+
+def tangent(point: Point, change: np.ndarray) -> float:
+    """Change of the frequency with that of the unknowns, where it counts in shares of itself."""
+    return float(point.omega / (2 * np.pi) * change[-3])
+
+
+QUANTITY = ModeQuantity("frequency of the nonlinear mode", "Hz", value, rank=1, tangent=tangent)
