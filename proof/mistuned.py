@@ -102,7 +102,7 @@ def groups(count: int, dense: int, states: Sequence[str] = tuple(STATES)) -> Ite
     for damping in DAMPING:
         for state in states:
             asked = (*STATES[state], f"damping.modal='{damping}'")
-            blades = patterns.Blades.of(scene_file.parse(WHEEL + DIFFER, "wheel.toml", asked, Path()))
+            blades = patterns.MistunedBlades.of(scene_file.parse(WHEEL + DIFFER, "wheel.toml", asked, Path()))
             wheel, errors, seconds = wheels.build(blades.file), [np.nan], 0.0
             failed, other, slipping = dict[int, str](), dict[int, str](), [np.nan]
             for number in range(1, count + 1):
@@ -134,7 +134,7 @@ def groups(count: int, dense: int, states: Sequence[str] = tuple(STATES)) -> Ite
 
 
 def from_dense(
-    wheel: wheels.Wheel, blades: patterns.Blades, pattern: patterns.Pattern, omega: float, x: np.ndarray
+    wheel: wheels.Wheel, blades: patterns.MistunedBlades, pattern: patterns.Pattern, omega: float, x: np.ndarray
 ) -> float:
     """Largest relative difference of blade amplitudes at omega [rad/s], from contact displacement x, inf if unsolved.
 

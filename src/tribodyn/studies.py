@@ -5,24 +5,27 @@ and `study` are made from these functions.
 """
 
 from tribodyn.geometry.surface import HeightMap as HeightMap
-from tribodyn.workflows.studies.convergence import Converged as Converged, converge as converge
+from tribodyn.workflows.studies.convergence import Convergence as Convergence, converge as converge
 from tribodyn.workflows.studies.curves.backbones import SceneBackbone as SceneBackbone, backbone as backbone
 from tribodyn.workflows.studies.curves.decay import Decay as Decay, ring_down as ring_down
-from tribodyn.workflows.studies.curves.fold_study import FoldsFound as FoldsFound, folds as folds
+from tribodyn.workflows.studies.curves.fold_study import FoldStudy as FoldStudy, folds as folds
 from tribodyn.workflows.studies.curves.tracking import Track as Track, track as track
 from tribodyn.workflows.studies.fits.fit_file import Fit as Fit, identify as identify, posterior as posterior
 from tribodyn.workflows.studies.fits.posterior import Posterior as Posterior
 from tribodyn.workflows.studies.forces import Forces as Forces, forces as forces
 from tribodyn.workflows.studies.inspection import Inspection as Inspection
-from tribodyn.workflows.studies.many.lives import Lives as Lives, lives as lives
+from tribodyn.workflows.studies.many.lives import LifeDistribution as LifeDistribution, lives as lives
 from tribodyn.workflows.studies.many.optimum import Optimum as Optimum, optimise as optimise
 from tribodyn.workflows.studies.many.study_runs import grid as grid
 from tribodyn.workflows.studies.many.study_table import StudyTable as StudyTable
-from tribodyn.workflows.studies.measured.compare import Compared as Compared, compare as compare
+from tribodyn.workflows.studies.measured.compare import (
+    MeasurementComparison as MeasurementComparison,
+    compare as compare,
+)
 from tribodyn.workflows.studies.response_derivatives import (
     ResponseDerivatives as ResponseDerivatives,
     derivatives as derivatives,
 )
 from tribodyn.workflows.studies.surfaces import FaceAsperities as FaceAsperities, asperities as asperities
-from tribodyn.workflows.studies.verification import Comparison as Comparison
+from tribodyn.workflows.studies.verification import TimeComparison as TimeComparison
 from tribodyn.workflows.studies.worn_states import WornStates as WornStates

@@ -11,8 +11,8 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies.fits.curve_target import CurveTarget
-from tribodyn.workflows.studies.fits.fit_file import Answers, Asked
-from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, Prediction, fit
+from tribodyn.workflows.studies.fits.fit_file import SceneAnswers, Target
+from tribodyn.workflows.studies.fits.identification import FitParameter, Identification, MeasuredNumber, Prediction, fit
 
 STEP = 1e-3  # of a parameter, over it or the width of its bounds
 
@@ -23,14 +23,14 @@ def plain(file: SceneFile) -> ReducedModel:
     return modelling.plain_of(file, part)
 
 
-def predict(file: SceneFile, measured: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
+def predict(file: SceneFile, measured: Mapping[str, Target | CurveTarget]) -> np.ndarray:
     """(n_measured,) what a scene says to each measured number, to a curve at each of its points."""
-    return Answers(file, modelling.build(file, Progress())).all_to(measured)
+    return SceneAnswers(file, modelling.build(file, Progress())).all_to(measured)
 
 
 def fit_by_differences(
-    parameters: Sequence[Parameter],
-    measured: Sequence[Measured],
+    parameters: Sequence[FitParameter],
+    measured: Sequence[MeasuredNumber],
     predict: Prediction,
     before: Mapping[str, float] | None = None,
 ) -> Identification:

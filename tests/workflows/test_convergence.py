@@ -17,7 +17,7 @@ from tribodyn.workflows.errors.settling import Measured, Row, Settling, Settling
 from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import convergence
-from tribodyn.workflows.studies.convergence import Converged
+from tribodyn.workflows.studies.convergence import Convergence
 
 SMALL = (
     "geometry.n_length=4",
@@ -29,12 +29,12 @@ SMALL = (
 
 
 @pytest.fixture(scope="module")
-def found() -> Converged:
+def found() -> Convergence:
     names = ("modes", "newton", "interface_rank")
     return convergence.converge("beam", settings=names, overrides=(*SMALL, "wear="))
 
 
-def test_each_setting_is_held_against_where_it_tends_to(found: Converged) -> None:
+def test_each_setting_is_held_against_where_it_tends_to(found: Convergence) -> None:
     for one in found.table.ladders:
         assert all(row.measured.outcome == "converged" and row.measured.memory > 1e7 for row in one.rows)
         bounds = [one.bound(row, "amplitude") for row in one.rows]
@@ -147,7 +147,7 @@ def test_the_setting_that_is_needed_is_the_first_from_which_all_are_good() -> No
     assert needed is not None
     assert needed.setting.label == "n=3"
     assert made_up("n", [1, 2], [0.004, 0.0]).needed("amplitude", 0.001).setting.label == "n=2"
-    text = str(Converged(Settlings("made up", (), 4.0, (one,))))
+    text = str(Convergence(Settlings("made up", (), 4.0, (one,))))
     assert "1% on amplitude needs n=3 or finer" in text
     assert "the setting of the scene, n=1, is good for 1% on all: amplitude 0.004" in text
     assert "for 1% on amplitude use n=1: 0.4%, 1 s" in text

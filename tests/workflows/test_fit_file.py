@@ -24,8 +24,8 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file
 from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
-from tribodyn.workflows.studies.fits.fit_file import Known, Task
-from tribodyn.workflows.studies.fits.identification import Measured, Parameter
+from tribodyn.workflows.studies.fits.fit_file import FitTables, MeasuredTarget
+from tribodyn.workflows.studies.fits.identification import FitParameter, MeasuredNumber
 from tribodyn.workflows.studies.measured.measurement import Run
 
 BEAM = (
@@ -37,10 +37,10 @@ BEAM = (
 
 def found_again(scene, overrides, true, looked, measured):
     """Measure the scene with the true numbers, then look for them from the scene as it stands."""
-    known = {name: Known(value=1.0, **table) for name, table in measured.items()}
+    known = {name: MeasuredTarget(value=1.0, **table) for name, table in measured.items()}
     answers = predict(scene_file.read(scene, (*overrides, *true)), known)
     assert (answers > 0).all()
-    task = Task.model_validate(
+    task = FitTables.model_validate(
         {
             "parameters": looked,
             "measured": {
@@ -127,7 +127,7 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
     original = modelling.make_mesh
     monkeypatch.setenv("TRIBODYN_CACHE", "off")
     monkeypatch.setattr(modelling, "make_mesh", lambda *args: made.append(1) or original(*args))
-    task = Task.model_validate(
+    task = FitTables.model_validate(
         {
             "parameters": {"height": {"keys": ["surfaces.mating_height"], "low": "-5 um", "high": "5 um"}},
             "measured": {"rest": {"of": "preload", "value": "36 N"}},
@@ -145,9 +145,9 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
 
 def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypatch, tmp_path):
     measured = {
-        "open": Known(of="open frequency", mode=3, value=300.0),
-        "energy": Known(of="energy", at="290 Hz", value=1.0),
-        "shaken": Known(of="preload", at="290 Hz", value=31.0),
+        "open": MeasuredTarget(of="open frequency", mode=3, value=300.0),
+        "energy": MeasuredTarget(of="energy", at="290 Hz", value=1.0),
+        "shaken": MeasuredTarget(of="preload", at="290 Hz", value=31.0),
     }
     made, answers, original = [], [], modelling.plain_model
     monkeypatch.setenv("TRIBODYN_CACHE", str(tmp_path))
@@ -165,17 +165,17 @@ def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypa
 
 
 def test_a_wheel_has_the_frequencies_of_its_wave():
-    known = {"first": Known(of="stuck frequency", mode=1, value=341.0)}
+    known = {"first": MeasuredTarget(of="stuck frequency", mode=1, value=341.0)}
     one, two = (predict(scene_file.read("blade_thesis", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2))
     assert 300 < one[0] < 400 < two[0] < 550
 
 
 def test_derivatives_at_zero_and_at_a_bound_are_those_of_the_prediction():
     """An unknown that starts at zero, and one that starts at its upper bound, both find their way."""
-    parameters = [Parameter("x", -1.0, 1.0, (0.0,), ratio=False), Parameter("y", 1.0, 2.0, (2.0,))]
+    parameters = [FitParameter("x", -1.0, 1.0, (0.0,), ratio=False), FitParameter("y", 1.0, 2.0, (2.0,))]
     found = fit_by_differences(
         parameters,
-        [Measured("a", 1.3), Measured("b", 2.6)],
+        [MeasuredNumber("a", 1.3), MeasuredNumber("b", 2.6)],
         lambda v: np.array([1.0 + v["x"], v["y"] * (1 + v["x"])]) * (1 + 1e-7 * np.sin(1e9 * v["x"])),  # rounding
     )
     assert found.values == pytest.approx([0.3, 2.0], rel=1e-3)
@@ -220,7 +220,7 @@ def test_a_bad_file_is_one_sentence_and_exit_code_2(text, words, tmp_path, capsy
 
 
 def test_a_life_without_wear_and_a_run_that_stops_early_are_told():
-    life = {"life": Known(of="life", left=0.1, value=1e6)}
+    life = {"life": MeasuredTarget(of="life", left=0.1, value=1e6)}
     with pytest.raises(ValueError, match=r"the scene has no \[wear\]"):
         predict(scene_file.read("beam", (*BEAM, "wear=")), life)
     with pytest.raises(SolveFailed, match=r"measured.life: the preload did not fall to 0.1 .* stopped"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.fits import fit_by_differences as fit
-from tribodyn.workflows.studies.fits.identification import Measured, Parameter
+from tribodyn.workflows.studies.fits.identification import FitParameter, MeasuredNumber
 
 
 def springs_in_a_row(values):
@@ -19,11 +19,11 @@ def springs_in_a_row(values):
 
 A, B = 40.0, 9.0
 TRUE = springs_in_a_row({"a": A, "b": B})
-PAIR = [Parameter("a", 1.0, 1e3, (10.0,), "N/m"), Parameter("b", 1.0, 1e3, (10.0, 100.0), "N/m")]
+PAIR = [FitParameter("a", 1.0, 1e3, (10.0,), "N/m"), FitParameter("b", 1.0, 1e3, (10.0, 100.0), "N/m")]
 
 
 def numbers(values):
-    return [Measured(f"mode {i}", float(value), "rad/s") for i, value in enumerate(values)]
+    return [MeasuredNumber(f"mode {i}", float(value), "rad/s") for i, value in enumerate(values)]
 
 
 def test_known_parameters_are_found_from_exact_numbers():
@@ -37,7 +37,9 @@ def test_known_parameters_are_found_from_exact_numbers():
 
 def test_columns_of_long_names_do_not_run_together():
     long = "contacts.shroud_of_the_next_blade.tangential_stiffness"
-    found = fit([Parameter(long, 1.0, 1e3, (10.0,))], [Measured(long, 4.0, "N/um")], lambda v: np.array([v[long]]))
+    found = fit(
+        [FitParameter(long, 1.0, 1e3, (10.0,))], [MeasuredNumber(long, 4.0, "N/um")], lambda v: np.array([v[long]])
+    )
     rows = [line.split() for line in found.report().splitlines() if line.startswith(long)]
     assert [row[0] for row in rows] == [long, long]
     assert float(rows[0][1]) == 10.0
@@ -46,8 +48,8 @@ def test_columns_of_long_names_do_not_run_together():
 
 def test_sensitivities_are_those_of_the_closed_form():
     found = fit(
-        [Parameter("k", 1.0, 1e3, (10.0,)), Parameter("m", 0.1, 10.0, (3.0,))],
-        [Measured("omega", 4.0), Measured("force", 48.0)],
+        [FitParameter("k", 1.0, 1e3, (10.0,)), FitParameter("m", 0.1, 10.0, (3.0,))],
+        [MeasuredNumber("omega", 4.0), MeasuredNumber("force", 48.0)],
         lambda v: np.array([np.sqrt(v["k"] / v["m"]), v["k"] * v["m"] ** 2]),
     )
     np.testing.assert_allclose(found.sensitivity, [[0.5, -0.5], [1.0, 2.0]], atol=1e-6)
@@ -58,7 +60,7 @@ def test_standard_error_is_that_of_the_mean():
     """Scatter about one constant: the logarithm's standard error is s / sqrt(n)."""
     scatter = 0.05 * np.random.default_rng(2).standard_normal(40)
     found = fit(
-        [Parameter("level", 0.1, 10.0, (1.0,))],
+        [FitParameter("level", 0.1, 10.0, (1.0,))],
         numbers(3.0 * np.exp(scatter)),
         lambda v: np.full(40, v["level"]),
     )
@@ -69,15 +71,15 @@ def test_standard_error_is_that_of_the_mean():
 
 def test_weights_pull_towards_the_number_that_counts_more():
     def level(weight):
-        measured = [Measured("low", 1.0), Measured("high", 4.0, weight=weight)]
-        return fit([Parameter("x", 0.1, 10.0, (2.0,))], measured, lambda v: np.full(2, v["x"])).values[0]
+        measured = [MeasuredNumber("low", 1.0), MeasuredNumber("high", 4.0, weight=weight)]
+        return fit([FitParameter("x", 0.1, 10.0, (2.0,))], measured, lambda v: np.full(2, v["x"])).values[0]
 
     assert level(1.0) == pytest.approx(2.0, rel=1e-6)
     assert level(3.0) == pytest.approx(4 ** (9 / 10), rel=1e-6)
 
 
 def test_bounds_hold_and_are_told():
-    found = fit([Parameter("x", 1.0, 3.0, (2.0,))], numbers([5.0, 5.0]), lambda v: np.full(2, v["x"]))
+    found = fit([FitParameter("x", 1.0, 3.0, (2.0,))], numbers([5.0, 5.0]), lambda v: np.full(2, v["x"]))
     assert found.values[0] == pytest.approx(3.0)
     assert found.values[0] <= 3.0
     assert found.verdict(0) == "at its upper bound"
@@ -85,7 +87,7 @@ def test_bounds_hold_and_are_told():
 
 def test_what_the_numbers_do_not_determine_is_said():
     """Only the product counts: both are open; a parameter without any influence is open too."""
-    three = [Parameter(name, 0.1, 10.0, (1.0,)) for name in ("p", "q", "idle")]
+    three = [FitParameter(name, 0.1, 10.0, (1.0,)) for name in ("p", "q", "idle")]
     found = fit(three, numbers([2.0, 2.1, 1.9]), lambda v: np.full(3, v["p"] * v["q"]))
     assert np.isinf(found.deviation).all()
     assert found.report().count("not determined by these numbers") == 3
@@ -100,7 +102,7 @@ def test_the_best_of_several_starts_is_kept():
         x = values["x"]
         return np.array([2.0 + (x - 1) ** 2 * (x - 4) ** 2 + 0.3 * (4 - x)])
 
-    found = fit([Parameter("x", 0.5, 5.0, (1.0, 4.5), ratio=False)], [Measured("y", 1.9)], folded)
+    found = fit([FitParameter("x", 0.5, 5.0, (1.0, 4.5), ratio=False)], [MeasuredNumber("y", 1.9)], folded)
     assert found.values[0] == pytest.approx(4.0, abs=0.2)
     assert found.before[0] == pytest.approx(folded({"x": 1.0})[0])
 
@@ -108,10 +110,10 @@ def test_the_best_of_several_starts_is_kept():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: Parameter("k", 2.0, 1.0, (1.5,)), "bounds low < high"),
-        (lambda: Parameter("k", 1.0, 2.0, (3.0,)), "starts between them"),
-        (lambda: Parameter("k", 1.0, 2.0, ()), "starts between them"),
-        (lambda: Parameter("k", 0.0, 2.0, (1.0,)), "a ratio needs bounds above 0"),
+        (lambda: FitParameter("k", 2.0, 1.0, (1.5,)), "bounds low < high"),
+        (lambda: FitParameter("k", 1.0, 2.0, (3.0,)), "starts between them"),
+        (lambda: FitParameter("k", 1.0, 2.0, ()), "starts between them"),
+        (lambda: FitParameter("k", 0.0, 2.0, (1.0,)), "a ratio needs bounds above 0"),
         (lambda: fit(PAIR, numbers([1.0, 0.0]), springs_in_a_row), "measured numbers above 0"),
         (lambda: fit(PAIR, numbers([1.0, 2.0, 3.0]), springs_in_a_row), "instead of 3 numbers"),
         (lambda: fit(PAIR, numbers([1.0]), lambda v: np.array([-1.0])), "narrow the bounds"),

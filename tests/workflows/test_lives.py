@@ -19,9 +19,9 @@ import tribodyn as td
 from tests.helpers.command import leave
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.many import pool, quantiles, study_file, study_pictures
-from tribodyn.workflows.studies.many.parameter_space import Space
+from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
 from tribodyn.workflows.studies.many.quantiles import Sample, influences
-from tribodyn.workflows.studies.many.run_task import Row, Task, slope_column, solve
+from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, slope_column, solve
 from tribodyn.workflows.studies.many.surrogate import Surrogate, covariance
 
 PRESS, FRICTION, DAMPING = "loads.static.press.value", "contact.friction", "damping.modal"
@@ -39,15 +39,15 @@ def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
     """They take longer than all the rest."""
     if "command" not in request.node.name:
         monkeypatch.setattr(study_pictures, "shown", lambda found: ())
-        monkeypatch.setattr(td.studies.Lives, "plot", lambda self: Figure())
+        monkeypatch.setattr(td.studies.LifeDistribution, "plot", lambda self: Figure())
 
 
 def study(vary: dict[str, Any] = VARY, runs: int = 32, seed: int = 3, **more: Any) -> dict[str, Any]:
     return {"study": {"scene": "beam", "design": "sobol", "runs": runs, "seed": seed}, "vary": vary, **more}
 
 
-def space(tables: dict[str, Any]) -> Space:
-    return Space.of(study_file.parse(tables, "mine.toml", Path()))
+def space(tables: dict[str, Any]) -> ParameterSpace:
+    return ParameterSpace.of(study_file.parse(tables, "mine.toml", Path()))
 
 
 def width(key: str) -> float:
@@ -68,20 +68,20 @@ def lasts(values: dict[str, float]) -> float:
     return MEDIAN * math.prod((values[key] / medians[key]) ** power for key, power in POWERS.items())
 
 
-def engine(life: Callable[[dict[str, float], Task], dict[str, float] | None]) -> Any:
+def engine(life: Callable[[dict[str, float], StudyRun], dict[str, float] | None]) -> Any:
     """In place of the processes: rows with a closed-form life."""
 
-    def finished(tasks: Sequence[Task], workers: int, solve: Any) -> Iterator[Row]:
+    def finished(tasks: Sequence[StudyRun], workers: int, solve: Any) -> Iterator[RunRow]:
         for task in tasks:
             said = dict(text.split("=", 1) for text in task.overrides)
             numbers = life({key: float(said[key]) for key in VARY}, task)
             done = numbers is not None
-            yield Row(task.number, task.key, "complete" if done else "failed", "told", numbers or {})
+            yield RunRow(task.number, task.key, "complete" if done else "failed", "told", numbers or {})
 
     return finished
 
 
-def planted(seed: int) -> tuple[Space, Callable[[np.ndarray], np.ndarray]]:
+def planted(seed: int) -> tuple[ParameterSpace, Callable[[np.ndarray], np.ndarray]]:
     """A problem of four lognormal variables with powers, curvature and a wave."""
     draw = np.random.default_rng(seed)
     vary = {
@@ -166,7 +166,7 @@ def test_quantiles_and_indices_are_those_of_the_closed_form(tmp_path: Path, monk
 def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
 
-    def life(values: dict[str, float], task: Task) -> dict[str, float]:
+    def life(values: dict[str, float], task: StudyRun) -> dict[str, float]:
         asked.append(task.number)
         whole = lasts(values)
         return {"life_cycles": whole * math.exp(0.2 * math.sin(6 * math.log(whole / MEDIAN)))}
@@ -205,11 +205,11 @@ def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
         return whole * (20e3 / x[PRESS]) ** powers[1]
 
     def runs(powers: tuple[float, float]) -> Any:
-        def finished(tasks: Sequence[Task], workers: int, solve: Any) -> Iterator[Row]:
+        def finished(tasks: Sequence[StudyRun], workers: int, solve: Any) -> Iterator[RunRow]:
             for task in tasks:
                 said = dict(text.split("=", 1) for text in task.overrides)
                 numbers = {"life_cycles": life({key: float(said[key]) for key in vary}, powers)}
-                yield Row(task.number, task.key, "complete", "told", numbers)
+                yield RunRow(task.number, task.key, "complete", "told", numbers)
 
         return finished
 
@@ -227,7 +227,7 @@ def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
 
 
 def test_missing_runs_widen_what_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def life(values: dict[str, float], task: Task) -> dict[str, float] | None:
+    def life(values: dict[str, float], task: StudyRun) -> dict[str, float] | None:
         return None if task.number % 16 == 0 else {"life_cycles": lasts(values)}
 
     monkeypatch.setattr(pool, "finished", engine(life))
@@ -242,7 +242,7 @@ def test_missing_runs_widen_what_is_told(tmp_path: Path, monkeypatch: pytest.Mon
 def test_lives_that_did_not_end_are_lower_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limit = 1.2 * MEDIAN
 
-    def life(values: dict[str, float], task: Task) -> dict[str, float]:
+    def life(values: dict[str, float], task: StudyRun) -> dict[str, float]:
         own = lasts(values)
         return {"cycles": limit} if own > limit else {"cycles": own, "life_cycles": own}
 
@@ -373,7 +373,7 @@ def test_a_life_by_controlled_errors_is_smooth_and_its_row_has_its_derivatives()
     keys, lives = ("contact.friction", "wear.coefficient"), []
     for friction in (0.495, 0.5, 0.505):
         file = scene_file.read("blade", (*cheap, f"contact.friction={friction}"))
-        row = solve(Task(1, "blade", file.text, file.overrides, file.folder, keys if friction == 0.5 else ()))
+        row = solve(StudyRun(1, "blade", file.text, file.overrides, file.folder, keys if friction == 0.5 else ()))
         lives.append(row.numbers["life_cycles"])
         if friction == 0.5:
             by_friction, by_coefficient = (row.numbers[slope_column("life_cycles", key)] for key in keys)

@@ -9,7 +9,7 @@ import pytest
 
 import tribodyn as td
 from tribodyn.workflows.studies.many import quantiles, study_file
-from tribodyn.workflows.studies.many.parameter_space import Space
+from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
 from tribodyn.workflows.studies.many.quantiles import Sample
 from tribodyn.workflows.studies.many.surrogate import Surrogate
 
@@ -46,7 +46,7 @@ def population(tmp_path_factory: pytest.TempPathFactory) -> tuple[np.ndarray, np
     found = td.studies.grid(LIVES, tmp_path_factory.mktemp("population")).columns
     values = np.asarray(found["life_cycles"], float)
     has = np.isfinite(values)
-    space = Space.of(study_file.parse(LIVES, "population.toml", Path()))
+    space = ParameterSpace.of(study_file.parse(LIVES, "population.toml", Path()))
     return space.coordinates(space.points_of(found))[has], np.log(values[has])
 
 

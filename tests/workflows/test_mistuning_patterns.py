@@ -76,7 +76,7 @@ def test_the_command_draws_patterns_and_resumes(
 
 def test_blades_alike_amplify_nothing(scene: Path) -> None:
     """The search for the highest peak of the whole wheel finds that of the wave."""
-    blades = patterns.Blades.of(scene_file.read(str(scene), ("mistuning.frequency=0", "mistuning.friction=0")))
+    blades = patterns.MistunedBlades.of(scene_file.read(str(scene), ("mistuning.frequency=0", "mistuning.friction=0")))
     none = np.zeros(6)
     found, _ = blades.peak(patterns.Pattern(0, none, none, none))
     assert found.amplitude == pytest.approx(blades.alike.amplitude, rel=1e-4)
@@ -109,4 +109,4 @@ def test_what_cannot_be_is_one_sentence(scene: Path, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"mistuning\.frequency"):
         scene_file.read(str(scene), ("mistuning.frequency=2",))
     with pytest.raises(SceneError, match="unknown"):
-        patterns.Blades.of(scene_file.read(str(scene), ('mistuning.body="blade"',)))
+        patterns.MistunedBlades.of(scene_file.read(str(scene), ('mistuning.body="blade"',)))

@@ -14,7 +14,7 @@ import tribodyn as td
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import study_file
-from tribodyn.workflows.studies.many.optimum import Known, best_trades, promised, propose
+from tribodyn.workflows.studies.many.optimum import EvaluatedRuns, best_trades, promised, propose
 from tribodyn.workflows.studies.many.run_task import numbers_of
 from tribodyn.workflows.studies.many.study_table import StudyTable
 
@@ -37,7 +37,7 @@ def searched(aims, excess, first, count, slopes=True, seed=0):
 
         by = np.stack([(both(share + h) - both(share - h)) / 8e-6 for h in 1e-6 * np.eye(2)], axis=2)
         m = aims(share).shape[1]
-        return Known(share, both(share)[:, :m], both(share)[:, m:], by if slopes else np.full(by.shape, np.nan))
+        return EvaluatedRuns(share, both(share)[:, :m], both(share)[:, m:], by if slopes else np.full(by.shape, np.nan))
 
     while len(share) < count:
         place, gain = propose(known(), lambda s: 4 * (s - 0.5), seed)
@@ -122,7 +122,7 @@ def test_few_runs_with_derivatives_of_one_aim_say_where_the_next_goes() -> None:
     """Of two aims the other is known by its values alone, which are the same."""
     share, slopes = np.array([[0.5, 0.5], [0.55, 0.5]]), np.full((2, 2, 2), np.nan)
     slopes[:, 0] = [1.0, -1.0]
-    known = Known(share, np.array([[0.0, 0.0], [0.2, 0.0]]), np.zeros((2, 0)), slopes)
+    known = EvaluatedRuns(share, np.array([[0.0, 0.0], [0.2, 0.0]]), np.zeros((2, 0)), slopes)
     for seed in range(5):
         place, _ = propose(known, lambda s: 4 * (s - 0.5), seed)
         np.testing.assert_allclose(place, [0.0, 1.0], atol=1e-3)

@@ -15,15 +15,15 @@ from tests.helpers.fits import predict
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import posterior
-from tribodyn.workflows.studies.fits.fit_file import Asked
-from tribodyn.workflows.studies.fits.identification import Measured, Parameter
+from tribodyn.workflows.studies.fits.fit_file import Target
+from tribodyn.workflows.studies.fits.identification import FitParameter, MeasuredNumber
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
 
 pytest.importorskip("emcee")
 
 SLOPES = np.array([[1.0, 0.5], [-0.4, 1.5], [0.8, 0.8]])  # d ln(number) / d ln(parameter)
 ERRORS = np.array([0.05, 0.08, 0.05])
-BOX = (Parameter("a", 0.5, 2.0, (1.0,)), Parameter("b", 0.5, 2.0, (1.0,)))
+BOX = (FitParameter("a", 0.5, 2.0, (1.0,)), FitParameter("b", 0.5, 2.0, (1.0,)))
 TRUE = np.log([1.1, 0.9])
 
 
@@ -33,9 +33,11 @@ def linear(values: Mapping[str, float]) -> np.ndarray:
     return np.exp(np.append(SLOPES @ z, 2 * z[0] - z[1]))
 
 
-def measured(noise: np.ndarray) -> list[Measured]:
+def measured(noise: np.ndarray) -> list[MeasuredNumber]:
     values = np.exp(SLOPES @ TRUE + noise)
-    return [Measured(f"m{i}", float(v), error=float(e)) for i, (v, e) in enumerate(zip(values, ERRORS, strict=True))]
+    return [
+        MeasuredNumber(f"m{i}", float(v), error=float(e)) for i, (v, e) in enumerate(zip(values, ERRORS, strict=True))
+    ]
 
 
 def test_a_linear_problem_has_its_normal_posterior() -> None:
@@ -56,7 +58,7 @@ def test_a_linear_problem_has_its_normal_posterior() -> None:
 
 
 def test_a_prior_counts_and_what_is_not_told_is_said() -> None:
-    only_a = [Measured("m", 1.2, error=0.1)]
+    only_a = [MeasuredNumber("m", 1.2, error=0.1)]
     prior = {"a": Marginal.of(Distribution(distribution="lognormal", median=1.0, cov="10 %"))}
     found = posterior.sample(BOX, only_a, lambda values: np.array([values["a"]]), priors=prior)
     width = np.sqrt(np.log1p(0.01))
@@ -81,7 +83,7 @@ def test_trials_that_fail_are_left_out_and_too_many_end_it() -> None:
     with pytest.raises(SolveFailed, match="narrow the bounds; the last: no peak"):
         posterior.sample(BOX, measured(np.zeros(3)), fails_above(0.7))
     with pytest.raises(ValueError, match=r"measured.m.error: a posterior needs the error"):
-        posterior.sample(BOX, [Measured("m", 1.0)], linear)
+        posterior.sample(BOX, [MeasuredNumber("m", 1.0)], linear)
 
 
 BEAM = (
@@ -98,7 +100,7 @@ AHEAD = {"amplitude": {"of": "amplitude", "at": "700 Hz", "load": 1.5}}
 
 
 def test_a_planted_truth_of_a_scene_is_in_its_interval(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    both = {name: Asked.model_validate(table) for name, table in (ASKED | AHEAD).items()}
+    both = {name: Target.model_validate(table) for name, table in (ASKED | AHEAD).items()}
     truth = predict(scene_file.read("beam", (*BEAM, *TRUTH)), both)
     off = (1 + 0.004, 1 - 0.03)  # what was measured misses the truth by some of its errors
     task = {

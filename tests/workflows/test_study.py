@@ -25,7 +25,7 @@ from tribodyn.hbm.linear import compliance
 from tribodyn.workflows.run import kept, modelling
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.many import parameter_space, pool, study_file, study_pictures
-from tribodyn.workflows.studies.many.run_task import Row, Task, solve
+from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, solve
 from tribodyn.workflows.studies.many.study_table import Journal
 
 TINY = [
@@ -157,7 +157,9 @@ def test_runs_that_share_their_linear_side_give_what_each_gives_by_itself(monkey
     base, springs, damping = scene_file.read("beam"), "contact.tangential_stiffness=300 N/um", "damping.modal=2 %"
     changes = ["", f"{FRICTION}=0.3", f"{PRESS}=10 kN", springs, damping, "loads.harmonic.shake.value=8 kN"]
     always = (*TINY, "response.points=20", "verdict.enabled=false")
-    tasks = [Task(n, base.name, base.text, (*always, *filter(None, [c])), base.folder) for n, c in enumerate(changes)]
+    tasks = [
+        StudyRun(n, base.name, base.text, (*always, *filter(None, [c])), base.folder) for n, c in enumerate(changes)
+    ]
     alone = [solve(task).numbers for task in tasks]
     assert len({tuple(numbers.values()) for numbers in alone}) == len(tasks), alone
     made: list[float] = []
@@ -181,10 +183,10 @@ def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
     (tmp_path / "rows.jsonl").write_text(lines[0] + lines[1] + '{"run": 2, "key": "torn')
     asked: list[int] = []
 
-    def pretend(tasks: list[Task], workers: int, solve: Any) -> Any:
+    def pretend(tasks: list[StudyRun], workers: int, solve: Any) -> Any:
         for one in tasks:
             asked.append(one.number)
-            yield Row(one.number, one.key, "failed", "at 400 Hz")
+            yield RunRow(one.number, one.key, "failed", "at 400 Hz")
 
     monkeypatch.setattr(pool, "finished", pretend)
     found = td.studies.grid(TABLES, tmp_path, resume=True)
@@ -202,7 +204,7 @@ def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
 
 def test_the_key_of_a_run_follows_its_files(tmp_path: Path) -> None:
     (tmp_path / "map.txt").write_text("1")
-    one = Task(1, "own", 'file = "map.txt"', ("a=1",), tmp_path)
+    one = StudyRun(1, "own", 'file = "map.txt"', ("a=1",), tmp_path)
     assert one.key == replace(one, number=2).key
     assert one.key != replace(one, overrides=("a=2",)).key
     before = one.key
@@ -215,7 +217,7 @@ def test_a_process_that_dies_takes_no_other_run_with_it(tmp_path: Path, monkeypa
     forked = get_context("forkserver")  # spawned ones, as in `done`, import the program anew: six of them here
     forked.set_forkserver_preload(["tests.helpers.dying"])
     monkeypatch.setattr(pool, "get_context", lambda _: forked)
-    good = Task(1, "none", "", (), tmp_path)
+    good = StudyRun(1, "none", "", (), tmp_path)
     tasks = [replace(good, number=n) for n in (1, 2, 3, 4)]
     rows = {row.run: row for row in pool.finished(tasks, 2, dying.at_two)}
     assert {n: row.status for n, row in rows.items()} == {1: "refused", 2: "lost", 3: "refused", 4: "refused"}

@@ -74,10 +74,10 @@ def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
     assert abs(found[640]["outputs"]["response"]["difference"]) < 0.1
 
 
-def with_harmonics(folder: Path, highest: int, hertz: float) -> verification.Comparison:
+def with_harmonics(folder: Path, highest: int, hertz: float) -> verification.TimeComparison:
     override = [f"harmonics.kept={list(range(highest + 1))}"]
     found = verify(store.load(folder / "result.h5"), hertz, overrides=override, steps=512, progress=Progress())
-    assert isinstance(found, verification.Comparison)
+    assert isinstance(found, verification.TimeComparison)
     return found
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, scale_bar
-from tribodyn.workflows.pictures.opened import Field
+from tribodyn.workflows.pictures.opened import FieldPaint
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.theme import BODIES, LAYOUT, PRESSURE_MAP, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import bodies, meetings_of
@@ -133,7 +133,7 @@ def exploded_picture(result: Result) -> Figure:
         lift = LAYOUT.lift * float(np.sqrt(one.patch.area.sum()))
         for face in one.faces:
             there = face.points + lift * face.outward + offset[face.nodes[0]]
-            layers += Field(values[one.pairs], limits, map_)(one.patch, there)
+            layers += FieldPaint(values[one.pairs], limits, map_)(one.patch, there)
     towards, up = drawing.looking(result)
     axis = up / np.linalg.norm(up)
     level = towards - (towards @ axis) * axis

@@ -36,7 +36,7 @@ from tribodyn.workflows.pictures.figures import (
 )
 from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.plots import cycle_axis, loop_of, loop_size
-from tribodyn.workflows.pictures.render import Moving
+from tribodyn.workflows.pictures.render import MovingPart
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
 from tribodyn.workflows.pictures.theme import (
     BLUE,
@@ -223,10 +223,10 @@ class WearFilm:
 
     def _paint(self, state: State, name: str) -> book.Paint:
         if name == "status":
-            return book.Status(np.zeros(len(state.depth), int) if state.status is None else state.status)
+            return book.StatusPaint(np.zeros(len(state.depth), int) if state.status is None else state.status)
         if name == "depth":
-            return book.Field(state.depth, (0.0, self._depth_top), WEAR_MAP)
-        return book.Field(np.maximum(_pressure(state), 0) ** ROOT, (0.0, self._pressure_top**ROOT), PRESSURE_MAP)
+            return book.FieldPaint(state.depth, (0.0, self._depth_top), WEAR_MAP)
+        return book.FieldPaint(np.maximum(_pressure(state), 0) ** ROOT, (0.0, self._pressure_top**ROOT), PRESSURE_MAP)
 
     def _bars(self, figure: Any) -> None:
         unit, factor = length_unit(self._depth_top)
@@ -302,7 +302,7 @@ class CycleFilm:
         self._contact = book.opened(result, shown[0]) if shown else None
         self._moving = None
         if self.state.field is not None and result.part is not None and len(patch.faces):
-            self._moving = Moving(result, deformation, wear)
+            self._moving = MovingPart(result, deformation, wear)
             _, moved = over_a_cycle(result, self.state.field, count)
             self._vibration = moved - moved.mean(axis=0)
             self._factor = self._moving.vibration_scale(self._moving.swing(self.state))
@@ -369,7 +369,7 @@ class CycleFilm:
             found.append(self._moving.marked(shoot(view, self._moving.camera, LAYOUT.film_part), points))
         if self._contact is not None:
             own = self._contact.own(self.state)
-            paint = book.Status(self._status[self._contact.contact.pairs, sample])
+            paint = book.StatusPaint(self._status[self._contact.contact.pairs, sample])
             view = self._contact.view(own.depth, self._wear, paint)
             found.append(shoot(view, self._contact.camera, LAYOUT.film_part))
         return found

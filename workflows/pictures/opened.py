@@ -105,7 +105,7 @@ class Paint(Protocol):
 
 
 @dataclass(frozen=True)
-class Field:
+class FieldPaint:
     """A value for each pair, between two limits of a colour map."""
 
     values: np.ndarray
@@ -122,7 +122,7 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Status:
+class StatusPaint:
     """The status of each pair on its share of the face."""
 
     status: np.ndarray

@@ -64,7 +64,7 @@ def figures(
 def part_picture(result: Result, deformation: float | None = None, wear: float | None = None) -> Figure:
     """The part in each shown state at its largest swing, coloured by amplitude, one camera for all."""
     states = [state for state in shown_states(result) if state.field is not None]
-    moving = Moving(result, deformation, wear)
+    moving = MovingPart(result, deformation, wear)
     images, scales, bars = [], [], []
     for state in states:
         amplitude, vibration = moving.amplitude(state), moving.swing(state)
@@ -125,7 +125,7 @@ def _painted(contact: book.Opened, state: State, name: str, wear: float) -> tupl
     """The opened contact showing one quantity of a state, and the scale bar that goes with it."""
     if name == "status":
         none = np.zeros(len(state.depth), int)
-        return contact.view(state.depth, wear, book.Status(none if state.status is None else state.status)), None
+        return contact.view(state.depth, wear, book.StatusPaint(none if state.status is None else state.status)), None
     if name == "depth":
         unit, factor = length_unit(float(state.depth.max()))
         values, map_, label = factor * state.depth, WEAR_MAP, f"total wear depth / {unit}"
@@ -134,11 +134,11 @@ def _painted(contact: book.Opened, state: State, name: str, wear: float) -> tupl
         unit, factor = pressure_unit(float(pressure.max()))
         values, map_, label = factor * pressure, PRESSURE_MAP, f"mean pressure / {unit}"
     low, high = maps.limits(values)
-    paint = book.Field(values, (low, high), map_)
+    paint = book.FieldPaint(values, (low, high), map_)
     return contact.view(state.depth, wear, paint), (map_, low, high, label)
 
 
-class Moving:
+class MovingPart:
     """The worn part of a result in motion, and one camera for all its states.
 
     deformation, wear : factors of displacement and depth, by size where None

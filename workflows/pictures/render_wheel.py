@@ -27,7 +27,7 @@ from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states
 
 
-class Blades:
+class BladeSurface:
     """All blades of a wheel as one surface, seen nearly along its axis.
 
     nodes : (n_point,) of the part on its surface; size : largest distance of the part from the axis [m]
@@ -61,7 +61,7 @@ def wheel_picture(result: Result, wheel: Around, deformation: float | None = Non
     assert fields is not None
 
     states = [state for state in shown_states(result) if state.field is not None]
-    blades = Blades(wheel, part)
+    blades = BladeSurface(wheel, part)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(3.4 * len(states) + 0.2, 4.4), layout="constrained")
         for axes, state in zip(np.atleast_1d(figure.subplots(1, len(states))), states, strict=True):
@@ -124,7 +124,7 @@ class MistunedWheelFilm:
         check()
 
         self.count, self._states, self._sectors = count, tuple(states), wheel.sectors
-        self._blades = Blades(wheel, part)
+        self._blades = BladeSurface(wheel, part)
         nodes = self._blades.nodes
         self._rest, self._swings = [], []
         for state in states:

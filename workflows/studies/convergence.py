@@ -39,7 +39,7 @@ MARKERS = "osD^v<>PX*hp"
 
 
 @dataclass(frozen=True, repr=False)
-class Converged(StudyResult):
+class Convergence(StudyResult):
     """The settings of a scene, measured."""
 
     table: Settlings
@@ -66,7 +66,7 @@ class Converged(StudyResult):
 
 def converge(
     scene: AnyPath, *, settings: Sequence[str] = (), most: int = 99, overrides: Overrides = (), progress: Report = None
-) -> Converged:
+) -> Convergence:
     """Measure how far each setting of a scene is from where its answers tend to, and what it costs.
 
     scene : name of a scene or a .toml file, with its own ladders of grids and settings in NAME.study.toml beside it
@@ -76,7 +76,7 @@ def converge(
     if most < 1:
         raise Refusal(f"--most {most}: a ladder needs one setting at least")
     texts, say = override_texts(overrides), reporter(progress).say
-    return Converged(settle(fspath(scene), settings, texts, say, most))
+    return Convergence(settle(fspath(scene), settings, texts, say, most))
 
 
 def on_grid(fine: np.ndarray, field: np.ndarray, coarse: np.ndarray) -> np.ndarray:

@@ -45,7 +45,7 @@ HZ = 2 * np.pi  # rad/s of one Hz
 
 
 @dataclass(frozen=True)
-class Contact:
+class MatrixContact:
     """A joint: where a structure touches, with its contact law.
 
     name : unique in a structure; interface : what `Matrices.contact` or `Matrices.contact_rows` makes
@@ -83,7 +83,7 @@ class Structure:
     """
 
     model: ReducedModel
-    contacts: tuple[Contact, ...]
+    contacts: tuple[MatrixContact, ...]
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -110,7 +110,7 @@ class Structure:
         samples: int = 128,
         transitions: str = "auto",
         tolerance: float = 1e-8,
-    ) -> Balance:
+    ) -> HertzBalance:
         """The harmonic balance of the structure under loads.
 
         up_to : highest excitation frequency that will be asked for [Hz]
@@ -123,7 +123,7 @@ class Structure:
         basis = HarmonicBasis(tuple(harmonics), samples, chosen)
         loads = Excitation.of(static, harmonic)
         made = HarmonicBalance.of(self.model, self.joints, basis, loads, HZ * up_to)
-        return Balance(made, NewtonOptions(tolerance=tolerance))
+        return HertzBalance(made, NewtonOptions(tolerance=tolerance))
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class Cycle:
 
 
 @dataclass(frozen=True)
-class Balance:
+class HertzBalance:
     """A harmonic balance with frequencies in Hz: from `Structure.balance`, or `Balance(build(scene).balance)`.
 
     problem : the same in rad/s, as the solver has it; newton : how exactly it is solved
@@ -197,11 +197,11 @@ class Balance:
         """Highest excitation frequency [Hz]."""
         return self.problem.omega_max / HZ
 
-    def with_load(self, factor: float) -> Balance:
+    def with_load(self, factor: float) -> HertzBalance:
         """The same with all loads but the static ones times a factor."""
         return replace(self, problem=self.problem.with_load(factor))
 
-    def with_gap(self, gap: np.ndarray) -> Balance:
+    def with_gap(self, gap: np.ndarray) -> HertzBalance:
         """The same with another gap of every pair (n_pair,) [m], as wear makes it."""
         return replace(self, problem=self.problem.with_gap(gap))
 
@@ -332,7 +332,7 @@ def wear_law(name: str, **numbers: float | np.ndarray) -> JointWear:
 
 def reduce(
     matrices: ForeignMatrices,
-    contacts: Contact | Sequence[Contact],
+    contacts: MatrixContact | Sequence[MatrixContact],
     *,
     loads: Mapping[str, Terms],
     outputs: Mapping[str, Terms],
@@ -347,7 +347,7 @@ def reduce(
     damping_ratio : of every mode without contact, where the matrices hold no damping; there may be none at all
     Raises  ValueError for contacts of one name, DOFs that do not exist, two kinds of damping
     """
-    touching = (contacts,) if isinstance(contacts, Contact) else tuple(contacts)
+    touching = (contacts,) if isinstance(contacts, MatrixContact) else tuple(contacts)
     if not touching:
         raise Refusal("a structure needs at least one contact")
     system, interface = matrices.system(loads, outputs), joined([contact.interface for contact in touching])

@@ -42,7 +42,7 @@ STRIDE = 5e-3  # of the frequency, from the nearest solution to the one asked fo
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison(StudyResult):
+class TimeComparison(StudyResult):
     """The balance at one frequency and what time integration says.
 
     balance, solution : the problem, with the wear of `row` (None: unworn), and its solution
@@ -202,7 +202,7 @@ def held_against(
     row: int | None,
     steps: int | None,
     progress: Progress,
-) -> Comparison:
+) -> TimeComparison:
     """The comparison with the model at hand: the scene of a result and its unworn problem; at : [rad/s]."""
     start = time.perf_counter()
     with limited(scene.solver.threads):
@@ -225,7 +225,7 @@ def held_against(
             left_alone = None
             if not stable or not found.motion.periodic:
                 left_alone = leave_alone(balance, target, solution.state, LEFT_ALONE, options)
-    return Comparison(balance, solution, found, stable, how, row, steps, time.perf_counter() - start, left_alone)
+    return TimeComparison(balance, solution, found, stable, how, row, steps, time.perf_counter() - start, left_alone)
 
 
 def alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> LeftAlone:

@@ -28,7 +28,7 @@ from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies import verification
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.verification import Comparison
+from tribodyn.workflows.studies.verification import TimeComparison
 
 HEADER = (
     f"{'row':>4} {'cycles':>11} {'Hz':>9} {'run [J]':>11} {'balance [J]':>11} {'time [J]':>11} {'difference':>11} "
@@ -51,19 +51,19 @@ class WornStates(StudyResult):
     """
 
     wear: WearHistory
-    found: Mapping[int, Comparison | str]
+    found: Mapping[int, TimeComparison | str]
     alone: Mapping[int, LeftAlone]
 
     def record(self) -> dict[str, Any]:
         """For machines; `comparison` as that of one state, `left_alone_J` mean and spread."""
         rows = []
         for row, found in self.found.items():
-            seen, compared = self.alone.get(row), isinstance(found, Comparison)
+            seen, compared = self.alone.get(row), isinstance(found, TimeComparison)
             rows.append(
                 {
                     "row": row, "cycles": float(self.wear.cycles[row]), "frequency_hz": float(self.wear.frequency[row]),
                     "energy_of_run_J": float(self.wear.energy[row].sum()),
-                    "comparison": found.record() if isinstance(found, Comparison) else None,
+                    "comparison": found.record() if isinstance(found, TimeComparison) else None,
                     "left_alone_J": None if seen is None else [seen.energy, seen.energy_spread],
                     "no_comparison": None if compared else found,
                 }
@@ -88,7 +88,7 @@ class WornStates(StudyResult):
 
     def _periodic(self, row: int) -> bool:
         found = self.found[row]
-        return isinstance(found, Comparison) and found.found.motion.periodic
+        return isinstance(found, TimeComparison) and found.found.motion.periodic
 
     def write(self, folder: Path) -> list[Path]:
         """Write verify_states.png."""
@@ -120,7 +120,7 @@ def verify(
     steps: int | None = None,
     overrides: Overrides = (),
     progress: Report = None,
-) -> Comparison | WornStates:
+) -> TimeComparison | WornStates:
     """Check a result against direct time integration of the same model with the same contact law.
 
     result : folder or file of a result
@@ -144,7 +144,7 @@ def verify(
     if states is None or result.wear is None:
         omega = None if at is None else 2 * np.pi * at
         return verification.held_against(result, file.scene, unworn, omega, row, steps, report)
-    found: dict[int, Comparison | str] = {}
+    found: dict[int, TimeComparison | str] = {}
     alone: dict[int, LeftAlone] = {}
     for row in spread(result.wear, states):
         try:

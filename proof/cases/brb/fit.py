@@ -18,7 +18,7 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.measured.computed_runs import beside
+from tribodyn.workflows.studies.measured.computed_runs import compare_runs
 from tribodyn.workflows.studies.measured.measurement import prepared
 from tribodyn.workflows.studies.measured.reading import read
 
@@ -66,7 +66,7 @@ class Beam:
             one.measured.control: np.log(
                 [one.computed.frequency / one.measured.frequency, one.computed.damping / one.measured.damping]
             )
-            for one in beside(file, model, self.measured, Progress())
+            for one in compare_runs(file, model, self.measured, Progress())
         }
 
 

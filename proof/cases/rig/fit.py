@@ -27,13 +27,13 @@ from tests.helpers.fits import fit_by_differences as identify
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter
+from tribodyn.workflows.studies.fits.identification import FitParameter, Identification, MeasuredNumber
 
 RIGID = 1e11  # stiffness beyond which no published frequency changes by one in a thousand [N/m]
 MICROMETRE = 1e-6
 SECTIONS = 3  # models kept, some 0.2 GB each: a section and its two neighbours for the derivatives
 FREQUENCIES = tuple(
-    Measured(f"{state}, {kind}", value, "Hz")
+    MeasuredNumber(f"{state}, {kind}", value, "Hz")
     for state, modes in (("open", OPEN), ("stuck", STUCK))
     for kind, value in modes
 )
@@ -51,7 +51,7 @@ def rigid() -> dict[str, float]:
 
 def fit_joints(joints: Joints) -> Identification:
     """Joint springs to the published frequencies; "before" is the rig with rigid joints."""
-    parameters = [Parameter(name, 1e8, RIGID, (1e9 if name.startswith("base") else RIGID,), "N/m") for name in TIED]
+    parameters = [FitParameter(name, 1e8, RIGID, (1e9 if name.startswith("base") else RIGID,), "N/m") for name in TIED]
     before = dict.fromkeys(TIED, RIGID)
     return identify(parameters, FREQUENCIES, lambda values: joints.frequencies(stiffnesses(values)), before)
 
@@ -68,32 +68,32 @@ def fit_column(scene: str, overrides: Sequence[str] = ()) -> Identification:
         length, depth = (round(values[name] / MICROMETRE) * MICROMETRE for name in ("column_length", "column_depth"))
         return joints(length, depth).frequencies(stiffnesses({**values, "seat": RIGID}))
 
-    springs = [Parameter(name, 1e8, RIGID, (1e9,), "N/m") for name in ("base_vertical", "base_sliding")]
-    section = [Parameter(name, 0.085, 0.13, (0.1,), "m") for name in ("column_length", "column_depth")]
+    springs = [FitParameter(name, 1e8, RIGID, (1e9,), "N/m") for name in ("base_vertical", "base_sliding")]
+    section = [FitParameter(name, 0.085, 0.13, (0.1,), "m") for name in ("column_length", "column_depth")]
     return identify([*springs, *section], FREQUENCIES, predict)
 
 
 def fit_height(rig: Rig) -> Identification:
     """Platform height to the published preload."""
-    parameter = Parameter("platform", 5e-6, 50e-6, (rig.height,), "m")
+    parameter = FitParameter("platform", 5e-6, 50e-6, (rig.height,), "m")
     with kept.at_hand():
         return identify(
             [parameter],
-            [Measured("preload", PRELOAD, "N")],
+            [MeasuredNumber("preload", PRELOAD, "N")],
             lambda values: np.array([rig.with_height(values["platform"]).at_rest().preload]),
         )
 
 
 def fit_damping(rig: Rig) -> Identification:
     """Modal damping to the published energies per cycle."""
-    measured = [Measured(f"energy at {force:.0f} N", energy, "J") for force, (energy, _) in TABLE_5_3.items()]
+    measured = [MeasuredNumber(f"energy at {force:.0f} N", energy, "J") for force, (energy, _) in TABLE_5_3.items()]
 
     def energies(values: Mapping[str, float]) -> np.ndarray:
         damped = rig.with_damping(values["modal damping"])
         return np.array([max(damped.with_force(force).cycle().energy, 1e-9) for force in TABLE_5_3])
 
     with kept.at_hand():
-        return identify([Parameter("modal damping", 0.005, 0.06, (0.01, 0.03), "-")], measured, energies)
+        return identify([FitParameter("modal damping", 0.005, 0.06, (0.01, 0.03), "-")], measured, energies)
 
 
 def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
@@ -104,8 +104,8 @@ def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
     if not run.lost:
         raise ValueError(f"a wear coefficient needs a run that loses its preload, but this one: {run.end}")
     found = np.array([run.history.cycles[-1], run.spent[-1]])
-    measured = [Measured("cycles to loss", LIFE_MEASURED), Measured("work to loss", WORK, "J")]
-    parameter = Parameter("coefficient", coefficient / 10, 10 * coefficient, (coefficient,), "m3/J")
+    measured = [MeasuredNumber("cycles to loss", LIFE_MEASURED), MeasuredNumber("work to loss", WORK, "J")]
+    parameter = FitParameter("coefficient", coefficient / 10, 10 * coefficient, (coefficient,), "m3/J")
     return identify([parameter], measured, lambda values: found * coefficient / values["coefficient"])
 
 

@@ -26,7 +26,7 @@ from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.joints import contact_stiffness
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.fits.identification import Measured, Parameter
+from tribodyn.workflows.studies.fits.identification import FitParameter, MeasuredNumber
 from tribodyn.workflows.studies.forces import forces
 
 
@@ -120,10 +120,10 @@ def test_known_springs_are_found_again(joints):
     """From eight modes; near the ninth one there are several of its kind, so that it may be taken for another."""
     true = {"base_vertical": 7e8, "base_sliding": 3e9, "seat": rig_fit.RIGID}
     numbers = joints.frequencies(rig_fit.stiffnesses(true))[:8]
-    parameters = [Parameter(name, 1e8, 1e11, (1e9,), "N/m") for name in ("base_vertical", "base_sliding")]
+    parameters = [FitParameter(name, 1e8, 1e11, (1e9,), "N/m") for name in ("base_vertical", "base_sliding")]
     found = fit(
         parameters,
-        [Measured(str(i), value, "Hz") for i, value in enumerate(numbers)],
+        [MeasuredNumber(str(i), value, "Hz") for i, value in enumerate(numbers)],
         lambda values: joints.frequencies(rig_fit.stiffnesses({**values, "seat": rig_fit.RIGID}))[:8],
     )
     assert found.values[0] == pytest.approx(7e8, rel=1e-2)

@@ -23,7 +23,7 @@ from tribodyn.workflows.studies.study_result import StudyResult
 
 
 @dataclass(frozen=True, repr=False)
-class FoldsFound(StudyResult):
+class FoldStudy(StudyResult):
     """The response curve of a scene, by arc length, and its folds in the order of the curve."""
 
     branch: Branch
@@ -56,7 +56,7 @@ class FoldsFound(StudyResult):
         return said
 
 
-def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), progress: Report = None) -> FoldsFound:
+def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), progress: Report = None) -> FoldStudy:
     """Find the folds of the response by harmonic balance, and where the same branches end in time integration.
 
     scene : name of a scene or a .toml file
@@ -86,4 +86,4 @@ def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), pr
                     omega = float(branch.omega[fold])
                     why = SolveEnd.INTEGRATION_FAILED.say(f" {failure}")
                     found.append(FoldInTime(fold, omega, omega, float("nan"), within, why))
-    return FoldsFound(branch, tuple(found))
+    return FoldStudy(branch, tuple(found))

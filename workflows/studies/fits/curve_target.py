@@ -16,8 +16,8 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.own import folder_of
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.studies.fits.identification import Measured
-from tribodyn.workflows.studies.measured.computed_runs import beside
+from tribodyn.workflows.studies.fits.identification import MeasuredNumber
+from tribodyn.workflows.studies.measured.computed_runs import compare_runs
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run, prepared
 from tribodyn.workflows.studies.measured.reading import read
 
@@ -70,7 +70,7 @@ class CurveTarget:
         except ValueError as trouble:
             raise SceneError(f"curves.{name}: {trouble}") from None
 
-    def numbers(self) -> list[Measured]:
+    def numbers(self) -> list[MeasuredNumber]:
         """Every point as a measured number, see `values`."""
         found = []
         for run in self.measured.runs:
@@ -79,7 +79,7 @@ class CurveTarget:
             for kind, (values, column, unit) in self._columns(run).items():
                 for x, value, error in zip(self._places(run), values, errors[:, column], strict=True):
                     weight = self.table.weight * FULL / float(error)
-                    found.append(Measured(f"{self.name} {x} {kind}", float(value), unit, weight, float(error)))
+                    found.append(MeasuredNumber(f"{self.name} {x} {kind}", float(value), unit, weight, float(error)))
         return found
 
     def _places(self, run: Run) -> list[str]:
@@ -94,7 +94,7 @@ class CurveTarget:
 
     def values(self, file: SceneFile, model: modelling.Model) -> np.ndarray:
         """(n,) what a scene says to the numbers; raises SolveFailed where it does not reach a point."""
-        pairs = beside(file, model, self.measured, Progress())
+        pairs = compare_runs(file, model, self.measured, Progress())
         found = np.concatenate([v for one in pairs for v, *_ in self._columns(one.computed).values()])
         if away := np.sum(~np.isfinite(found)):
             raise SolveFailed(f"curves.{self.name}: the scene does not reach {away} of its points")

@@ -37,7 +37,7 @@ from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
 from tribodyn.workflows.studies.fits import posterior as posteriors
 from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
-from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit
+from tribodyn.workflows.studies.fits.identification import FitParameter, Identification, MeasuredNumber, fit
 from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
 from tribodyn.workflows.studies.study_result import StudyResult
@@ -51,7 +51,7 @@ DIFFERENCE = 1e-3  # step of a parameter, over it or the width of its bounds
 Quantity = float | str
 
 
-class Looked(Table):
+class ParameterTable(Table):
     """A number that is looked for.
 
     keys : of the scene, section.key; several get the same value
@@ -69,7 +69,7 @@ class Looked(Table):
     prior: Distribution | None = None
 
 
-class Asked(Table):
+class Target(Table):
     """A number that a scene answers.
 
     of : what it is
@@ -101,7 +101,7 @@ class Asked(Table):
         return self
 
 
-class Known(Asked):
+class MeasuredTarget(Target):
     """A measured number.
 
     value : with a unit or in SI; weight : of its relative error in a fit
@@ -113,16 +113,16 @@ class Known(Asked):
     error: Annotated[Number, Field(gt=0)] | None = None
 
 
-class Task(Table):
+class FitTables(Table):
     """What is looked for, what is known, and what is to follow from it, by names of one's own.
 
     curves : measured curves, which may take the place of measured numbers
     """
 
-    parameters: Annotated[dict[str, Looked], Field(min_length=1)]
-    measured: dict[str, Known]
+    parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
+    measured: dict[str, MeasuredTarget]
     curves: dict[str, Curve] = Field(default_factory=dict)
-    predict: dict[str, Asked] = Field(default_factory=dict)
+    predict: dict[str, Target] = Field(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod
@@ -134,12 +134,12 @@ class Task(Table):
         return table
 
 
-def read(task: AnyPath | Mapping[str, Any]) -> Task:
+def read(task: AnyPath | Mapping[str, Any]) -> FitTables:
     """Read and check the file of a fit, or its tables; raises SceneError with one sentence."""
     if isinstance(task, Mapping):
-        return scene_file.checked(Task, dict(task), "fit", Path())
+        return scene_file.checked(FitTables, dict(task), "fit", Path())
     path = Path(task)
-    return scene_file.checked(Task, scene_file.tables(path, "fit"), path.name, path.parent)
+    return scene_file.checked(FitTables, scene_file.tables(path, "fit"), path.name, path.parent)
 
 
 @dataclass(frozen=True, repr=False)
@@ -173,9 +173,9 @@ def identify(
     return best(read_scene(scene, overrides), read(task), reporter(progress))
 
 
-def best(file: SceneFile, task: Task, progress: Progress) -> Fit:
+def best(file: SceneFile, task: FitTables, progress: Progress) -> Fit:
     """The fit of a scene that was read."""
-    looked = _Looking(file, task, progress)
+    looked = SceneFit(file, task, progress)
     own = {name: value_of(file.mesh_scene, one.keys[0]) for name, one in task.parameters.items()}
     before = {name: value for name, value in own.items() if value is not None}
     known = before if len(before) == len(looked.parameters) else None
@@ -208,7 +208,7 @@ def posterior(
     Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: most trials fail
     """
     wanted = read(task)
-    looked = _Looking(read_scene(scene, overrides), wanted, reporter(progress))
+    looked = SceneFit(read_scene(scene, overrides), wanted, reporter(progress))
     asked = {**looked.targets, **wanted.predict}
     units = {name: MEASURED_IN[one.of] for name, one in wanted.predict.items()}
     priors = {name: looked.prior(name, one.prior) for name, one in wanted.parameters.items() if one.prior is not None}
@@ -218,25 +218,25 @@ def posterior(
         )
 
 
-class _Looking:
+class SceneFit:
     """A scene whose numbers are looked for."""
 
-    def __init__(self, file: SceneFile, task: Task, progress: Progress):
+    def __init__(self, file: SceneFile, task: FitTables, progress: Progress):
         both = set(task.measured) & set(task.predict)
         if both:
             raise SceneError(f"predict.{min(both)}: a measured number has this name, give another one")
         self.file, self._task, self._progress = file, task, progress
         self.parameters = [parameter(name, one, self.file.mesh_scene) for name, one in task.parameters.items()]
         self.measured = [
-            Measured(name, _si(f"measured.{name}.value", known.value, (MEASURED_IN[known.of],))[0],
+            MeasuredNumber(name, _si(f"measured.{name}.value", known.value, (MEASURED_IN[known.of],))[0],
                      MEASURED_IN[known.of], known.weight, known.error)
             for name, known in task.measured.items()
         ]  # fmt: skip
         curves = {f"curves.{name}": CurveTarget.of(name, one, file) for name, one in task.curves.items()}
         self.measured += [number for one in curves.values() for number in one.numbers()]
-        self.targets: Mapping[str, Asked | CurveTarget] = {**task.measured, **curves}
+        self.targets: Mapping[str, Target | CurveTarget] = {**task.measured, **curves}
         self._count = 0
-        self._last: Answers | None = None
+        self._last: SceneAnswers | None = None
 
     def changes(self, values: Mapping[str, float], digits: int = 17) -> list[str]:
         """Overrides that put values into the scene."""
@@ -244,19 +244,19 @@ class _Looking:
         return [f"{key}={text}" for name, text in said.items() for key in self._task.parameters[name].keys]
 
     def trial(
-        self, values: Mapping[str, float], asked: Mapping[str, Asked | CurveTarget], nearby: bool = False
+        self, values: Mapping[str, float], asked: Mapping[str, Target | CurveTarget], nearby: bool = False
     ) -> np.ndarray:
         """What the scene says with values; nearby : its cycles are found from those of the trial before."""
         self._count += 1
         trial = self.file.changed(*self.changes(values))
-        self._last = Answers(trial, modelling.build(trial, Progress()), self._last if nearby else None)
+        self._last = SceneAnswers(trial, modelling.build(trial, Progress()), self._last if nearby else None)
         found = self._last.all_to(asked)
         self._progress.say(
             f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         )
         return found
 
-    def slopes(self, values: Mapping[str, float], asked: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
+    def slopes(self, values: Mapping[str, float], asked: Mapping[str, Target | CurveTarget]) -> np.ndarray:
         """(n_measured, n_parameter) derivatives of what the last trial said; values : its own."""
         here = self._last
         assert here is not None
@@ -276,10 +276,10 @@ class _Looking:
             rows += list(np.transpose([(up - down) / (2 * s[1]) for (up, down), s in zip(beside, sides, strict=True)]))
         return np.array(rows)
 
-    def _beside(self, values: Mapping[str, float]) -> Answers:
+    def _beside(self, values: Mapping[str, float]) -> SceneAnswers:
         """The scene with values near those of the last trial, of which nothing is solved yet."""
         file = self.file.changed(*self.changes(values))
-        return Answers(file, modelling.build(file, Progress()), self._last)
+        return SceneAnswers(file, modelling.build(file, Progress()), self._last)
 
     @staticmethod
     def prior(name: str, table: Distribution) -> Marginal:
@@ -290,7 +290,7 @@ class _Looking:
             raise SceneError(f"parameters.{name}.prior: {error}") from None
 
 
-def parameter(name: str, looked: Looked, scene: MeshScene) -> Parameter:
+def parameter(name: str, looked: ParameterTable, scene: MeshScene) -> FitParameter:
     """A number that is looked for, in SI units."""
     low, unit = _si(f"parameters.{name}.low", looked.low, UNITS)
     same = (unit,) if isinstance(looked.low, str) else UNITS
@@ -305,7 +305,7 @@ def parameter(name: str, looked: Looked, scene: MeshScene) -> Parameter:
         if not low <= own <= high:
             raise SceneError(f"{what} between {low:g} and {high:g} but {own:g}: give start, or other bounds low < high")
         starts = (own,)
-    return Parameter(name, low, high, starts, unit, ratio)
+    return FitParameter(name, low, high, starts, unit, ratio)
 
 
 def value_of(scene: MeshScene, key: str) -> float | None:
@@ -334,22 +334,22 @@ def _si(key: str, value: Quantity, units: tuple[str, ...]) -> tuple[float, str]:
     raise SceneError(f"{key}: {problem}")
 
 
-Side = tuple[str, float, "Answers", "Answers"]
+Side = tuple[str, float, "SceneAnswers", "SceneAnswers"]
 
 
-class Answers:
+class SceneAnswers:
     """What one scene says; cycles and wear runs that several numbers share are solved once.
 
     near : a scene that differs little, from whose cycles those of this one are found
     """
 
-    def __init__(self, file: SceneFile, model: modelling.Model, near: Answers | None = None):
+    def __init__(self, file: SceneFile, model: modelling.Model, near: SceneAnswers | None = None):
         self.file, self.model, self._near = file, model, {} if near is None else near._points
         self._points: dict[tuple[Place, float], OperatingPoint] = {}
         self._derived: dict[tuple[Place | None, float], Derivatives] = {}
         self._runs: dict[float, WearHistory] = {}
 
-    def all_to(self, asked: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
+    def all_to(self, asked: Mapping[str, Target | CurveTarget]) -> np.ndarray:
         """(n_measured,) its numbers, of a curve one for each point."""
         found = (
             one.values(self.file, self.model) if isinstance(one, CurveTarget) else [self.to(name, one)]
@@ -357,7 +357,7 @@ class Answers:
         )
         return np.concatenate([np.asarray(part, float) for part in found])
 
-    def slopes(self, known: Asked, sides: Sequence[Side]) -> Sequence[float]:
+    def slopes(self, known: Target, sides: Sequence[Side]) -> Sequence[float]:
         """Derivatives of a number by parameters.
 
         sides : name of each, step, and the scene a step above and a step below
@@ -399,7 +399,7 @@ class Answers:
             found = replace(found, slopes=found.slopes + ride)
         return found
 
-    def to(self, name: str, known: Asked) -> float:
+    def to(self, name: str, known: Target) -> float:
         """The scene's number beside a measured one; raises SolveFailed, naming it, where there is none."""
         try:
             if known.mode is not None:
@@ -447,7 +447,7 @@ class Answers:
             self._points[where, load] = point
         return self._points[where, load]
 
-    def _wear(self, known: Asked) -> float:
+    def _wear(self, known: Target) -> float:
         if self.file.scene.wear is None:
             raise SceneError("a life or its work is measured, but the scene has no [wear]")
         if known.left not in self._runs:

@@ -22,7 +22,7 @@ Prediction = Callable[[Mapping[str, float]], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Parameter:
+class FitParameter:
     """A number that is looked for. low, high : bounds; starts : one or several; unit : of all of them, for the report.
 
     ratio : the unknown is its logarithm, for positive numbers known to their order only; else it counts in `high - low`
@@ -51,7 +51,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredNumber:
     """A measured number, above 0.
 
     weight : of its logarithmic residual ln(predicted / measured); error : its relative standard deviation, where known
@@ -73,8 +73,8 @@ class Identification:
     deviation : (n_parameter,) standard error in the same units, from what the fit leaves; inf where nothing tells
     """
 
-    parameters: tuple[Parameter, ...]
-    measured: tuple[Measured, ...]
+    parameters: tuple[FitParameter, ...]
+    measured: tuple[MeasuredNumber, ...]
     values: np.ndarray
     before: np.ndarray
     after: np.ndarray
@@ -150,8 +150,8 @@ class Identification:
 
 
 def fit(
-    parameters: Sequence[Parameter],
-    measured: Sequence[Measured],
+    parameters: Sequence[FitParameter],
+    measured: Sequence[MeasuredNumber],
     predict: Prediction,
     slopes: Prediction,
     before: Mapping[str, float] | None = None,

@@ -23,7 +23,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.theme import BLUE, INK, RED, STYLE
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.files import write_files
-from tribodyn.workflows.studies.fits.identification import Measured, Parameter
+from tribodyn.workflows.studies.fits.identification import FitParameter, MeasuredNumber
 from tribodyn.workflows.studies.many.distributions import Marginal
 from tribodyn.workflows.studies.many.surrogate import Surrogate
 from tribodyn.workflows.studies.study_result import StudyResult
@@ -60,8 +60,8 @@ class Posterior(StudyResult):
     chain : length of the chains in autocorrelation times; narrowed : (n_parameter,) width over that of the prior
     """
 
-    parameters: tuple[Parameter, ...]
-    measured: tuple[Measured, ...]
+    parameters: tuple[FitParameter, ...]
+    measured: tuple[MeasuredNumber, ...]
     samples: np.ndarray
     predicted: Mapping[str, np.ndarray]
     units: Mapping[str, str]
@@ -127,8 +127,8 @@ class Posterior(StudyResult):
 
 
 def sample(
-    parameters: Sequence[Parameter],
-    measured: Sequence[Measured],
+    parameters: Sequence[FitParameter],
+    measured: Sequence[MeasuredNumber],
     trial: Trial,
     predicted: Mapping[str, str] | None = None,
     priors: Mapping[str, Marginal] | None = None,
@@ -184,7 +184,7 @@ def sample(
 class _Box:
     """The unknowns between their bounds as shares from 0 to 1."""
 
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[FitParameter, ...]
     priors: dict[str, Marginal]
 
     def values(self, share: np.ndarray) -> list[float]:

@@ -13,7 +13,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import units
 from tribodyn.workflows.scene.fields import Table
 
-Given = float | str
+NumberWithUnit = float | str
 
 # kind -> numbers that it must have, numbers of which one must be there, numbers that it may have
 NUMBERS: dict[str, tuple[set[str], set[str], set[str]]] = {
@@ -29,19 +29,19 @@ class Distribution(Table):
     """A distribution as a study gives it; numbers have units, or are in SI."""
 
     distribution: Literal["uniform", "loguniform", "normal", "lognormal", "triangular"]
-    low: Given | None = None
+    low: NumberWithUnit | None = None
     """Smallest value; of a normal or lognormal one, where it is truncated."""
-    high: Given | None = None
+    high: NumberWithUnit | None = None
     """Largest value; of a normal or lognormal one, where it is truncated."""
-    mode: Given | None = None
+    mode: NumberWithUnit | None = None
     """Most likely value."""
-    mean: Given | None = None
+    mean: NumberWithUnit | None = None
     """Mean, before it is truncated."""
-    median: Given | None = None
+    median: NumberWithUnit | None = None
     """Median, before it is truncated."""
-    std: Given | None = None
+    std: NumberWithUnit | None = None
     """Standard deviation, before it is truncated."""
-    cov: Given | None = None
+    cov: NumberWithUnit | None = None
     """Coefficient of variation, standard deviation over mean, before it is truncated, such as "10 %"."""
 
 
@@ -110,7 +110,7 @@ def _told(given: set[str]) -> str:
     return ", ".join(sorted(given)) or "none of them"
 
 
-def _numbers(given: dict[str, Given]) -> dict[str, float]:
+def _numbers(given: dict[str, NumberWithUnit]) -> dict[str, float]:
     """The numbers in SI units; all but the coefficient of variation in the same one."""
     found = {"cov": units.to_si(given["cov"], "")} if "cov" in given else {}
     unit = {name: unit_of(value) for name, value in given.items() if name != "cov"}
@@ -119,7 +119,7 @@ def _numbers(given: dict[str, Given]) -> dict[str, float]:
     return found | {name: units.to_si(given[name], of) for name, of in unit.items()}
 
 
-def unit_of(value: Given) -> str:
+def unit_of(value: NumberWithUnit) -> str:
     """The unit that a scene counts a quantity in; raises ValueError where it is no quantity."""
     if not isinstance(value, str):
         return ""

@@ -22,10 +22,10 @@ from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import quantiles, study_file, study_pictures, study_runs as studies
-from tribodyn.workflows.studies.many.parameter_space import Space
+from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
 from tribodyn.workflows.studies.many.quantiles import RARE, Influence, Sample, influences
 from tribodyn.workflows.studies.many.run_task import solve
-from tribodyn.workflows.studies.many.study_file import LISTED, Study
+from tribodyn.workflows.studies.many.study_file import LISTED, ParameterStudy
 from tribodyn.workflows.studies.many.study_runs import Runner
 from tribodyn.workflows.studies.many.study_table import LIFE, Journal, StudyTable
 from tribodyn.workflows.studies.many.surrogate import Law, Surrogate
@@ -65,7 +65,7 @@ class Quantile:
 
 
 @dataclass(frozen=True, repr=False)
-class Lives(StudyResult):
+class LifeDistribution(StudyResult):
     """A number as a distribution.
 
     table : of the full runs; runs : that have the number; open : of them, those with only a lower bound of it
@@ -147,7 +147,7 @@ def lives(
     scheduler: str = "",
     resume: bool = False,
     progress: Report = None,
-) -> Lives:
+) -> LifeDistribution:
     """Life distribution: what life a share of the parts outlives (B10), how sure that is, and what to measure next.
 
     study : the .toml file of a study that draws from distributions, or its tables; its table [lives] has what is wanted
@@ -163,14 +163,14 @@ def lives(
     return _distribution(asked, runner, rare)
 
 
-def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
+def _distribution(study: ParameterStudy, runner: Runner, rare: float | None) -> LifeDistribution:
     """Runs until the first share is known as well as is wanted, and what they come to."""
     wanted = study.lives
     if study.settings.design in LISTED:
         raise SceneError(f'{study.name}: lives are drawn, give design = "sobol" and distributions instead of lists')
     if rare is not None and not 0 < rare < 1:
         raise Refusal(f"rare {rare}: give a share between 0 and 1")
-    space, groups = Space.of(study), _scaling(study)
+    space, groups = ParameterSpace.of(study), _scaling(study)
     shares = wanted.shares if rare is None else (rare, *wanted.shares)
     middle = space.run_of(space.values(np.full((1, len(space.keys)), 0.5))[0])
     probes = [{**middle, **{key: PROBED * middle[key] for key in group}} for group in groups]
@@ -178,7 +178,7 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
     while True:
         again = replace(runner, resume=runner.resume or len(added) > len(groups) + 1)
         table = studies.run(study, again, more=added, drawn=False)
-        found = _Fit.of(space, table, wanted.number, study.settings.runs or 0, shares[0], groups)
+        found = LifeFit.of(space, table, wanted.number, study.settings.runs or 0, shares[0], groups)
         sample = Sample.of(found.space, found.surrogate, shares[0] < RARE)
         half = _half_width(found, sample, shares[0], wanted.confidence)
         done = len(table.columns["run"])
@@ -200,7 +200,7 @@ def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
 
 
 @dataclass(frozen=True)
-class _Fit:
+class LifeFit:
     """A surrogate of a number, over a space.
 
     drawn : (n,) whether a run was drawn from the distribution, not added where it says most about a quantile
@@ -211,7 +211,7 @@ class _Fit:
     by_ratio : (n,) what a key that scales by itself adds to each run; ratios : (m,) what it adds to equally likely ones
     """
 
-    space: Space
+    space: ParameterSpace
     surrogate: Surrogate
     drawn: np.ndarray
     asked: float | None
@@ -254,8 +254,14 @@ class _Fit:
 
     @classmethod
     def of(
-        cls, space: Space, table: StudyTable, number: str, drawn: int, asked: float, groups: Sequence[tuple[str, ...]]
-    ) -> _Fit:
+        cls,
+        space: ParameterSpace,
+        table: StudyTable,
+        number: str,
+        drawn: int,
+        asked: float,
+        groups: Sequence[tuple[str, ...]],
+    ) -> LifeFit:
         values, bounds = table.bounded(number)
         open_ = np.isfinite(bounds)
         good = np.isfinite(values)
@@ -282,7 +288,7 @@ class _Fit:
         )  # fmt: skip
 
 
-def _scaling(study: Study) -> list[tuple[str, ...]]:
+def _scaling(study: ParameterStudy) -> list[tuple[str, ...]]:
     """Keys that vary whose common factor a life may be in proportion to the reciprocal of.
 
     So the wear coefficient, that rates are in proportion to; and all loads together, of a contact whose forces are in
@@ -298,7 +304,7 @@ def _scaling(study: Study) -> list[tuple[str, ...]]:
     return groups
 
 
-def _half_width(found: _Fit, sample: Sample, share: float, confidence: float) -> float:
+def _half_width(found: LifeFit, sample: Sample, share: float, confidence: float) -> float:
     """Half the confidence interval of a quantile, relative."""
     low, high = found.ends(sample, share, share, quantiles.drawn(sample, found.surrogate, share), confidence)
     if found.logarithmic:
@@ -307,7 +313,7 @@ def _half_width(found: _Fit, sample: Sample, share: float, confidence: float) ->
 
 
 def _model_error(
-    study: Study, middle: Mapping[str, float], table: StudyTable, folder: Path, progress: Progress
+    study: ParameterStudy, middle: Mapping[str, float], table: StudyTable, folder: Path, progress: Progress
 ) -> tuple[float | None, str]:
     """Relative error of the model itself, and where it is from."""
     given, quantity = study.lives.model_error, COLUMNS.get(study.lives.number, "")
@@ -332,9 +338,9 @@ def _model_error(
 
 
 def _result(
-    study: Study, table: StudyTable, found: _Fit, sample: Sample,
+    study: ParameterStudy, table: StudyTable, found: LifeFit, sample: Sample,
     shares: Sequence[float], error: float | None, source: str,
-) -> Lives:  # fmt: skip
+) -> LifeDistribution:  # fmt: skip
     wanted, body = study.lives, sample
     if shares[0] < RARE:
         body = Sample.of(found.space, found.surrogate)
@@ -345,14 +351,14 @@ def _result(
         every.append(_quantile(found, of, share, wanted.confidence, error))
     middle = float(body.mean @ body.weight)
     scatter = float(np.sqrt((body.mean - middle) ** 2 @ body.weight))
-    return Lives(
+    return LifeDistribution(
         study.name, wanted.number, table, tuple(every), influences(found.space, found.surrogate.mean),
         wanted.confidence, found.runs, found.open, len(table.columns["run"]) - found.runs, found.scaled,
         found.surrogate.explained, scatter, found.logarithmic, error, source, back(body.mean), body.weight,
     )  # fmt: skip
 
 
-def _quantile(found: _Fit, sample: Sample, share: float, confidence: float, error: float | None) -> Quantile:
+def _quantile(found: LifeFit, sample: Sample, share: float, confidence: float, error: float | None) -> Quantile:
     """One quantile; runs that are missing may all lie below it or all above it."""
     fewest = max((share - found.failed) / (1 - found.failed), 0.0)
     most = min(share / (1 - found.failed), 1.0)

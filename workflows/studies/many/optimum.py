@@ -30,9 +30,9 @@ from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import study_file, study_pictures, study_runs as studies
 from tribodyn.workflows.studies.many.distributions import Marginal, si
-from tribodyn.workflows.studies.many.parameter_space import Space
+from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
 from tribodyn.workflows.studies.many.run_task import RUN
-from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Study
+from tribodyn.workflows.studies.many.study_file import LISTED, Aim, ParameterStudy
 from tribodyn.workflows.studies.many.study_runs import Runner
 from tribodyn.workflows.studies.many.study_table import SENTENCE, StudyTable
 from tribodyn.workflows.studies.many.surrogate import FEWEST, Surrogate
@@ -136,7 +136,7 @@ def optimise(
     return _search(asked, runner)
 
 
-def _search(study: Study, runner: Runner) -> Optimum:
+def _search(study: ParameterStudy, runner: Runner) -> Optimum:
     """Runs where they promise most, until nothing is to be gained or there are as many as may be."""
     wanted, space = study.optimise, _space(study)
     study = replace(study, settings=study.settings.model_copy(update={"derivatives": True}))
@@ -171,13 +171,13 @@ def _search(study: Study, runner: Runner) -> Optimum:
     return found
 
 
-def _space(study: Study) -> Space:
+def _space(study: ParameterStudy) -> ParameterSpace:
     """The space of a study whose keys have ranges; raises SceneError."""
     if study.settings.design in LISTED:
         raise SceneError(f'{study.name}: an optimisation begins with runs that are drawn, give design = "sobol"')
     if study.correlations:
         raise SceneError(f"{study.name}: correlations are of what scatters, leave them out of an optimisation")
-    space = Space.of(study)
+    space = ParameterSpace.of(study)
     for key, law in study.varied.items():
         assert isinstance(law, Marginal)
         if not np.isfinite(law.at(np.array([0.0, 1.0]))).all():
@@ -185,7 +185,7 @@ def _space(study: Study) -> Space:
     return space
 
 
-def _known(study: Study, space: Space, table: StudyTable) -> Known:
+def _known(study: ParameterStudy, space: ParameterSpace, table: StudyTable) -> EvaluatedRuns:
     """What the runs say of aims and limits, small values better; a number that is always positive by its logarithm."""
     wanted, columns = study.optimise, []
     for aim in wanted.aims:
@@ -208,7 +208,7 @@ def _known(study: Study, space: Space, table: StudyTable) -> Known:
                 columns.append((size * (values - at), size * slopes))
     numbers, by = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
     m = len(wanted.aims)
-    return Known(space.shares(space.points_of(table.columns)), numbers[:, :m], numbers[:, m:], by)
+    return EvaluatedRuns(space.shares(space.points_of(table.columns)), numbers[:, :m], numbers[:, m:], by)
 
 
 def _short(value: Any) -> str:
@@ -216,7 +216,7 @@ def _short(value: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Known:
+class EvaluatedRuns:
     """What runs have told.
 
     share : (n, k) places of the runs in the unit cube
@@ -266,7 +266,7 @@ def chebyshev(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.n
     return np.asarray(weighed(aims, weights, low, high).max(axis=-1))
 
 
-def ends(known: Known) -> tuple[np.ndarray, np.ndarray]:
+def ends(known: EvaluatedRuns) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest values (m,) of the aims along the best trades, of all runs where these are fewer than two."""
     front = known.front
     aims = known.aims[front if len(front) > 1 else known.solved]
@@ -274,7 +274,7 @@ def ends(known: Known) -> tuple[np.ndarray, np.ndarray]:
     return low, np.where(high > low, high, low + 1.0)
 
 
-def propose(known: Known, scale: Callable[[np.ndarray], np.ndarray], seed: int) -> tuple[np.ndarray, float]:
+def propose(known: EvaluatedRuns, scale: Callable[[np.ndarray], np.ndarray], seed: int) -> tuple[np.ndarray, float]:
     """A place (k,) in the unit cube for the run that promises most; the same runs and seed propose the same.
 
     scale : places (n, k) -> coordinates (n, k) that surrogates are fitted in

@@ -15,25 +15,25 @@ from scipy.stats import qmc
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many.distributions import Marginal
 from tribodyn.workflows.studies.many.run_task import slope_column
-from tribodyn.workflows.studies.many.study_file import Study
+from tribodyn.workflows.studies.many.study_file import ParameterStudy
 
 MOST_RUNS = 1_000_000
 INSIDE = 1e-12  # shares stay this far from 0 and 1, where a quantile may be infinite
 
 
 @dataclass(frozen=True)
-class Space:
+class ParameterSpace:
     """What varies, in SI units.
 
     study : every key of which varies by a distribution
     ratios : keys whose coordinates are logarithms whatever their distributions
     """
 
-    study: Study
+    study: ParameterStudy
     ratios: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, study: Study) -> Space:
+    def of(cls, study: ParameterStudy) -> ParameterSpace:
         """The space of a study; raises SceneError for a key that varies over a list."""
         for key, law in study.varied.items():
             if not isinstance(law, Marginal):
@@ -109,7 +109,7 @@ class Space:
         return law
 
 
-def runs(study: Study) -> list[dict[str, Any]]:
+def runs(study: ParameterStudy) -> list[dict[str, Any]]:
     """The values of the keys, run by run: as the lists have them, drawn ones in SI units.
 
     A key with a list in a design that draws takes its values with equal chances.
@@ -128,7 +128,7 @@ def runs(study: Study) -> list[dict[str, Any]]:
     return [dict(zip(keys, values, strict=True)) for values in zip(*columns, strict=True)]
 
 
-def shares(study: Study) -> np.ndarray:
+def shares(study: ParameterStudy) -> np.ndarray:
     """(n_run, n_key) points of the unit cube, by scipy.stats.qmc; scrambled Sobol points or a Latin hypercube."""
     count, width = study.settings.runs or 0, len(study.varied)
     draw = np.random.default_rng(study.settings.seed)
@@ -138,7 +138,7 @@ def shares(study: Study) -> np.ndarray:
         return np.clip(engine.random(count), INSIDE, 1 - INSIDE)
 
 
-def correlated(study: Study, share: np.ndarray) -> np.ndarray:
+def correlated(study: ParameterStudy, share: np.ndarray) -> np.ndarray:
     """The points under the study's correlations, by a Gaussian copula; raises SceneError where there is none."""
     if not study.correlations:
         return share

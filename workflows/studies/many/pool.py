@@ -23,17 +23,17 @@ from tribodyn.extras import package
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.studies.many.run_task import Row, Task
+from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
 LOCAL = "local"
 WAIT = "20s"  # for a scheduler to answer
 _always = ExitStack()  # what a process of the pool is within as long as it lives
 
-Work = TypeVar("Work", bound=Task)
+Work = TypeVar("Work", bound=StudyRun)
 
 
-def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) -> Iterator[Row]:
+def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], RunRow]) -> Iterator[RunRow]:
     """Rows as they come, made by `solve` of a module; a run whose process died ATTEMPTS times is lost.
 
     The death of one process ends the whole pool. Nobody tells which run killed it, so all that were under way are
@@ -48,7 +48,7 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
         alone = deaths[waiting[0].number] > 0
         limit = 1 if alone else min(workers, len(waiting))
         pool = ProcessPoolExecutor(limit, processes, _begin)
-        under_way: dict[Future[Row], Work] = {}
+        under_way: dict[Future[RunRow], Work] = {}
         try:
             while under_way or (waiting and (deaths[waiting[0].number] > 0) == alone):
                 # no more than there are processes: what is under way when one dies is then known
@@ -71,7 +71,7 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
                     waiting.appendleft(task)
                 else:
                     told = f"the process that worked on it died {ATTEMPTS} times, it was killed or short of memory"
-                    yield Row(task.number, task.key, "lost", told)
+                    yield RunRow(task.number, task.key, "lost", told)
         finally:
             _stop(pool)
 
@@ -113,7 +113,7 @@ def _stop(pool: ProcessPoolExecutor) -> None:
         process.join()
 
 
-def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callable[[Work], Row]) -> Iterator[Row]:
+def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callable[[Work], RunRow]) -> Iterator[RunRow]:
     """Rows as they come, by dask.distributed; all that is distributed about a study is its work.
 
     address : of a scheduler, such as tcp://host:8786, or "local" for a cluster of `workers` processes of its own
@@ -133,7 +133,7 @@ def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callabl
         for future in distributed.as_completed(list(by_future), loop=client.loop):
             task, why = by_future.pop(future), future.exception() if future.status == "error" else None
             if why is not None:  # the run itself raises nothing: its workers died, or cannot run it at all
-                yield Row(task.number, task.key, "lost", " ".join(f"{type(why).__name__}: {why}".split()))
+                yield RunRow(task.number, task.key, "lost", " ".join(f"{type(why).__name__}: {why}".split()))
             elif future.status == "finished":
                 yield future.result()
             else:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from tribodyn.workflows.studies.many.parameter_space import Space
+from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
 from tribodyn.workflows.studies.many.surrogate import Surrogate
 
 EXPONENT = 14  # of two: points that a distribution is made of
@@ -35,7 +35,7 @@ class Sample:
     deviation: np.ndarray
 
     @classmethod
-    def of(cls, space: Space, surrogate: Surrogate, rare: bool = False, seed: int = 0) -> Sample:
+    def of(cls, space: ParameterSpace, surrogate: Surrogate, rare: bool = False, seed: int = 0) -> Sample:
         """Points of a space; rare : spread wider, for shares below RARE."""
         points, weight = space.draw(EXPONENT, seed, WIDE if rare else 1.0)
         coordinates = space.coordinates(points)
@@ -150,7 +150,7 @@ class Influence:
         return float(np.sqrt(max(1 - self.first, 0.0)))
 
 
-def influences(space: Space, mean: Callable[[np.ndarray], np.ndarray], seed: int = 0) -> tuple[Influence, ...]:
+def influences(space: ParameterSpace, mean: Callable[[np.ndarray], np.ndarray], seed: int = 0) -> tuple[Influence, ...]:
     """Of every key, the largest first.
 
     mean : coordinates (n, k) -> values (n,)
@@ -172,7 +172,9 @@ def influences(space: Space, mean: Callable[[np.ndarray], np.ndarray], seed: int
     return tuple(sorted(found, key=lambda one: -one.first))
 
 
-def _indices(space: Space, mean: Callable[[np.ndarray], np.ndarray], seed: int) -> tuple[np.ndarray, np.ndarray]:
+def _indices(
+    space: ParameterSpace, mean: Callable[[np.ndarray], np.ndarray], seed: int
+) -> tuple[np.ndarray, np.ndarray]:
     """First and total indices (k,) with respect to the independent shares behind a space."""
     if len(space.keys) == 1:
         return np.ones(1), np.ones(1)
@@ -185,13 +187,13 @@ def _indices(space: Space, mean: Callable[[np.ndarray], np.ndarray], seed: int) 
     return np.clip(found.first_order.ravel(), 0, 1), np.clip(found.total_order.ravel(), 0, 1)
 
 
-def _ordered(space: Space, keys: list[str]) -> Space:
+def _ordered(space: ParameterSpace, keys: list[str]) -> ParameterSpace:
     study = space.study
-    return Space(replace(study, varied={key: study.varied[key] for key in keys}))
+    return ParameterSpace(replace(study, varied={key: study.varied[key] for key in keys}))
 
 
 def _as_before(
-    space: Space, mean: Callable[[np.ndarray], np.ndarray], keys: list[str]
+    space: ParameterSpace, mean: Callable[[np.ndarray], np.ndarray], keys: list[str]
 ) -> Callable[[np.ndarray], np.ndarray]:
     """The function of coordinates in another order of the keys."""
     back = [keys.index(key) for key in space.keys]

@@ -32,7 +32,7 @@ SINGLE = ("energy_J", "depth_max_m", "volume_m3", "cycles", "life_cycles")
 
 
 @dataclass(frozen=True)
-class Task:
+class StudyRun:
     """One run: a scene by its text, so that another process or machine needs no file of it.
 
     number : of the run, from 1; overrides : of the scene, those of the run last; folder : of the files it names
@@ -60,7 +60,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Row:
+class RunRow:
     """What a run leaves.
 
     key : of the task; sentence : how it ended; numbers : by column, SI units, what there is none of is left out
@@ -78,13 +78,13 @@ class Row:
 _one_at_a_time = threading.Lock()  # workers may have several threads, Gmsh and the threads of BLAS are of a process
 
 
-def solve(task: Task) -> Row:
+def solve(task: StudyRun) -> RunRow:
     """Do one run; whatever goes wrong in it becomes its row."""
     start = time.perf_counter()
 
-    def ended(status: Status, sentence: object, numbers: dict[str, float] | None = None) -> Row:
+    def ended(status: Status, sentence: object, numbers: dict[str, float] | None = None) -> RunRow:
         told = " ".join(str(sentence).split())
-        return Row(task.number, task.key, status, told, numbers or {}, time.perf_counter() - start)
+        return RunRow(task.number, task.key, status, told, numbers or {}, time.perf_counter() - start)
 
     with _one_at_a_time:
         try:

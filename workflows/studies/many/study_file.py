@@ -14,13 +14,13 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
-from tribodyn.workflows.studies.many.distributions import Distribution, Given, Marginal, si
+from tribodyn.workflows.studies.many.distributions import Distribution, Marginal, NumberWithUnit, si
 
 LISTED = ("grid", "list")
 """Designs made of listed values; the others draw."""
 
 
-class Settings(Table):
+class StudySettings(Table):
     """The table [study]."""
 
     scene: str
@@ -41,7 +41,7 @@ class Settings(Table):
     """Keys that take the value of one that varies, such as those of two contacts that are made alike."""
 
     @model_validator(mode="after")
-    def _runs_are_drawn(self) -> Settings:
+    def _runs_are_drawn(self) -> StudySettings:
         if self.design in LISTED and self.runs is not None:
             raise Refusal(f"study.runs: a {self.design} has as many runs as its values make, leave it out")
         if self.design not in LISTED and self.runs is None:
@@ -61,7 +61,7 @@ class Correlation(Table):
 Share = Annotated[Number, Field(gt=0, lt=1)]
 
 
-class Lives(Table):
+class LifeSettings(Table):
     """The table [lives]: what `tribodyn study lives` asks of the runs."""
 
     number: str = "life_cycles"
@@ -87,18 +87,18 @@ class Aim(Table):
     """Which of its values are better."""
 
 
-class Limit(Table):
+class Constraint(Table):
     """One entry of optimise.limits."""
 
     number: str
     """Column of the study's table."""
-    low: Given | None = None
+    low: NumberWithUnit | None = None
     """Least value that may be."""
-    high: Given | None = None
+    high: NumberWithUnit | None = None
     """Largest value that may be."""
 
     @model_validator(mode="after")
-    def _has_an_end(self) -> Limit:
+    def _has_an_end(self) -> Constraint:
         if self.low is None and self.high is None:
             raise Refusal(f"a limit of {self.number} needs low or high")
         for end in (self.low, self.high):
@@ -110,12 +110,12 @@ class Limit(Table):
 AIMS = (Aim(number="peak_m_first", want="low"), Aim(number="life_cycles", want="high"))
 
 
-class Optimise(Table):
+class OptimiseSettings(Table):
     """The table [optimise]: what `tribodyn study optimise` asks of the runs."""
 
     aims: Annotated[tuple[Aim, ...], Field(min_length=1, max_length=3)] = AIMS
     """What is wanted; of several aims the best trades are looked for."""
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[Constraint, ...] = ()
     """What a run must keep to."""
     evaluations: Annotated[StrictInt, Field(ge=2)] = 40
     """Most runs, those of the design among them."""
@@ -124,15 +124,15 @@ class Optimise(Table):
 class StudyFile(Table):
     """A study as its file has it."""
 
-    study: Settings
+    study: StudySettings
     vary: dict[str, Any]
     correlations: tuple[Correlation, ...] = ()
-    lives: Lives = Lives()
-    optimise: Optimise = Optimise()
+    lives: LifeSettings = LifeSettings()
+    optimise: OptimiseSettings = OptimiseSettings()
 
 
 @dataclass(frozen=True)
-class Study:
+class ParameterStudy:
     """A study that was read and checked.
 
     varied : key of the scene -> values, or the distribution that they are drawn from
@@ -140,12 +140,12 @@ class Study:
     """
 
     name: str
-    settings: Settings
+    settings: StudySettings
     varied: Mapping[str, tuple[Any, ...] | Marginal]
     correlations: tuple[Correlation, ...]
     folder: Path
-    lives: Lives
-    optimise: Optimise
+    lives: LifeSettings
+    optimise: OptimiseSettings
 
     @property
     def scene(self) -> str:
@@ -154,7 +154,7 @@ class Study:
         return str(beside) if beside.suffix == ".toml" and beside.is_file() else self.settings.scene
 
 
-def read(study: AnyPath | Mapping[str, Any]) -> Study:
+def read(study: AnyPath | Mapping[str, Any]) -> ParameterStudy:
     """Read and check the file of a study, or its tables; raises SceneError that names the file and the key."""
     if isinstance(study, Mapping):
         return parse(study, "study", Path().resolve())
@@ -162,7 +162,7 @@ def read(study: AnyPath | Mapping[str, Any]) -> Study:
     return parse(scene_file.tables(path, "study"), path.name, path.resolve().parent)
 
 
-def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
+def parse(data: Mapping[str, Any], label: str, folder: Path) -> ParameterStudy:
     """Check the tables of a study; label names it in errors. Raises SceneError."""
     file = scene_file.checked(StudyFile, dict(data), label)
     leaves = dict(_leaves(file.vary))
@@ -188,7 +188,7 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
                 f'{label}: study.same: "{copy}" = "{original}": give a key that does not vary, and one that does'
             )
     name = Path(label).name.removesuffix(".toml")
-    return Study(name, file.study, varied, file.correlations, folder, file.lives, file.optimise)
+    return ParameterStudy(name, file.study, varied, file.correlations, folder, file.lives, file.optimise)
 
 
 def _leaves(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:

@@ -16,7 +16,7 @@ from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED, STYL
 from tribodyn.workflows.studies.many.run_task import RUN
 
 if TYPE_CHECKING:
-    from tribodyn.workflows.studies.many.lives import Lives
+    from tribodyn.workflows.studies.many.lives import LifeDistribution
     from tribodyn.workflows.studies.many.optimum import Optimum
     from tribodyn.workflows.studies.many.study_table import StudyTable
 
@@ -107,7 +107,7 @@ def wide(values: np.ndarray) -> bool:
     return bool(values.min() > 0 and values.max() > WIDE_SCALE * values.min())
 
 
-def picture_of_lives(found: Lives) -> Figure:
+def picture_of_lives(found: LifeDistribution) -> Figure:
     """The share of the parts below a value, on normal probability paper, and Sobol indices as bars."""
     with axes_of(10.0, 4.4, columns=2, share=False) as (figure, (left, right)):
         below = np.cumsum(found.weights) - 0.5 * found.weights

@@ -20,8 +20,8 @@ from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import parameter_space, pool, study_file, study_pictures
 from tribodyn.workflows.studies.many.pool import Work
-from tribodyn.workflows.studies.many.run_task import Row, Task, solve
-from tribodyn.workflows.studies.many.study_file import Study
+from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, solve
+from tribodyn.workflows.studies.many.study_file import ParameterStudy
 from tribodyn.workflows.studies.many.study_table import Journal, StudyTable, table, write
 
 
@@ -73,13 +73,13 @@ def grid(
     return run(asked, Runner(place(asked, folder), reporter(progress), workers, scheduler, resume or retry, retry))
 
 
-def place(study: Study, folder: AnyPath | None) -> Path:
+def place(study: ParameterStudy, folder: AnyPath | None) -> Path:
     """The folder that a study leaves its tables in."""
     return Path("results") / study.name if folder is None else Path(folder)
 
 
 def run(
-    study: Study, runner: Runner, more: Sequence[dict[str, Any]] = (), drawn: bool = True, inside: bool = False
+    study: ParameterStudy, runner: Runner, more: Sequence[dict[str, Any]] = (), drawn: bool = True, inside: bool = False
 ) -> StudyTable:
     """Do the runs of a study, and leave its tables and pictures in a folder.
 
@@ -109,8 +109,8 @@ def run(
 def finish(
     tasks: Sequence[Work],
     runner: Runner,
-    rows: dict[int, Row],
-    solve: Callable[[Work], Row],
+    rows: dict[int, RunRow],
+    solve: Callable[[Work], RunRow],
     what: str = "runs",
     inside: bool = False,
 ) -> None:
@@ -134,7 +134,7 @@ def finish(
         progress.say(f"{len(left)} {what} on {where}, one thread for each")
     with progress.track(f"{len(left)} {what}") as advance:
         if not left:
-            coming: Iterator[Row] = iter(())
+            coming: Iterator[RunRow] = iter(())
         elif scheduler:
             coming = pool.on_cluster(left, scheduler, count, solve)
         else:
@@ -146,34 +146,34 @@ def finish(
             advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
 
 
-def _here(tasks: Sequence[Work], solve: Callable[[Work], Row]) -> Iterator[Row]:
+def _here(tasks: Sequence[Work], solve: Callable[[Work], RunRow]) -> Iterator[RunRow]:
     with limited(1), kept.at_hand():
         yield from map(solve, tasks)
 
 
-def task_at(study: Study, values: Mapping[str, Any]) -> Task:
+def task_at(study: ParameterStudy, values: Mapping[str, Any]) -> StudyRun:
     """One run of a study by itself, with a verdict on what it finds."""
     base = scene_file.read(study.scene, always := ("solver.threads=1", *study.settings.set))
-    return Task(1, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
+    return StudyRun(1, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
 
 
-def _overrides(study: Study, values: Mapping[str, Any]) -> list[str]:
+def _overrides(study: ParameterStudy, values: Mapping[str, Any]) -> list[str]:
     every = {**values, **{copy: values[original] for copy, original in study.settings.same.items()}}
     return [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in every.items()]
 
 
-def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], dict[int, Row]]:
+def _tasks(study: ParameterStudy, varied: Sequence[dict[str, Any]]) -> tuple[list[StudyRun], dict[int, RunRow]]:
     """The runs, and rows for those whose scene is refused; raises SceneError where every one is."""
     always = ["solver.threads=1", *([] if study.settings.verdict else ["verdict.enabled=false"]), *study.settings.set]
     base = scene_file.read(study.scene, always)
     slopes = tuple(dict.fromkeys((*study.varied, *study.settings.same))) if study.settings.derivatives else ()
     tasks, refused = [], {}
     for number, values in enumerate(varied, 1):
-        task = Task(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder, slopes)
+        task = StudyRun(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder, slopes)
         try:
             task.scene()
         except SceneError as error:
-            refused[number] = Row(number, "", "refused", str(error))
+            refused[number] = RunRow(number, "", "refused", str(error))
         else:
             tasks.append(task)
     if not tasks:

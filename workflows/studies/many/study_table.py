@@ -18,7 +18,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.store import replacing, set_aside
 from tribodyn.workflows.studies.many import study_pictures
 from tribodyn.workflows.studies.many.distributions import si
-from tribodyn.workflows.studies.many.run_task import ENDS, RUN, SINGLE, Row
+from tribodyn.workflows.studies.many.run_task import ENDS, RUN, SINGLE, RunRow
 from tribodyn.workflows.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ class StudyTable(StudyResult):
 
 
 def table(
-    name: str, varied: Sequence[Mapping[str, Any]], rows: Mapping[int, Row], folder: Path | None = None
+    name: str, varied: Sequence[Mapping[str, Any]], rows: Mapping[int, RunRow], folder: Path | None = None
 ) -> StudyTable:
     """The table of the runs that are finished.
 
@@ -192,19 +192,19 @@ class Journal:
     def __init__(self, folder: Path):
         self.path = folder / JOURNAL
 
-    def rows(self) -> dict[str, Row]:
+    def rows(self) -> dict[str, RunRow]:
         """Rows by their keys; a last line that was torn when the study was killed is left out."""
-        found: dict[str, Row] = {}
+        found: dict[str, RunRow] = {}
         if self.path.exists():
             for line in self.path.read_text(encoding="utf-8").splitlines():
                 try:
-                    row = Row(**json.loads(line))
+                    row = RunRow(**json.loads(line))
                 except (ValueError, TypeError):
                     continue
                 found[row.key] = row
         return found
 
-    def begin(self, rows: Iterable[Row], resume: bool) -> Path | None:
+    def begin(self, rows: Iterable[RunRow], resume: bool) -> Path | None:
         """Begin with rows that are there already; returns where an earlier journal is now, None if none was."""
         previous = None if resume else set_aside(self.path)
         fresh = self.path.with_suffix(".new")
@@ -215,7 +215,7 @@ class Journal:
         os.replace(fresh, self.path)
         return previous
 
-    def add(self, row: Row) -> None:
+    def add(self, row: RunRow) -> None:
         """Append a row and wait until the disk has it."""
         with self.path.open("a", encoding="utf-8") as file:
             file.write(f"{json.dumps(vars(row))}\n")

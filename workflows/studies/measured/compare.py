@@ -20,14 +20,14 @@ from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
-from tribodyn.workflows.studies.measured.computed_runs import Beside, beside
+from tribodyn.workflows.studies.measured.computed_runs import ComparedRun, compare_runs
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run, prepared
 from tribodyn.workflows.studies.measured.reading import read
 from tribodyn.workflows.studies.study_result import StudyResult
 
 
 @dataclass(frozen=True)
-class Shown:
+class ColumnFormat:
     """How a quantity is printed and drawn: its word, unit, factor from SI, and whether its axis is logarithmic."""
 
     word: str
@@ -51,7 +51,7 @@ class Shown:
 
 
 @dataclass(frozen=True, repr=False)
-class Compared(StudyResult):
+class MeasurementComparison(StudyResult):
     """A measurement and a scene.
 
     name : of the scene; measured : in its directions, repeated runs as their mean
@@ -60,8 +60,8 @@ class Compared(StudyResult):
 
     name: str
     measured: Measurement
-    runs: tuple[Beside, ...]
-    band: Mapping[str, tuple[Beside, ...]]
+    runs: tuple[ComparedRun, ...]
+    band: Mapping[str, tuple[ComparedRun, ...]]
 
     @property
     def along(self) -> str:
@@ -134,15 +134,15 @@ class Compared(StudyResult):
         first = "amplitude_m" if self.measured.kind == "response" else "frequency_hz"
         return sum(not np.isfinite(row[f"computed_{first}"]) for row in self.rows())
 
-    def _shown(self) -> dict[str, Shown]:
+    def _shown(self) -> dict[str, ColumnFormat]:
         unit, scale = length_unit(max(float(np.nan_to_num(one.measured.amplitude).max()) for one in self.runs))
         return {
-            "number": Shown("mode", ""),
-            "frequency_hz": Shown("frequency", "Hz"),
-            "damping": Shown("damping", "%", 100.0, log=True),
-            "amplitude_m": Shown("amplitude", unit, scale, log=True),
-            "phase_deg": Shown("phase", "deg"),
-            "force_N": Shown("force", "N", log=True),
+            "number": ColumnFormat("mode", ""),
+            "frequency_hz": ColumnFormat("frequency", "Hz"),
+            "damping": ColumnFormat("damping", "%", 100.0, log=True),
+            "amplitude_m": ColumnFormat("amplitude", unit, scale, log=True),
+            "phase_deg": ColumnFormat("phase", "deg"),
+            "force_N": ColumnFormat("force", "N", log=True),
         }
 
     def lines(self) -> list[str]:
@@ -208,7 +208,7 @@ def compare(
     band: Sequence[str] = (),
     overrides: Overrides = (),
     progress: Report = None,
-) -> Compared:
+) -> MeasurementComparison:
     """Put a measurement beside what a scene computes: response, backbone, free decay or modes.
 
     scene : name of a scene or a .toml file
@@ -230,11 +230,11 @@ def compare(
             with limited(file.scene.solver.threads):
                 model = modelling.build(file, report)
                 measured.near(file.scene, model.part)
-                found[change] = beside(file, model, measured, report)
+                found[change] = compare_runs(file, model, measured, report)
     except ValueError as trouble:
         raise Refusal(f"{measured.source}: {trouble}") from None
     first = found.pop("")
-    return Compared(own.name, measured, first, found)
+    return MeasurementComparison(own.name, measured, first, found)
 
 
 def changed(scene: Source, overrides: Overrides, changes: Sequence[str]) -> dict[str, SceneFile]:

@@ -21,7 +21,7 @@ SAME = 1e-5  # relative difference of frequencies that a universal file, with si
 
 
 @dataclass(frozen=True)
-class Beside:
+class ComparedRun:
     """A measured run, and what a scene computes beside it.
 
     computed : at the points of the run, nan where the scene does not reach; curve : all that was computed
@@ -32,7 +32,9 @@ class Beside:
     curve: Run
 
 
-def beside(file: SceneFile, model: modelling.Model, measured: Measurement, progress: Progress) -> tuple[Beside, ...]:
+def compare_runs(
+    file: SceneFile, model: modelling.Model, measured: Measurement, progress: Progress
+) -> tuple[ComparedRun, ...]:
     """The scene beside every run. measured : in the directions of the scene, see `Measurement.on`
 
     Of a response each run is computed with the force that it has at its largest amplitude, where contacts slip most;
@@ -43,10 +45,10 @@ def beside(file: SceneFile, model: modelling.Model, measured: Measurement, progr
         own = file.scene.backbone
         omega, ratio = FreeVibration(model.balance, own.mode if own else 0, measured.output).about_rest()
         found = _run(omega / (2 * np.pi), np.full(len(omega), np.nan), ratio)
-        return tuple(Beside(run, _nearest(found, run), found) for run in measured.runs)
+        return tuple(ComparedRun(run, _nearest(found, run), found) for run in measured.runs)
     if measured.kind == "backbone":
         found = _backbone(file, model, measured, progress)
-        return tuple(Beside(run, _at_amplitude(found, run), found) for run in measured.runs)
+        return tuple(ComparedRun(run, _at_amplitude(found, run), found) for run in measured.runs)
     return tuple(_response(file, model, measured.output, run, progress) for run in measured.runs)
 
 
@@ -88,7 +90,7 @@ def _nearest(found: Run, run: Run) -> Run:
     return replace(run, frequency=found.frequency[at], damping=found.damping[at])
 
 
-def _response(file: SceneFile, model: modelling.Model, output: str, run: Run, progress: Progress) -> Beside:
+def _response(file: SceneFile, model: modelling.Model, output: str, run: Run, progress: Progress) -> ComparedRun:
     _, scale = driving_load(file.scene)
     level = float(run.force[run.amplitude.argmax()])
     with progress.track(f"response, {run.name}") as advance:
@@ -98,7 +100,7 @@ def _response(file: SceneFile, model: modelling.Model, output: str, run: Run, pr
     at_level = replace(run, displacement=run.displacement * (level / run.force))
     whole = _first_harmonic(branch, output, model.balance.basis.order, scale, level)
     there = replace(at_level, displacement=_at_frequency(whole, at_level), force=np.full(len(run.force), level))
-    return Beside(at_level, there, whole)
+    return ComparedRun(at_level, there, whole)
 
 
 def _first_harmonic(branch: Branch, output: str, order: np.ndarray, force: complex, level: float) -> Run:

@@ -29,7 +29,7 @@ from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import where_it_can_be, write_files
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.wheels.patterns import Blades, asked_of
+from tribodyn.workflows.studies.wheels.patterns import MistunedBlades, asked_of
 
 IMAGES = 32  # of a film
 
@@ -43,7 +43,7 @@ class MistunedWear(StudyResult):
     preload : (n_row, N) mean normal force of the contacts of every sector [N]; formats : of films
     """
 
-    blades: Blades
+    blades: MistunedBlades
     number: int
     blade: int
     history: WearHistory
@@ -141,7 +141,7 @@ def pattern_wear(
         report.say(f"{row.cycles:.4g} cycles, {1e6 * row.depth.max():.4g} um")
 
     with limited(file.scene.solver.threads):
-        blades = Blades.of(file)
+        blades = MistunedBlades.of(file)
         n, drawn = blades.wheel.n_sectors, blades.pattern(pattern)
         balance = blades.balance(drawn)
         _, blade = blades.peak(drawn)
@@ -167,7 +167,9 @@ def _of_output(site: Site, output: str) -> Site:
     return replace(site, output=output)
 
 
-def write_wheel(blades: Blades, states: Sequence[WheelState], folder: Path, formats: Sequence[str] = ()) -> list[Path]:
+def write_wheel(
+    blades: MistunedBlades, states: Sequence[WheelState], folder: Path, formats: Sequence[str] = ()
+) -> list[Path]:
     """Write mistuned_wheel.png, and a film over one cycle in some formats; returns their paths.
 
     Raises  ValueError for a part that has no mesh of one kind; RenderingUnavailable
@@ -186,7 +188,7 @@ def write_wheel(blades: Blades, states: Sequence[WheelState], folder: Path, form
 
 
 def nodes(
-    blades: Blades, balance: HarmonicBalance, displacement: np.ndarray, force: np.ndarray, omega: float
+    blades: MistunedBlades, balance: HarmonicBalance, displacement: np.ndarray, force: np.ndarray, omega: float
 ) -> np.ndarray:
     """Displacement (N, n_node, 3, n_coeff) of every blade [m]."""
     full = blades.wheel.full_displacement(blades.reduced, balance, displacement, force, omega)

@@ -41,7 +41,7 @@ from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
-from tribodyn.workflows.studies.many.run_task import Row, Status, Task
+from tribodyn.workflows.studies.many.run_task import RunRow, Status, StudyRun
 from tribodyn.workflows.studies.many.study_runs import Runner, finish
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel_model as wheels
@@ -74,7 +74,7 @@ def whitehead(n_sectors: int) -> float:
 
 
 @dataclass(frozen=True)
-class Blades:
+class MistunedBlades:
     """The wheel of a scene, ready for any pattern.
 
     part : the sector; reduced : its reduction, with the shapes in which sectors may deviate among its outputs
@@ -87,7 +87,7 @@ class Blades:
     wheel: MistunedWheel
 
     @classmethod
-    def of(cls, file: SceneFile) -> Blades:
+    def of(cls, file: SceneFile) -> MistunedBlades:
         """Mesh and reduce; raises SceneError for a scene without [wheel] or [mistuning]."""
         asked = asked_of(file)
         wheel = wheels.build(file)
@@ -209,7 +209,7 @@ def _hertz(omega: float) -> str:
     return f"{omega / (2 * np.pi):.5g} Hz"
 
 
-class PatternTask(Task):
+class PatternRun(StudyRun):
     """One pattern of a scene, for any process: that of its number."""
 
     @property
@@ -218,10 +218,10 @@ class PatternTask(Task):
         return f"{super().key} {self.number}"
 
 
-_ready: tuple[Task, Blades] | None = None  # of the process
+_ready: tuple[StudyRun, MistunedBlades] | None = None  # of the process
 
 
-def solve(task: PatternTask) -> Row:
+def solve(task: PatternRun) -> RunRow:
     """The row of one pattern; whatever goes wrong in it becomes its row."""
     global _ready
     start = time.process_time()
@@ -230,14 +230,14 @@ def solve(task: PatternTask) -> Row:
             wheel = replace(task, number=0)
             if _ready is None or _ready[0] != wheel:
                 file = scene_file.parse(task.text, f"{task.name}.toml", task.overrides, task.folder)
-                _ready = wheel, Blades.of(file)
+                _ready = wheel, MistunedBlades.of(file)
             blades = _ready[1]
             alike, _ = blades.alike, blades.ends  # of all patterns
             start = time.process_time()
             found, blade = blades.peak(blades.pattern(task.number))
         except (ValueError, RuntimeError, np.linalg.LinAlgError, MemoryError) as error:
             status: Status = "refused" if isinstance(error, SceneError) else "failed"
-            return Row(task.number, task.key, status, " ".join(str(error).split()), {}, time.process_time() - start)
+            return RunRow(task.number, task.key, status, " ".join(str(error).split()), {}, time.process_time() - start)
     numbers = {
         "amplification": found.amplitude / alike.amplitude,
         "peak_m": found.amplitude,
@@ -246,7 +246,7 @@ def solve(task: PatternTask) -> Row:
         "peak_alike_m": alike.amplitude,
         "solves": float(found.solves),
     }
-    return Row(task.number, task.key, "complete", "complete", numbers, time.process_time() - start)
+    return RunRow(task.number, task.key, "complete", "complete", numbers, time.process_time() - start)
 
 
 @dataclass(frozen=True, repr=False)
@@ -258,11 +258,11 @@ class Patterns(StudyResult):
 
     name: str
     n_sectors: int
-    rows: tuple[Row, ...]
+    rows: tuple[RunRow, ...]
     folder: Path
 
     @cached_property
-    def complete(self) -> tuple[Row, ...]:
+    def complete(self) -> tuple[RunRow, ...]:
         """Rows of the patterns that were solved."""
         return tuple(row for row in self.rows if row.status == "complete")
 
@@ -331,10 +331,10 @@ class Patterns(StudyResult):
         return figure
 
 
-def tasks_of(file: SceneFile, count: int) -> list[PatternTask]:
+def tasks_of(file: SceneFile, count: int) -> list[PatternRun]:
     """The patterns 1 to `count` of a scene, whose rows do not depend on how many there are."""
     others = tuple(one for one in file.overrides if one.partition("=")[0].strip() != "mistuning.patterns")
-    return [PatternTask(n, file.name, file.text, others, file.folder) for n in range(1, count + 1)]
+    return [PatternRun(n, file.name, file.text, others, file.folder) for n in range(1, count + 1)]
 
 
 def patterns(
@@ -361,7 +361,7 @@ def patterns(
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
     runner = Runner(folder, report, workers, resume=resume, retry=resume)
     folder.mkdir(parents=True, exist_ok=True)
-    rows: dict[int, Row] = {}
+    rows: dict[int, RunRow] = {}
     with alone_in(folder):
         finish(tasks := tasks_of(file, asked.patterns), runner, rows, solve, "patterns", inside=True)
     found = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks), folder)

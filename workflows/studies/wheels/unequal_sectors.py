@@ -37,7 +37,7 @@ TOLERANCE = 3e-3  # of the curves between their points
 
 
 @dataclass(frozen=True, repr=False)
-class Mistuned(StudyResult):
+class MistunedSectors(StudyResult):
     """Responses of a wheel, and of the same wheel with all sectors alike.
 
     stiffness : (n_sectors,) factors; heights : (n_point, n_sectors) amplitudes of the wheel at its points [m]
@@ -153,7 +153,7 @@ def mistuned(
     spread: Number = 0.02,
     seed: int = 1,
     overrides: Overrides = (),
-) -> Mistuned:
+) -> MistunedSectors:
     """Solve all sectors of a wheel at once, their stiffnesses a little apart, beside sectors alike.
 
     scene : name of a scene with a [wheel], or a .toml file
@@ -180,4 +180,4 @@ def mistuned(
         except NoDerivative as reason:
             peak = reason
         alike = wheels.follow(wheel.wave(), frequency, TOLERANCE)
-    return Mistuned(factors, branch, heights, alike, peak)
+    return MistunedSectors(factors, branch, heights, alike, peak)
