@@ -1,4 +1,4 @@
-"""Solutions of a symmetric sparse matrix by a factor, of PARDISO or of SuperLU after METIS, or without one."""
+"""Solutions of a symmetric sparse matrix by a factor, of PARDISO, of SuperLU after METIS, or of MUMPS."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, triu
-from scipy.sparse.linalg import LinearOperator, splu
+from scipy.sparse.linalg import splu
 
-from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.mumps import Mumps
 from tribodyn.refusal import Refusal
 
@@ -43,14 +42,11 @@ def factorise(
 ) -> Factor:
     """Factorise a sparse symmetric real matrix once, for many right-hand sides.
 
-    K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix). An Elementwise
-        one has no factor, see `multigrid`
+    K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix).
     solver : "pardiso" or "superlu", the best available by default; "mumps" in MPI processes of another Python
     few : rows that `solve_few` is to be fast for
     Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
-    if isinstance(K, LinearOperator):
-        return Multigrid(K, factorise)
     K = csr_matrix(K)
     if solver is None:
         solver = "pardiso" if pardiso_available() else "superlu"

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, eigvalsh
-from scipy.sparse import block_array, issparse
+from scipy.sparse import block_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.factor import Factor, factorise
-from tribodyn.fem.multigrid import Multigrid
 from tribodyn.fem.system import dense
 from tribodyn.refusal import Refusal
 
@@ -58,14 +57,11 @@ def modes(
     size = K.shape[0]
     if not 1 <= n <= size:
         raise Refusal(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
-    if isinstance(K, np.ndarray) or (issparse(K) and (size <= EIGEN.dense_below or 2 * n >= size)):
+    if isinstance(K, np.ndarray) or size <= EIGEN.dense_below or 2 * n >= size:
         values, phi = eigh(dense(K), dense(M), subset_by_index=[0, n - 1])
     else:
         if factor is None:
             factor, sigma = _factorise_shifted(K, M, sigma)
-        if isinstance(factor, Multigrid):
-            values, phi = factor.lowest(M, n)
-            return frequencies(values, K, M), phi * _signs(phi)
         with threadpool_limits(1):  # two BLAS pools that wait for each other make this many times slower
             try:
                 values, phi = eigsh(

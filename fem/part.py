@@ -15,7 +15,6 @@ from tribodyn.fem.constraints import AXES, Clamp, Constraint, NoMeanRotation, fr
 from tribodyn.fem.contact import ContactFaces, no_contact
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.elementwise import Elementwise, matrices
 from tribodyn.fem.interface import ContactInterface, join
 from tribodyn.fem.loads import Load
 from tribodyn.fem.springs import Mass
@@ -81,8 +80,6 @@ class Part:
 
     def restricted(self, matrix: Any) -> Any:
         """A symmetric matrix (n_dof, n_dof) over all DOFs as one (n_free, n_free) over the free ones."""
-        if isinstance(matrix, Elementwise):
-            return matrix.restricted(self.free)
         if self.follow is None:
             return matrix[self.free][:, self.free]
         return csr_matrix(self.follow.T @ matrix @ self.follow)
@@ -104,7 +101,6 @@ def build(
     held: Sequence[NoMeanRotation] = (),
     constraints: Sequence[Constraint] = (),
     masses: Sequence[Mass] = (),
-    elementwise: bool = False,
 ) -> Part:
     """Assemble a part or an assembly, hold it, and define where it touches, is loaded and is observed.
 
@@ -112,12 +108,9 @@ def build(
     material : one, or subdomain name -> material; of an assembly one, or body name -> these
     springs : joints that give way, to the ground or between sets
     held : motions that are held besides the clamps; constraints : DOFs that follow others; masses : on points or sets
-    elementwise : whether mass and stiffness are left unassembled, for meshes whose matrices do not fit
     Raises  ValueError where a name is unknown or a group is empty, one sentence
     """
-    if elementwise and constraints:
-        raise Refusal('reduction.solver: "multigrid" cannot do nodes that follow others: take "direct"')
-    M, K = (matrices if elementwise else assemble)(mesh, material)
+    M, K = assemble(mesh, material)
     K = sum((spring.matrix(mesh, node_sets) for spring in springs), start=K)
     M = sum((mass.matrix(mesh, node_sets) for mass in masses), start=M)
     points = coordinates(mesh)

@@ -37,11 +37,10 @@ def bench(
         Harmonics 0+1 and 0+3 alone, in under a minute.
     fe
         Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
-        same library, of cubes ("36k-cubes", "140k-cubes", "1M-cubes", "5M-cubes") by a factor and without one, or of an
+        same library, of cubes ("36k-cubes", "140k-cubes", "1M-cubes"), or of an
         "assembly" of 200 000 DOFs with three joints; can be repeated.
     way
-        One way of --fe alone: "product", "by hand", "flexibility" (no contact DOFs in the model) or "multigrid" (the
-        same without a factor); can be repeated.
+        One way of --fe alone: "product", "by hand", "flexibility" (no contact DOFs in the model); can be repeated.
     contact
         Set-up, memory and seconds of one response at 0+3 on "500", "1500", "3k", "12k" or "48k" contact DOFs instead,
         with residual flexibility and, up to 3k, beside the dense compliance; can be repeated.

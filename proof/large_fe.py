@@ -34,7 +34,7 @@ SIZES: dict[str, tuple[int, ...]] = {  # of the beam, name -> elements along it 
     # 13 x 13 contact nodes
     "30k": (24, 6), "100k": (44, 12), "300k": (88, 18), "1M": (170, 36),
     # elements that are cubes, with so many contact nodes along a side
-    "36k-cubes": (45, 5, 11), "140k-cubes": (72, 8, 17), "1M-cubes": (144, 16, 33), "5M-cubes": (252, 27, 55),
+    "36k-cubes": (45, 5, 11), "140k-cubes": (72, 8, 17), "1M-cubes": (144, 16, 33),
 }  # fmt: skip
 # three posts on a plate, each on a joint of faces that do not match, from four mesh files: elements of the plate along
 # its three axes, and of a post upwards
@@ -42,11 +42,10 @@ ASSEMBLIES = {"assembly": (52, 14, 9, 30)}
 PRODUCTS = {  # ways of the product -> how the scene asks for it
     "product": (),
     "flexibility": ("reduction.method=residual_flexibility",),
-    "multigrid": ("reduction.method=residual_flexibility", "reduction.solver=multigrid"),
 }
 WAYS = ("product", "by hand")
-WAYS_OF_SIZE = {"1M": ("flexibility",), "5M-cubes": ("multigrid",)}  # constraint modes do not fit 24 GB, nor a factor
-WAYS_OF_SIZE |= dict.fromkeys(("36k-cubes", "140k-cubes", "1M-cubes"), ("flexibility", "multigrid"))
+# constraint modes of a million do not fit 24 GB
+WAYS_OF_SIZE = dict.fromkeys(("1M", "36k-cubes", "140k-cubes", "1M-cubes"), ("flexibility",))
 STAGES = {  # function of a reduction -> what its seconds are told as
     "factorise": "factor", "fixed_interface_modes": "modes", "constraint_modes": "constraint modes",
     "_congruent": "projection", "_ritz": "static shapes",

@@ -30,7 +30,7 @@ def linear_modes(
 
 
 def stuck_stiffness(K: Any, B: Any, stiffness: np.ndarray) -> Any:
-    """K + B^H k B (n, n) [N/m], sparse, elementwise or dense like K; stiffness k : (n_pair, n_component) [N/m]."""
+    """K + B^H k B (n, n) [N/m], sparse or dense like K; stiffness k : (n_pair, n_component) [N/m]."""
     if not isinstance(K, np.ndarray):
         B = csr_matrix(B)
         return K + csr_matrix(B.conj().T @ diags_array(np.ravel(stiffness)) @ B)

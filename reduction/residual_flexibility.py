@@ -46,7 +46,6 @@ class ResidualFlexibility:
     """Static contact flexibility that the coordinates of a reduced model leave out.
 
     stiffness : (n_contact,) contact springs that are part of K_s [N/m]; free : (n_full, n_full) K without them, sparse
-        or elementwise, as mass
     B : (n_contact, n_full) sparse contact map; shapes : (n_full, n) V; squares : (n,) Lambda [rad2/s2]
     mass : (n_full, n_full); solver : see fem.factor
     """
@@ -161,7 +160,7 @@ def residual_flexibility(
 ) -> ReducedModel:
     """Reduce a full system to modes of its stuck state and Ritz vectors, with the flexibility these leave out.
 
-    system : sparse or elementwise, n_full DOFs; interface : B over the same DOFs
+    system : sparse, n_full DOFs; interface : B over the same DOFs
     stiffness : (n_pair, n_component) contact springs [N/m]; n_modes : of the stuck structure
         kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     clusters : of pairs, whose tractions give Ritz vectors; solver : see fem.factor

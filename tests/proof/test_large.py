@@ -19,8 +19,6 @@ def test_a_reduction_is_measured_in_four_ways(monkeypatch: pytest.MonkeyPatch) -
     smaller = large_fe.measure((4, 1), "flexibility", n_patch=3)
     assert smaller.first_hz == pytest.approx(rows[0].first_hz, rel=1e-3)  # by other shapes
     assert smaller.masters == 0
-    multigrid = large_fe.measure((4, 1, 3), "multigrid")
-    assert multigrid.first_hz == pytest.approx(large_fe.measure((4, 1, 3), "flexibility").first_hz, rel=1e-8)
     text = large_fe.as_text(rows)
     assert "by hand: seconds grow with the power" in text
     with pytest.raises(ValueError, match='no way "by foot": there are product, flexibility'):

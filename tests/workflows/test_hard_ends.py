@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 import time
-from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ import tribodyn as td
 import tribodyn.__main__ as program
 from tests.helpers import synthetic_result
 from tribodyn.workflows.result import store
-from tribodyn.workflows.run import memory
 from tribodyn.workflows.scene import scene_file
 
 pytestmark = pytest.mark.faults
@@ -166,20 +164,6 @@ def test_a_mesh_beyond_the_memory_is_refused_before_it_is_factorised(monkeypatch
     monkeypatch.setattr(os, "sysconf", lambda name: page if name == "SC_PAGE_SIZE" else 1000)
     with pytest.raises(ValueError, match="DOFs, whose factorisation needs"):
         td.run("beam", overrides=TINY)
-
-
-@pytest.mark.parametrize(("n_dof", "columns", "gigabytes"), [(5_063_850, 18, 16.5), (1_045_440, 210, 5.57)])
-def test_without_a_factor_less_memory_is_asked_for(
-    n_dof: int, columns: int, gigabytes: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As much as was measured, within a tenth; see docs/validation/large.md."""
-    for share, fits in ((0.9, False), (1.1, True)):
-        pages = int(share * gigabytes * 1e9)
-        monkeypatch.setattr(os, "sysconf", lambda name, pages=pages: 1 if name == "SC_PAGE_SIZE" else pages)
-        with nullcontext() if fits else pytest.raises(ValueError, match=r"make the mesh coarser$"):
-            memory.check(n_dof, "multigrid", columns)
-    with pytest.raises(ValueError, match=r'or set reduction\.solver = "multigrid"'):
-        memory.check(n_dof, "direct", columns)
 
 
 def test_ctrl_c_while_the_program_is_loaded_ends_quietly(

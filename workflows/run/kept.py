@@ -93,7 +93,7 @@ def beside(make: Callable[[HarmonicBalance | None], HarmonicBalance]) -> Harmoni
 def part(file: SceneFile, make: Callable[[], Part]) -> Part:
     """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
     early = json.loads(early_of(file.mesh_scene))
-    early["reduction"] = file.mesh_scene.reduction.solver == "multigrid"  # elementwise, all that a part needs of it
+    del early["reduction"]  # a part needs nothing of it
     return _kept(file, "part", (early,), make)
 
 

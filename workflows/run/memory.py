@@ -8,8 +8,7 @@ from pathlib import Path
 
 from tribodyn.refusal import Refusal
 
-# bytes for each DOF, as measured in docs/validation/large.md: of a factor; of elements with a factor of linear ones
-OF_SOLVER = {"direct": 15e3, "mumps": 15e3, "multigrid": 3.4e3}
+FACTOR = 15e3  # bytes of a factor for each DOF, as measured in docs/validation/large.md
 
 
 def forget_peak() -> None:
@@ -38,10 +37,9 @@ def check(n_dof: int, solver: str, columns: int = 0) -> None:
         machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, OSError, ValueError):  # as on Windows
         return
-    needed = (OF_SOLVER[solver] + 8 * columns) * n_dof
+    needed = (FACTOR + 8 * columns) * n_dof
     if needed > machine and solver != "mumps":  # perhaps on other hosts
-        less = ', or set reduction.solver = "multigrid", which takes less and far longer' if solver == "direct" else ""
         raise Refusal(
             f"the mesh has {n_dof} DOFs, whose factorisation needs some {needed / 1e9:.0f} GB, and this machine has "
-            f"{machine / 1e9:.0f} GB: make the mesh coarser{less}"
+            f"{machine / 1e9:.0f} GB: make the mesh coarser"
         )

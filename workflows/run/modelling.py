@@ -167,7 +167,6 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
         held=[] if turning is None else [NoMeanRotation(turning)],
         constraints=joined.constraints,
         masses=joined.masses,
-        elementwise=scene.reduction.solver == "multigrid",
     )
 
 

@@ -95,7 +95,7 @@ def without_masters(scene: MeshScene, contact_dofs: int, held: bool) -> bool:
     held : whether motions are held besides the clamps
     Raises  ValueError where the scene asks for it and has what needs them
     """
-    method = "residual_flexibility" if scene.reduction.solver == "multigrid" else scene.reduction.method
+    method = scene.reduction.method
     needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": held}
     needed = [name for name, there in needs.items() if there]
     if method == "residual_flexibility" and needed:

@@ -106,7 +106,7 @@ def plan(file: SceneFile) -> Plan:
     scene = file.scene
     check_names(scene, own_files=False)
     elements = nodes = held = 0
-    sparse, solver = False, "direct"
+    sparse = False
     remarks: list[str] = []
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
@@ -128,7 +128,7 @@ def plan(file: SceneFile) -> Plan:
         full = len(free)
         pairs, masters = _contact(built, mesh, node_sets, free)
         held = int(built.geometry is not None and built.geometry.no_turning is not None)
-        modes, cutoff, solver = built.reduction.modes, built.reduction.cutoff, built.reduction.solver
+        modes, cutoff = built.reduction.modes, built.reduction.cutoff
         sparse = without_masters(built, pairs * len(components(scene)), held > 0)
         if sparse:
             masters = LIMITS.clusters * len(components(scene)) + 5
@@ -138,7 +138,7 @@ def plan(file: SceneFile) -> Plan:
     model = masters + (modes if modes is not None else 50) - held
     memory = (
         200e6  # the program itself
-        + memory_use.OF_SOLVER[solver] * full
+        + memory_use.FACTOR * full
         + 3 * 8.0 * full * model
         + 10 * 8.0 * model**2
         + (0.0 if sparse else 8 * 8.0 * contact**2)

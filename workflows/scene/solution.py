@@ -179,9 +179,8 @@ class Reduction(Table):
     """Number of modes."""
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
     """Frequency up to which modes are kept, instead of their number."""
-    solver: Literal["direct", "mumps", "multigrid"] = "direct"
-    """How the part's equations are solved: by a factor, or by one of MUMPS in MPI processes; where none fits, by
-    conjugate gradients with two levels, which take far longer and less memory; mass and stiffness are not assembled."""
+    solver: Literal["direct", "mumps"] = "direct"
+    """How the part's equations are solved: by a factor in this process, or by one of MUMPS in MPI processes."""
     interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
     """Replace the masters by this number of characteristic constraint modes."""
     interface_keep: tuple[str, ...] | None = None
@@ -192,10 +191,6 @@ class Reduction(Table):
     def _whole(self) -> Reduction:
         if self.interface_modes is None and self.interface_keep is not None:
             raise Refusal("expected interface_keep only with interface_modes")
-        if self.solver == "multigrid" and (self.needs_masters or self.method == "craig_bampton"):
-            raise Refusal(
-                'expected solver = "direct" with relative = true, interface_modes or method = "craig_bampton"'
-            )
         if (self.modes is None) == (self.cutoff is None):
             raise Refusal("expected either modes = number or cutoff = frequency, and not both")
         if self.method == "residual_flexibility" and self.needs_masters:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from scipy.sparse import issparse
 
 from tribodyn.fem.assembly import Assembly, Body, named_in
 from tribodyn.fem.couplings import Tie
@@ -231,8 +230,7 @@ def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, flo
 
 def _frequencies(M: Any, K: Any, count: int) -> tuple[float, ...]:
     """The lowest natural frequencies of mass and stiffness [Hz]; 0 where they are rounding."""
-    # K alone is singular where something can move rigidly; an elementwise one has no shift
-    shift = 1e-9 * stiffest(K, M) if issparse(K) else 0.0
+    shift = 1e-9 * stiffest(K, M)  # K alone is singular where something can move rigidly
     omega, _ = modes(K, M, min(count, M.shape[0]), sigma=-shift)
     omega[omega**2 < 1e-5 * shift] = 0.0
     return tuple((omega / (2 * np.pi)).tolist())
