@@ -17,13 +17,13 @@ from cyclopts import App
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from tribodyn.found import Kind
 from tribodyn.geometry import parts
 from tribodyn.geometry.sources import abaqus_cards, ansys, nastran
 from tribodyn.geometry.sources.card_table import words as words_of
 from tribodyn.hbm import continuation
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.wear import law as wear_law
+from tribodyn.plugins import PluginKind
 from tribodyn.workflows.command.main import app
 from tribodyn.workflows.result import store
 from tribodyn.workflows.scene import json_schema
@@ -177,7 +177,7 @@ def parameters_of(modules: Iterable[ModuleType]) -> str:
     return "\n".join(lines)
 
 
-def numbers_of(kind: Kind) -> str:
+def numbers_of(kind: PluginKind) -> str:
     """A section for each file of a kind, with the numbers that it declares; none is run for it."""
     lines: list[str] = []
     for path in map(kind.file_of, kind.names()):

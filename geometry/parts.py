@@ -17,10 +17,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from tribodyn import declare
+from tribodyn import declarations
 from tribodyn.refusal import Refusal
 
-_PACKAGE = Path(declare.__file__).parent
+_PACKAGE = Path(declarations.__file__).parent
 _GENERAL, _CASES = "geometry/*.py", "workflows/cases/*/*.py"
 
 
@@ -51,7 +51,7 @@ def load(name: str) -> ModuleType:
     Raises Refusal: there is no such part
     """
     if name.endswith(".py"):
-        return declare.run_file(Path(name), "part", ("build", "Parameters"))
+        return declarations.run_file(Path(name), "part", ("build", "Parameters"))
     module = file_of(name).relative_to(_PACKAGE).with_suffix("")
     return importlib.import_module(".".join(("tribodyn", *module.parts)))
 

@@ -18,8 +18,8 @@ import scipy.linalg as sla
 from scipy.sparse import issparse
 
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm.contact.joint import Contact, Joint
-from tribodyn.hbm.contact.law import STICKS, ContactCycle
+from tribodyn.hbm.contact.contact_law import STICKS, ContactCycle
+from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.krylov import gmres
@@ -74,7 +74,7 @@ class HarmonicBalance:
     """
 
     model: ReducedModel
-    contact: Contact
+    contact: JointSet
     basis: HarmonicBasis
     excitation: Excitation
     omega_max: float
@@ -107,7 +107,7 @@ class HarmonicBalance:
         """
         if not 0 < omega_max < np.inf:
             raise Refusal(f"the highest frequency is {omega_max} rad/s: give a finite one above zero")
-        contact = Contact.of(model, joints)
+        contact = JointSet.of(model, joints)
         if memory is None:
             memory = np.zeros((contact.n_pair, contact.n_state))
         held = model.residual
@@ -144,7 +144,7 @@ class HarmonicBalance:
         """The same problem with another gap (n_pair,) [m], as wear makes it; everything linear is shared."""
         return replace(self, contact=self.contact.with_gap(np.asarray(gap, float)))
 
-    def with_contact(self, contact: Contact) -> HarmonicBalance:
+    def with_contact(self, contact: JointSet) -> HarmonicBalance:
         """The same problem with other contact parameters; the stuck reference springs stay those of the first."""
         return replace(self, contact=contact)
 

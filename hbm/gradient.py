@@ -23,7 +23,7 @@ import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.joint import Contact
+from tribodyn.hbm.contact.joint import JointSet
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.krylov import gmres
@@ -127,7 +127,7 @@ class Posed:
     """
 
     model: ReducedModel
-    contact: Contact
+    contact: JointSet
     excitation: Excitation
     memory: np.ndarray
     balance: HarmonicBalance | None = None
@@ -330,7 +330,7 @@ class Gradient:
         x = 0.0 if residual is None else residual.apply(self._pull(posed))
         return x if base is None else x - self.balance.loaded(base)
 
-    def _force(self, contact: Contact, memory: np.ndarray) -> np.ndarray:
+    def _force(self, contact: JointSet, memory: np.ndarray) -> np.ndarray:
         """(n_pair, n_component, n_coeff) what another contact adds to the forces at the same x [N]."""
         if contact is self.balance.contact and memory is self.balance.memory:
             return np.zeros_like(self.state.x)

@@ -14,8 +14,8 @@ from typing import NoReturn, cast
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.joint import Contact
-from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.contact.contact_law import ContactParameters
+from tribodyn.hbm.contact.joint import JointSet
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.mistuned import Alike, MistunedCompliance
 from tribodyn.reduction.cyclic import ReducedSector, travelling_wave
@@ -78,7 +78,7 @@ class MistunedWheel:
         if change is not None:
             size = one.contact.n_pair
             joints = tuple(replace(j, parameters=change(j.parameters, j.rows // size)) for j in joints)
-        contact = Contact.of(self._model, joints)
+        contact = JointSet.of(self._model, joints)
         memory = np.tile(one.memory, (self.n_sectors, 1))
         at_rest = None if one.at_rest is None else np.tile(one.at_rest, (self.n_sectors, 1))
         return HarmonicBalance(

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from tribodyn.hbm.balance import NEARLY_ALL, HarmonicBalance, Linearisation, State
-from tribodyn.hbm.contact.law import ContactCycle
+from tribodyn.hbm.contact.contact_law import ContactCycle
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 from tribodyn.reduction.residual_flexibility import ResidualFlexibility

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, kron
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.law import ContactCycle
+from tribodyn.hbm.contact.contact_law import ContactCycle
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 
 

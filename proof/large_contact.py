@@ -27,7 +27,7 @@ from proof.bench import Machine, Work
 from tests.helpers.reduced import reduce_part
 from tribodyn.fem.factor import Pardiso, factorise
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation
-from tribodyn.hbm.contact.joint import Contact
+from tribodyn.hbm.contact.joint import JointSet
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.linear import all_harmonics
@@ -44,7 +44,7 @@ WAYS = {"craig_bampton": 60, "residual_flexibility": 24}  # and its modes
 RANGE, HARMONICS, SAMPLES = 200, [0, 1, 2, 3], 100  # points of the scene's range; fewer are taken about its middle
 PROBE_HZ, PROBES = 3000.0, 3  # the highest harmonic at the upper end of the range
 WATCHED: dict[str, tuple[Any, str]] = {  # what a curve by residual flexibility is made of
-    "contact": (Contact, "cycle"),
+    "contact": (JointSet, "cycle"),
     "slopes": (Linearisation, "g_slope"),
     "products": (all_harmonics, "nearly_displaced"),
     "modes": (CompliancePoint, "nearly"),

@@ -12,7 +12,7 @@ import numpy as np
 from tests.helpers.wheel_scene import WHEEL
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import patterns, wheel_model as wheels

@@ -16,11 +16,11 @@
     history = thesis_rule.evolve(wear, 1e-6, max_steps=5)
     print(history.cycles, history.depth.max(axis=1))
 
-with `ContactParameters` from hbm.contact.law, `Joint` from hbm.contact.joint, `HarmonicBalance` from hbm.balance,
-`HarmonicBasis` from hbm.harmonics, `Excitation` from hbm.excitation, `natural` from hbm.continuation.methods, `AtPeak`
-from hbm.continuation.operating_point, `Duty` and `WearProblem` from hbm.wear.evolution, `JointWear` from hbm.wear.law
-and `thesis_rule` from hbm.wear. The names of `import tribodyn` are a shorter way to the same; a scene with
-[model] does the same without Python.
+with `ContactParameters` from hbm.contact.contact_law, `Joint` from hbm.contact.joint, `HarmonicBalance` from
+hbm.balance, `HarmonicBasis` from hbm.harmonics, `Excitation` from hbm.excitation, `natural` from
+hbm.continuation.methods, `AtPeak` from hbm.continuation.operating_point, `Duty` and `WearProblem` from
+hbm.wear.evolution, `JointWear` from hbm.wear.law and `thesis_rule` from hbm.wear. The names of `import tribodyn` are a
+shorter way to the same; a scene with [model] does the same without Python.
 
 Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,
 ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or "z".

@@ -7,10 +7,10 @@ from types import ModuleType
 import numba
 import numpy as np
 
-from tribodyn.hbm.contact import events, law as contact_law
+from tribodyn.hbm.contact import contact_law, events
 from tribodyn.hbm.contact.compiled_law import pointer
+from tribodyn.hbm.contact.contact_law import ContactCycle, ContactParameters
 from tribodyn.hbm.contact.events import CycleNotPeriodic
-from tribodyn.hbm.contact.law import ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 

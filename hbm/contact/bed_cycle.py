@@ -20,7 +20,7 @@ import numpy as np
 
 from tribodyn.hbm.contact import located as transitions
 from tribodyn.hbm.contact.asperity import Asperity, heights, pressure, tangential_ratio
-from tribodyn.hbm.contact.law import SEPARATES, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.contact.laws import jenkins
 from tribodyn.hbm.harmonics import HarmonicBasis
 

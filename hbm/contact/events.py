@@ -21,7 +21,7 @@ import numba
 import numpy as np
 
 from tribodyn.hbm.contact.compiled_law import pointer
-from tribodyn.hbm.contact.law import SEPARATES, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.contact_law import SEPARATES, ContactCycle, ContactParameters
 from tribodyn.hbm.contact.located import POINTS, WEIGHTS
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import SolverFailure

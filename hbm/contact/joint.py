@@ -14,8 +14,8 @@ from types import ModuleType
 
 import numpy as np
 
-from tribodyn.hbm.contact import aft, law as contact_law
-from tribodyn.hbm.contact.law import ContactCycle, ContactParameters
+from tribodyn.hbm.contact import aft, contact_law
+from tribodyn.hbm.contact.contact_law import ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
@@ -42,7 +42,7 @@ class Joint:
 
     @property
     def rows(self) -> np.ndarray:
-        """(n_pair,) indices of its pairs, once the joint is part of a Contact."""
+        """(n_pair,) indices of its pairs, once the joint is part of a JointSet."""
         assert isinstance(self.pairs, np.ndarray)
         return self.pairs
 
@@ -59,7 +59,7 @@ def joint_transitions(joints: Joint | Sequence[Joint]) -> str:
 
 
 @dataclass(frozen=True)
-class Contact:
+class JointSet:
     """All joints of one contact interface; every pair belongs to exactly one of them.
 
     components : of the interface, in the order t1, t2, n; n_pair : its number of pairs
@@ -71,7 +71,7 @@ class Contact:
     joints: tuple[Joint, ...]
 
     @classmethod
-    def of(cls, model: ReducedModel, joints: Joint | Sequence[Joint]) -> Contact:
+    def of(cls, model: ReducedModel, joints: Joint | Sequence[Joint]) -> JointSet:
         """The joints of a model.
 
         Raises  ValueError where they do not share out its pairs, there is no such law, it does not serve the
@@ -203,15 +203,15 @@ class Contact:
         """Values (n_pair, ...) of all pairs, joint by joint; for status, energy, forces, wear."""
         return {joint.name: of_pairs[joint.rows] for joint in self.joints}
 
-    def with_gap(self, gap: np.ndarray) -> Contact:
+    def with_gap(self, gap: np.ndarray) -> JointSet:
         """The same with another gap (n_pair,) [m]."""
         return self._with(lambda joint: replace(joint.parameters, gap=gap[joint.rows]))
 
-    def with_parameters(self, change: Callable[[ContactParameters], ContactParameters]) -> Contact:
+    def with_parameters(self, change: Callable[[ContactParameters], ContactParameters]) -> JointSet:
         """The same with the parameters of every joint changed."""
         return self._with(lambda joint: change(joint.parameters))
 
-    def _with(self, parameters: Callable[[Joint], ContactParameters]) -> Contact:
+    def _with(self, parameters: Callable[[Joint], ContactParameters]) -> JointSet:
         return replace(self, joints=tuple(replace(joint, parameters=parameters(joint)) for joint in self.joints))
 
     def cycle(self, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray, jacobian: bool = True) -> ContactCycle:
@@ -269,7 +269,7 @@ class Contact:
             joints.append(replace(joint, parameters=parameters, pairs=(starts + joint.rows).ravel()))
         return tuple(joints)
 
-    def taken(self, pairs: np.ndarray) -> Contact:
+    def taken(self, pairs: np.ndarray) -> JointSet:
         """The contact of some of the pairs, in the order given."""
         order = np.full(self.n_pair, -1)
         order[pairs] = np.arange(len(pairs))
@@ -279,4 +279,4 @@ class Contact:
             kept = kept[np.argsort(order[joint.rows][kept])]
             if len(kept):
                 joints.append(replace(joint, parameters=joint.parameters.taken(kept), pairs=order[joint.rows][kept]))
-        return Contact(self.components, len(pairs), tuple(joints))
+        return JointSet(self.components, len(pairs), tuple(joints))

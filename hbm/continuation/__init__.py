@@ -6,7 +6,7 @@ A method is a module of `methods`, or a file of one's own, with `class Options` 
 
 from __future__ import annotations
 
-from tribodyn.found import Kind
+from tribodyn.plugins import PluginKind
 
-KIND = Kind("continuation", "tribodyn.hbm.continuation.methods", ("follow", "Options"), declares="Options")
+KIND = PluginKind("continuation", "tribodyn.hbm.continuation.methods", ("follow", "Options"), declares="Options")
 names, file_of, load, declared = KIND.names, KIND.file_of, KIND.load, KIND.declared

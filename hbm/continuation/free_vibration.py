@@ -20,7 +20,7 @@ import scipy.linalg as sla
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.law import SEPARATES, ContactCycle
+from tribodyn.hbm.contact.contact_law import SEPARATES, ContactCycle
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.linear.expansion import stuck_modes
 from tribodyn.refusal import Refusal

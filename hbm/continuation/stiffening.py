@@ -21,7 +21,7 @@ import scipy.linalg as sla
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
-from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution, lead

@@ -25,7 +25,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.law import STICKS
+from tribodyn.hbm.contact.contact_law import STICKS
 from tribodyn.hbm.continuation import bordered, parameter
 from tribodyn.hbm.continuation.bordered import Direction, Metric
 from tribodyn.hbm.continuation.branch import Branch

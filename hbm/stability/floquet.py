@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.law import STICKS
+from tribodyn.hbm.contact.contact_law import STICKS
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time import period_search, wave_in_time
 from tribodyn.hbm.time.period_search import Period, PeriodSearch, push

@@ -24,7 +24,7 @@ import numba
 import numpy as np
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
-from tribodyn.hbm.contact.law import SEPARATES
+from tribodyn.hbm.contact.contact_law import SEPARATES
 
 # a contact law is passed as a function
 warnings.filterwarnings("ignore", "First-class function type", NumbaExperimentalFeatureWarning)

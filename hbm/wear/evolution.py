@@ -10,7 +10,7 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.law import SEPARATES
+from tribodyn.hbm.contact.contact_law import SEPARATES
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.sites import Site
 from tribodyn.hbm.newton import lead

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation
-from tribodyn.hbm.contact.law import ContactCycle
+from tribodyn.hbm.contact.contact_law import ContactCycle
 from tribodyn.hbm.linear.compliance import CompliancePoint
 
 MAX_ITERATIONS = 80

@@ -2,7 +2,7 @@
 
 A law is a module `hbm/wear/<name>.py`, or a file of one's own, with `depth_rate(exposure) -> (n_pair,)`: total wear
 depth of each pair per vibration cycle [m], the sum over both surfaces. Its own numbers, such as a wear coefficient, it
-declares in `class Parameters` with their units, see `tribodyn.declare`.
+declares in `class Parameters` with their units, see `tribodyn.declarations`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribodyn import declare
-from tribodyn.found import Kind
+from tribodyn import declarations
+from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class JointWear:
 
         Raises  ValueError where there is no such law, or a number is missing, unknown or out of its limits
         """
-        given = declare.checked(declared(law), numbers, f"wear law '{Path(law).stem}'")
+        given = declarations.checked(declared(law), numbers, f"wear law '{Path(law).stem}'")
         return cls(law, given)
 
 
@@ -92,7 +92,7 @@ class Exposure:
 
     @property
     def status(self) -> np.ndarray:
-        """(n_pair,) bits of what happened in the cycle, see `hbm.contact.law`."""
+        """(n_pair,) bits of what happened in the cycle, see `hbm.contact.contact_law`."""
         return (self.state.cycle if self.motion is None else self.motion).status[self.joint.rows]
 
     @cached_property
@@ -129,7 +129,7 @@ class Exposure:
         return slider[:, None], np.maximum(f[:, None, t], 0.0)
 
 
-KIND = Kind("wear law", "tribodyn.hbm.wear.laws", ("depth_rate",))
+KIND = PluginKind("wear law", "tribodyn.hbm.wear.laws", ("depth_rate",))
 names, file_of, load, declared = KIND.names, KIND.file_of, KIND.load, KIND.declared
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from tests.helpers.rough_faces import gaussian
 from tribodyn.geometry.asperities import identify
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.contact.bed_cycle import bed
-from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.contact.contact_law import ContactParameters
 
 tm = pytest.importorskip("tamaas", reason="tamaas has no wheel for this platform: pip install tamaas")
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.jenkins import describing_function
-from tribodyn.hbm.contact import aft, law as contact_law
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.contact import aft, contact_law
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 

@@ -14,9 +14,9 @@ from tests.helpers.verification_models import oscillator, slab
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import events, law as contact_law
+from tribodyn.hbm.contact import contact_law, events
+from tribodyn.hbm.contact.contact_law import STICKS, ContactParameters
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
-from tribodyn.hbm.contact.law import STICKS, ContactParameters
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -26,7 +26,7 @@ CLOSED_FORMS = [(name, c) for name, c in LOCATED if contact_law.load(name).__nam
 OWN = '''
 """A law of one's own that has its steps alone."""
 from dataclasses import dataclass
-from tribodyn.declare import number
+from tribodyn.declarations import number
 from tribodyn.hbm.contact.laws.{name} import COMPONENTS, n_state, step
 '''
 FRICTION = '''

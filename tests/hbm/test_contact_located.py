@@ -6,8 +6,8 @@ from hypothesis import given, strategies as st
 
 from tests.helpers.contact_draws import HARMONICS, LOCATED, draw, own
 from tests.helpers.random_problems import cases
-from tribodyn.hbm.contact import aft, law as contact_law, located
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.contact import aft, contact_law, located
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 EVERY_LAW = pytest.mark.parametrize(

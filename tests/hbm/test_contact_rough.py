@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.helpers.steel_asperities import ALL, E_STAR, FACE, MU, POISSON, RADIUS, STEEL, YOUNG, G, moving
-from tribodyn.hbm.contact import aft, law as contact_law
+from tribodyn.hbm.contact import aft, contact_law
 from tribodyn.hbm.contact.asperity import asperity, heights, pressure
 from tribodyn.hbm.contact.bed_cycle import bed
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.contact.laws import rough
 from tribodyn.hbm.harmonics import HarmonicBasis
 

@@ -13,8 +13,8 @@ from tests.helpers.continuation_models import Duffing, Lifting, rubbing_mass, ru
 from tests.helpers.verification_models import random_structure, slab
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import bordered, parameter
 from tribodyn.hbm.continuation.bordered import Direction, Metric
 from tribodyn.hbm.continuation.methods import arc_length, natural

@@ -10,8 +10,8 @@ from tests.helpers.continuation_models import Duffing
 from tests.helpers.verification_models import oscillator
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.methods.arc_length import Options

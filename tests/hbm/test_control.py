@@ -10,8 +10,8 @@ import pytest
 from tests.helpers.verification_models import oscillator, random_structure
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.control import PhaseResonance, constant_response, driven, phase_resonance
 from tribodyn.hbm.continuation.methods import arc_length, natural
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions

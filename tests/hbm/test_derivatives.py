@@ -14,9 +14,9 @@ from tests.helpers.verification_models import interface, modal_damping, random_s
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import derivatives, newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact import contact_law
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.derivatives import at_frequency
 from tribodyn.hbm.excitation import Excitation

@@ -93,7 +93,7 @@ def test_derivatives_of_a_life_are_those_of_its_steps_taken_again(rule, site, na
 OWN_LAW = """
 from dataclasses import dataclass
 import numpy as np
-from tribodyn.declare import number
+from tribodyn.declarations import number
 
 @dataclass(frozen=True)
 class Parameters:

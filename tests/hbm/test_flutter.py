@@ -10,8 +10,8 @@ import pytest
 from tests.helpers import tiny_wheel as tiny
 from tribodyn.fem.cyclic import at_index, seam_map, seam_parts
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.limit_cycles import limit_cycles
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.excitation import Excitation

@@ -11,7 +11,7 @@ from tests.helpers.held_bodies import OMEGA, PLATFORM, problem, two_bodies
 from tests.helpers.pressed_body import growth_by_few_modes
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.outcome import WearEnd
@@ -50,7 +50,7 @@ def test_motion_in_time_is_that_of_many_harmonics(height: float, force: float) -
     """They stick, slip and lift; at the larger load the motion is unstable."""
     balance = held(force, height=height)
     state = solved(balance)
-    assert np.bitwise_or.reduce(state.cycle.status) == law.STICKS | law.SLIPS | law.SEPARATES
+    assert np.bitwise_or.reduce(state.cycle.status) == STICKS | SLIPS | SEPARATES
     found = verify(balance, state, Options(512, tolerance=1e-8))
     assert found.motion.periodic
     assert found.largest < 1e-3
@@ -89,7 +89,7 @@ def test_a_force_that_is_known_makes_the_same_motion() -> None:
 
 
 @pytest.mark.parametrize(
-    ("friction", "gap", "status"), [(1e6, -1e-4, law.STICKS), (0.4, 1.0, law.SEPARATES)], ids=["stuck", "loose"]
+    ("friction", "gap", "status"), [(1e6, -1e-4, STICKS), (0.4, 1.0, SEPARATES)], ids=["stuck", "loose"]
 )
 def test_a_plain_march_comes_to_the_mean_of_a_stuck_and_of_a_loose_contact(
     friction: float, gap: float, status: int

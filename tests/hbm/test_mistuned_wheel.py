@@ -11,8 +11,8 @@ from tests.helpers import small_wheel as small
 from tribodyn.fem.cyclic import sector_maps
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import SLIPS, ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import recovery, travelling_wave as waves

@@ -7,8 +7,8 @@ from tests.helpers.verification_models import interface, random_structure
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.continuation.residual_shear import amplitude_slope, response_bounds
 from tribodyn.hbm.excitation import Excitation

@@ -9,8 +9,8 @@ from tests.helpers.verification_models import interface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.stiffening import solve_along_friction
 from tribodyn.hbm.excitation import Excitation

@@ -9,8 +9,8 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 from tests.helpers.verification_models import oscillator
 from tribodyn.hbm import newton, rest, threads
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation

@@ -9,9 +9,9 @@ from scipy.integrate import solve_ivp
 from tests.helpers.verification_models import interface, oscillator, random_structure
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import compiled_law, law as contact_law
+from tribodyn.hbm.contact import compiled_law, contact_law
+from tribodyn.hbm.contact.contact_law import STICKS, ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import STICKS, ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED

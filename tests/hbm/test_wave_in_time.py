@@ -9,7 +9,7 @@ import pytest
 
 from tests.helpers import tiny_wheel as tiny
 from tribodyn.hbm import newton
-from tribodyn.hbm.contact.law import SLIPS
+from tribodyn.hbm.contact.contact_law import SLIPS
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import integrate, leave_alone
 from tribodyn.hbm.time.verify import verify

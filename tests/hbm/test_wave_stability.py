@@ -9,7 +9,7 @@ from tests.helpers import tiny_wheel as tiny
 from tests.helpers.floquet import multipliers
 from tests.helpers.stability_in_time import stability_in_time
 from tribodyn.hbm import newton
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.reduction.damping import modal_damping

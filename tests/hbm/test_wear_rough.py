@@ -14,8 +14,8 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import rest
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.asperity import asperity
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis

@@ -11,7 +11,7 @@ import pytest
 from tests.helpers.pressed_body import N_PAIR, balance_of, growth_by_few_modes, life, pressed_body, wear_problem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.law import SEPARATES
+from tribodyn.hbm.contact.contact_law import SEPARATES
 from tribodyn.hbm.continuation.operating_point import (
     AtFrequency,
     AtPeak,

@@ -15,8 +15,8 @@ from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.prestress import coriolis
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import SLIPS, ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import expansion, travelling_wave as waves
 from tribodyn.reduction import linear

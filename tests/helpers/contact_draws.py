@@ -6,8 +6,8 @@ from types import ModuleType
 
 import numpy as np
 
-from tribodyn.hbm.contact import law as contact_law
-from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.contact import contact_law
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 # a law with a table is drawn in units of its own, see test_contact_rough

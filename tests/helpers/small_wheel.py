@@ -10,8 +10,8 @@ from tribodyn.fem.material import Material
 from tribodyn.fem.part import build
 from tribodyn.geometry import mesh as mesh_file
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import travelling_wave as waves

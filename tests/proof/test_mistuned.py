@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proof import mistuned
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from tests.helpers.held_bodies import N_PAIR, OMEGA, PLATFORM, problem, two_bodies
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact import contact_law
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import prescribe
 
@@ -84,8 +84,8 @@ def test_equals_the_rearranged_equations_of_the_thesis(height, force):
     state = solution.state
     status = state.cycle.status
     if force > 10:
-        assert (status & law.SLIPS).any()
-        assert (status & law.SEPARATES).any()
+        assert (status & contact_law.SLIPS).any()
+        assert (status & contact_law.SEPARATES).any()
 
     start = np.zeros((free.system.n_dof, balance.basis.n_coeff))
     start[:, 0] = static_shape(model, balance, state)

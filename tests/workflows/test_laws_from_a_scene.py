@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tribodyn import declare
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn import declarations
+from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.wear import law as wear_law
 
 SMALL: dict[str, Any] = {
@@ -33,7 +33,7 @@ PLAIN = [law for law in contact_law.names() if not hasattr(contact_law.load(law)
 VALUES = {"friction": 0.5, "normal_load": 2e3, "cubic": 1e15, "coefficient": 2e-15}
 
 
-def numbers(table: str, law: str, declared: tuple[declare.Number, ...], changed: str = "") -> dict[str, Any]:
+def numbers(table: str, law: str, declared: tuple[declarations.Number, ...], changed: str = "") -> dict[str, Any]:
     """The overrides for a law and its numbers, one of them doubled."""
     values = {n.name: VALUES[n.name] * (2.0 if n.name == changed else 1.0) for n in declared}
     return {f"{table}.law": law} | {f"{table}.{name}": value for name, value in values.items()}
@@ -54,7 +54,7 @@ def contact_overrides(law: str) -> dict[str, Any]:
 @cache
 def response(law: str, changed: str = "") -> np.ndarray:
     """(n_point, n_coeff) response of the beam with a contact law."""
-    declared = declare.read(contact_law.file_of(law))
+    declared = declarations.read(contact_law.file_of(law))
     curve = td.run("beam", overrides=contact_overrides(law) | numbers("contact", law, declared, changed)).response
     assert curve.converged.all()
     return np.asarray(curve.response[:, 0])
@@ -63,7 +63,7 @@ def response(law: str, changed: str = "") -> np.ndarray:
 @pytest.mark.parametrize("law", PLAIN)
 def test_every_number_of_a_contact_law_changes_the_response(law: str) -> None:
     first = response(law)
-    for number in declare.read(contact_law.file_of(law)):
+    for number in declarations.read(contact_law.file_of(law)):
         again = response(law, number.name)
         assert np.abs(again - first).max() > 1e-3 * np.abs(first).max(), number.name
 
@@ -77,7 +77,7 @@ def test_the_contact_laws_with_friction_give_different_responses() -> None:
 
 @pytest.mark.parametrize("law", wear_law.names())
 def test_every_number_of_a_wear_law_changes_the_wear_per_cycle(law: str) -> None:
-    declared = declare.read(wear_law.file_of(law))
+    declared = declarations.read(wear_law.file_of(law))
     assert declared
     # a small preload, so that pairs slip, open and close at this frequency
     overrides = SMALL | {"wear.rule": "thesis", "wear.max_steps": 1, "wear.at": "600 Hz"}

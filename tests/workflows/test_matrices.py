@@ -13,8 +13,8 @@ from tests.helpers.command import leave
 from tests.helpers.matrix_scene import SCENE, matrix_folder
 from tests.helpers.verification_models import random_structure
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.excitation import Excitation

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tribodyn import declare
+from tribodyn import declarations
 from tribodyn.geometry import parts
 from tribodyn.hbm import continuation
-from tribodyn.hbm.contact import aft, law as contact_law
+from tribodyn.hbm.contact import aft, contact_law
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.workflows.errors import ladders
@@ -24,7 +24,7 @@ from tribodyn.workflows.scene import scene_file
 PART = """
 from dataclasses import dataclass
 from pathlib import Path
-from tribodyn.declare import number
+from tribodyn.declarations import number
 from tribodyn.workflows.cases.beam import beam
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ LAW = '''
 """Jenkins elements along t1 and t2 that hold a cohesion besides friction."""
 from dataclasses import dataclass
 import numba
-from tribodyn.declare import number
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.declarations import number
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 
 COMPONENTS = (("t1", "t2", "n"),)
 
@@ -79,7 +79,7 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
 
 WEAR = """
 from dataclasses import dataclass
-from tribodyn.declare import number
+from tribodyn.declarations import number
 
 @dataclass(frozen=True)
 class Parameters:
@@ -94,7 +94,7 @@ def depth_rate(exposure):
 METHOD = """
 from dataclasses import dataclass, field
 
-from tribodyn.declare import number
+from tribodyn.declarations import number
 from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.newton import NewtonOptions
 
@@ -248,7 +248,7 @@ def test_every_file_of_a_kind_declares_what_it_takes() -> None:
     for name in wear_law.names():
         assert [n.name for n in wear_law.declared(name) if n.needed] == ["coefficient"]
     for name in parts.names():
-        assert declare.read(parts.file_of(name))
+        assert declarations.read(parts.file_of(name))
     for name in continuation.names():
         assert callable(continuation.load(name).follow)
     with pytest.raises(ValueError, match="wear law 'energy' has no number exponent: its numbers are coefficient"):

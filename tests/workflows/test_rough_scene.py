@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tribodyn.hbm.contact.law import SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SLIPS, STICKS
 from tribodyn.workflows.scene import scene_file
 
 SMALL = {

@@ -12,7 +12,7 @@ from tests.helpers.structures import BLOCKS, FREE, STACK, STEEL, built
 from tribodyn.geometry import blocks
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.hbm import newton
-from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.continuation import nonlinear_modes
 from tribodyn.hbm.outcome import BranchEnd, WearEnd
 from tribodyn.reduction.linear import linear_modes
@@ -146,7 +146,7 @@ def solved(text: str, folder: Path, *overrides: str, slips: bool = True) -> np.n
     options = newton.NewtonOptions(tolerance=1e-12, krylov=1e-6)
     found = newton.solve(balance, omega, balance.stuck(omega), options)
     assert found.converged
-    assert (found.state.cycle.status != law.STICKS).any() == slips
+    assert (found.state.cycle.status != contact_law.STICKS).any() == slips
     return balance.outputs(found.state)[0]
 
 
@@ -224,7 +224,7 @@ def test_a_free_structure_of_two_bodies_is_the_limit_of_one_on_weak_springs(tmp_
         omega = 2 * np.pi * 5e3
         solved = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12, krylov=1e-6))
         assert solved.converged
-        assert (solved.state.cycle.status != law.STICKS).any()
+        assert (solved.state.cycle.status != contact_law.STICKS).any()
         found.append(balance.outputs(solved.state)[0, 1:])  # its static place is anywhere
     assert np.abs(found[0] - found[1]).max() < 1e-6 * np.abs(found[1]).max()
 

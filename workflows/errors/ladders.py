@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
@@ -137,7 +137,7 @@ def _of_harmonics(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
     more = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
     tops = [top for top in TOPS if top >= max(needed, default=1)]
     yield "harmonics", [Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *more)) for top in tops]
-    if all(hasattr(law.load(contact.law_name), "located") for contact in scene.joints.values()):
+    if all(hasattr(contact_law.load(contact.law_name), "located") for contact in scene.joints.values()):
         top = max(scene.harmonics.kept, default=1)
         sampled = [
             Setting(n, (f"harmonics.samples={n}", 'harmonics.transitions="sampled"')) for n in SAMPLES if n > 2 * top

@@ -191,7 +191,7 @@ def contact_surface(result: Result, state: State) -> Any:
     """Body 1's face of the contact as a pyvista surface: fields at its pairs and their means on its faces.
 
     depth, gap with it [m]; area [m2]; pressure [Pa], mean over the cycle; energy_per_cycle [J]; normal; status, bits of
-    hbm.contact.law (1 sticks, 2 slips, 4 separates)
+    hbm.contact.contact_law (1 sticks, 2 slips, 4 separates)
     """
     pv = package("pyvista")
 

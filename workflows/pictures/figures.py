@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from tribodyn.hbm.contact.law import SEPARATES
+from tribodyn.hbm.contact.contact_law import SEPARATES
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.theme import FORMATS, LAYOUT, STATUS, STYLE
 from tribodyn.workflows.result.result import Result

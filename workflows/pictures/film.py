@@ -22,7 +22,7 @@ from matplotlib.patches import Patch as Swatch
 from PIL import Image
 
 from tribodyn.extras import package
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures.figures import (

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 
 BLUE, ORANGE, GREEN, RED, GREY, INK = "#0072b2", "#e69f00", "#009e73", "#d55e00", "#7f858e", "#22262d"
 SKY, YELLOW, PALE, PAPER = "#56b4e9", "#f0e442", "#b9bec6", "white"

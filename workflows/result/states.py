@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.result import Result

@@ -9,7 +9,7 @@ import numpy as np
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import Part
-from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.excitation import Excitation
@@ -26,11 +26,11 @@ def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
     k = np.zeros((interface.n_pair, len(interface.components)))
     for name, pairs in joint_pairs(scene, reduced).items():
         contact = scene.joints[name]
-        module = law.load(contact.law_name)
+        module = contact_law.load(contact.law_name)
         if getattr(module, "OWN_STIFFNESS", False):
             seen = [interface.components.index(c) for c in contact.components]
             own = parameters_of(contact, interface, pairs, np.ones((len(interface.area[pairs]), len(seen))))
-            k[pairs, seen] = module.springs(law.checked(contact.law_name, own))
+            k[pairs, seen] = module.springs(contact_law.checked(contact.law_name, own))
             continue
         tangential, normal = joint_stiffness(scene, contact)
         total = {"t1": tangential, "t2": tangential, "n": normal}
@@ -88,19 +88,19 @@ def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
         parameters = parameters_of(contact, interface, pairs, springs[pairs][:, seen])
         found.append(Joint(name, contact.law_name, parameters, pairs))
     if not found:  # a structure that touches nothing: a joint of no pairs
-        nothing = law.ContactParameters.of(interface.components, springs, gap=interface.gap, friction=0.0)
+        nothing = contact_law.ContactParameters.of(interface.components, springs, gap=interface.gap, friction=0.0)
         found.append(Joint("none", "jenkins", nothing))
     return found
 
 
 def parameters_of(
     contact: ContactTable, interface: ContactInterface, pairs: slice, springs: np.ndarray
-) -> law.ContactParameters:
+) -> contact_law.ContactParameters:
     """The parameters of a joint with springs (n_pair, n_component); a law that counts by area has that of each pair."""
     numbers: dict[str, Any] = dict(contact.numbers)
-    if any(n.name == "area" for n in law.declared(contact.law_name)):
+    if any(n.name == "area" for n in contact_law.declared(contact.law_name)):
         numbers.setdefault("area", interface.area[pairs])
-    return law.ContactParameters.of(
+    return contact_law.ContactParameters.of(
         contact.components,
         springs,
         gap=interface.gap[pairs],

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm import continuation
-from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.newton import NewtonOptions
@@ -30,7 +30,7 @@ def check_names(scene: Scene, own_files: bool = True) -> None:
     """
     for contact in scene.joints.values():
         if own_files or not is_file(contact.law):
-            law.check_components(contact.law_name, contact.components)
+            contact_law.check_components(contact.law_name, contact.components)
     if own_files or not is_file(scene.response.method):
         response_options(scene)
     if scene.wear is not None and (own_files or not is_file(scene.wear.law)):

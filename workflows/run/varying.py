@@ -12,11 +12,11 @@ from typing import Any, cast
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from tribodyn import declare
+from tribodyn import declarations
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm.contact.joint import Contact
+from tribodyn.hbm.contact.joint import JointSet
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, wave_of
 from tribodyn.reduction.limits import LIMITS
@@ -55,7 +55,7 @@ def keys(scene: Scene) -> dict[str, float]:
     single = list(scene.joints) == ["contact"] and not getattr(scene, "contacts", None)
     for name, contact in scene.joints.items():
         table = "contact" if single else f"contacts.{name}"
-        own = {n.name: contact.numbers.get(n.name) for n in declare.read(contact.law_file) if not n.whole}
+        own = {n.name: contact.numbers.get(n.name) for n in declarations.read(contact.law_file) if not n.whole}
         add(table, contact, (*OF_CONTACT, "temperature"))
         add(table, {name: None if value is None else float(value) for name, value in own.items()}, list(own))
     for kind in ("static", "harmonic"):
@@ -140,12 +140,12 @@ class Varying:
             return self.file.changed(f"{key}={value!r}")
         return replace(self.file, scene=_with(self.scene, key.split("."), value))
 
-    def _contact(self, key: str, value: float) -> Contact:
+    def _contact(self, key: str, value: float) -> JointSet:
         """The contact with another value of a key."""
         plain = self.plain
         if key.startswith(GEOMETRY):
             plain = replace(plain, interface=self._interface(plain.interface, key, value))
-        return Contact.of(self.own.model, joints.make_joints(self._changed(key, value).scene, plain))
+        return JointSet.of(self.own.model, joints.make_joints(self._changed(key, value).scene, plain))
 
     def posed(self, key: str, value: float) -> Posed:
         """The problem with another value of a key; nothing is solved but what the preload comes to rest in."""

@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from tribodyn.declare import read
+from tribodyn.declarations import read
 from tribodyn.geometry import parts
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import (

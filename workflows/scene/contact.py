@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
-from tribodyn import declare
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn import declarations
+from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
 from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
@@ -95,7 +95,7 @@ class ContactTable(LawTable):
     @model_validator(mode="after")
     def _table_that_the_law_takes(self, info: ValidationInfo) -> Self:
         if folder_of(info) is not None:
-            columns = declare.constant(self.law_file, "TABLE")
+            columns = declarations.constant(self.law_file, "TABLE")
             if (columns is None) != (self.table is None):
                 verb = "has no meaning" if columns is None else f"is missing ({' and '.join(columns)})"
                 raise Refusal(f"{self.TABLE}.table {verb} for the law '{self.law}'")
@@ -126,7 +126,7 @@ class ContactTable(LawTable):
         """Whether the stiffness follows from something else than its two numbers."""
         if is_file(self.law) and self._own is None:  # of a result: it was checked when the scene was read
             return self.tangential_stiffness is None and self.normal_stiffness is None
-        return bool(declare.constant(self.law_file, "OWN_STIFFNESS"))
+        return bool(declarations.constant(self.law_file, "OWN_STIFFNESS"))
 
 
 class FaceContact(ContactTable):

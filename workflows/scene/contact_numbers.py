@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from tribodyn import declare
-from tribodyn.hbm.contact import law as contact_law
+from tribodyn import declarations
+from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ByTemperature, Change, Surfaces
 from tribodyn.workflows.scene.fields import Table
@@ -100,7 +100,7 @@ def takes_asperities(contact: Any) -> bool:
     if not isinstance(name, str) or is_file(name) or "table" in contact:
         return False
     try:
-        return declare.constant(contact_law.file_of(name), "TABLE") is not None
+        return declarations.constant(contact_law.file_of(name), "TABLE") is not None
     except ValueError:  # no such law, which is reported where the contact is read
         return False
 

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 
-from tribodyn.declare import Number, read
+from tribodyn.declarations import Number, read
 from tribodyn.geometry import parts
 from tribodyn.hbm import continuation
 from tribodyn.workflows.scene.fields import IN_UNIT

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ConfigDict, PrivateAttr, ValidationInfo, model_validator
 
-from tribodyn.declare import Number, read
+from tribodyn.declarations import Number, read
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Table, unknown_key
 from tribodyn.workflows.scene.units import to_si

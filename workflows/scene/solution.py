@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from tribodyn.declare import read
+from tribodyn.declarations import read
 from tribodyn.hbm import continuation
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import (

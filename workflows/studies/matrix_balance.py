@@ -15,8 +15,8 @@ import scipy.sparse as sp
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, join
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
-from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import nonlinear_modes as modes
 from tribodyn.hbm.continuation.branch import Branch, amplitude as vibration
 from tribodyn.hbm.continuation.control import constant_response, driven, phase_resonance

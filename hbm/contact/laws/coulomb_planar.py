@@ -26,9 +26,9 @@ from typing import cast
 import numba
 import numpy as np
 
-from tribodyn.declare import number
+from tribodyn.declarations import number
 from tribodyn.hbm.contact.aft import march
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("t1", "t2", "n"),)

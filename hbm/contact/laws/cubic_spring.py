@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numba
 
-from tribodyn.declare import number
-from tribodyn.hbm.contact.law import STICKS
+from tribodyn.declarations import number
+from tribodyn.hbm.contact.contact_law import STICKS
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "t2"), ("t1", "n"), ("t2", "n"), ("t1",), ("t2",), ("n",))
 BY_SAMPLES = True

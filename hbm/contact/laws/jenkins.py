@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from tribodyn.declare import number
+from tribodyn.declarations import number
 from tribodyn.hbm.contact import located as transitions
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numba
 
-from tribodyn.declare import number
+from tribodyn.declarations import number
 from tribodyn.hbm.contact import located as transitions
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 
 COMPONENTS = (("t1", "t2"), ("t1",), ("t2",))
 LINEAR_WHERE_STUCK = True

@@ -25,11 +25,11 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from tribodyn.declare import number
+from tribodyn.declarations import number
 from tribodyn.hbm.contact import bed_cycle
 from tribodyn.hbm.contact.asperity import asperity, tangential_ratio
 from tribodyn.hbm.contact.bed_cycle import ROWS, SPRINGS, TABULATED, bed, look_up, table_of
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from tribodyn.hbm.contact.asperity import Asperity, asperity, tangential_ratio
 from tribodyn.hbm.contact.bed_cycle import deepest_of
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.contact.laws import rough
 from tribodyn.hbm.harmonics import HarmonicBasis
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 
 from tribodyn.hbm.contact import located as transitions
-from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 
 COMPONENTS = (("n",),)
 LINEAR_WHERE_STUCK = True

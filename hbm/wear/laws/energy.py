@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.declare import number
+from tribodyn.declarations import number
 from tribodyn.hbm.wear.law import Exposure
 
 

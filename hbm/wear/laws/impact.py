@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.declare import number
-from tribodyn.hbm.contact.law import SEPARATES
+from tribodyn.declarations import number
+from tribodyn.hbm.contact.contact_law import SEPARATES
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.refusal import Refusal
 

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch as Swatch
 from proof.cases.leaf_seal.record import Record
 from proof.cases.leaf_seal.response import LeafResponse
 from proof.problems import linear_references
-from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.style import BLUE, GREEN, INK, ORANGE, PRESSURE_MAP, RED, STATUS, STYLE
 from tribodyn.workflows.pictures.maps import draw_field, draw_status
 from tribodyn.workflows.result.result import Patch

@@ -13,7 +13,7 @@ import numpy as np
 
 from proof.cases.leaf_seal.cases import Case
 from proof.cases.leaf_seal.response import LINER_NODE, LeafResponse
-from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.workflows.result.store import replacing as write_whole
 from tribodyn.workflows.scene.schema import Scene

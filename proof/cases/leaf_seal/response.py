@@ -12,7 +12,7 @@ from proof.chatter import Chatter, chatter
 from proof.problems import follow_response, impact_work, state_at
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.stability.exponents import BranchStability, mark as mark_stability
 from tribodyn.hbm.wear.laws.impact import loading_work

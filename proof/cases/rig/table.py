@@ -11,7 +11,7 @@ from proof.cases.rig import published
 from proof.cases.rig.cases import READINGS, STUCK_PRELOAD, Stage, Study, solved
 from proof.cases.rig.fit import FREQUENCIES
 from proof.cases.rig.wear import RigWear
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS
 
 MILLION = 1e6
 UPPER_PEAK = (340.0, 450.0)  # where the peak near 400 Hz is looked for [Hz]

@@ -19,7 +19,7 @@ from proof.cases.leaf_seal.response import LINER_NODE, respond
 from proof.cases.leaf_seal.study import KEPT
 from tests.helpers.reduced import reduce_part
 from tribodyn.hbm import newton
-from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import time_integration

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribodyn import Exposure
-from tribodyn.declare import number
+from tribodyn.declarations import number
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from tribodyn.fem.constraints import named
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.continuation import highest_peak
 from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length

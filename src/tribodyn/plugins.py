@@ -10,16 +10,16 @@ from functools import cache
 from pathlib import Path
 from types import ModuleType
 
-from tribodyn import declare
+from tribodyn import declarations
 from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
-class Kind:
+class PluginKind:
     """One kind of file.
 
     what : it is, in words; package : whose modules are those of the product
-    needs : functions or classes that each must have; declares : its class of numbers, see `tribodyn.declare`
+    needs : functions or classes that each must have; declares : its class of numbers, see `tribodyn.declarations`
     """
 
     what: str
@@ -54,9 +54,9 @@ class Kind:
         """The module of this name, or of a file of one's own; raises ValueError where there is none."""
         path = self.file_of(name)
         if name.endswith(".py"):
-            return declare.run_file(path, self.what, self.needs)
+            return declarations.run_file(path, self.what, self.needs)
         return importlib.import_module(f"{self.package}.{name}")
 
-    def declared(self, name: str) -> tuple[declare.Number, ...]:
+    def declared(self, name: str) -> tuple[declarations.Number, ...]:
         """The numbers that a file declares; it is not run."""
-        return declare.read(self.file_of(name), self.declares)
+        return declarations.read(self.file_of(name), self.declares)

@@ -3,7 +3,7 @@
 A law is a module `hbm/contact/laws/<name>.py`, or a file of one's own, with
 
 - `COMPONENTS` : the component tuples it accepts, such as (("t1", "t2", "n"),)
-- `Parameters` : its own numbers with their units, see `tribodyn.declare`; none where the class is missing
+- `Parameters` : its own numbers with their units, see `tribodyn.declarations`; none where the class is missing
 - `n_state(components)` : number of memory variables of one pair
 - optionally `TABLE` : meaning of the columns of a table that it needs, and `tabulated(parameters)` : (n_pair, m) what
   it makes of it, with which every packed row ends
@@ -32,8 +32,8 @@ from types import ModuleType
 
 import numpy as np
 
-from tribodyn import declare
-from tribodyn.found import Kind
+from tribodyn import declarations
+from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
 STICKS, SLIPS, SEPARATES = 1, 2, 4
@@ -140,7 +140,7 @@ class ContactCycle:
     status: np.ndarray
 
 
-KIND = Kind("contact law", "tribodyn.hbm.contact.laws", ("step", "n_state"))
+KIND = PluginKind("contact law", "tribodyn.hbm.contact.laws", ("step", "n_state"))
 names, file_of, declared = KIND.names, KIND.file_of, KIND.declared
 
 
@@ -167,7 +167,7 @@ def called(law: ModuleType) -> str:
 @cache
 def _order(law: ModuleType) -> tuple[str, ...]:
     assert law.__file__ is not None
-    return tuple(n.name for n in declare.read(Path(law.__file__)))
+    return tuple(n.name for n in declarations.read(Path(law.__file__)))
 
 
 def require_order(law: ModuleType, parameters: ContactParameters) -> None:
@@ -188,7 +188,7 @@ def check_components(name: str, components: tuple[str, ...]) -> None:
 def checked(name: str, parameters: ContactParameters) -> ContactParameters:
     """The parameters with the law's own numbers complete and in their order; raises ValueError where that fails."""
     check_components(name, parameters.components)
-    values = declare.checked(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
+    values = declarations.checked(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
     n = parameters.n_pair
     numbers = {key: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for key, v in values.items()}
     complete, law = replace(parameters, numbers=numbers), load(name)
