@@ -18,16 +18,16 @@ from typing import Any, TypeVar
 import numpy as np
 
 from tribodyn import declare
-from tribodyn.found import Kind
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.free_vibration import Point
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.time.mean_motion import MeanMotion
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
+from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
-FILES = Kind("quantity", "tribodyn.hbm.quantities", ())
+FILES = PluginKind("quantity", "tribodyn.hbm.quantities", ())
 Pairs = slice | np.ndarray
 
 
