@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tribodyn import declare
+from tribodyn import declarations
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.free_vibration import Point
@@ -299,7 +299,7 @@ def load(name: str) -> StatedQuantity:
     """The quantity of this name; raises Refusal with the known names."""
     for file in _files:
         if file.stem == name:
-            quantity = getattr(declare.run_file(file, FILES.what, FILES.needs), "QUANTITY", None)
+            quantity = getattr(declarations.run_file(file, FILES.what, FILES.needs), "QUANTITY", None)
             break
     else:
         FILES.file_of(name)
