@@ -13,7 +13,7 @@ import numpy as np
 from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.result import store, summary
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import Verdict, loaded
+from tribodyn.workflows.result.verdict import Verdict
 
 MAY_LACK = (
     "patch.free_deflection", "stability.growth", "worn.omega", "worn.amplitude", "wear.preload_at_rest",
@@ -30,8 +30,7 @@ def wrong(file: Path) -> str:
     for name, value in _numbers(result):
         if name not in MAY_LACK and not np.isfinite(value).all():
             return f"not finite: {name}"
-    verdict = loaded(result.verdict) if result.verdict else None
-    return "" if verdict is None else _of_verdict(verdict, summary.numbers(result))
+    return "" if result.verdict is None else _of_verdict(result.verdict, summary.numbers(result))
 
 
 def _numbers(result: Result) -> Iterator[tuple[str, Any]]:

@@ -33,7 +33,6 @@ from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.errors.limit import limit_of
 from tribodyn.workflows.errors.verdict import with_verdict
-from tribodyn.workflows.result.verdict import loaded
 from tribodyn.workflows.run import modelling, pipeline, references
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -201,7 +200,8 @@ def beam() -> Numbers:
 def stated() -> Numbers:
     """Errors that a run states of itself."""
     result = pipeline.run(scene_file.read("beam", BEAM), None, Progress(), judge=with_verdict)
-    said = loaded(result.verdict)
+    said = result.verdict
+    assert said is not None
     found = {f"stated error of {name}": one.error for name, one in said.statements.items()}
     parts = {f"change of {one.quantity} by {one.refinement}": one.relative for one in said.changes}
     values = np.array([_response_size(lattice(2, 2), top) for top in (1, 3, 7)])

@@ -22,7 +22,7 @@ from proof.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.errors import accuracy, verdict
 from tribodyn.workflows.errors.states import relative
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import QUANTITIES, Verdict, loaded
+from tribodyn.workflows.result.verdict import QUANTITIES, Verdict
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -197,6 +197,7 @@ def _bound(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
     except (ValueError, RuntimeError):
         return ()
     truth, _ = reference.solved(file.changed("wear=", *bound.overrides), seconds, reference.FINER.refined_elements)
-    stated = loaded(result.verdict)
+    stated = result.verdict
+    assert stated is not None
     names = [name for name, reason in bound.reasons.items() if not reason]
     return tuple(replace(_judged(name, stated, truth), error=bound.wanted.error) for name in names)

@@ -111,7 +111,8 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     loop_x = (displacement.reshape(n_row, n_pair, 3, 3) @ functions.T)[rows]
     loops = Loops(rows, loop_x, np.clip(1e8 * loop_x, -4e2, 4e2))
     return Result(
-        provenance={"scene_name": "beam", "scene_text": file.text, "scene": file.scene.model_dump_json()},
+        provenance={"scene_name": "beam", "scene_text": file.text},
+        scene=file.scene,
         facts=Facts(seconds=12.5, delta_max_m=5e-3, unknowns=9 * n_pair, model_dofs=3 * n_pair + 17, harmonics=(0, 1)),
         stage=Stage.COMPLETE,
         patch=where,

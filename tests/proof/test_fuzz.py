@@ -98,7 +98,7 @@ def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.
         return fuzz_result.wrong(tmp_path / "changed.h5")
 
     def verdict(**changes: object) -> str:
-        return end(verdict=Verdict({"depth": replace(told["depth"], **changes)}, (), 2.0, 0.0).dumped())
+        return end(verdict=Verdict({"depth": replace(told["depth"], **changes)}, (), 2.0, 0.0))
 
     assert end() == verdict() == ""
     assert verdict(error=None) == "verdict: depth is stated without an error"

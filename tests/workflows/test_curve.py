@@ -16,7 +16,7 @@ from tribodyn.hbm.stability.exponents import mark
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.scene_file import from_json, read
+from tribodyn.workflows.scene.scene_file import read
 
 QUICK = ["wear.max_steps=0", "response.points=20", "verdict.enabled=false"]
 
@@ -53,7 +53,7 @@ def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixtu
     peak = settings.peak_of(file.scene).first(balance).state
     own = estimate(widened(balance, 9), kept, peak.omega, peak.x, split=False).error
     assert own == pytest.approx(result.facts.harmonics_error, rel=0.3)
-    assert from_json(result.provenance["scene"]) == file.scene
+    assert result.scene == file.scene
 
 
 def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,8 @@ from tribodyn.workflows.errors.accuracy import Bound
 from tribodyn.workflows.errors.in_time import Left
 from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.errors.states import relative
-from tribodyn.workflows.result.verdict import QUANTITIES, Change, Refinement, Statement, Status, Verdict, loaded
+from tribodyn.workflows.result import store
+from tribodyn.workflows.result.verdict import QUANTITIES, Change, Refinement, Statement, Status, Verdict
 from tribodyn.workflows.run import wear_run
 from tribodyn.workflows.scene import scene_file
 
@@ -41,8 +42,13 @@ def small() -> td.Result:
     return td.run("beam", overrides=(*SMALL, "wear.max_steps=2"))
 
 
+def verdict_of(result: td.Result) -> Verdict:
+    assert result.verdict is not None
+    return result.verdict
+
+
 def rows(result: td.Result, refinement: Refinement) -> dict[str, Change]:
-    return {row.quantity: row for row in loaded(result.verdict).changes if row.refinement == refinement}
+    return {row.quantity: row for row in verdict_of(result).changes if row.refinement == refinement}
 
 
 def test_every_quantity_has_a_statement(small: td.Result) -> None:
@@ -97,7 +103,7 @@ def test_the_error_holds_against_a_finer_reference(small: td.Result) -> None:
     file = scene_file.read("beam", (*SMALL, "wear="))
     truth, outcome = reference.solved(file, 120.0)
     assert outcome == reference.MEASURED
-    for name, one in loaded(small.verdict).statements.items():
+    for name, one in verdict_of(small).statements.items():
         right = truth[name]
         if one.stated and right is not None:
             assert one.value is not None
@@ -106,7 +112,7 @@ def test_the_error_holds_against_a_finer_reference(small: td.Result) -> None:
 
 def test_the_same_scene_has_the_same_errors_in_every_digit(small: td.Result) -> None:
     """Nothing that is decided depends on a clock."""
-    first, again = loaded(small.verdict), loaded(td.run("beam", overrides=(*SMALL, "wear.max_steps=2")).verdict)
+    first, again = verdict_of(small), verdict_of(td.run("beam", overrides=(*SMALL, "wear.max_steps=2")))
     assert replace(again, seconds=first.seconds) == first
 
 
@@ -162,9 +168,9 @@ def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
     assert preload[-2] > 0.05 > preload[-1] > 1e-3
     assert result.wear.cycles[-2] < result.summary()["life_cycles"] < result.wear.cycles[-1]
     limits = replace(DEFAULT, max_wear=0.0, harmonics=3)
-    verdict_of = verdict.judge(file, td.build(file), result, td_progress(), limits)
-    assert verdict_of.worn_ratio == pytest.approx(refine.mesh(file, 1 / 1.5)[1])
-    judged = replace(result, verdict=verdict_of.dumped())
+    judgement = verdict.judge(file, td.build(file), result, td_progress(), limits)
+    assert judgement.worn_ratio == pytest.approx(refine.mesh(file, 1 / 1.5)[1])
+    judged = replace(result, verdict=judgement)
     coarser = refine.harmonics(refine.modes(refine.mesh(file, 1 / 1.5)[0], 2) or file, 3)
     there = td.run(coarser, overrides=["verdict.enabled=false"])
     assert rows(judged, Refinement.COMBINED)["life"].refined == pytest.approx(there.summary()["life_cycles"], rel=1e-6)
@@ -185,7 +191,7 @@ def test_a_refined_run_begins_at_the_peak_that_is_known(monkeypatch: pytest.Monk
 
 def stated(result: td.Result, unstable: float) -> None:
     """The life's error follows from its row by the rule, and is no less than the wear steps say of themselves."""
-    found = loaded(result.verdict)
+    found = verdict_of(result)
     own = DEFAULT.total(rows(result, Refinement.COMBINED)["life"].relative or 0.0, found.worn_ratio)
     least = rows(result, Refinement.WEAR_STEPS)["life"].relative or 0.0
     assert found.statements["life"].error == pytest.approx(max(own, least) + unstable)
@@ -257,7 +263,7 @@ def test_a_machine_that_leaves_the_balance_makes_the_error_of_a_life() -> None:
     result = td.run(file)
     aside = rows(result, Refinement.OTHER_MOTION)
     assert set(aside) == {"life", "depth"}
-    found, life = loaded(result.verdict), aside["life"].relative or 0.0
+    found, life = verdict_of(result), aside["life"].relative or 0.0
     assert life > 0
     own = DEFAULT.total(rows(result, Refinement.COMBINED)["life"].relative or 0.0, found.worn_ratio)
     least = rows(result, Refinement.WEAR_STEPS)["life"].relative or 0.0
@@ -275,8 +281,9 @@ def test_an_end_of_the_range_is_no_peak() -> None:
 
 
 def test_the_verdict_is_kept(small: td.Result, tmp_path: Path) -> None:
-    found = loaded(small.verdict)
-    assert loaded(found.dumped()) == found
+    found = verdict_of(small)
+    store.save(tmp_path / "result.h5", small)
+    assert store.load(tmp_path / "result.h5").verdict == found
     assert small.summary()["changes"] == [vars(row) for row in found.changes]
 
 
@@ -327,7 +334,7 @@ def search(wanted: str, verdicts: list[Verdict]) -> tuple[Bound, list[tuple[str,
     def run(file: td.SceneFile, number: int) -> td.Result:
         asked.append(file.overrides)
         given = verdicts[min(number, len(verdicts)) - 1]
-        return cast(td.Result, SimpleNamespace(verdict=given.dumped(), harmonics=(0, 1)))
+        return cast(td.Result, SimpleNamespace(verdict=given, harmonics=(0, 1)))
 
     file = td.read_scene("beam", ["harmonics.kept=[0, 1]"])
     return accuracy.to_accuracy(file, wanted, run, lambda sentence: None)[1], asked

@@ -30,6 +30,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.structure import NamedContact
 
 SMALL = (
     "verdict.enabled=false",
@@ -92,8 +93,8 @@ def test_pyuff_reads_responses_histories_and_loops(tmp_path: Path) -> None:
     response = next(s for s in sets if s["type"] == 58 and s["id1"].startswith("response over force, harmonic 1"))
     assert given.response is not None
     assert response["func_type"] == 4
-    load = json.loads(given.provenance["scene"])["loads"]["harmonic"]["shake"]
-    wanted = (given.response.response[:, 0, 1] - 1j * given.response.response[:, 0, 2]) / load["value"]
+    load = given.scene.loads.harmonic["shake"]
+    wanted = (given.response.response[:, 0, 1] - 1j * given.response.response[:, 0, 2]) / load.value
     np.testing.assert_allclose(response["data"], wanted, rtol=1e-10, atol=1e-11 * np.abs(wanted).max())
     np.testing.assert_allclose(response["x"], given.response.frequency, rtol=1e-5)  # single precision in the format
     preload = next(s for s in sets if s.get("id1", "").startswith("preload_N"))
@@ -103,10 +104,10 @@ def test_pyuff_reads_responses_histories_and_loops(tmp_path: Path) -> None:
 
 def test_two_forces_are_no_frequency_response_function() -> None:
     given = result()
-    scene = json.loads(given.provenance["scene"])
-    scene["loads"]["harmonic"]["more"] = scene["loads"]["harmonic"]["shake"]
+    loads = given.scene.loads
+    more = loads.model_copy(update={"harmonic": {**loads.harmonic, "more": loads.harmonic["shake"]}})
     assert given.driving_force == pytest.approx(1e4)
-    assert replace(given, provenance={**given.provenance, "scene": json.dumps(scene)}).driving_force is None
+    assert replace(given, scene=given.scene.model_copy(update={"loads": more})).driving_force is None
 
 
 def test_paraview_reader_opens_the_series(series: Path) -> None:
@@ -341,13 +342,15 @@ def test_every_named_contact_slips_at_its_own_friction() -> None:
     assert given.loops is not None
     assert given.patch is not None
     n = len(given.patch.area)
-    scene = json.dumps({"contacts": {"first": {"friction": 0.5}, "second": {"friction": 0.1}, "third": {"law": "own"}}})
+    table = {"group": "face", "first": "a", "second": "b"}
+    first, second = (NamedContact.model_construct(**table, friction=mu) for mu in (0.5, 0.1))
+    contacts = {"first": first, "second": second, "third": NamedContact.model_construct(**table)}
     force = np.zeros((1, n, 3, 2))
     force[..., 0, :], force[..., 2, :] = 1.0, 10.0
-    joints = json.dumps({"first": [0, 4], "second": [4, 6], "third": [6, n]})
+    joints = {"first": slice(0, 4), "second": slice(4, 6), "third": slice(6, n)}
     several = replace(
         given,
-        provenance={**given.provenance, "scene": scene},
+        scene=given.scene.model_copy(update={"contact": None, "contacts": contacts}),
         facts=replace(given.facts, joints=joints),
         loops=replace(given.loops, row=given.loops.row[:1], displacement=force, force=force),
     )

@@ -27,7 +27,7 @@ from tests.helpers.synthetic_result import result
 from tribodyn.workflows.result import store
 full = result(60)
 for n in range(10**6):
-    store.save(Path(sys.argv[1]), replace(full, verdict=f"checkpoint {n}"))
+    store.save(Path(sys.argv[1]), replace(full, provenance={**full.provenance, "started": f"checkpoint {n}"}))
 """
 
 
@@ -79,7 +79,7 @@ def test_a_kill_at_any_moment_leaves_a_whole_checkpoint(tmp_path: Path, delay: f
             assert writer.poll() is None
             time.sleep(0.01)
         for _ in range(5):  # a reader never meets a part of a file either
-            assert store.load(path).verdict.startswith("checkpoint")
+            assert store.load(path).provenance["started"].startswith("checkpoint")
         time.sleep(delay)
     finally:
         writer.send_signal(signal.SIGKILL)

@@ -11,7 +11,7 @@ from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import refine
 from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import NAMES, Refinement, Verdict, loaded
+from tribodyn.workflows.result.verdict import NAMES, Refinement, Verdict
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.units import to_si
 
@@ -112,7 +112,8 @@ def to_accuracy(
     for number in range(1, rounds.most + 1):
         current = file.changed(*(f"{key}={value}" for key, value in (always | added).items()))
         result = run(current, number)
-        found = loaded(result.verdict)
+        found = result.verdict
+        assert found is not None
         of = wanted.quantities or tuple(name for name, one in found.statements.items() if one.value is not None)
         if not of:
             raise SolverFailure(f"{file.name} has no error: {found.statements['peak_frequency'].reason}")

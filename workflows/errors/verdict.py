@@ -26,7 +26,7 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 
 def with_verdict(file: SceneFile, model: Model, result: Result, progress: Progress) -> Result:
     """The result with its verdict: what `run` has done after everything else."""
-    return replace(result, verdict=judge(file, model, result, progress).dumped())
+    return replace(result, verdict=judge(file, model, result, progress))
 
 
 def judge(file: SceneFile, model: Model, result: Result, progress: Progress, options: Options = DEFAULT) -> Verdict:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from tribodyn.extras import package
-from tribodyn.workflows.result import verdict
 from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.result.result import Result
 
@@ -48,9 +47,8 @@ def write_mat(result: Result, folder: Path) -> list[Path]:
         name: {key: _plain(column) for key, column in table.items()} for name, table in tables(result).items()
     }
     facts: dict[str, Any] = {key: value for key, value in result.facts.table().items() if len(key) <= 31}
-    facts["changes"] = [
-        {k: np.nan if v is None else v for k, v in row.items()} for row in verdict.table(result.verdict)
-    ]
+    changes = () if result.verdict is None else result.verdict.changes
+    facts["changes"] = [{k: np.nan if v is None else v for k, v in vars(change).items()} for change in changes]
     content |= {"facts": facts, "provenance": dict(result.provenance), "state": result.state}
     path = folder / "result.mat"
     savemat(path, content, long_field_names=True, oned_as="column")

@@ -235,7 +235,7 @@ def _label_axes(grid: np.ndarray, patch: Patch) -> None:
 
 def _name_contacts(columns: np.ndarray, result: Result) -> None:
     """Names of the contacts beside their faces, where several are drawn one above the other."""
-    patch, joints = result.patch, result.facts.pairs_of_joints
+    patch, joints = result.patch, result.facts.joints
     if len(joints) < 2 or patch.in_one_plane:
         return
     height = 1e3 * patch.flat[:, 1]

@@ -147,10 +147,9 @@ def _summary(result: Result) -> str:
 
 def _method(result: Result) -> str:
     """One paragraph on how the numbers came about and what they take for granted."""
-    scene, facts = json.loads(result.provenance["scene"]), result.facts
-    contacts = scene.get("contacts") or {"contact": scene.get("contact") or {}}
-    laws = ", ".join(sorted({str(one.get("law", "jenkins")) for one in contacts.values()}))
-    wear = (scene.get("wear") or {}).get("law")
+    scene, facts = result.scene, result.facts
+    laws = ", ".join(sorted({contact.law for contact in scene.joints.values()}))
+    wear = None if scene.wear is None else scene.wear.law
     said = [
         f"The structure is linear: {facts.full_dofs} degrees of freedom with small displacements and linear elasticity"
         + (f", reduced to {facts.model_dofs}" if facts.model_dofs != facts.full_dofs else "") + ".",

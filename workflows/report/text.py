@@ -9,7 +9,7 @@ from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.readable import UNKNOWN, digits, measured, rounded
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, life_ends, order_of_line, size_of, worn_at_peak
-from tribodyn.workflows.result.verdict import NAMES, UNITS, Refinement, Statement, Status, loaded
+from tribodyn.workflows.result.verdict import NAMES, UNITS, Refinement, Statement, Status
 
 Lines = list[tuple[str, str]]
 TOGETHER = "mesh, modes and harmonics together"
@@ -18,7 +18,7 @@ MOST_JOINTS = 4  # named contacts that a summary has a line each for
 
 def brief(result: Result) -> list[str]:
     """The summary of a result: model, response, wear, errors, warnings, each number with the digits it has."""
-    found, judged = result.summary(), loaded(result.verdict).statements if result.verdict else {}
+    found, judged = result.summary(), result.verdict.statements if result.verdict else {}
     groups = {
         "model": _model_in_brief(result, found),
         "response": _response_in_brief(result, found, judged),

@@ -76,7 +76,7 @@ def meetings_of(result: Result) -> tuple[Meeting, ...]:
     part, patch = result.part, result.patch
     if part is None or not len(patch.faces):
         return ()
-    named = result.facts.pairs_of_joints or {"": slice(0, len(patch.area))}
+    named = result.facts.joints or {"": slice(0, len(patch.area))}
     found = []
     for name, pairs in named.items():
         own = patch.of(pairs)

@@ -57,7 +57,7 @@ class Facts:
     interface_modes : characteristic constraint modes that stand for the masters
     delta_max_m : depth at which the static loads can close the contact no longer; wear_split : share of body 1
     around : the wheel of a part that is a sector
-    joints : of a scene with named contacts, JSON of name -> [first pair, one beyond its last]
+    joints : named contact -> its pairs; empty where the scene names none
     harmonics_error, harmonics_choice : estimated truncation error of chosen harmonics, and how they were chosen
     """
 
@@ -85,12 +85,7 @@ class Facts:
     around: Around | None = None
     harmonics_error: float | None = None
     harmonics_choice: str | None = None
-    joints: str | None = None
-
-    @property
-    def pairs_of_joints(self) -> dict[str, slice]:
-        """Named contact -> its pairs; empty where the scene names none."""
-        return {} if self.joints is None else {name: slice(*ends) for name, ends in json.loads(self.joints).items()}
+    joints: Mapping[str, slice] = field(default_factory=dict)
 
     @property
     def share_of_body_1(self) -> float:
@@ -99,10 +94,12 @@ class Facts:
 
     def table(self) -> dict[str, Any]:
         """name -> value of all that applies, those of the wheel among them: what a result file and exports keep."""
-        found = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "around"}
+        found = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in ("around", "joints")}
         found["harmonics"] = np.array(self.harmonics, dtype=np.int64)
         if self.around is not None:
             found |= vars(self.around)
+        if self.joints:
+            found["joints"] = json.dumps({name: [pairs.start, pairs.stop] for name, pairs in self.joints.items()})
         return {name: value for name, value in found.items() if value is not None}
 
     @classmethod

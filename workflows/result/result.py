@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,6 +15,8 @@ from tribodyn.hbm.stability.exponents import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.summary import summary
+from tribodyn.workflows.result.verdict import Verdict
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 PEAKS = 3  # of a response that does not wear, shown in pictures
 
@@ -200,14 +201,15 @@ class WornResponses:
 class Result:
     """A run, finished or not.
 
-    provenance : scene text and overrides, versions, seed, start time, threads
+    provenance : scene text and overrides, versions, seed, start time, threads; scene : that it was computed from
     facts : what was modelled and how long it took
     stage : how far the run came; `state` is its sentence
-    verdict : JSON text of result.verdict.Verdict, empty where none was asked for
+    verdict : its errors, None where none was asked for
     response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them
     """
 
     provenance: Mapping[str, str]
+    scene: Scene
     facts: Facts
     stage: Stage
     patch: Patch
@@ -220,7 +222,7 @@ class Result:
     worn: WornResponses | None = None
     fields: Fields | None = None
     loops: Loops | None = None
-    verdict: str = ""
+    verdict: Verdict | None = None
 
     @property
     def state(self) -> str:
@@ -272,14 +274,11 @@ class Result:
     @property
     def driving_force(self) -> complex | None:
         """The one force that drives in harmonic 1, F exp(i phase) [N]; None where something else drives it too."""
-        scene = json.loads(self.provenance["scene"])
-        loads = list(((scene.get("loads") or {}).get("harmonic") or {}).values())
-        if len(loads) != 1 or scene.get("motion") or loads[0].get("pressure") is not None:
+        loads = list(self.scene.loads.harmonic.values())
+        moves = isinstance(self.scene, MeshScene) and self.scene.motion
+        if len(loads) != 1 or moves or loads[0].harmonic != 1 or not loads[0].value:
             return None
-        load = loads[0]
-        if load.get("harmonic", 1) != 1 or not load.get("value"):
-            return None
-        return complex(load["value"] * np.exp(1j * load.get("phase", 0.0)))
+        return complex(loads[0].value * np.exp(1j * loads[0].phase))
 
     def depth_after(self, row: int) -> np.ndarray:
         """(n_pair,) wear depth when the step of a row is done [m]."""

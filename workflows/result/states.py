@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,13 +102,11 @@ def counted(number: float) -> str:
 
 def friction_of(result: Result) -> np.ndarray:
     """(n_pair,) friction coefficient that the scene gives each pair's contact, nan where it gives none."""
-    scene = json.loads(result.provenance["scene"])
     found = np.full(len(result.patch.area), np.nan)
-    pairs_of_joints = result.facts.pairs_of_joints
-    for name, contact in (scene.get("contacts") or {"": scene.get("contact")}).items():
-        mu = None if contact is None else contact.get("friction")
+    for name, contact in result.scene.joints.items():
+        mu = contact.numbers.get("friction")
         if mu is not None:
-            found[pairs_of_joints.get(name, slice(None))] = mu
+            found[result.facts.joints.get(name, slice(None))] = mu
     return found
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -35,8 +36,10 @@ from tribodyn.workflows.result.result import (
     ShearBounds,
     WornResponses,
 )
+from tribodyn.workflows.result.verdict import Verdict
+from tribodyn.workflows.scene import scene_file
 
-FORMAT = "tribodyn result 3"
+FORMAT = "tribodyn result 4"
 USER_BLOCK = 512  # bytes before the HDF5 content, the least that HDF5 allows
 MARK = b"tribodyn result, sha256 of what follows this block: "
 FIELD = {"frf": "response"}  # groups of the file that have another name than the field of a Result
@@ -133,9 +136,10 @@ def _write(file: h5py.File, result: Result) -> None:
     file.attrs["format"] = FORMAT
     file.attrs["state"] = result.state
     file.attrs["stage"] = result.stage.name
-    file.attrs["verdict"] = result.verdict
+    file.attrs["verdict"] = "" if result.verdict is None else json.dumps(asdict(result.verdict))
     facts, scales = result.facts.table(), dict[str, h5py.Dataset]()
-    for name, table in (("provenance", result.provenance), ("facts", facts)):
+    provenance = {**result.provenance, "scene": result.scene.model_dump_json()}
+    for name, table in (("provenance", provenance), ("facts", facts)):
         group = file.create_group(name)
         for key, value in table.items():
             group.attrs[key] = value
@@ -232,16 +236,26 @@ def load(path: str | os.PathLike[str]) -> Result:
                 for name, (kind, arrays) in SCHEMA.items()
                 if name in file
             }
-            facts, stage = _attributes(file["facts"].attrs), Stage[str(file.attrs["stage"])]
+            facts, provenance = _attributes(file["facts"].attrs), _attributes(file["provenance"].attrs)
+            joints = {name: slice(*ends) for name, ends in json.loads(facts.get("joints", "{}")).items()}
+            verdict = str(file.attrs["verdict"])
+            return Result(
+                provenance=provenance,
+                scene=scene_file.from_json(provenance.pop("scene")),
+                facts=Facts.of(facts | {"joints": joints}),
+                stage=Stage[str(file.attrs["stage"])],
+                verdict=Verdict.of(json.loads(verdict)) if verdict else None,
+                **parts,
+            )
+        except scene_file.SceneError as error:
+            raise ResultError(f'"{path}": {error}') from None
         except (KeyError, ValueError):
             raise ResultError(f'"{path}" was written by another version of tribodyn: run its scene again') from None
-        return Result(
-            provenance=_attributes(file["provenance"].attrs),
-            facts=Facts.of(facts),
-            stage=stage,
-            verdict=str(file.attrs.get("verdict", "")),
-            **parts,
-        )
+
+
+def file_digests(result: Result) -> dict[str, str]:
+    """File beside the scene -> digest of its content when the result was computed."""
+    return dict(json.loads(result.provenance.get("files", "{}")))
 
 
 def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,8 @@ from tribodyn.hbm.continuation.parameter import FREQUENCY
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share, events, first
-from tribodyn.workflows.result import verdict
+from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.wear import Place
 
 if TYPE_CHECKING:
     from tribodyn.workflows.result.result import Result
@@ -60,8 +61,10 @@ def numbers(result: Result) -> dict[str, Any]:
     found |= _curve(result)
     found["joints"] = by_joint(result)
     found |= {"free_hz": result.facts.free_hz.tolist(), "stuck_hz": result.facts.stuck_hz.tolist()}
-    found["verdict"] = verdict.record(result.verdict)
-    found["changes"] = verdict.table(result.verdict)
+    verdict = result.verdict
+    statements = {} if verdict is None else verdict.statements
+    found["verdict"] = {name: asdict(s) | {"stated": s.stated} for name, s in statements.items()} or None
+    found["changes"] = [] if verdict is None else [asdict(change) for change in verdict.changes]
     return found
 
 
@@ -74,7 +77,7 @@ def by_joint(result: Result) -> dict[str, dict[str, Any]]:
     """What each named contact carries and loses; see `summary`."""
     patch, wear = result.patch, result.wear
     found: dict[str, dict[str, Any]] = {}
-    for name, pairs in result.facts.pairs_of_joints.items():
+    for name, pairs in result.facts.joints.items():
         area = patch.area[pairs]
         found[name] = {"pairs": len(area), "area_m2": float(area.sum())}
         if wear is None or not len(wear.cycles) or not len(area):
@@ -95,17 +98,21 @@ def life(result: Result) -> float | None:
     """Cycles until the preload had fallen as `life_ends` says; with `wear.lost_of` "any" that of the first joint."""
     if result.wear is None:
         return None
-    if _wear_table(result).get("lost_of") != "any":
+    if not _ends_with_any_joint(result):
         return cycles_to_preload(result.wear, life_ends(result)[0])
     return min(_lives(result).values(), default=None)
 
 
 def first_lost(result: Result) -> str | None:
     """The joint whose life is that of a run with `wear.lost_of` "any"; None where none has ended, or all count."""
-    if result.wear is None or _wear_table(result).get("lost_of") != "any":
+    if result.wear is None or not _ends_with_any_joint(result):
         return None
     lives = _lives(result)
     return min(lives, key=lives.__getitem__, default=None)
+
+
+def _ends_with_any_joint(result: Result) -> bool:
+    return result.scene.wear is not None and result.scene.wear.lost_of == "any"
 
 
 def _lives(result: Result) -> dict[str, float]:
@@ -116,27 +123,25 @@ def _lives(result: Result) -> dict[str, float]:
 
 def order_of_line(result: Result) -> int | None:
     """Engine order of an operating line, along which the frequency is that many times the speed; None for no line."""
-    wheel = json.loads(result.provenance.get("scene", "{}")).get("wheel") or {}
-    return abs(wheel["engine_order"]) if wheel.get("sweep") == "speed" else None
+    wheel = result.scene.wheel if isinstance(result.scene, MeshScene) else None
+    return abs(wheel.engine_order) if wheel is not None and wheel.along_speed else None
 
 
 def worn_at_peak(result: Result) -> bool:
     """Whether a result wears at a peak, not at a frequency that its scene gives."""
-    return (_wear_table(result).get("at") or {}).get("frequency") is None
-
-
-def _wear_table(result: Result) -> dict[str, Any]:
-    return dict(json.loads(result.provenance.get("scene", "{}")).get("wear") or {})
+    wear = result.scene.wear
+    return wear is None or not isinstance(wear.at, Place) or wear.at.frequency is None
 
 
 def _life_share(result: Result) -> float:
     """Share of the first preload where a life ends: the scene's `wear.lost_below`, else LIFE_SHARE."""
-    return float(_wear_table(result).get("lost_below") or LIFE_SHARE)
+    wear = result.scene.wear
+    return (wear.lost_below if wear is not None else 0.0) or LIFE_SHARE
 
 
 def life_ends(result: Result) -> tuple[float, str]:
     """Share of the first preload where the life of a whole contact ends, and which preload that is."""
-    at_rest = _wear_table(result).get("end_at") == "at_rest"
+    at_rest = result.scene.wear is not None and result.scene.wear.end_at == "at_rest"
     return _life_share(result), "preload at rest" if at_rest else "preload"
 
 

@@ -5,8 +5,7 @@ Data and its words alone; `tribodyn.workflows.errors` measures them.
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
@@ -92,25 +91,9 @@ class Verdict:
     seconds: float
     worn_ratio: float | None = None
 
-    def dumped(self) -> str:
-        """The verdict as JSON text."""
-        return json.dumps(asdict(self))
-
-
-def loaded(text: str) -> Verdict:
-    """A verdict from its JSON text."""
-    data: dict[str, Any] = json.loads(text)
-    data["statements"] = {name: Statement(**item) for name, item in data["statements"].items()}
-    return Verdict(**data | {"changes": tuple(Change(**item) for item in data["changes"])})
-
-
-def record(text: str) -> dict[str, dict[str, Any]] | None:
-    """Statements by quantity for machines, None without a verdict."""
-    if not text:
-        return None
-    return {name: asdict(one) | {"stated": one.stated} for name, one in loaded(text).statements.items()}
-
-
-def table(text: str) -> list[dict[str, Any]]:
-    """The rows of the table for machines; empty without a verdict."""
-    return [asdict(change) for change in loaded(text).changes] if text else []
+    @classmethod
+    def of(cls, table: dict[str, Any]) -> Verdict:
+        """A verdict from its fields as plain data, as `dataclasses.asdict` gives them."""
+        statements = {name: Statement(**item) for name, item in table["statements"].items()}
+        changes = tuple(Change(**item) for item in table["changes"])
+        return cls(**table | {"statements": statements, "changes": changes})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Iterator
@@ -18,7 +17,6 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Facts
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile, first_difference
 from tribodyn.workflows.scene.schema import Scene
@@ -90,10 +88,10 @@ def earlier(path: Path, file: SceneFile) -> Result | None:
     if not path.exists():
         return None
     result = store.load(path)
-    key = same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
+    key = same_problem(result.scene, file.scene)
     if key:
         raise Refusal(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
-    before = json.loads(result.provenance.get("files", "{}"))
+    before = store.file_digests(result)
     for name, found in digests(file.scene.model_dump(mode="json"), file.folder).items():
         if before.get(name, found) != found:
             raise Refusal(f"{path} was computed with another content of {name}: run the scene without --resume")

@@ -71,7 +71,7 @@ def described(
         pairs = {name: slice(0, i.n_pair) for name in file.scene.contacts}  # a single joint has them all
         pairs |= {joint.name: joint.pairs for joint in balance.contact.joints if isinstance(joint.pairs, slice)}
         pairs |= {name: own for name, own in reduced.info.joints.items() if name in pairs}
-        facts = replace(facts, joints=json.dumps({name: [own.start, own.stop] for name, own in pairs.items()}))
+        facts = replace(facts, joints=pairs)
     if file.scene.wear is not None:
         depth = delta_max(file.scene, free, i.area)  # none where nothing holds the part without its contact
         facts = replace(facts, delta_max_m=depth if np.isfinite(depth) else None, wear_split=file.scene.wear.split)
@@ -80,7 +80,7 @@ def described(
     if choice is not None:
         facts = replace(facts, harmonics_error=choice.estimate.error, harmonics_choice=choice.outcome)
     mesh = part_mesh(part) if part is not None and file.scene.pictures.renders else None
-    return Result(provenance(file), facts, Stage.BUILT, patch=patch, part=mesh)
+    return Result(provenance(file), file.scene, facts, Stage.BUILT, patch=patch, part=mesh)
 
 
 def provenance(file: SceneFile) -> dict[str, str]:
@@ -90,7 +90,6 @@ def provenance(file: SceneFile) -> dict[str, str]:
         "scene_text": file.text,
         "overrides": "\n".join(file.overrides),
         "folder": str(file.folder),
-        "scene": file.scene.model_dump_json(),
         "files": json.dumps(digests(file.scene.model_dump(mode="json"), file.folder)),
         "versions": ", ".join(f"{name} {package_version(name)}" for name in PACKAGES),
         "python": platform.python_version(),

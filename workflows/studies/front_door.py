@@ -125,7 +125,7 @@ def draw(
     """
     from tribodyn.workflows.pictures import plots
 
-    wanted, missing = scene_file.from_json(result.provenance["scene"]).pictures, ""
+    wanted, missing = result.scene.pictures, ""
     folder.mkdir(parents=True, exist_ok=True)
     written = plots.draw(result, folder, formats, dpi) if wanted.plots else []
     if wanted.renders:
@@ -154,7 +154,7 @@ def animate(
     """
     from tribodyn.workflows.pictures.film import film
 
-    wanted = scene_file.from_json(result.provenance["scene"]).pictures
+    wanted = result.scene.pictures
     factors = wanted.deformation_scale, wanted.wear_scale
     return film(result, folder, over, row, formats, images, dpi, *factors)
 

@@ -85,7 +85,7 @@ def test_every_contact_is_told_by_itself(worn: td.Result) -> None:
     assert all(joint["pairs"] > 0 for joint in joints.values())
     assert result.wear is not None
     lives = []
-    for name, pairs in result.facts.pairs_of_joints.items():
+    for name, pairs in result.facts.joints.items():
         preload, life = result.wear.normal_force[:, pairs].sum(axis=1), joints[name]["life_cycles"]
         assert (life is None) == (preload.min() >= 0.9995 * preload[0])
         if life is not None:
