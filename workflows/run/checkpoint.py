@@ -18,8 +18,12 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Facts
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene.content import digests
-from tribodyn.workflows.scene.scene_file import SceneFile, first_difference
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.scene_values import scene_values
 from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.stages import DRAW
+
+_ABSENT = object()
 
 
 class Clock:
@@ -110,8 +114,12 @@ def is_complete(result: Result, scene: Scene) -> bool:
 def same_problem(first: Scene, second: Scene) -> str:
     """Empty where one scene's result can be resumed by the other, else the first key that differs.
 
-    What is drawn, how many wear steps are wanted, how their result is reported and how many threads work may differ.
+    What is drawn or reported may differ, and the fields that are marked as resumable.
     """
-    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}}
-    ignored["wear"] = {"max_steps", "responses", "split"}
-    return first_difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))
+    before, after = (_values_of_problem(scene) for scene in (first, second))
+    return next((key for key in before | after if before.get(key, _ABSENT) != after.get(key, _ABSENT)), "")
+
+
+def _values_of_problem(scene: Scene) -> dict[str, Any]:
+    """Key -> value of what two scenes must share for one to resume the result of the other."""
+    return {entry.key: entry.value for entry in scene_values(scene) if entry.stage < DRAW and not entry.is_resumable}

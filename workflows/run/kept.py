@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import json
 import os
 import pickle
 import platform
@@ -33,42 +32,18 @@ from tribodyn.version import package_version
 from tribodyn.workflows.run import joints, part_reduction
 from tribodyn.workflows.scene.content import code, digests, files_named
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.scene_values import values_through
 from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.stages import PART
 
 FOLDER = "TRIBODYN_CACHE"  # variable of the environment: another folder, or "off"
 ROOM = 4e9  # bytes of all entries: ten of the Brake-Reuss beam, the largest scene that comes along
 PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "pypardiso", "mkl", "pymetis")
 CODE = code()  # of what this process has loaded: sources may change before it makes anything
 INCLUDES = re.compile(rb"^[ \t]*\*?[ \t]*(include|merge)\b|shapefromfile", re.IGNORECASE | re.MULTILINE)
-LATE: Any = {
-    "scene": True, "damping": True, "harmonics": True, "preload": True, "backbone": True, "wear": True, "solver": True,
-    "pictures": True, "surfaces": True, "verdict": True, "motion": True, "mistuning": True, "flow": True,
-    "loads": {"static": {"__all__": {"value", "pressure"}}, "harmonic": {"__all__": {"value", "pressure", "phase"}}},
-    "prescribed": {"__all__": {"displacement"}}, "bolts": {"__all__": {"preload"}},
-    "response": {"frequency", "references", "points", "method", "stability", "bounds", "options"},
-}  # fmt: skip
-"""What a scene may change without another part or reduction."""
-OF_JOINT = {
-    "law", "tangential_stiffness", "normal_stiffness", "punch", "table", "temperature", "by_temperature", "gap_map",
-    "wear",
-}  # fmt: skip
-"""... and a contact of it, besides the numbers of its law."""
 
 T = TypeVar("T")
 _last: ContextVar[dict[str, Any] | None] = ContextVar("tribodyn_last", default=None)
-
-
-def early_of(scene: MeshScene) -> str:
-    """What a part and its reduction are made of, but for contact springs and gaps: equal texts, equal models."""
-    late, wheel = dict(LATE), scene.wheel
-    if wheel is not None and wheel.speed > 0:  # its stress is that of the contact at rest under the loads
-        del late["loads"]
-    else:
-        numbers = OF_JOINT.union(*(contact.numbers for contact in scene.joints.values()))
-        late |= {"contact": numbers, "contacts": {"__all__": numbers}}
-    if wheel is not None and wheel.along_speed:  # its speeds are those of the response and of the duties
-        del late["response"], late["wear"]
-    return json.dumps(scene.model_dump(mode="json", exclude=late), sort_keys=True)
 
 
 @contextmanager
@@ -92,28 +67,33 @@ def beside(make: Callable[[HarmonicBalance | None], HarmonicBalance]) -> Harmoni
 
 def part(file: SceneFile, make: Callable[[], Part]) -> Part:
     """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
-    early = json.loads(early_of(file.mesh_scene))
-    del early["reduction"]  # a part needs nothing of it
-    return _kept(file, "part", (early,), make)
+    scene = file.mesh_scene
+    return _kept(file, "part", (values_through(scene, PART), _kinds_of_loads(scene)), make)
 
 
 def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) -> ReducedModel:
     """The reduction of a part, not damped, with nothing prescribed: as it is kept, else made and kept.
 
-    It does not depend on the gaps, which are those of the part
+    It does not depend on the gaps, which are those of the part.
     """
     scene, interface, springs = file.mesh_scene, whole.interface, b""
+    speeds = scene.operating_range if scene.wheel and scene.wheel.along_speed else ()
     if scene.wheel or part_reduction.without_masters(scene, interface.B.shape[0], len(whole.held) > 0):
         springs = joints.contact_stiffness(scene, joints.unreduced(whole)).tobytes()
-    found = _kept(file, "reduction", (json.loads(early_of(scene)), springs), make)
+    values = values_through(scene, scene.reduced_through)
+    found = _kept(file, "reduction", (values, _kinds_of_loads(scene), springs, speeds), make)
     return replace(found, interface=replace(found.interface, gap=interface.gap))
+
+
+def _kinds_of_loads(scene: MeshScene) -> list[str]:
+    """The kind of every load, which the part has per unit of its amplitude."""
+    return [load.kind for load in (*scene.loads.static.values(), *scene.loads.harmonic.values())]
 
 
 def heights(file: SceneFile, nodes: np.ndarray, make: Callable[[], T]) -> T:
     """Heights of measured faces at contact nodes, whatever the mating height: as they are kept, else made and kept."""
-    table = file.mesh_scene.model_dump(mode="json", include={"surfaces"})
-    del table["surfaces"]["mating_height"]
-    return _kept(file, "heights", (table, nodes.tobytes()), make)
+    surfaces = file.mesh_scene.model_dump(include={"surfaces"}, exclude={"surfaces": {"mating_height"}})
+    return _kept(file, "heights", (surfaces, nodes.tobytes()), make)
 
 
 def folder() -> Path | None:
@@ -127,7 +107,7 @@ def folder() -> Path | None:
         return None
 
 
-def _key(file: SceneFile, early: dict[str, Any], *more: bytes) -> str:
+def _key(file: SceneFile, early: dict[str, Any], *more: object) -> str:
     """Hash of the tables, of the files that they name, of the program and of its packages; empty where it is not known.
 
     What a file of Python code reads, or one that includes others, is not known.

@@ -95,11 +95,9 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
     foretell at the newest one are right to `LIMITS.speeds_apart`, at most seven of them
     Raises  ValueError where it cannot stand at one of them
     """
-    wheel, (lowest, highest) = scene.wheel, scene.response.range
+    wheel = scene.wheel
     assert wheel is not None
-    worn = () if scene.wear is None else scene.wear.duties
-    places = [lowest, highest, *(duty.at.frequency for duty in worn if duty.at.frequency)]
-    low, high = (end(places) / abs(wheel.engine_order) for end in (min, max))
+    low, high = (frequency / abs(wheel.engine_order) for frequency in scene.operating_range)
     squares = low**2 + (high**2 - low**2) * np.array([0.0, 1.0, 0.5, 0.25, 0.75, 0.125, 0.875])
     turning: list[Sector] = []
     speeds = np.sqrt(squares).tolist()

@@ -12,7 +12,6 @@ from typing import Any, cast
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from tribodyn import declarations
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
@@ -25,10 +24,16 @@ from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
 from tribodyn.workflows.run import bodies, joints, matrix_model, modelling, part_reduction, sector
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.loads import KINDS
+from tribodyn.workflows.scene.body import Meshed, SolidMaterial
+from tribodyn.workflows.scene.contact import ContactTable
+from tribodyn.workflows.scene.loads import SpringTable, Vibrates
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.scene_values import SceneValue, smooth_numbers
 from tribodyn.workflows.scene.schema import MeshScene, Scene
+from tribodyn.workflows.scene.sectors import WheelTable
+from tribodyn.workflows.scene.stages import CONTACT, REDUCTION
+from tribodyn.workflows.scene.structure import BoltTable
 
 # relative, of a number that acts on contact, loads or damping alone. With 1e-7 forces round: the law of scaling of the
 # beam's stiffness is 2e-6 off, for 3e-8; with 1e-5 a peak at a corner, seen from 3e-4 half widths, 3e-4, for 3e-6
@@ -38,55 +43,21 @@ REBUILT = 1e-3  # the same of a number of the structure, whose rounding is large
 # rotations elsewhere; a model is reduced anew by 4 times as much. By 10 times a harmonic beside its own resonance takes
 # the coarse blade's preload by its span 4e-5 off; by 1, rounding the coarse rig's amplitude by its height
 NODES = 1e-4
-STRUCTURAL = ("material.", "materials.", "springs.", *(GEOMETRY := ("geometry.", "bodies.")))
-OF_CONTACT = ("tangential_stiffness", "normal_stiffness")
 
 
 def keys(scene: Scene) -> dict[str, float]:
-    """The numbers of a scene that its response depends on smoothly, by their keys, in SI units; zeros are left out."""
-    found: dict[str, float] = {}
-
-    def add(table: str, values: Any, names: Sequence[str]) -> None:
-        for name in names:
-            value = values.get(name) if isinstance(values, dict) else getattr(values, name, None)
-            if isinstance(value, float) and value != 0.0:
-                found[f"{table}.{name}"] = value
-
-    single = list(scene.joints) == ["contact"] and not getattr(scene, "contacts", None)
-    for name, contact in scene.joints.items():
-        table = "contact" if single else f"contacts.{name}"
-        own = {n.name: contact.numbers.get(n.name) for n in declarations.read(contact.law_file) if not n.whole}
-        add(table, contact, (*OF_CONTACT, "temperature"))
-        add(table, {name: None if value is None else float(value) for name, value in own.items()}, list(own))
-    for kind in ("static", "harmonic"):
-        for name, load in getattr(scene.loads, kind).items():
-            add(f"loads.{kind}.{name}", load, KINDS)
-    add("damping", scene.damping, ("modal", "mass", "stiffness"))
-    add("material", getattr(scene, "material", None), ("young", "density"))
-    for name, material in getattr(scene, "materials", {}).items():
-        add(f"materials.{name}", material, ("young", "density"))
-    for section, names in (
-        ("springs", ("stiffness",)),
-        ("prescribed", ("displacement",)),
-        ("bolts", ("preload",)),
-        ("motion", ("static", "harmonic")),
-    ):
-        for name, table in getattr(scene, section, {}).items():
-            add(f"{section}.{name}", table, names)
-    add("wheel", getattr(scene, "wheel", None), ("speed",))
-    return found
+    """The numbers of a scene that its response depends on smoothly, without lengths and angles of its parts, by key."""
+    return {key: number.value for key, number in smooth_numbers(scene).items() if not moves_nodes(number)}
 
 
 def geometry_keys(scene: Scene) -> dict[str, float]:
     """The lengths and angles of the parts of a scene by their keys, SI units; zeros are left out."""
-    parts = {f"bodies.{name}": body for name, body in getattr(scene, "bodies", {}).items()}
-    parts["geometry"] = getattr(scene, "geometry", None)
-    return {
-        f"{table}.{name}": value
-        for table, part in parts.items()
-        for name, value in ({} if part is None else part.parameters).items()
-        if isinstance(value, float) and value != 0.0
-    }
+    return {key: number.value for key, number in smooth_numbers(scene).items() if moves_nodes(number)}
+
+
+def moves_nodes(number: SceneValue) -> bool:
+    """Whether a number is a length or an angle of a part."""
+    return isinstance(number.table, Meshed)
 
 
 class Varying:
@@ -107,7 +78,7 @@ class Varying:
         self.part, self.plain = part, plain
         self.model = modelling.make_model(self.scene, part, reduced)
         self.own = Posed.of(self.model.balance)
-        self.values = keys(self.scene) | geometry_keys(self.scene)
+        self.numbers = smooth_numbers(self.scene)
         self._ways: dict[str, SecondOrderSystem] = {}  # key -> what the reduced model moves by where it doubles
         self._beside: dict[str, tuple[Part, Part]] = {}  # key -> the part with its nodes moved to both sides
 
@@ -118,17 +89,17 @@ class Varying:
 
     def change(self, key: str, value: float) -> Change:
         """The problems a step above and below a value of a key."""
-        anew = self._settles or self.anew(key)
+        number, anew = self.numbers[key], self._settles or self.anew(key)
         linear = self._scales(key) or self.follows(key)
         step = (REBUILT if anew or linear else self.step) * abs(value)
-        if key.startswith(GEOMETRY):
+        if moves_nodes(number):
             self.nodes_moved(key)  # or refused
             step = (4 if anew else 1) * NODES * abs(value) if anew or self._sector else step
         far: tuple[Posed, ...] | None = () if anew or linear else None
-        if self._settles or (anew and key.startswith((*STRUCTURAL, "wheel."))):
+        if self._settles or (anew and number.stage <= REDUCTION):
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
         touching = None
-        if (anew or linear) and not self._settles and _touches(key):
+        if (anew or linear) and not self._settles and _touches(number):
             small = self.step * abs(value)
             up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
             touching = Change(key, small, up, down)
@@ -136,34 +107,35 @@ class Varying:
 
     def _changed(self, key: str, value: float) -> SceneFile:
         """The scene with another value of a key; read again only where other numbers follow from it."""
-        if key.startswith(("wheel.", *GEOMETRY)) or key.endswith(".temperature"):
+        number = self.numbers[key]
+        if isinstance(number.table, (WheelTable, Meshed)) or number.name == "temperature":
             return self.file.changed(f"{key}={value!r}")
-        return replace(self.file, scene=_with(self.scene, key.split("."), value))
+        return replace(self.file, scene=_with(self.scene, number.path, value))
 
     def _contact(self, key: str, value: float) -> JointSet:
         """The contact with another value of a key."""
         plain = self.plain
-        if key.startswith(GEOMETRY):
+        if moves_nodes(self.numbers[key]):
             plain = replace(plain, interface=self._interface(plain.interface, key, value))
         return JointSet.of(self.own.model, joints.make_joints(self._changed(key, value).scene, plain))
 
     def posed(self, key: str, value: float) -> Posed:
         """The problem with another value of a key; nothing is solved but what the preload comes to rest in."""
         file = self._changed(key, value)
-        scene, part, plain = file.scene, self.part, self.plain
+        scene, part, plain, number = file.scene, self.part, self.plain, self.numbers[key]
         if self._scales(key):
-            plain = _scaled(plain, key.rpartition(".")[2], value / self.values[key])
+            plain = _scaled(plain, number.name, value / number.value)
         elif self.follows(key):
             plain = self._followed(key, value)
-            if part is not None and key.startswith(GEOMETRY):
+            if part is not None and moves_nodes(number):
                 part = replace(part, interface=self._interface(part.interface, key, value))
         elif self.anew(key):
             part, plain = self._made(file)
         reduced = self.own.model
         if plain is not self.plain or self._damps(scene, plain):
-            more, like = value / self.values[key], self._damped
+            more, like = value / number.value, self._damped
             if self._scales(key) and scene.damping.modal is not None and scene.damping.state != "stuck":
-                more, like = more**0.5, _scaled(like, key.rpartition(".")[2], more)  # as all frequencies go
+                more, like = more**0.5, _scaled(like, number.name, more)  # as all frequencies go
             if key == "damping.modal" or like is not self._damped:  # the same modes
                 reduced = like.with_damping(lambda system, _: more * np.asarray(system.damping))
             else:
@@ -177,8 +149,8 @@ class Varying:
         base = None
         if isinstance(scene, MeshScene) and part is not None:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
-        contact = self._contact(key, value) if _touches(key) and plain is self.plain else self.own.contact
-        loads = self.own.excitation if key.startswith("contact") else joints.excite(scene, base)
+        contact = self._contact(key, value) if _touches(number) and plain is self.plain else self.own.contact
+        loads = self.own.excitation if number.stage is CONTACT else joints.excite(scene, base)
         return Posed(reduced, contact, loads, self.own.memory, alike=self.follows(key))
 
     @property
@@ -193,15 +165,17 @@ class Varying:
 
     def anew(self, key: str) -> bool:
         """Whether the model is reduced anew: the stress of a part that spins is that of its contact at rest."""
-        of_stress = ("contact.", "contacts.", "loads.static.") if self._spins else ()
-        structural = key.startswith((*STRUCTURAL, "wheel.", *of_stress))
-        return structural and not self._scales(key) and not self.follows(key)
+        number, scene = self.numbers.get(key), self.scene
+        if number is None or isinstance(number.table, (Vibrates, BoltTable)) or self._scales(key) or self.follows(key):
+            return False
+        return number.stage <= (scene.reduced_through if isinstance(scene, MeshScene) else REDUCTION)
 
     def follows(self, key: str) -> bool:
         """Whether the reduced matrices follow the full ones, which are linear in it."""
-        if key.startswith(GEOMETRY) and self._settles:  # bolts are as long as their part is thick
+        number = self.numbers[key]
+        if moves_nodes(number) and self._settles:  # bolts are as long as their part is thick
             return False
-        return key.startswith(STRUCTURAL) and not self._scales(key) and self._sensitivity is not None
+        return number.stage <= REDUCTION and not self._scales(key) and self._sensitivity is not None
 
     @cached_property
     def _sensitivity(self) -> Sensitivity | None:
@@ -239,15 +213,16 @@ class Varying:
 
     def _followed(self, key: str, value: float) -> ReducedModel:
         """The reduced model with another value of a key that it follows."""
-        share, following, scene = value / self.values[key] - 1, self._sensitivity, self.file.mesh_scene
+        number, following, scene = self.numbers[key], self._sensitivity, self.file.mesh_scene
+        share = value / number.value - 1
         assert following is not None
         if key == "material.young" and _loaded_alike(scene):  # all stiffness but that of the springs
-            springs = [(self._way(f"springs.{name}.stiffness"), -share) for name in scene.springs]
-            moved = following.moved(springs, share)
+            springs = [spring for spring, number in self.numbers.items() if isinstance(number.table, SpringTable)]
+            moved = following.moved([(self._way(spring), -share) for spring in springs], share)
         else:
             moved = following.moved([(self._way(key), share)])
         wave, turned = self._sector, list[Any]()
-        if key.startswith(GEOMETRY):
+        if moves_nodes(number):
             there = self.nodes_moved(key)[int(share < 0)]
             rows = [(self._coordinates(there)[1].B, self._here[1].B)]
             if wave is not None:
@@ -264,11 +239,11 @@ class Varying:
         """What the reduced model moves by where a key is doubled."""
         if key not in self._ways:
             assert self._sensitivity is not None
-            if key.startswith(GEOMETRY):
+            if moves_nodes(self.numbers[key]):
                 up, down = (self._coordinates(one)[0] for one in self.nodes_moved(key))
                 change = _between(up, down, 1 / (2 * NODES))
             else:
-                change = self._doubled(key, 2 * self.values.get(key, 0.0))
+                change = self._doubled(key)
                 change = change if self._here[2] is None else change.projected(self._here[2])
             self._ways[key] = self._sensitivity.towards(change)
         return self._ways[key]
@@ -284,7 +259,7 @@ class Varying:
         """
         if key not in self._beside:
             assert self.part is not None
-            value, reach = self.values[key], self._reach(key)
+            value, reach = self.numbers[key].value, self._reach(key)
             try:
                 up, down = (self._part(self._changed(key, value * side)) for side in (1 + reach, 1 - reach))
             except ValueError as reason:
@@ -304,24 +279,23 @@ class Varying:
 
     def _interface(self, own: ContactInterface, key: str, value: float, turned: Any = 0.0) -> ContactInterface:
         """An interface with its places, frames, areas and gaps moved to another length or angle, its rows `turned`."""
-        share = (value / self.values[key] - 1) / (2 * self._reach(key))
+        share = (value / self.numbers[key].value - 1) / (2 * self._reach(key))
         up, down = (one.interface for one in self.nodes_moved(key))
         names = ("points", "frames", "area", "gap")
         moved = {n: getattr(own, n) + share * (getattr(up, n) - getattr(down, n)) for n in names}
         return replace(own, **moved, B=own.B + turned)
 
-    def _doubled(self, key: str, value: float) -> SecondOrderSystem:
+    def _doubled(self, key: str) -> SecondOrderSystem:
         """What the full system moves by where a key is doubled; springs need no assembly."""
-        scene, part, of_spring = self.scene, self.part, key.startswith("springs.")
+        number, part = self.numbers[key], self.part
         assert part is not None
-        assert isinstance(scene, MeshScene)
         own = part.system
-        if scene.material is not None and of_spring:
-            spring = bodies.spring(scene.springs[key.split(".")[1]])
+        if self.file.mesh_scene.material is not None and isinstance(number.table, SpringTable):
+            spring = bodies.spring(number.table)
             change = part.restricted(spring.matrix(part.mesh, part.node_sets))
             still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
             return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
-        return _between(self._part(self._changed(key, value)).system, own)
+        return _between(self._part(self._changed(key, 2 * number.value)).system, own)
 
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""
@@ -369,10 +343,11 @@ def _smooth(up: Part, own: Part, down: Part) -> bool:
     return True
 
 
-def _touches(key: str) -> bool:
-    """Whether the law of a contact may see a key."""
-    seen = key.startswith(("contact", "material", *GEOMETRY)) or key.endswith(".temperature")
-    return seen and not key.endswith(".density")
+def _touches(number: SceneValue) -> bool:
+    """Whether the law of a contact may depend on a number."""
+    if number.name == "density":
+        return False
+    return isinstance(number.table, (ContactTable, SolidMaterial, Meshed)) or number.name == "temperature"
 
 
 def _loaded_alike(scene: MeshScene) -> bool:

@@ -25,9 +25,10 @@ from tribodyn.workflows.scene.fields import (
     refuse_slips,
 )
 from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
+from tribodyn.workflows.scene.stages import PART, SMOOTH
 
 
-class Meshed(Table):
+class Meshed(Table, stage=PART):
     """A part of geometry/ or a mesh file, and the groups that are held fixed.
 
     All other keys of the table are parameters of the part; those left out have the part's own defaults.
@@ -72,12 +73,17 @@ class Meshed(Table):
         return self
 
     @property
+    def numbers(self) -> dict[str, int | float]:
+        """The parameters of its part."""
+        return self.parameters
+
+    @property
     def part_name(self) -> str | None:
         """The part for geometry.parts: its name, or the path of the file beside the scene."""
         return self.part if self._own is None else str(self._own)
 
 
-class Geometry(Meshed):
+class Geometry(Meshed, stage=PART):
     """A part of geometry/ or a mesh file, and the groups that are held fixed.
 
     All other keys of the table are parameters of the part; those left out have the part's own defaults.
@@ -108,17 +114,17 @@ Modulus = Annotated[float, quantity("Pa"), Field(gt=0)]
 Expansion = Annotated[float, quantity("1/K")]
 
 
-class SolidMaterial(Table):
+class SolidMaterial(Table, stage=PART):
     """An isotropic material by single numbers, or an orthotropic one by three along its own axes."""
 
-    young: Modulus | tuple[Modulus, Modulus, Modulus]
+    young: Annotated[Modulus | tuple[Modulus, Modulus, Modulus], SMOOTH]
     """Young's modulus; three along the axes of an orthotropic material."""
     poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number] = 0.3
     """Poisson's ratio; nu12, nu13, nu23 of an orthotropic material, the strain along the second axis when it is pulled
     along the first."""
     shear: tuple[Modulus, Modulus, Modulus] | None = None
     """Shear moduli G12, G13, G23 of an orthotropic material."""
-    density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
+    density: Annotated[float, quantity("kg/m3"), Field(gt=0), SMOOTH]
     """Density."""
     axes: tuple[Direction, Direction] | None = None
     """First and second axis of an orthotropic material; x and y by default."""

@@ -14,6 +14,7 @@ from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
 from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
+from tribodyn.workflows.scene.stages import CONTACT, PART, SMOOTH, SceneStage
 
 
 def rows_of(path: Path) -> list[list[float]]:
@@ -29,7 +30,7 @@ Change = Annotated[float, quantity("K")]
 GIVEN = ("friction", "tangential_stiffness", "normal_stiffness")
 
 
-class ByTemperature(Table):
+class ByTemperature(Table, stage=CONTACT):
     """Numbers of a contact at several changes of temperature, linear between them; none beyond their ends."""
 
     temperature: Annotated[tuple[Change, ...], Field(min_length=1)]
@@ -71,18 +72,19 @@ class ContactTable(LawTable):
     """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
 
     TABLE: ClassVar[str] = "contact"
+    NUMBERS_STAGE: ClassVar[SceneStage] = CONTACT
     LAWS: ClassVar[ModuleType] = contact_law
 
-    components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
+    components: Annotated[tuple[Literal["t1", "t2", "n"], ...], PART] = ("t1", "t2", "n")
     """Contact components that are modelled."""
-    law: str = "jenkins"
+    law: Annotated[str, CONTACT] = "jenkins"
     """Name of a contact law, or a file my_law.py beside the scene; its own numbers, such as friction, are further keys
     of this table."""
-    tangential_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16)] | None = None
+    tangential_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16), CONTACT, SMOOTH] | None = None
     """Tangential stiffness of all pairs together."""
-    normal_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16)] | None = None
+    normal_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16), CONTACT, SMOOTH] | None = None
     """Normal stiffness of all pairs together."""
-    table: tuple[tuple[float, ...], ...] | None = None
+    table: Annotated[tuple[tuple[float, ...], ...] | None, CONTACT] = None
     """File of the law's own table beside the scene, comma-separated numbers, or its rows; where the law takes one. Left
     out, it is that of the measured faces in [surfaces], and so is the law's radius."""
 
@@ -129,7 +131,7 @@ class ContactTable(LawTable):
         return bool(declarations.constant(self.law_file, "OWN_STIFFNESS"))
 
 
-class FaceContact(ContactTable):
+class FaceContact(ContactTable, stage=PART):
     """Faces of the part against the ground, or a face against another one."""
 
     group: str | Annotated[tuple[str, ...], Field(min_length=1)]
@@ -146,7 +148,7 @@ class FaceContact(ContactTable):
     one-point integration, as zero-thickness elements of other programs have it."""
     gap: Length | None = None
     """Initial gap of all pairs; by default that of the geometry, interference negative, and 0 against the ground."""
-    gap_map: str | None = None
+    gap_map: Annotated[str | None, CONTACT] = None
     """File beside the scene with rows x, y, z, opening in metres, which adds to the gap; its least at a pair is taken
     off."""
     pairing: Literal["auto", "nodes", "mortar"] = "auto"
@@ -161,11 +163,11 @@ class FaceContact(ContactTable):
     """Direction towards a ground that is a plane, which each face touches with its nearest node."""
     inclination: Angle = 0.0
     """Inclination of that plane about t1, by the right hand."""
-    punch: tuple[Annotated[Length, Field(gt=0)], Annotated[Length, Field(gt=0)]] | None = None
+    punch: Annotated[tuple[Annotated[Length, Field(gt=0)], Annotated[Length, Field(gt=0)]] | None, CONTACT] = None
     """Sides of a rectangular punch along t1 and t2, from which the contact stiffness is calculated instead of given
     numbers."""
 
-    temperature: Change | None = None
+    temperature: Annotated[Change | None, CONTACT, SMOOTH] = None
     """Change of temperature of the contact, for `by_temperature`; by default the mean over its two bodies of what
     static loads heat them by."""
     by_temperature: ByTemperature | None = None
@@ -213,7 +215,7 @@ class FaceContact(ContactTable):
         return first == second
 
 
-class SyntheticPair(Table):
+class SyntheticPair(Table, stage=CONTACT):
     """A made-up pair of faces, see geometry.surface.synthetic_pair."""
 
     seed: Annotated[StrictInt, Field(ge=0)]
@@ -228,7 +230,7 @@ class SyntheticPair(Table):
     """Root mean square of waves about 50 um long."""
 
 
-class Surfaces(Table):
+class Surfaces(Table, stage=CONTACT):
     """Measured faces of a flat contact, whose waviness becomes the gap before loading."""
 
     first: str | None = None

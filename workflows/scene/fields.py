@@ -5,15 +5,17 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.scene.stages import PART, SceneStage, stage_of
 from tribodyn.workflows.scene.units import to_si
 
 IN_UNIT = "in_unit"  # attribute of the validator of a quantity
+PARAMETERS = "parameters"  # field in which a table gathers the keys that its part declares
 
 
 class Table(BaseModel):
@@ -21,9 +23,30 @@ class Table(BaseModel):
 
     The text below a key is its meaning; the list of keys in the documentation is made from it. The documentation reads
     it from the source: to let pydantic do so costs every command half a second.
+
+    Every field of a scene declares the stage that reads it first: `key: Annotated[Length, CONTACT]`. A class keyword,
+    `class Surfaces(Table, stage=CONTACT)`, marks all fields that declare none. Fields that hold tables need none.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    NUMBERS_STAGE: ClassVar[SceneStage] = PART
+    """The stage that reads the numbers first which a law or a part declares as its own."""
+
+    def __init_subclass__(cls, *, stage: SceneStage | None = None, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, *, stage: SceneStage | None = None, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        for field in cls.model_fields.values() if stage is not None else ():
+            if stage_of(field) is None and not holds_tables(field.annotation):
+                field.metadata = [*field.metadata, stage]
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """The numbers that a law or a part declares as its own."""
+        return {}
 
     @model_validator(mode="before")
     @classmethod
@@ -34,6 +57,13 @@ class Table(BaseModel):
                 if key not in cls.model_fields:
                     raise UnknownKey(key, list(cls.model_fields))
         return table
+
+
+def holds_tables(annotation: Any) -> bool:
+    """Whether a type is that of a table, or of a dict, a list or alternatives with one."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return True
+    return any(holds_tables(part) for part in get_args(annotation))
 
 
 class UnknownKey(Refusal):
@@ -88,7 +118,7 @@ Direction = Annotated[tuple[float, float, float], BeforeValidator(parsed_directi
 
 def unknown_key(key: str, known: list[str]) -> str:
     """Clause about a key that does not exist, with the one that was probably meant and all that exist."""
-    names = [name for name in known if name != "parameters"]
+    names = [name for name in known if name != PARAMETERS]
     close = difflib.get_close_matches(key.rpartition(".")[2], names, n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
     return f"unknown key {key}{hint}, known here: {', '.join(names)}"

@@ -23,37 +23,38 @@ from tribodyn.workflows.scene.fields import (
     Table,
     quantity,
 )
+from tribodyn.workflows.scene.stages import LOADS, PART, REDUCTION, SMOOTH
 
 KINDS = ("value", "pressure", "moment", "acceleration", "base_acceleration", "speed", "temperature")
 
 
-class SpringTable(Table):
+class SpringTable(Table, stage=PART):
     """A spring from a group to the ground, or to the matching nodes of another group, that acts in one direction."""
 
     group: str
     """Group of nodes that the spring holds; on a face each node has a share by its tributary area."""
     direction: Direction
     """Direction in which it acts."""
-    stiffness: Annotated[Stiffness, Field(ge=0)]
+    stiffness: Annotated[Stiffness, Field(ge=0), SMOOTH]
     """Stiffness of all nodes together."""
     opposite: str | None = None
     """Group whose matching nodes it connects to, instead of the ground."""
 
 
-class Prescribed(Table):
+class Prescribed(Table, stage=REDUCTION):
     """Nodes whose static displacement along an axis is given; its force is a result, vibration is free."""
 
     group: str
     """Group of nodes."""
     axis: Literal["x", "y", "z"]
     """Axis of the displacement."""
-    displacement: Length
+    displacement: Annotated[Length, LOADS, SMOOTH]
     """The static displacement."""
-    springs: tuple[str, ...] = ()
+    springs: Annotated[tuple[str, ...], LOADS] = ()
     """Names of springs between these nodes and the ground that act about the prescribed position."""
 
 
-class StaticLoad(Table):
+class StaticLoad(Table, stage=PART):
     """A load that does not change: a force on a group, a pressure into a face, a moment on the point of a coupling, an
     acceleration, a rotation, or a change of temperature."""
 
@@ -61,25 +62,25 @@ class StaticLoad(Table):
     """Group that is loaded by a force, a pressure or a moment; a force on a face is shared by area."""
     direction: Direction | None = None
     """Direction of the force."""
-    value: Force | None = None
+    value: Annotated[Force | None, LOADS, SMOOTH] = None
     """The whole force on the group."""
-    pressure: Pressure | None = None
+    pressure: Annotated[Pressure | None, LOADS, SMOOTH] = None
     """Pressure into the face, instead of a force."""
     opposite: str | None = None
     """Group on which the same force acts the other way: a couple."""
     shared: Literal["area", "nodes"] = "area"
     """How a force is shared on a face: "area" by tributary area, "nodes" equally by its nodes."""
-    moment: Annotated[float, quantity("N m")] | None = None
+    moment: Annotated[float, quantity("N m"), LOADS, SMOOTH] | None = None
     """Moment about the direction, on the point of a coupling."""
-    acceleration: Annotated[float, quantity("m/s2")] | None = None
+    acceleration: Annotated[float, quantity("m/s2"), LOADS, SMOOTH] | None = None
     """Gravity or another acceleration field along the direction, on all mass."""
-    base_acceleration: Annotated[float, quantity("m/s2")] | None = None
+    base_acceleration: Annotated[float, quantity("m/s2"), LOADS, SMOOTH] | None = None
     """Acceleration of the ground along the direction; displacements are then those relative to the ground."""
-    speed: Frequency | None = None
+    speed: Annotated[Frequency | None, LOADS, SMOOTH] = None
     """Speed of rotation about an axis along the direction through `point`, whose centrifugal force acts."""
     point: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
     """Point on the axis of rotation."""
-    temperature: Annotated[float, quantity("K")] | None = None
+    temperature: Annotated[float, quantity("K"), LOADS, SMOOTH] | None = None
     """Change of temperature."""
     bodies: tuple[str, ...] = ()
     """Bodies that are heated; all by default."""
@@ -89,33 +90,37 @@ class StaticLoad(Table):
 
     @model_validator(mode="after")
     def _one_kind(self) -> StaticLoad:
-        given = [kind for kind in KINDS if getattr(self, kind) is not None]
-        if self.field is not None and "temperature" not in given:
-            given.append("temperature")
-        if len(given) != 1:
-            raise Refusal(f"expected one out of {', '.join(KINDS)}, got {', '.join(given) or 'none'}")
-        directed = given[0] not in ("pressure", "temperature")
-        if directed != (self.direction is not None):
-            raise Refusal(f"expected {'a' if directed else 'no'} direction with {given[0]}")
-        if bool(self.group) != (given[0] in ("value", "pressure", "moment")):
-            raise Refusal(f"expected {'no ' if self.group else ''}group with {given[0]}")
-        if self.opposite is not None and given[0] != "value":
+        kinds = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if self.field is not None and "temperature" not in kinds:
+            kinds.append("temperature")
+        if len(kinds) != 1:
+            raise Refusal(f"expected one out of {', '.join(KINDS)}, got {', '.join(kinds) or 'none'}")
+        kind = kinds[0]
+        if (kind in ("pressure", "temperature")) != (self.direction is None):
+            raise Refusal(f"expected {'a' if self.direction is None else 'no'} direction with {kind}")
+        if bool(self.group) != (kind in ("value", "pressure", "moment")):
+            raise Refusal(f"expected {'no ' if self.group else ''}group with {kind}")
+        if self.opposite is not None and kind != "value":
             raise Refusal("expected opposite only with value and direction, for a couple of forces")
-        if self.bodies and given[0] != "temperature":
+        if self.bodies and kind != "temperature":
             raise Refusal("expected bodies only with temperature")
         return self
+
+    @property
+    def kind(self) -> str:
+        """What it is: one out of KINDS."""
+        return next((kind for kind in KINDS if getattr(self, kind) is not None), "temperature")
 
     @property
     def amplitude(self) -> float:
         """Its size [N], [Pa], [N m], [m/s2], [rad2/s2] or [K]."""
         if self.speed is not None:
             return (2 * math.pi * self.speed) ** 2
-        if self.field is not None and self.temperature is None:
-            return 1.0
-        return next((size for kind in KINDS if (size := getattr(self, kind)) is not None), 0.0)
+        size: float | None = getattr(self, self.kind)
+        return 1.0 if size is None else size
 
 
-class Vibrates(Table):
+class Vibrates(Table, stage=LOADS):
     """A load that goes as cos(harmonic * w t + phase)."""
 
     phase: Angle = 0.0
@@ -128,14 +133,14 @@ class HarmonicLoad(Vibrates, StaticLoad):
     """A load that goes as cos(harmonic * w t + phase)."""
 
 
-class Motion(Table):
+class Motion(Table, stage=LOADS):
     """The ground of a contact face moves: static + harmonic * cos(w t + phase), along a direction."""
 
     direction: Direction
     """Direction of the motion."""
-    static: Length = 0.0
+    static: Annotated[Length, SMOOTH] = 0.0
     """Its static part."""
-    harmonic: Length = 0.0
+    harmonic: Annotated[Length, SMOOTH] = 0.0
     """Its amplitude."""
     phase: Angle = 0.0
     """Its phase."""

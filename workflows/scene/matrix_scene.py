@@ -16,12 +16,13 @@ from tribodyn.workflows.scene.fields import Direction, Force, Number, Quantity, 
 from tribodyn.workflows.scene.loads import Loads, Vibrates
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.solution import Reduction, Response
+from tribodyn.workflows.scene.stages import LOADS, PART, SMOOTH
 from tribodyn.workflows.scene.units import to_si
 
 Dof = int | tuple[int, int | str]
 
 
-class Variable(Table):
+class Variable(Table, stage=PART):
     """A named array of the file that holds the matrices."""
 
     variable: str
@@ -65,7 +66,7 @@ def per_pair(unit: str) -> Quantity:
     return Quantity(convert, unit=unit)
 
 
-class MatrixFiles(Table):
+class MatrixFiles(Table, stage=PART):
     """The files with the matrices, as reduction.foreign.read_matrices takes them."""
 
     file: str | None = None
@@ -90,16 +91,16 @@ class MatrixFiles(Table):
         return self
 
 
-class DofContact(ContactTable):
+class DofContact(ContactTable, stage=PART):
     """DOFs that touch, pair by pair, each other or the ground."""
 
-    dofs: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows)]
+    dofs: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows), PART]
     """A row for each pair: its DOFs t1, t2, n as `components` says, or x, y, z where `normal` is given."""
-    opposite: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows)] | None = None
+    opposite: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows), PART] | None = None
     """DOFs that they touch, in the same form; the ground by default."""
-    area: Annotated[float | tuple[float, ...] | Variable, per_pair("m2")]
+    area: Annotated[float | tuple[float, ...] | Variable, per_pair("m2"), PART]
     """Area of the patch, shared equally, or of each pair."""
-    gap: Annotated[float | tuple[float, ...] | Variable, per_pair("m")] = 0.0
+    gap: Annotated[float | tuple[float, ...] | Variable, per_pair("m"), PART] = 0.0
     """Initial gap, one for all pairs or one for each."""
     normal: Direction | None = None
     """Direction in which the pairs close, for DOFs along x, y, z."""
@@ -111,7 +112,7 @@ class DofContact(ContactTable):
     """Position of each pair, for maps."""
 
 
-class DofOutput(Table):
+class DofOutput(Table, stage=PART):
     """A displacement that is observed: the mean of DOFs, or a row of factors."""
 
     dofs: Annotated[tuple[Dof, ...], BeforeValidator(_dofs)] | None = None
@@ -129,7 +130,7 @@ class DofOutput(Table):
 class DofLoad(DofOutput):
     """A force that does not change: shared equally by DOFs, or times a vector of factors."""
 
-    value: Force
+    value: Annotated[Force, LOADS, SMOOTH]
     """The force."""
 
     @property

@@ -240,14 +240,3 @@ def _key(location: Sequence[str | int]) -> str:
     for item in location:
         key += f"[{item}]" if isinstance(item, int) else f".{item}" if key else item
     return key or "the scene"
-
-
-def first_difference(first: Any, second: Any) -> str:
-    """The first key "section.key" in which two scenes as plain tables differ, "." where they are no tables, else ""."""
-    if isinstance(first, dict) and isinstance(second, dict):
-        for key in [*first, *(k for k in second if k not in first)]:
-            below = first_difference(first.get(key), second.get(key))
-            if below:
-                return f"{key}.{below}".rstrip(".")
-        return ""
-    return "" if first == second else "."

@@ -40,6 +40,7 @@ from tribodyn.workflows.scene.solution import (
     Solver,
     VerdictOptions,
 )
+from tribodyn.workflows.scene.stages import DRAW, LOADS, REDUCTION, SceneStage
 from tribodyn.workflows.scene.structure import (
     GROUND,
     BodyTable,
@@ -57,7 +58,7 @@ CENTRIFUGAL = "centrifugal"
 MODES = 20  # of a scene that says nothing of its reduction
 
 
-class Heading(Table):
+class Heading(Table, stage=DRAW):
     """What the scene is and where its numbers come from."""
 
     title: str = ""
@@ -219,6 +220,19 @@ class MeshScene(Scene):
         own = 0.0 if self.wheel is None else self.wheel.speed
         mission = () if self.wear is None else self.wear.mission
         return tuple(sorted({duty.speed for duty in mission if duty.speed is not None} - {own}))
+
+    @property
+    def operating_range(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the response and of the duties of the wear [Hz]."""
+        duties = () if self.wear is None else self.wear.duties
+        frequencies = [*self.response.range, *(duty.at.frequency for duty in duties if duty.at.frequency)]
+        return min(frequencies), max(frequencies)
+
+    @property
+    def reduced_through(self) -> SceneStage:
+        """The last stage whose fields the reduced model depends on: the stress of a wheel that turns is that of its
+        contact at rest under the loads."""
+        return LOADS if self.wheel is not None and self.wheel.speed > 0 else REDUCTION
 
     @model_validator(mode="after")
     def _speeds_of_a_wheel(self) -> MeshScene:

@@ -9,25 +9,26 @@ from pydantic import Field, StrictBool, StrictInt, TypeAdapter, ValidationError,
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table
+from tribodyn.workflows.scene.stages import PART, REDUCTION, SMOOTH, STUDY
 
 
-class WheelTable(Table):
+class WheelTable(Table, stage=REDUCTION):
     """Identical sectors about an axis through the origin, under a wave that travels round.
 
     A contact with the next sector has the right face as its first one, the left one as its second. Static loads act on
     every sector alike, harmonic loads on each sector one phase later than on its right neighbour.
     """
 
-    sectors: Annotated[StrictInt, Field(ge=2)]
+    sectors: Annotated[StrictInt, Field(ge=2), PART]
     """Number of sectors."""
     engine_order: StrictInt
     """Waves round the wheel; the phase from sector to sector is 2 pi engine_order / sectors. Above 0 they run in the
     sense of the rotation, below 0 against it, as those of a disturbance that stands still in space do."""
-    axis: Direction = (1.0, 0.0, 0.0)
+    axis: Annotated[Direction, PART] = (1.0, 0.0, 0.0)
     """Axis of the wheel; positive rotation leads to the left."""
     seam: tuple[str, str] | None = None
     """Right and left face where sectors are one piece; left out where only the contact couples them."""
-    speed: Annotated[Frequency, Field(ge=0)] = 0.0
+    speed: Annotated[Frequency, Field(ge=0), PART, SMOOTH] = 0.0
     """Speed of rotation: its centrifugal force is a static load, its stress stiffens, its frame softens and turns."""
     sweep: Literal["speed", "frequency"] | None = None
     """What the response is followed along: "speed", an operating line on which the frequency is the engine order times
@@ -82,7 +83,7 @@ RANGE = TypeAdapter(tuple[Frequency, Frequency])
 Spread = Annotated[Number, Field(ge=0, le=0.3)]
 
 
-class Mistuning(Table):
+class Mistuning(Table, stage=STUDY):
     """Blades that differ: what is drawn for `tribodyn wheel patterns`, blade by blade and pattern by pattern.
 
     All deviations are normally distributed and cut off at three standard deviations.
@@ -111,7 +112,7 @@ class Mistuning(Table):
 Influence = tuple[StrictInt, Number, Number]
 
 
-class FlowTable(Table):
+class FlowTable(Table, stage=STUDY):
     """Forces of a flow on the vibrating blades of the wheel, by coefficients of one family of modes; see the theory of
     flutter.
     """

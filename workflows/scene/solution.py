@@ -30,12 +30,13 @@ from tribodyn.workflows.scene.fields import (
     quantity,
 )
 from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
+from tribodyn.workflows.scene.stages import DRAW, PART, REDUCTION, RESUMABLE, SMOOTH, SOLVE, STUDY
 from tribodyn.workflows.scene.units import to_si
 
 HIGHEST = 15  # harmonic that kept = "auto" may keep, where the scene does not name one
 
 
-class Pictures(Table):
+class Pictures(Table, stage=DRAW):
     """What is drawn after a run."""
 
     plots: StrictBool = True
@@ -48,7 +49,7 @@ class Pictures(Table):
     """Factor on wear depth in renders; chosen by size by default."""
 
 
-class VerdictOptions(Table):
+class VerdictOptions(Table, stage=STUDY):
     """What is measured to judge a finished result, see `tribodyn.workflows.errors.verdict`."""
 
     enabled: StrictBool = True
@@ -58,7 +59,7 @@ class VerdictOptions(Table):
     components."""
 
 
-class Output(Table):
+class Output(Table, stage=PART):
     """A displacement that is observed, the mean of a group."""
 
     group: str
@@ -73,7 +74,7 @@ def _amplitudes(value: object) -> object:
     return to_si(value, "m")
 
 
-class Response(Table):
+class Response(Table, stage=SOLVE):
     """The frequency response that is computed."""
 
     frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
@@ -157,7 +158,7 @@ class Response(Table):
         return self.frequency
 
 
-class PartResponse(Response, Output):
+class PartResponse(Response, Output, stage=SOLVE):
     """The displacement whose response is computed."""
 
     others: dict[str, Output] = Field(default_factory=dict)
@@ -166,7 +167,7 @@ class PartResponse(Response, Output):
     """Range of speeds of a wheel's operating line, such as ["5000 rpm", "7000 rpm"], instead of `frequency`."""
 
 
-class Reduction(Table):
+class Reduction(Table, stage=REDUCTION):
     """How many modes, or up to which frequency: fixed-interface modes of Craig-Bampton, or those of the stuck part."""
 
     method: Literal["auto", "craig_bampton", "residual_flexibility"] = "auto"
@@ -212,7 +213,7 @@ def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]
     return kept
 
 
-class Harmonics(Table):
+class Harmonics(Table, stage=SOLVE):
     """Harmonics of the response that are kept, and time samples of one cycle."""
 
     kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = (0, 1)
@@ -249,10 +250,10 @@ class Harmonics(Table):
         return self
 
 
-class Damping(Table):
+class Damping(Table, stage=SOLVE):
     """Structural damping: a ratio for every mode, or Rayleigh's two coefficients."""
 
-    modal: Annotated[Number, Field(ge=0, lt=1)] | None = None
+    modal: Annotated[Number, Field(ge=0, lt=1), SMOOTH] | None = None
     """Damping ratio of every mode."""
     state: Literal["free", "stuck"] = "free"
     """Whose modes these are: "free" without the contact, or "stuck" with every pair closed."""
@@ -260,9 +261,9 @@ class Damping(Table):
     """Damping ratios of two modes, from which Rayleigh's two coefficients follow."""
     modes: tuple[Annotated[StrictInt, Field(ge=0)], Annotated[StrictInt, Field(ge=0)]] | None = None
     """Numbers of these two modes, from 0; motions of a free structure as a rigid body count."""
-    mass: Annotated[float, quantity("1/s"), Field(ge=0)] | None = None
+    mass: Annotated[float, quantity("1/s"), Field(ge=0), SMOOTH] | None = None
     """Rayleigh's coefficient of the mass matrix."""
-    stiffness: Annotated[float, quantity("s"), Field(ge=0)] | None = None
+    stiffness: Annotated[float, quantity("s"), Field(ge=0), SMOOTH] | None = None
     """Rayleigh's coefficient of the stiffness matrix."""
 
     @model_validator(mode="after")
@@ -280,14 +281,14 @@ class Damping(Table):
         return any(v is not None for v in (self.modal, self.mass, self.stiffness, self.ratios))
 
 
-class Preload(Table):
+class Preload(Table, stage=SOLVE):
     """How the contact comes to its preload."""
 
     frictionless: StrictBool = False
     """Let the static loads act without friction; then friction is on, and all sliders rest where the contact stands."""
 
 
-class NonlinearMode(Table):
+class NonlinearMode(Table, stage=STUDY):
     """The nonlinear mode that `tribodyn curve backbone` follows where its options are not given."""
 
     modal_amplitude: tuple[Annotated[Number, Field(gt=0)], Annotated[Number, Field(gt=0)]]
@@ -304,10 +305,10 @@ class NonlinearMode(Table):
         return self
 
 
-class Solver(Table):
+class Solver(Table, stage=SOLVE):
     """Tolerances of the solver, and how many threads may work."""
 
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
     """Newton's tolerance on the contact displacement, relative to its size."""
-    threads: Annotated[StrictInt, Field(ge=1)] = 1
+    threads: Annotated[StrictInt, Field(ge=1), PART, RESUMABLE] = 1
     """Threads of the linear algebra while the model is made; all that is solved takes one."""

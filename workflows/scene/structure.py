@@ -23,6 +23,7 @@ from tribodyn.workflows.scene.fields import (
     quantity,
     refuse_slips,
 )
+from tribodyn.workflows.scene.stages import LOADS, PART, SMOOTH
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import JointWearTable
 
@@ -31,7 +32,7 @@ GROUND = "ground"
 Point = tuple[Length, Length, Length]
 
 
-class FaceRule(Table):
+class FaceRule(Table, stage=PART):
     """A face of a body: the facets of its boundary that satisfy all that is given.
 
     Places are those of the file or part, before the body is moved, in metres unless a unit is given.
@@ -69,14 +70,14 @@ def in_metres(value: object) -> object:
     return to_si(f"1 {value}", "m") if isinstance(value, str) else value
 
 
-class DeckFace(FaceRule):
+class DeckFace(FaceRule, stage=PART):
     """A face of a body of a deck that is picked by rule, where the deck puts the body."""
 
     body: str
     """Body of the deck, as `tribodyn inspect` lists it."""
 
 
-class DeckTable(Table):
+class DeckTable(Table, stage=PART):
     """A deck of another FE program with its bodies, materials, constraints, supports and loads.
 
     Its bodies stand in the scene under their names in the deck, its groups under "body.group". The forces and pressures
@@ -107,7 +108,7 @@ class DeckTable(Table):
     """Faces of its bodies that are picked by rule, by name; they are known as "body.name"."""
 
 
-class Rotation(Table):
+class Rotation(Table, stage=PART):
     """A turn about an axis through a point, by the right hand."""
 
     axis: Direction
@@ -118,7 +119,7 @@ class Rotation(Table):
     """Point on the axis."""
 
 
-class BodyTable(Meshed):
+class BodyTable(Meshed, stage=PART):
     """A body: a part of geometry/ or a mesh file, where it stands, what it is made of and what holds it.
 
     All other keys of the table are parameters of the part; those left out have the part's own defaults.
@@ -184,7 +185,7 @@ class NamedContact(FaceContact):
         return {**rest, "group": table["first"], **other}
 
 
-class TieTable(Table):
+class TieTable(Table, stage=PART):
     """Two faces that are glued; their meshes need not match."""
 
     first: str
@@ -200,7 +201,7 @@ Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
 AXES: tuple[Axis, ...] = get_args(Axis)
 
 
-class CouplingTable(Table):
+class CouplingTable(Table, stage=PART):
     """A point that carries a face; loads, springs, masses and outputs may name it."""
 
     face: str
@@ -220,7 +221,7 @@ class CouplingTable(Table):
         return self
 
 
-class LinkTable(Table):
+class LinkTable(Table, stage=PART):
     """The points of two couplings move alike."""
 
     first: str
@@ -242,7 +243,7 @@ class LinkTable(Table):
 Inertia = Annotated[float, quantity("kg m2"), Field(ge=0)]
 
 
-class PointMassTable(Table):
+class PointMassTable(Table, stage=PART):
     """A lumped mass."""
 
     at: str
@@ -253,14 +254,14 @@ class PointMassTable(Table):
     """Moments of inertia about x, y, z at the point of a coupling."""
 
 
-class BoltTable(Table):
+class BoltTable(Table, stage=PART):
     """A bolt between the faces under its head and under its nut, as an elastic rod with a preload."""
 
     first: str
     """Face under the head."""
     second: str
     """Face under the nut."""
-    preload: Annotated[float, quantity("N"), Field(ge=0)]
+    preload: Annotated[float, quantity("N"), Field(ge=0), LOADS, SMOOTH]
     """Force in the shank when it is tightened, all other loads away."""
     state: Literal["locked", "constant"] = "locked"
     """"locked": the shank keeps its length after tightening, so that its force follows the structure; "constant": the

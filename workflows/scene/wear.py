@@ -11,10 +11,11 @@ from tribodyn.hbm.wear import law as wear_law
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Frequency, Number, Table
 from tribodyn.workflows.scene.own import LawTable
+from tribodyn.workflows.scene.stages import DRAW, RESUMABLE, WEAR, SceneStage
 from tribodyn.workflows.scene.units import to_si
 
 
-class WearStep(Table):
+class WearStep(Table, stage=WEAR):
     """Largest depth that one wear step may add: a share of delta_max, or a depth [m]."""
 
     share: Annotated[float, Field(gt=0)] | None = None
@@ -34,7 +35,7 @@ def _step(value: object) -> object:
     raise Refusal(f'expected a share of delta_max such as "5 %" or a depth such as "50 um", above 0, got {value!r}')
 
 
-class Place(Table):
+class Place(Table, stage=WEAR):
     """Where the cycle that wears is taken: a frequency [Hz], or a ratio to the frequency of the resonance peak."""
 
     frequency: Annotated[float, Field(gt=0)] | None = None
@@ -67,7 +68,7 @@ def _place(value: object) -> object:
 At = Annotated[Place, BeforeValidator(_place)]
 
 
-class Sweep(Table):
+class Sweep(Table, stage=WEAR):
     """A slow sweep of the frequency over a band, again and again: cycles in proportion to the frequency."""
 
     start: Annotated[Frequency, Field(gt=0)]
@@ -104,7 +105,7 @@ def _place_or_sweep(value: object) -> object:
     return _place(value)
 
 
-class MissionDuty(Table):
+class MissionDuty(Table, stage=WEAR):
     """A part of the mission: a share of all cycles at one place, with the harmonic loads times `load`."""
 
     at: At
@@ -117,10 +118,11 @@ class MissionDuty(Table):
     """Speed of the wheel meanwhile; `wheel.speed` by default."""
 
 
-class JointWearTable(LawTable):
+class JointWearTable(LawTable, stage=WEAR):
     """How one joint wears."""
 
     TABLE: ClassVar[str] = "wear"
+    NUMBERS_STAGE: ClassVar[SceneStage] = WEAR
     LAWS: ClassVar[ModuleType] = wear_law
 
     law: str = "energy"
@@ -128,12 +130,12 @@ class JointWearTable(LawTable):
     of this table."""
 
 
-class Wear(JointWearTable):
+class Wear(JointWearTable, stage=WEAR):
     """Wear of the contact until it is lost or max_steps are done."""
 
-    split: Annotated[Number, Field(ge=0, le=1)] = 0.5
+    split: Annotated[Number, Field(ge=0, le=1), DRAW] = 0.5
     """Share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one."""
-    responses: Annotated[StrictInt, Field(ge=0, le=100)] = 0
+    responses: Annotated[StrictInt, Field(ge=0, le=100), RESUMABLE] = 0
     """Number of response curves of the worn contact, evenly spread over the worn depth."""
     rule: Literal["thesis", "error_controlled"] = "thesis"
     """How the steps are chosen: "thesis" takes `step`, "error_controlled" takes `tolerance`."""
@@ -155,7 +157,7 @@ class Wear(JointWearTable):
     such as "420 Hz to 880 Hz" or "420 Hz to 880 Hz in 41" parts."""
     mission: tuple[MissionDuty, ...] = ()
     """List of duties that share the cycles, instead of `at`."""
-    max_steps: Annotated[StrictInt, Field(ge=0)] = 10_000
+    max_steps: Annotated[StrictInt, Field(ge=0), RESUMABLE] = 10_000
     """Largest number of wear steps."""
 
     @property

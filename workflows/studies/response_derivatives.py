@@ -30,7 +30,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, pipeline, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.run.varying import GEOMETRY, STEP, Varying, geometry_keys, keys
+from tribodyn.workflows.run.varying import STEP, Varying, geometry_keys, keys, moves_nodes
 from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import Scene
@@ -264,7 +264,7 @@ def _changes(
     for i, (key, value) in enumerate(wanted.items()):
         advance(i / len(wanted), key)
         try:
-            if key in varying.values:
+            if key in varying.numbers:
                 yield varying.change(key, value)
         except (NoDerivative, ValueError) as reason:
             if without is None:
@@ -329,9 +329,10 @@ def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[
     Returns (number, key) -> d number / d key, SI units, as far as these are exact
     """
     scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
-    known, in_wear = varying.values, {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
+    known = {key: number.value for key, number in varying.numbers.items()}
+    in_wear = {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
     own, more = ({key: of[key] for key in wanted if key in of} for of in (known, in_wear))
-    own = {key: value for key, value in own.items() if not key.startswith(GEOMETRY) or varying.follows(key)}
+    own = {key: v for key, v in own.items() if not moves_nodes(varying.numbers[key]) or varying.follows(key)}
     joints = varying.model.balance.contact.joints
     gaps = {"contact.gap" if one.name == "contact" else f"contacts.{one.name}.gap": one.rows for one in joints}
     gaps = {key: rows for key, rows in gaps.items() if key in wanted}

@@ -16,10 +16,12 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
-from tribodyn.workflows.run.varying import keys
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
+from tribodyn.workflows.scene.loads import StaticLoad
+from tribodyn.workflows.scene.matrix_scene import DofLoad
 from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.scene_values import smooth_numbers
 from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import quantiles, study_file, study_pictures, study_runs as studies
 from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
@@ -296,7 +298,8 @@ def _scaling(study: ParameterStudy) -> list[tuple[str, ...]]:
     """
     if study.lives.number != LIFE or study.correlations:
         return []
-    loads = [key for key in keys(scene_file.read(study.scene, study.settings.set).scene) if key.startswith("loads.")]
+    numbers = smooth_numbers(scene_file.read(study.scene, study.settings.set).scene)
+    loads = [key for key, number in numbers.items() if isinstance(number.table, (StaticLoad, DofLoad))]
     moved = {**{key: key for key in study.varied}, **study.settings.same}
     groups: list[tuple[str, ...]] = [(COEFFICIENT,)] if COEFFICIENT in study.varied else []
     if loads and all(key in moved for key in loads):

@@ -169,7 +169,7 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> ParameterStudy:
     if not leaves:
         raise SceneError(f'{label}: vary is empty, give keys of the scene such as "contact.friction" = [0.3, 0.5]')
     given = (*leaves, *file.study.set, *file.study.same)
-    if any(key.replace(" ", "").startswith("solver.threads") for key in given):
+    if any(key.partition("=")[0].strip() == "solver.threads" for key in given):
         raise SceneError(f"{label}: solver.threads: every run has one thread, say by --workers how many run at a time")
     varied = {key: _read(key, value, file.study.design, label) for key, value in leaves.items()}
     design, lengths = file.study.design, {key: len(v) for key, v in varied.items() if isinstance(v, tuple)}
