@@ -110,10 +110,10 @@ def folder() -> Path | None:
 def _key(file: SceneFile, early: dict[str, Any], *more: object) -> str:
     """Hash of the tables, of the files that they name, of the program and of its packages; empty where it is not known.
 
-    What a file of Python code reads, or one that includes others, is not known.
+    What a file of Python code reads, or one that includes others, is not known; the program's own code is in CODE.
     """
     named = files_named(early, file.folder)
-    if any(_reads_others(path, path.stat().st_mtime_ns) for path in named.values()):
+    if not file.comes_along and any(_reads_others(path, path.stat().st_mtime_ns) for path in named.values()):
         return ""
     versions = (platform.python_version(), platform.machine(), *map(package_version, PACKAGES))
     own = (early, digests(early, file.folder), usable(file.scene.solver.threads), CODE, versions, more)
