@@ -20,6 +20,7 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 import tribodyn as td
+from tribodyn.workflows.pictures import response_plots
 from tribodyn.workflows.studies import front_door
 
 HERE = Path(__file__).parent
@@ -110,7 +111,7 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
 
 def story(result: td.Result, path: Path, place: Path) -> Path:
     """One picture of a wear run: the part in motion, its contact opened and worn, the response before and after."""
-    from tribodyn.workflows.pictures import plots, render
+    from tribodyn.workflows.pictures import render
 
     first, last = (result_at(result, row) for row in (0, len(result.fields.row) - 1))
     panels = []
@@ -118,7 +119,7 @@ def story(result: td.Result, path: Path, place: Path) -> Path:
         (
             lambda: render.figures(first)["part"](),
             lambda: render.figures(last)["contact"](),
-            lambda: plots.response(result),
+            lambda: response_plots.response(result),
         )
     ):
         file = place / f"panel_{number}.png"

@@ -42,10 +42,10 @@ __all__ = sorted(_HOME)
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'tribodyn' has no attribute '{name}'")
-    module, there = _HOME[name]
+    module, attribute = _HOME[name]
     if module == __name__:
-        return importlib.import_module(f"{module}.{there}")
-    value = getattr(importlib.import_module(module), there)
+        return importlib.import_module(f"{module}.{attribute}")
+    value = getattr(importlib.import_module(module), attribute)
     globals()[name] = value
     return value
 

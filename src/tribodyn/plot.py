@@ -12,6 +12,7 @@ from tribodyn.workflows.export.vtk import mesh_fields, patch_fields
 from tribodyn.workflows.pictures.figures import axes_of as axes, length_unit
 from tribodyn.workflows.pictures.film import film
 from tribodyn.workflows.pictures.live import Live
+from tribodyn.workflows.pictures.loop_plots import hysteresis
 from tribodyn.workflows.pictures.maps import (
     draw_field,
     draw_status,
@@ -19,8 +20,10 @@ from tribodyn.workflows.pictures.maps import (
     patch_maps as patch,
     status_maps as status,
 )
-from tribodyn.workflows.pictures.plots import draw as write, hysteresis, response, wear
+from tribodyn.workflows.pictures.plots import draw as write
 from tribodyn.workflows.pictures.render import draw as render
+from tribodyn.workflows.pictures.response_plots import response
+from tribodyn.workflows.pictures.wear_plots import wear
 from tribodyn.workflows.pictures.wheel_diagrams import campbell, nodal_diameters, safe, shades
 
 __all__ = [

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tribodyn.workflows.pictures import plots
+from tribodyn.workflows.pictures import plots, response_plots
 from tribodyn.workflows.report import page
 from tribodyn.workflows.result.result import Result
 
@@ -89,7 +89,7 @@ def clicked_zoomed_and_turned(
     from selenium.webdriver.support.select import Select
 
     monkeypatch.setattr(page, "_renders", lambda found: {})
-    monkeypatch.setattr(plots, "figures", lambda found: {"frf": plots.response})
+    monkeypatch.setattr(plots, "figures", lambda found: {"frf": response_plots.response})
     path = page.write([(name, result, None)], folder / f"{name}.html")
     assert path.stat().st_size < page.LARGEST
     opened(driver, path)

@@ -13,7 +13,7 @@ from tests.helpers.command import leave
 from tests.helpers.matrix_scene import matrix_folder
 from tribodyn.workflows import cases
 from tribodyn.workflows.export import formats
-from tribodyn.workflows.pictures import plots
+from tribodyn.workflows.pictures import plots, response_plots
 
 PLAIN = ("wear.max_steps=0", "verdict.enabled=false", "harmonics.kept=[0, 1]", "response.points=12")
 
@@ -52,7 +52,7 @@ def test_a_phase_resonance_from_a_scene_lags_by_a_quarter_and_is_drawn(tmp_path:
     np.testing.assert_allclose(np.abs(frf.fundamental("response")), frf.parameter, rtol=1e-8)
     assert frf.parameter[-1] == pytest.approx(20e-6)
     assert "control" in plots.figures(result)
-    assert len(plots.controlled(result).axes) == 3
+    assert len(response_plots.controlled(result).axes) == 3
     assert result.summary()["peak_at_end"] is None
 
 

@@ -310,14 +310,14 @@ def test_bodies_are_drawn_apart_along_their_faces() -> None:
     part, patch = given.part, given.patch
     assert part is not None
     assert patch is not None
-    body, moved = faces.bodies(part), exploded.apart(given)
+    body, moved = faces.bodies(part), exploded.explosion_offsets(given)
     between = moved[body == body[patch.nodes[0]]][0] - moved[body != body[patch.nodes[0]]][0]
     np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(patch.area.sum())], atol=1e-12)
     tied = replace(given, patch=replace(patch, faces=np.zeros((0, 4), int)))  # they touch, and no contact says so
-    moved = exploded.apart(tied)
+    moved = exploded.explosion_offsets(tied)
     between = moved[body == body[patch.nodes[0]]][0] - moved[body != body[patch.nodes[0]]][0]
     np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(LENGTH * WIDTH)], atol=1e-12)
-    assert not exploded.apart(result()).any()
+    assert not exploded.explosion_offsets(result()).any()
 
 
 def test_status_at_an_instant_is_that_of_the_force() -> None:

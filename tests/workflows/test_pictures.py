@@ -18,7 +18,17 @@ from PIL import Image
 
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
-from tribodyn.workflows.pictures import film, maps, offscreen, plots, render, view
+from tribodyn.workflows.pictures import (
+    film,
+    loop_plots,
+    maps,
+    offscreen,
+    plots,
+    render,
+    response_plots,
+    view,
+    wear_plots,
+)
 from tribodyn.workflows.pictures.film import CycleFilm, WearFilm
 from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, RED, STATUS
 from tribodyn.workflows.result.states import shown_states
@@ -51,21 +61,21 @@ def test_curves_show_the_numbers_of_the_result() -> None:
     def has(figure: Figure, wanted: np.ndarray) -> bool:
         return any(len(line) == len(wanted) and np.allclose(line, wanted, rtol=1e-12) for line in drawn(figure))
 
-    curve = plots.response(given)
+    curve = response_plots.response(given)
     for height in (given.references.free, given.references.stuck, wear.amplitude):
         assert has(curve, 1e3 * height)
     stretches = np.concatenate(drawn(curve))
     assert np.isin(1e3 * frf.amplitude("response"), stretches).all()  # stable and unstable ones, point by point
     mean = wear.depth @ given.patch.area / given.patch.area.sum()  # type: ignore[union-attr]
     for height in (wear.depth.max(axis=1), wear.depth.min(axis=1), mean):
-        assert has(plots.wear(given, "depth"), 1e3 * height)
-    assert has(plots.wear(given, "preload"), 1e-3 * wear.preload)
+        assert has(wear_plots.wear(given, "depth"), 1e3 * height)
+    assert has(wear_plots.wear(given, "preload"), 1e-3 * wear.preload)
     assert wear.preload_at_rest is not None
-    assert has(plots.wear(given, "preload"), 1e-3 * wear.preload_at_rest)
-    assert has(plots.wear(given, "peak"), wear.omega / (2 * np.pi))
-    assert has(plots.wear(given, "cycles_per_step"), 1e-6 * wear.cycles_in_step[:-1])
+    assert has(wear_plots.wear(given, "preload"), 1e-3 * wear.preload_at_rest)
+    assert has(wear_plots.wear(given, "peak"), wear.omega / (2 * np.pi))
+    assert has(wear_plots.wear(given, "cycles_per_step"), 1e-6 * wear.cycles_in_step[:-1])
     pair = 3
-    for at, loop in enumerate(drawn(plots.hysteresis(given, [pair]))):
+    for at, loop in enumerate(drawn(loop_plots.hysteresis(given, [pair]))):
         force = loops.force[at, pair]
         assert any(np.allclose(loop, np.append(one, one[0])) for one in force)
 

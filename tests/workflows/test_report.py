@@ -15,7 +15,7 @@ import pytest
 import tribodyn as td
 from tests.helpers.browser import DESK, PHONE, chromium, clicked_zoomed_and_turned, of_width, opened, until
 from tests.helpers.synthetic_result import result
-from tribodyn.workflows.pictures import plots
+from tribodyn.workflows.pictures import plots, wear_plots
 from tribodyn.workflows.report import page
 from tribodyn.workflows.report.charts import solid
 from tribodyn.workflows.result import faces
@@ -30,7 +30,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
     patch = pytest.MonkeyPatch()
     patch.setattr(page, "_renders", lambda found: {})
-    patch.setattr(plots, "figures", lambda found: {"preload": plots.preload_against_cycles})
+    patch.setattr(plots, "figures", lambda found: {"preload": wear_plots.preload_against_cycles})
     first = result()
     assert first.wear is not None
     second = replace(first, wear=replace(first.wear, preload=2 * first.wear.preload))

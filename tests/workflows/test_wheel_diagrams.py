@@ -12,7 +12,7 @@ from proof.cases.blade.few_sectors import FEW_SECTORS
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.pictures import maps, plots, wheel_diagrams
+from tribodyn.workflows.pictures import loop_plots, maps, wheel_diagrams
 
 
 @pytest.mark.parametrize("n_sectors", [7, 8])
@@ -100,6 +100,6 @@ def test_status_over_wear_and_loops_of_chosen_pairs() -> None:
     assert given.wear is not None
     figure = maps.status_maps(given, 5)
     assert len([axes for axes in figure.axes if axes.collections]) == 5
-    assert len(plots.hysteresis(given, [0, 2]).axes) == 6
+    assert len(loop_plots.hysteresis(given, [0, 2]).axes) == 6
     with pytest.raises(ValueError, match="this contact has pairs 0 to"):
-        plots.hysteresis(given, [1000])
+        loop_plots.hysteresis(given, [1000])

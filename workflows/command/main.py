@@ -57,12 +57,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(arguments: Sequence[str] | None) -> None:
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
+        command, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
     except cyclopts.UnknownCommandError as error:
-        said = str(error).partition(" Available commands:")[0].rstrip(". ")
-        raise Refusal(f"{said}{'' if said.endswith('?') else '.'} Available commands: {', '.join(WORDS)}") from None
+        message = str(error).partition(" Available commands:")[0].rstrip(". ")
+        dot = "" if message.endswith("?") else "."
+        raise Refusal(f"{message}{dot} Available commands: {', '.join(WORDS)}") from None
     if not gc.isenabled():
         gc.freeze()  # what is imported now is looked through no more
         gc.enable()

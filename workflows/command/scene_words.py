@@ -78,7 +78,7 @@ def run(
         else:
             result, bound = front_door.run(file, folder, progress=progress, resume=resume), None
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
+        raise KeyboardInterrupt(_stop_message(path, scene, file.overrides)) from None
     except SolveFailed as failure:
         raise SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
     if not quiet:
@@ -91,7 +91,7 @@ def run(
         raise SolverFailure(f"{bound.sentence}; the result is kept in {path}")
 
 
-def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
+def _stop_message(path: Path, scene: str, overrides: Sequence[str]) -> str:
     if not path.exists():
         return "stopped before anything was computed"
     words = [scene, "--out", str(path.parent), *(word for text in overrides for word in ("--set", text))]
@@ -181,8 +181,8 @@ def draw(
     if not film:
         _draw(loaded, folder, formats or ("png",), dpi or 200)
     for over in film:
-        given = {"row": row, "formats": formats or ("mp4",), "images": images, "dpi": dpi or 100}
-        print(*front_door.animate(loaded, folder, over, **given), sep="\n")  # type: ignore[arg-type]
+        choices = {"row": row, "formats": formats or ("mp4",), "images": images, "dpi": dpi or 100}
+        print(*front_door.animate(loaded, folder, over, **choices), sep="\n")  # type: ignore[arg-type]
 
 
 def _draw(

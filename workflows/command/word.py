@@ -41,16 +41,16 @@ Flag = Annotated[bool, Parameter(negative=())]
 class Option:
     """A parameter of a study as an option of its word.
 
-    placed : whether the study takes it by its place; unit : of a quantity, None for what is none
-    many : whether there are several values, by name where `by_name`
+    by_position : whether the study takes it by position; unit : of a quantity, None for what is none
+    is_repeated : whether it takes several values, by name where `by_name`
     """
 
     name: str
     hint: Any
     default: Any
-    placed: bool
+    by_position: bool
     unit: str | None = None
-    many: bool = False
+    is_repeated: bool = False
     by_name: bool = False
 
     @classmethod
@@ -58,14 +58,14 @@ class Option:
         """The option of a parameter with its type."""
         unit = next((mark.unit for mark in _marks(hint) if isinstance(mark, Quantity)), None)
         bare = _not_none(get_args(_not_none(hint))[0] if get_origin(_not_none(hint)) is Annotated else _not_none(hint))
-        origin, placed = get_origin(bare), parameter.kind is not inspect.Parameter.KEYWORD_ONLY
-        many = origin in (Sequence, Mapping)
-        return cls(parameter.name, bare, parameter.default, placed, unit, many, origin is Mapping)
+        origin, by_position = get_origin(bare), parameter.kind is not inspect.Parameter.KEYWORD_ONLY
+        is_repeated = origin in (Sequence, Mapping)
+        return cls(parameter.name, bare, parameter.default, by_position, unit, is_repeated, origin is Mapping)
 
     @property
     def positional(self) -> bool:
         """Whether it is given by its place: a scene, a result or another file."""
-        return self.placed and self._kind is not None
+        return self.by_position and self._kind is not None
 
     @property
     def _kind(self) -> Any:
@@ -76,7 +76,7 @@ class Option:
     @property
     def flag(self) -> str:
         """Such as --points; several values are given one at a time, under the name of one."""
-        repeated = self.by_name or (self.many and self.unit is None)
+        repeated = self.by_name or (self.is_repeated and self.unit is None)
         name = self.name.removesuffix("s") if repeated else self.name
         return NAMES.get(self.name, f"--{name.replace('_', '-')}")
 
@@ -88,27 +88,27 @@ class Option:
             place = inspect.Parameter.POSITIONAL_OR_KEYWORD
             return inspect.Parameter(self.name, place, default=self.default, annotation=annotation)
         kind, default = self._kind or self.hint, self.default
-        whole = self.many and get_args(self.hint)[:1] == (int,)
-        if self.by_name or (self.many and self.unit is None):
-            kind, default = tuple[int, ...] if whole else tuple[str, ...], default if required else default or ()
+        is_integer = self.is_repeated and get_args(self.hint)[:1] == (int,)
+        if self.by_name or (self.is_repeated and self.unit is None):
+            kind, default = tuple[int, ...] if is_integer else tuple[str, ...], default if required else default or ()
         elif self.unit is not None or kind == float | str:
             kind, default = str, f"{default:g} {self.unit}".strip() if isinstance(default, (int, float)) else default
         if default is None:
             kind = kind | None
-        plain = () if self.many or kind is bool else None
-        shown = Parameter(name=self.flag, help=meaning, negative=plain, consume_multiple=whole)
+        plain = () if self.is_repeated or kind is bool else None
+        shown = Parameter(name=self.flag, help=meaning, negative=plain, consume_multiple=is_integer)
         annotation = Annotated[kind, shown]
         return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
-    def value(self, given: Any) -> Any:
+    def value(self, texts: Any) -> Any:
         """What the study takes."""
-        if given is None or self.unit is None:
-            return given
+        if texts is None or self.unit is None:
+            return texts
         if self.by_name:
-            return dict(self._named(text) for text in given)
-        if self.many:
-            return tuple(quantity(self.flag, text.strip(), self.unit) for text in given.split(","))
-        return quantity(self.flag, given, self.unit)
+            return dict(self._named(text) for text in texts)
+        if self.is_repeated:
+            return tuple(quantity(self.flag, text.strip(), self.unit) for text in texts.split(","))
+        return quantity(self.flag, texts, self.unit)
 
     def _named(self, text: str) -> tuple[str, float]:
         name, equals, value = text.partition("=")
@@ -123,29 +123,30 @@ def word(
     *,
     into: Into = "results",
 ) -> Callable[..., None]:
-    """The function behind a word of the command line.
+    """Make the function behind a word of the command line.
 
-    words : such as "curve track", to tell how to continue
-    into : where --out is not given, tables and pictures go to results/NAME, beside the result, to its pictures,
-        beside the file that is given, or nowhere
+    words : such as "curve track", printed in the command that resumes
+    into : default folder of tables and pictures where --out is not given: results/NAME, the folder of the result, its
+        pictures/, the folder of the file, or none
     """
     hints = get_type_hints(study, include_extras=True)
     parameters = inspect.signature(study).parameters
     options = [Option.of(p, hints[name]) for name, p in parameters.items() if name not in SUPPLIED]
-    said = meanings(study.__doc__ or "", list(parameters))
-    found = hints["return"]
-    writes = "folder" in parameters or all(hasattr(kind, "write") for kind in get_args(found) or (found,))
+    help_texts = meanings(study.__doc__ or "", list(parameters))
+    return_type = hints["return"]
+    kinds = get_args(return_type) or (return_type,)
+    writes = "folder" in parameters or all(hasattr(kind, "write") for kind in kinds)
 
-    def call(*placed: Any, **named: Any) -> None:
-        bound = signature.bind(*placed, **named)
+    def call(*positional: Any, **by_keyword: Any) -> None:
+        bound = signature.bind(*positional, **by_keyword)
         bound.apply_defaults()
-        given = dict(bound.arguments)
-        out, as_json, overrides = given.pop("out", None), given.pop("as_json"), given.pop("overrides", None)
-        quiet = given.pop("quiet", False)
+        texts = dict(bound.arguments)
+        out, as_json, overrides = texts.pop("out", None), texts.pop("as_json"), texts.pop("overrides", None)
+        quiet = texts.pop("quiet", False)
         make_room(out)
-        first = next((given[one.name] for one in options if one.positional), None)
+        first = next((texts[option.name] for option in options if option.positional), None)
         folder = out or _folder(first, into)
-        values = {one.name: one.value(given[one.name]) for one in options}
+        values = {option.name: option.value(texts[option.name]) for option in options}
         if overrides is not None:
             values["overrides"] = overrides
         if "progress" in parameters:
@@ -153,25 +154,25 @@ def word(
         if "folder" in parameters:
             values["folder"] = folder
         try:
-            found = study(**values)
+            result = study(**values)
         except KeyboardInterrupt:
             if "resume" not in parameters:
                 raise
             sets = [word for text in overrides or () for word in ("--set", text)]
-            again = shlex.join(["tribodyn", *words.split(), str(first), *sets, "--out", str(folder), "--resume"])
-            raise KeyboardInterrupt(f"stopped; what was finished is kept in {folder}: resume with {again}") from None
-        if hasattr(found, "write"):
-            files = [] if folder is None else found.write(folder)
+            command = shlex.join(["tribodyn", *words.split(), str(first), *sets, "--out", str(folder), "--resume"])
+            raise KeyboardInterrupt(f"stopped; finished runs are in {folder}: resume with {command}") from None
+        if hasattr(result, "write"):
+            files = [] if folder is None else result.write(folder)
         else:
-            files = list(getattr(found, "files", ()))
-        show_found(found, files, as_json)
+            files = list(getattr(result, "files", ()))
+        print_result(result, files, as_json)
 
-    shown = [one.parameter(said.get(one.name, "")) for one in options]
+    shown = [option.parameter(help_texts.get(option.name, "")) for option in options]
     keyword = inspect.Parameter.KEYWORD_ONLY
     if "overrides" in parameters:
         shown.append(inspect.Parameter("overrides", keyword, default=(), annotation=Overrides))
     if writes:
-        meaning = said.get("folder", _OUT[into])
+        meaning = help_texts.get("folder", _OUT[into])
         out = Annotated[Path | None, Parameter(name="--out", help=meaning)]
         shown.append(inspect.Parameter("out", keyword, default=None, annotation=out))
     shown.append(inspect.Parameter("as_json", keyword, default=False, annotation=Json))
@@ -194,33 +195,33 @@ _OUT = {
 }
 
 
-def show_found(found: Any, files: Sequence[Path] = (), as_json: bool = False) -> None:
-    """Print what was found, as JSON or as lines, and the files that hold it.
+def print_result(result: Any, files: Sequence[Path] = (), as_json: bool = False) -> None:
+    """Print a result of a study, as JSON or as lines, and the files that hold it.
 
-    Raises  SolveFailed where what was found says in `failure` that it is not what was asked for
+    Raises  SolveFailed where the result has a sentence in `failure`
     """
     if as_json:
-        record = found.record()
+        record = result.record()
         if isinstance(record, dict) and files:
             record = {**record, "files": [str(path) for path in files]}
         print(json.dumps(record, indent=2))
     else:
-        print(*found.lines(), *files, sep="\n")
-    if failure := getattr(found, "failure", ""):
+        print(*result.lines(), *files, sep="\n")
+    if failure := getattr(result, "failure", ""):
         raise SolveFailed(failure)
 
 
 def meanings(doc: str, names: Sequence[str]) -> dict[str, str]:
     """Meaning of each name in the lines "name, name : meaning; name : meaning" of a docstring."""
-    found: dict[str, str] = {}
+    meanings_by_name: dict[str, str] = {}
     for line in re.sub(r"\n {4,}", " ", inspect.cleandoc(doc)).splitlines():  # each with those that continue it
         for piece in re.split(r"; (?=\w+(?:, \w+)* : )", line):
-            said, colon, meaning = piece.partition(" : ")
-            listed = [name.strip() for name in said.split(",")]
+            names_text, colon, meaning = piece.partition(" : ")
+            listed = [name.strip() for name in names_text.split(",")]
             if colon and set(names).issuperset(listed):
                 text = meaning.strip().rstrip(".")
-                found |= dict.fromkeys(listed, f"{text[:1].upper()}{text[1:]}.")
-    return found
+                meanings_by_name |= dict.fromkeys(listed, f"{text[:1].upper()}{text[1:]}.")
+    return meanings_by_name
 
 
 def summary(doc: str, names: Sequence[str]) -> str:
@@ -239,14 +240,14 @@ def _folder(first: Any, into: str) -> Path | None:
         return None if into == "asked" else Path(first).parent
     if into == "results":
         return Path("results") / (Path(first).name.removesuffix(".toml") if first is not None else "study")
-    beside = store.result_file(first).parent
-    return beside / "pictures" if into == "pictures" else beside
+    result_folder = store.result_file(first).parent
+    return result_folder / "pictures" if into == "pictures" else result_folder
 
 
 def _not_none(hint: Any) -> Any:
     """A type without None."""
     if get_origin(hint) in (Union, UnionType) and type(None) in get_args(hint):
-        return Union[tuple(one for one in get_args(hint) if one is not type(None))]  # noqa: UP007  # of one: itself
+        return Union[tuple(member for member in get_args(hint) if member is not type(None))]  # noqa: UP007  # of one: itself
     return hint
 
 
@@ -257,19 +258,19 @@ def _marks(hint: Any) -> Iterator[Any]:
 
 
 def quantity(name: str, text: str, unit: str) -> float:
-    """The value of an option in SI units; raises ValueError that names the option."""
+    """The value of an option in SI units; raises Refusal that names the option."""
     from tribodyn.workflows.scene.units import to_si
 
     try:
         return to_si(text, unit)
-    except ValueError as error:
+    except Refusal as error:
         raise Refusal(f"{name}: {error}") from None
 
 
 def make_room(out: Path | None, endings: Sequence[str] = ()) -> None:
-    """Make sure, before long work, that its outcome can be written to --out: to a folder, or a file of these endings.
+    """Check, before long work, that --out can be written: a folder, or a file with one of these endings.
 
-    Raises  ValueError with one sentence
+    Raises  Refusal
     """
     if out is None:
         return

@@ -40,56 +40,56 @@ class Explosion:
 EXPLOSION = Explosion()
 
 
-def apart(result: Result) -> np.ndarray:
+def explosion_offsets(result: Result) -> np.ndarray:
     """(n_node, 3) how far each node moves with its body so that the bodies stand apart, zero where there is one [m]."""
     part = result.part
     assert part is not None
     body = bodies(part)
-    moved = np.zeros((body.max() + 1, 3))
-    if len(moved) == 1:
+    offsets = np.zeros((body.max() + 1, 3))
+    if len(offsets) == 1:
         return np.zeros_like(part.points)
     links = _links(result, part, body)
-    placed = {int(np.argmax([np.ptp(part.points[body == b], axis=0).max() for b in range(len(moved))]))}
+    placed_bodies = {int(np.argmax([np.ptp(part.points[body == b], axis=0).max() for b in range(len(offsets))]))}
     while True:
-        open_ = {pair: v for pair, v in links.items() if (pair[0] in placed) != (pair[1] in placed)}
+        open_ = {pair: v for pair, v in links.items() if (pair[0] in placed_bodies) != (pair[1] in placed_bodies)}
         if not open_:
             break
-        (first, second), along = max(open_.items(), key=lambda item: float(np.linalg.norm(item[1])))
-        area = float(np.linalg.norm(along))
-        step = EXPLOSION.gap * np.sqrt(area) * along / area if area > 0 else along
-        if first in placed:
-            moved[second] = moved[first] + step
+        (first, second), direction = max(open_.items(), key=lambda item: float(np.linalg.norm(item[1])))
+        area = float(np.linalg.norm(direction))
+        step = EXPLOSION.gap * np.sqrt(area) * direction / area if area > 0 else direction
+        if first in placed_bodies:
+            offsets[second] = offsets[first] + step
         else:
-            moved[first] = moved[second] - step
-        placed |= {first, second}
-    return np.where(body[:, None] < 0, 0.0, moved[body])
+            offsets[first] = offsets[second] - step
+        placed_bodies |= {first, second}
+    return np.where(body[:, None] < 0, 0.0, offsets[body])
 
 
 def _links(result: Result, part: PartMesh, body: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
     """Bodies that touch -> sum of area times normal out of the first [m2], zero where faces look all ways."""
-    found: dict[tuple[int, int], np.ndarray] = {}
-    whole: dict[tuple[int, int], float] = {}
+    links: dict[tuple[int, int], np.ndarray] = {}
+    areas: dict[tuple[int, int], float] = {}
 
-    def add(first: int, second: int, along: np.ndarray, area: float) -> None:
+    def add(first: int, second: int, direction: np.ndarray, area: float) -> None:
         pair, sign = ((first, second), 1) if first < second else ((second, first), -1)
-        found[pair] = found.get(pair, np.zeros(3)) + sign * along
-        whole[pair] = whole.get(pair, 0.0) + area
+        links[pair] = links.get(pair, np.zeros(3)) + sign * direction
+        areas[pair] = areas.get(pair, 0.0) + area
 
-    for one in meetings_of(result):
-        if len(one.faces) > 1:
-            first, second = (int(np.bincount(body[face.nodes]).argmax()) for face in one.faces)
+    for meeting in meetings_of(result):
+        if len(meeting.faces) > 1:
+            first, second = (int(np.bincount(body[face.nodes]).argmax()) for face in meeting.faces)
             if first != second:
-                add(first, second, one.patch.area @ one.faces[0].outward, float(one.patch.area.sum()))
-    held = set(found)
+                add(first, second, meeting.patch.area @ meeting.faces[0].outward, float(meeting.patch.area.sum()))
+    linked_pairs = set(links)
     shells = [_shell(part, body == b) for b in range(body.max() + 1)]
     for first in range(len(shells)):
         for second in range(first + 1, len(shells)):
-            if (first, second) not in held:
-                along, area = _touching(shells[first], shells[second])
+            if (first, second) not in linked_pairs:
+                direction, area = _touching(shells[first], shells[second])
                 if area > 0:
-                    add(first, second, along, area)
+                    add(first, second, direction, area)
     return {
-        pair: v if np.linalg.norm(v) > EXPLOSION.one_way * whole[pair] else np.zeros(3) for pair, v in found.items()
+        pair: v if np.linalg.norm(v) > EXPLOSION.one_way * areas[pair] else np.zeros(3) for pair, v in links.items()
     }
 
 
@@ -108,16 +108,16 @@ def _touching(first: Any, second: Any) -> tuple[np.ndarray, float]:
     smaller = np.prod(np.ptp(a, axis=1)) < np.prod(np.ptp(b, axis=1))
     small, large, sign = (first, second, 1) if smaller else (second, first, -1)
     middles = small.cell_centers().compute_implicit_distance(large)
-    near = np.abs(np.asarray(middles["implicit_distance"])) < reach
-    area = np.asarray(small.compute_cell_sizes(length=False, volume=False).cell_data["Area"])[near]
-    return sign * (area @ np.asarray(small.cell_data["Normals"])[near]), float(area.sum())
+    is_near = np.abs(np.asarray(middles["implicit_distance"])) < reach
+    area = np.asarray(small.compute_cell_sizes(length=False, volume=False).cell_data["Area"])[is_near]
+    return sign * (area @ np.asarray(small.cell_data["Normals"])[is_near]), float(area.sum())
 
 
 def exploded_picture(result: Result) -> Figure:
     """All bodies apart, from two sides; the contacts are coloured by wear depth, or by pressure where nothing wears."""
     part = result.part
     assert part is not None
-    state, offset, body = shown_states(result)[-1], apart(result), bodies(part)
+    state, offset, body = shown_states(result)[-1], explosion_offsets(result), bodies(part)
     points = (part.points + offset)[body >= 0]
     pressure = np.zeros(len(state.depth)) if state.pressure is None else state.pressure
     worn = bool(state.depth.max() > 0)
@@ -129,11 +129,11 @@ def exploded_picture(result: Result) -> Figure:
         shell = _shell(part, body == b)
         shell.points += offset[np.flatnonzero(body == b)[0]]
         layers.append(Layer(shell, color=BODIES[b % len(BODIES)]))
-    for one in meetings_of(result):
-        lift = LAYOUT.lift * float(np.sqrt(one.patch.area.sum()))
-        for face in one.faces:
-            there = face.points + lift * face.outward + offset[face.nodes[0]]
-            layers += FieldPaint(values[one.pairs], limits, map_)(one.patch, there)
+    for meeting in meetings_of(result):
+        lift = LAYOUT.lift * float(np.sqrt(meeting.patch.area.sum()))
+        for face in meeting.faces:
+            points_on_face = face.points + lift * face.outward + offset[face.nodes[0]]
+            layers += FieldPaint(values[meeting.pairs], limits, map_)(meeting.patch, points_on_face)
     towards, up = drawing.looking(result)
     axis = up / np.linalg.norm(up)
     level = towards - (towards @ axis) * axis
@@ -141,8 +141,8 @@ def exploded_picture(result: Result) -> Figure:
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         shots, cameras = [], []
         for side in (level + EXPLOSION.rise * axis, level - EXPLOSION.rise * axis):
-            cameras.append(frame(points, side, up, LAYOUT.apart[0] / LAYOUT.apart[1]))
-            shots.append(shoot(View(layers), cameras[-1], LAYOUT.apart))
+            cameras.append(frame(points, side, up, LAYOUT.exploded[0] / LAYOUT.exploded[1]))
+            shots.append(shoot(View(layers), cameras[-1], LAYOUT.exploded))
         images, corner = with_room(trimmed(shots))
         long = images[0].shape[1] > EXPLOSION.flat * images[0].shape[0]
         wide = 7.0 if long else 5.0

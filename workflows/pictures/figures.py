@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
@@ -16,8 +17,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from tribodyn.hbm.contact.contact_law import SEPARATES
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.theme import FORMATS, LAYOUT, STATUS, STYLE
+from tribodyn.workflows.pictures.theme import FORMATS, LAYOUT, RED, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.summary import LARGEST_BEND, size_of
 
 
 @contextmanager
@@ -30,19 +32,19 @@ def axes_of(
         yield figure, figure.subplots(rows, columns, sharex=share and columns == 1)
 
 
-def heading(figure: Figure, result: Result, what: str) -> None:
+def heading(figure: Figure, result: Result, title: str) -> None:
     """A title over a figure of several axes."""
-    figure.suptitle(titled(result, what), x=0.01, ha="left")
+    figure.suptitle(titled(result, title), x=0.01, ha="left")
 
 
-def titled(result: Result, what: str) -> str:
+def titled(result: Result, title: str) -> str:
     """A title with the name of the scene."""
-    return named(result.provenance["scene_name"], what)
+    return named(result.provenance["scene_name"], title)
 
 
-def named(scene: str, what: str) -> str:
+def named(scene: str, title: str) -> str:
     """What a picture shows behind the name of its scene, alone where there is none."""
-    return f"{scene.replace('_', ' ')}: {what}" if scene else what[:1].upper() + what[1:]
+    return f"{scene.replace('_', ' ')}: {title}" if scene else title[:1].upper() + title[1:]
 
 
 def log_axis(axis: Any, low: float, high: float) -> None:
@@ -103,7 +105,7 @@ def force_unit(largest: float) -> tuple[str, float]:
 def area_energy_unit(largest: float) -> tuple[str, float]:
     """Unit and factor in which energies per area [J/m2] of this size read well."""
     units = [("J/m²", 1.0), ("mJ/m²", 1e3), ("µJ/m²", 1e6), ("nJ/m²", 1e9)]
-    return next((one for one in units if one[1] * largest >= 0.5), units[-1] if largest > 0 else units[0])
+    return next((unit for unit in units if unit[1] * largest >= 0.5), units[-1] if largest > 0 else units[0])
 
 
 def scale_bar(
@@ -121,3 +123,23 @@ def scale_bar(
         return
     bar.locator = MaxNLocator(4)
     bar.update_ticks()
+
+
+def positive_range(values: np.ndarray) -> tuple[float, float]:
+    """The smallest and the largest of some values above zero."""
+    above = np.asarray(values, float)
+    above = above[np.isfinite(above) & (above > 0)]
+    return (float(above.min()), float(above.max())) if len(above) else (1.0, 10.0)
+
+
+def shade_beyond_linear_model(axes: Any, result: Result, scale: float) -> None:
+    """Shade the amplitudes that a linear model does not describe, where the axes reach them."""
+    low, high = axes.get_ylim()
+    limit = scale * LARGEST_BEND * size_of(result)
+    if low < limit < high:
+        axes.axhspan(limit, high, color=RED, alpha=0.08, lw=0)
+        axes.text(
+            0.99, limit, "beyond the linear model", transform=axes.get_yaxis_transform(), color=RED, ha="right",
+            va="bottom",
+        )  # fmt: skip
+        axes.set_ylim(low, high)

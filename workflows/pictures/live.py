@@ -17,9 +17,9 @@ from tribodyn.workflows.run.progress import Advance, Progress
 class Live(Progress):
     """Progress as a plot below a notebook's cell, `td.run("beam", progress=td.plot.Live())`, drawn every `every` s."""
 
-    def __init__(self, every: float = 2.0):
+    def __init__(self, interval: float = 2.0):
         super().__init__(Console(), details=False)
-        self._every = every
+        self._interval = interval
 
     @contextmanager
     def track(self, name: str) -> Iterator[Advance]:
@@ -33,7 +33,7 @@ class Live(Progress):
         def advance(share: float, note: str, *point: tuple[float, float]) -> None:
             nonlocal shown, last
             points.extend(point)
-            if point and time.perf_counter() - last >= self._every:
+            if point and time.perf_counter() - last >= self._interval:
                 shown = shown or display(drawn(name, points), display_id=True)
                 shown.update(drawn(name, points))
                 last = time.perf_counter()

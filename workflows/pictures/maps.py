@@ -103,31 +103,31 @@ def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) 
     return _motion(patch, columns, labels, titled(result, "contact over wear"))
 
 
-def backbone_maps(balance: HarmonicBalance, found: Backbone, scene: str = "", columns: int = 4) -> Figure | None:
+def backbone_maps(balance: HarmonicBalance, mode: Backbone, scene: str = "", columns: int = 4) -> Figure | None:
     """The same at some converged points of a backbone, evenly spaced in the logarithm of the amplitude.
 
     Returns None where the contact is no face or has no friction; scene : its name, for the title
     """
     i = balance.model.interface
-    good = np.flatnonzero(found.converged)
+    good = np.flatnonzero(mode.converged)
     if not len(i.faces) or not {"t1", "t2"} & set(i.components) or not len(good):
         return None
     none, nowhere = np.zeros(i.n_pair), np.full(i.n_pair, -1)
     patch = Patch(i.components, nowhere, i.points, i.frames, i.area, i.gap, i.faces, none)
-    level = np.log(found.amplitude[good])
-    wanted = np.linspace(level.min(), level.max(), columns)
-    chosen = list(dict.fromkeys(int(good[np.abs(level - value).argmin()]) for value in wanted))
-    unit, factor = length_unit(float(found.amplitude[chosen].max()))
-    titles = [f"{factor * found.amplitude[at]:.3g} {unit}, {found.frequency[at]:.4g} Hz" for at in chosen]
-    motion = [backbone_motion(balance, found, at) for at in chosen]
+    level = np.log(mode.amplitude[good])
+    targets = np.linspace(level.min(), level.max(), columns)
+    chosen = list(dict.fromkeys(int(good[np.abs(level - value).argmin()]) for value in targets))
+    unit, factor = length_unit(float(mode.amplitude[chosen].max()))
+    titles = [f"{factor * mode.amplitude[at]:.3g} {unit}, {mode.frequency[at]:.4g} Hz" for at in chosen]
+    motion = [backbone_motion(balance, mode, at) for at in chosen]
     return _motion(patch, motion, titles, named(scene, "contact along the backbone"))
 
 
-def backbone_motion(balance: HarmonicBalance, found: Backbone, at: int) -> Motion:
+def backbone_motion(balance: HarmonicBalance, mode: Backbone, at: int) -> Motion:
     """What the pairs do at a point of the backbone; a gap is negative where the faces stay in touch."""
     contact = balance.contact
-    x = balance.shaped(found.contact[at])
-    state = balance.evaluate(float(found.omega[at]), x, jacobian=False)
+    x = balance.shaped(mode.contact[at])
+    state = balance.evaluate(float(mode.omega[at]), x, jacobian=False)
     slide, gap = slide_and_gap(balance.model.interface.components, x, balance.basis, contact.gap)
     return slide, gap, balance.energy(state) / balance.model.interface.area
 
@@ -141,8 +141,8 @@ def slide_and_gap(
     negative where the faces stay in touch, -inf where the contact has no normal component
     """
     motion = basis.to_time(x)
-    along = [c for c, name in enumerate(components) if name != "n"]
-    slide = motion[:, along] - x[:, along, :1] * basis.has_static
+    tangential = [c for c, name in enumerate(components) if name != "n"]
+    slide = motion[:, tangential] - x[:, tangential, :1] * basis.has_static
     opening = np.full(len(x), -np.inf)
     if "n" in components:
         opening = gap - motion[:, list(components).index("n")].min(axis=1)
@@ -199,7 +199,7 @@ def _drawn(patch: Patch, rows: Sequence[Row], titles: Sequence[str], title: str)
         for axes, text in zip(grid[0], titles, strict=True):
             axes.set_title(text)
         _label_axes(grid, patch)
-        present = {int(bits) for colors, row in rows if colors == "status" for _, own in row for bits in own}
+        present = {int(bits) for colors, row in rows if colors == "status" for _, values in row for bits in values}
         if present:
             status_legend(figure, present, patch.components)
         figure.suptitle(title, x=0.01, ha="left")

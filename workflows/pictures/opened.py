@@ -24,13 +24,13 @@ THICK = 0.5  # of its size, how deep the bodies are cut off
 
 
 @dataclass(frozen=True)
-class Opened:
+class OpenedContact:
     """What does not change over a series: where the faces lie and how they are looked at.
 
     contact : with its pairs and faces; part : of the result; split : share of the depth on body 1
     flat : (n_pair, 2) along t1, t2 [m]; size : of the patch [m]
-    along : which of t1, t2 the book opens along, hinge : the place of its hinge there [m]
-    around : lowest and highest t1, t2 of what is shown [m]
+    opening_axis : which of t1, t2 the book opens along, hinge : the place of its hinge there [m]
+    bounds : lowest and highest t1, t2 of what is shown [m]
     """
 
     contact: Meeting
@@ -38,9 +38,9 @@ class Opened:
     split: float
     flat: np.ndarray
     size: float
-    along: int
+    opening_axis: int
     hinge: float
-    around: tuple[np.ndarray, np.ndarray]
+    bounds: tuple[np.ndarray, np.ndarray]
     camera: Camera
 
     @property
@@ -49,7 +49,7 @@ class Opened:
         across = "body 2" if len(self.contact.faces) > 1 else "ground"
         return f"{f'contact {self.contact.name}'.strip().replace('_', ' ')}: body 1 in front, {across} behind"
 
-    def own(self, state: State) -> State:
+    def restrict(self, state: State) -> State:
         """A state, of this contact's pairs."""
         return state.of(self.contact.pairs)
 
@@ -71,18 +71,18 @@ class Opened:
 
     def _turned(self, points: np.ndarray, sign: int) -> np.ndarray:
         """Points of body 2 after it is opened; sign : -1 where their n still points as body 1's does."""
-        moved = points.copy()
-        moved[:, self.along] = 2 * self.hinge - moved[:, self.along]
-        moved[:, 2] *= sign
-        return moved
+        turned = points.copy()
+        turned[:, self.opening_axis] = 2 * self.hinge - turned[:, self.opening_axis]
+        turned[:, 2] *= sign
+        return turned
 
-    def _block(self, face: Face | None, below: bool, depth: np.ndarray) -> Any:
+    def _block(self, face: Face | None, is_below: bool, depth: np.ndarray) -> Any:
         """The elements near a face in the axes of the patch, worn, or a plate where no body is meshed."""
         pv = package("pyvista")
 
         patch, part = self.contact.patch, self.part
-        sign = -1.0 if below else 1.0
-        (x0, y0), (x1, y1) = self.around
+        sign = -1.0 if is_below else 1.0
+        (x0, y0), (x1, y1) = self.bounds
         if face is None or part is None:
             return pv.Box((x0, x1, y0, y1, *sorted((0.0, sign * 0.2 * self.size)))).cast_to_unstructured_grid()
         points = part.points + face.worn_off(depth, len(part.points))
@@ -91,11 +91,11 @@ class Opened:
         body = bodies(part)
         mine = (body[part.cells] == body[face.nodes[0]]).all(axis=1)
         low, high = local[part.cells].min(axis=1), local[part.cells].max(axis=1)
-        near = ((high > [x0, y0, -THICK * self.size]) & (low < [x1, y1, THICK * self.size])).all(axis=1)
-        cells = part.cells[mine & near & (sign * (low + high)[:, 2] > -0.2 * self.size)]
+        is_near = ((high > [x0, y0, -THICK * self.size]) & (low < [x1, y1, THICK * self.size])).all(axis=1)
+        cells = part.cells[mine & is_near & (sign * (low + high)[:, 2] > -0.2 * self.size)]
         grid = grid_of(part, local, cells)
         cut = grid.clip_box((x0, x1, y0, y1, -THICK * self.size, THICK * self.size), invert=False)
-        return cut if cut.n_points else self._block(None, below, depth)
+        return cut if cut.n_points else self._block(None, is_below, depth)
 
 
 class Paint(Protocol):
@@ -133,9 +133,9 @@ class StatusPaint:
         corners, pair = patch.shares(points)
         layers = []
         for bits, (_, color) in STATUS.items():
-            here = corners[self.status[pair] == bits]
-            if len(here):
-                layers.append(Layer(_quadrangles(here.reshape(-1, 3)), color, edges=False, flat=True))
+            drawn_shares = corners[self.status[pair] == bits]
+            if len(drawn_shares):
+                layers.append(Layer(_quadrangles(drawn_shares.reshape(-1, 3)), color, edges=False, flat=True))
         outline = pv.PolyData(points, polygons(patch.faces)).extract_feature_edges(
             boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
         )
@@ -154,22 +154,24 @@ def contacts(result: Result) -> tuple[Meeting, ...]:
     patch = result.patch
     if not len(patch.faces):
         return ()
-    found = meetings_of(result) or (Meeting("", slice(0, len(patch.area)), patch, ()),)
-    return tuple(one for one in found if one.patch.in_one_plane)
+    meetings = meetings_of(result) or (Meeting("", slice(0, len(patch.area)), patch, ()),)
+    return tuple(meeting for meeting in meetings if meeting.patch.in_one_plane)
 
 
-def opened(result: Result, contact: Meeting, aspect: float = 1.3) -> Opened:
+def opened(result: Result, contact: Meeting, aspect: float = 1.3) -> OpenedContact:
     """An opened contact of a result; aspect : of the view, width over height."""
     flat = contact.patch.flat
     low, high = flat.min(axis=0), flat.max(axis=0)
     size = float(np.sqrt(np.prod(high - low)))
-    along = int(np.argmin(high - low))  # open along the shorter side
-    around = (low - MARGIN * size, high + MARGIN * size)
-    hinge = float(around[1][along] + 0.1 * size)
-    (x0, y0), (x1, y1) = around
+    opening_axis = int(np.argmin(high - low))  # open along the shorter side
+    box = (low - MARGIN * size, high + MARGIN * size)
+    hinge = float(box[1][opening_axis] + 0.1 * size)
+    (x0, y0), (x1, y1) = box
     corners = np.array([[x, y, z] for x in (x0, x1) for y in (y0, y1) for z in (-0.4 * size, 0)])
     other = corners.copy()
-    other[:, along] = 2 * hinge - other[:, along]
-    look = np.array([-0.3, -0.8, 1.0]) if along == 1 else np.array([-0.8, -0.3, 1.0])
+    other[:, opening_axis] = 2 * hinge - other[:, opening_axis]
+    look = np.array([-0.3, -0.8, 1.0]) if opening_axis == 1 else np.array([-0.8, -0.3, 1.0])
     camera = frame(np.concatenate([corners, other]), look, np.array([0.0, 0, 1]), aspect, 1.05)
-    return Opened(contact, result.part, result.facts.share_of_body_1, flat, size, along, hinge, around, camera)
+    return OpenedContact(
+        contact, result.part, result.facts.share_of_body_1, flat, size, opening_axis, hinge, box, camera
+    )

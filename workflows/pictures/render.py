@@ -35,10 +35,10 @@ def draw(
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
     Raises  RenderingUnavailable
     """
-    found = figures(result, deformation, wear)
-    if found:
+    pictures = figures(result, deformation, wear)
+    if pictures:
         offscreen.check()
-    return [path for name, make in found.items() for path in save(make(), folder / name, formats, dpi)]
+    return [path for name, make in pictures.items() for path in save(make(), folder / name, formats, dpi)]
 
 
 def figures(
@@ -47,18 +47,18 @@ def figures(
     """The pictures that a result has data for, by name; see `draw`."""
     if not has_states(result):
         return {}
-    found: dict[str, Callable[[], Figure]] = {}
+    pictures: dict[str, Callable[[], Figure]] = {}
     if result.part is not None and result.fields is not None:
-        found["part"] = partial(part_picture, result, deformation, wear)
+        pictures["part"] = partial(part_picture, result, deformation, wear)
     for contact in book.contacts(result):
         name = f"contact_{contact.name}" if contact.name else "contact"
-        found[name] = partial(contact_picture, result, contact, wear)
+        pictures[name] = partial(contact_picture, result, contact, wear)
     if result.part is not None and int(bodies(result.part).max()) > 0:
-        found["exploded"] = partial(exploded.exploded_picture, result)
+        pictures["exploded"] = partial(exploded.exploded_picture, result)
     wheel = result.facts.around
     if wheel is not None and result.fields is not None:
-        found["wheel"] = partial(render_wheel.wheel_picture, result, wheel, deformation)
-    return found
+        pictures["wheel"] = partial(render_wheel.wheel_picture, result, wheel, deformation)
+    return pictures
 
 
 def part_picture(result: Result, deformation: float | None = None, wear: float | None = None) -> Figure:
@@ -80,12 +80,12 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
         tall = wide * images[0].shape[0] / images[0].shape[1]
         figure = Figure(figsize=(wide * len(states) + 0.2, tall + 2.0), layout="constrained")
         columns = np.atleast_1d(figure.subplots(1, len(states)))
-        for axes, state, image, scale, (most, label) in zip(columns, states, images, scales, bars, strict=True):
+        for axes, state, image, scale, (highest, label) in zip(columns, states, images, scales, bars, strict=True):
             show(axes, image, moving.camera, "xyz", corner)
             far = float(moving.amplitude(state).max()) > LARGEST_BEND * size_of(result)
             warned = "\nbeyond the linear model" if far else ""
             axes.set_title(f"{state.label}\n{moving.factors(scale)}{warned}", color=RED if far else INK)
-            scale_bar(figure, axes, MOTION_MAP, 0.0, most, label)
+            scale_bar(figure, axes, MOTION_MAP, 0.0, highest, label)
         heading(figure, result, "part at its largest swing, its contact outlined")
     return figure
 
@@ -93,11 +93,11 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
 def contact_picture(result: Result, contact: Meeting, wear: float | None = None) -> Figure:
     """Both faces of a contact opened like a book, in each shown state: depth in relief, status, mean pressure."""
     opened = book.opened(result, contact)
-    states = [opened.own(state) for state in shown_states(result)]
+    states = [opened.restrict(state) for state in shown_states(result)]
     depth = np.stack([state.depth for state in states])
     wear = wear or drawing.wear_scale(contact.patch, depth)
-    worn, known = bool(depth.max() > 0), [s for s in states if s.status is not None]
-    rows = [name for name, there in (("depth", worn), ("status", bool(known)), ("pressure", True)) if there]
+    worn, with_status = bool(depth.max() > 0), [s for s in states if s.status is not None]
+    rows = [name for name, is_shown in (("depth", worn), ("status", bool(with_status)), ("pressure", True)) if is_shown]
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(
             figsize=(max(LAYOUT.column * len(states), LAYOUT.least) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained"
@@ -114,14 +114,14 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
         for axes, state in zip(grid[0], states, strict=True):
             axes.set_title(state.label)
         if "status" in rows:
-            present = {int(bits) for s in known if s.status is not None for bits in s.status}
+            present = {int(bits) for s in with_status if s.status is not None for bits in s.status}
             status_legend(figure, present, contact.patch.components)
         told_scale = f", depth in relief × {wear:g}" if worn else ""
         heading(figure, result, f"opened {opened.sides}{told_scale}")
     return figure
 
 
-def _painted(contact: book.Opened, state: State, name: str, wear: float) -> tuple[View, tuple[Any, ...] | None]:
+def _painted(contact: book.OpenedContact, state: State, name: str, wear: float) -> tuple[View, tuple[Any, ...] | None]:
     """The opened contact showing one quantity of a state, and the scale bar that goes with it."""
     if name == "status":
         none = np.zeros(len(state.depth), int)
@@ -176,12 +176,12 @@ class MovingPart:
         if not len(corner):
             return image
         edges = np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1).reshape(-1, 2)
-        alone, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+        edges_once, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
         width = max(round(size[0] / 220), 1)
         picture = Image.fromarray(image)
         pen = ImageDraw.Draw(picture)
         at = np.array([place(self.camera, point, size) for point in points[self.patch.nodes]])
-        for i, j in alone[count == 1]:
+        for i, j in edges_once[count == 1]:
             ends = [(at[k][0] * size[0], at[k][1] * size[1]) for k in (i, j)]
             pen.line(ends, fill=RED, width=width)
         low, high = at.min(axis=0) * size, at.max(axis=0) * size
@@ -207,10 +207,12 @@ class MovingPart:
         """(n_node,) largest distance from the mean position over the cycle [m]."""
         return np.asarray(np.linalg.norm(drawing.cycle(self.terms(state), self.result.harmonics), axis=1).max(axis=1))
 
-    def points(self, state: State, moved: np.ndarray) -> np.ndarray:
+    def points(self, state: State, motion: np.ndarray) -> np.ndarray:
         """(n_node, 3) where wear, rest and a motion (n_node, 3) bring the nodes, as drawn [m]."""
-        rest = self.rest_scale * drawing.at_rest(self.terms(state), self.result.harmonics)
-        return np.asarray(self.part.points + rest + moved + self.wear * worn_off(self.meetings, state.depth, len(rest)))
+        static = self.rest_scale * drawing.at_rest(self.terms(state), self.result.harmonics)
+        return np.asarray(
+            self.part.points + static + motion + self.wear * worn_off(self.meetings, state.depth, len(static))
+        )
 
     def view(self, points: np.ndarray, values: np.ndarray, limits: tuple[float, float]) -> View:
         """The part with its nodes at points (n_node, 3), coloured by values of the nodes."""

@@ -40,16 +40,16 @@ class BladeSurface:
         self._wheel, axis = wheel, wheel.axis
         self.size = float(np.linalg.norm(np.cross(part.points, axis), axis=1).max())
         across = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [0.0, 0.0, 1.0])
-        aside = np.cross(axis, across)
-        corners = 1.15 * self.size * np.array([x * across + y * aside for x in (-1, 1) for y in (-1, 1)])
+        sideways = np.cross(axis, across)
+        corners = 1.15 * self.size * np.array([x * across + y * sideways for x in (-1, 1) for y in (-1, 1)])
         self.camera = frame(corners, axis + 0.25 * across, across, 1.0, 1.0)
 
-    def shot(self, rest: np.ndarray, moved: np.ndarray, scale: float, largest: float) -> np.ndarray:
-        """The image of blades at rest and moved ([N,] n_point, 3), each in its own frame; colours : up to `largest`."""
-        points = rest + scale * moved
-        placed = np.concatenate([self._wheel.sector(blade, n) for n, blade in enumerate(points)])
-        surface = package("pyvista").PolyData(placed, self._faces)
-        values = np.linalg.norm(moved, axis=2).ravel()
+    def shot(self, static: np.ndarray, motion: np.ndarray, scale: float, largest: float) -> np.ndarray:
+        """The image of blades displaced by `static` and `motion` ([N,] n_point, 3), coloured up to `largest`."""
+        points = static + scale * motion
+        positions = np.concatenate([self._wheel.sector(blade, n) for n, blade in enumerate(points)])
+        surface = package("pyvista").PolyData(positions, self._faces)
+        values = np.linalg.norm(motion, axis=2).ravel()
         layer = Layer(surface, values=values, map=MOTION_MAP, limits=(0.0, largest), edges=False)
         return shoot(View([layer]), self.camera, LAYOUT.wheel)
 
@@ -66,11 +66,11 @@ def wheel_picture(result: Result, wheel: Around, deformation: float | None = Non
         figure = Figure(figsize=(3.4 * len(states) + 0.2, 4.4), layout="constrained")
         for axes, state in zip(np.atleast_1d(figure.subplots(1, len(states))), states, strict=True):
             wave = fields.displacement[state.field or 0]
-            moved = np.stack(list(instants(wheel, result.harmonics, wave)))
-            largest = float(np.linalg.norm(moved, axis=-1).max())
+            motion = np.stack(list(instants(wheel, result.harmonics, wave)))
+            largest = float(np.linalg.norm(motion, axis=-1).max())
             scale = deformation or drawing.deformation_scale(drawing.swing(wave, result.harmonics), 2 * blades.size)
-            rest = (part.points + drawing.at_rest(wave, result.harmonics))[blades.nodes]
-            (image,), corner = with_room([blades.shot(rest, moved[:, blades.nodes], scale, largest)])
+            static = (part.points + drawing.at_rest(wave, result.harmonics))[blades.nodes]
+            (image,), corner = with_room([blades.shot(static, motion[:, blades.nodes], scale, largest)])
             show(axes, image, blades.camera, "xyz", corner)
             axes.set_title(f"{state.label}\nvibration × {scale:g}")
             _bar(figure, axes, largest)
@@ -126,11 +126,11 @@ class MistunedWheelFilm:
         self.count, self._states, self._sectors = count, tuple(states), wheel.sectors
         self._blades = BladeSurface(wheel, part)
         nodes = self._blades.nodes
-        self._rest, self._swings = [], []
+        self._static, self._swings = [], []
         for state in states:
-            moved = state.displacement[:, nodes]
-            self._rest.append(part.points[nodes] + drawing.at_rest(moved, harmonics))
-            self._swings.append(drawing.cycle(moved, harmonics))
+            displacement = state.displacement[:, nodes]
+            self._static.append(part.points[nodes] + drawing.at_rest(displacement, harmonics))
+            self._swings.append(drawing.cycle(displacement, harmonics))
         sizes = [np.linalg.norm(swing, axis=2) for swing in self._swings]
         self._largest = max(float(size.max()) for size in sizes)
         self._first = int(sizes[-1].max(axis=(0, 1)).argmax())
@@ -167,8 +167,8 @@ class MistunedWheelFilm:
 
     def _shot(self, at: int, number: int) -> np.ndarray:
         instants = self._swings[at].shape[-1]
-        moved = self._swings[at][..., (self._first + number * instants // self.count) % instants]
-        return self._blades.shot(self._rest[at], moved, self._scale, self._largest)
+        motion = self._swings[at][..., (self._first + number * instants // self.count) % instants]
+        return self._blades.shot(self._static[at], motion, self._scale, self._largest)
 
 
 def _repeated(faces: np.ndarray, n_point: int, count: int) -> np.ndarray:

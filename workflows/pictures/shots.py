@@ -100,8 +100,8 @@ def frame(points: np.ndarray, towards: np.ndarray, up: np.ndarray, aspect: float
     up = up - towards * (up @ towards)
     up /= np.linalg.norm(up)
     right = np.cross(up, towards)
-    seen = points @ np.stack([right, up, towards]).T
-    low, high = seen.min(axis=0), seen.max(axis=0)
+    projected = points @ np.stack([right, up, towards]).T
+    low, high = projected.min(axis=0), projected.max(axis=0)
     middle = (low + high) / 2
     centre = middle[0] * right + middle[1] * up + middle[2] * towards
     width, height, deep = high - low
@@ -134,9 +134,9 @@ def with_room(images: Sequence[np.ndarray]) -> tuple[list[np.ndarray], tuple[flo
     box = room(images[0])
     ink = np.any([image.min(axis=2) < 250 for image in images], axis=0)
     height, width = ink.shape
-    for top, left in ((height - box, 0), (height - box, width - box), (0, 0), (0, width - box)):
-        if not ink[top : top + box, left : left + box].any():
-            return list(images), (left + box / 2, top + box / 2)
+    for top, left_edge in ((height - box, 0), (height - box, width - box), (0, 0), (0, width - box)):
+        if not ink[top : top + box, left_edge : left_edge + box].any():
+            return list(images), (left_edge + box / 2, top + box / 2)
     strip = np.full((box, width, 3), 255, np.uint8)
     return [np.concatenate([image, strip]) for image in images], (box / 2, height + box / 2)
 
@@ -160,13 +160,13 @@ def draw_axes(axes: Any, camera: Camera, names: Sequence[str], middle: tuple[flo
     names : of the three axes; middle, box : where they stand, and how much room they have [pixels]
     """
     right, towards = np.cross(camera.up, camera.towards), np.asarray(camera.towards)
-    seen = np.column_stack([right, -np.asarray(camera.up)])  # pixels count downwards
-    length = np.linalg.norm(seen, axis=1)[:, None]
+    projected = np.column_stack([right, -np.asarray(camera.up)])  # pixels count downwards
+    length = np.linalg.norm(projected, axis=1)[:, None]
     long = length > LAYOUT.axes_dot
-    away = -seen.sum(axis=0) / max(float(np.linalg.norm(seen.sum(axis=0))), 1e-9)
-    outwards = np.where(long, seen / np.maximum(length, 1e-9), away)
-    start = np.asarray(middle) - 0.28 * box * np.clip(seen.sum(axis=0), -1, 1)
-    ends = start + 0.5 * box * seen
+    opposite = -projected.sum(axis=0) / max(float(np.linalg.norm(projected.sum(axis=0))), 1e-9)
+    outwards = np.where(long, projected / np.maximum(length, 1e-9), opposite)
+    start = np.asarray(middle) - 0.28 * box * np.clip(projected.sum(axis=0), -1, 1)
+    ends = start + 0.5 * box * projected
     labels = _spread(start + (0.5 * length + 0.17) * box * outwards, 0.24 * box)
     for i in np.argsort(towards):  # what points to the reader comes last
         if long[i]:
@@ -185,7 +185,7 @@ def _spread(places: np.ndarray, least: float) -> np.ndarray:
             between = places[j] - places[i]
             distance = float(np.linalg.norm(between))
             if distance < least:
-                along = between / distance if distance > 1e-9 else np.array([1.0, 0.0])
-                places[i] -= along * (least - distance) / 2
-                places[j] += along * (least - distance) / 2
+                direction = between / distance if distance > 1e-9 else np.array([1.0, 0.0])
+                places[i] -= direction * (least - distance) / 2
+                places[j] += direction * (least - distance) / 2
     return places

@@ -39,7 +39,7 @@ class Layout:
     dpi : dots per inch of figures, film_dpi : of films
     narrowest : inches of a figure of maps, below which a legend of all states does not fit
     column, least : inches of a column of views, and of the narrowest figure of them
-    view : pixels of a view of the part, book : of an opened contact, apart : of bodies drawn apart, wheel : of a wheel
+    view : pixels of a view of the part, wheel : of a wheel, book : of an opened contact, exploded : of an exploded view
     film : inches of a film; film_part, film_contact : pixels of the views in it; rate : images per second of a film
     images : of a film, fewer where there are fewer wear steps; samples : instants of a cycle in maps of its motion
     instants : of a cycle, among which that of the largest swing is found
@@ -60,7 +60,7 @@ class Layout:
     least: float = 6.0
     view: tuple[int, int] = (900, 760)
     book: tuple[int, int] = (900, 690)
-    apart: tuple[int, int] = (1100, 760)
+    exploded: tuple[int, int] = (1100, 760)
     wheel: tuple[int, int] = (1000, 1000)
     groups: tuple[int, int] = (1700, 680)
     film: tuple[float, float] = (12.8, 7.2)

@@ -51,15 +51,15 @@ def rest_scale(static: np.ndarray, points: np.ndarray, body: np.ndarray) -> floa
     """
     scale, each = deformation_scale(static, float(np.ptp(points, axis=0).max())), range(int(body.max()) + 1)
     means = np.stack([static[:, body == b].mean(axis=1) for b in each])
-    apart = float(np.linalg.norm(means[:, None] - means[None], axis=-1).max())
+    spread = float(np.linalg.norm(means[:, None] - means[None], axis=-1).max())
     least = min(float(np.ptp(points[body == b], axis=0).min()) for b in each)
-    return min(scale, nice(LAYOUT.sunk * least / apart)) if apart > 0 else scale
+    return min(scale, nice(LAYOUT.sunk * least / spread)) if spread > 0 else scale
 
 
 def wear_scale(patch: Patch, depth: np.ndarray) -> float:
     """Factor, at least 1, that draws the largest depth on one body as a tenth of the patch."""
-    wanted = 0.1 * float(np.sqrt(patch.area.sum()))
-    return max(1.0, nice(wanted / (0.5 * depth.max()))) if depth.max() > 0 else 1.0
+    target = 0.1 * float(np.sqrt(patch.area.sum()))
+    return max(1.0, nice(target / (0.5 * depth.max()))) if depth.max() > 0 else 1.0
 
 
 def nice(value: float) -> float:
@@ -89,20 +89,20 @@ def polygons(faces: np.ndarray) -> np.ndarray:
 
 def looking(result: Result) -> tuple[np.ndarray, np.ndarray]:
     """Where to look from, and what is up: a little aside of the face of body 1, a sector with its outside upwards."""
-    part, patch, around = result.part, result.patch, result.facts.around
+    part, patch, wheel = result.part, result.patch, result.facts.around
     points = patch.points if part is None else part.points
     normal = patch.frames[:, 2].mean(axis=0)
-    if around is not None:
-        axis = around.axis / np.linalg.norm(around.axis)
+    if wheel is not None:
+        axis = wheel.axis / np.linalg.norm(wheel.axis)
         outside = points.mean(axis=0) - axis * (points.mean(axis=0) @ axis)
         outside /= np.linalg.norm(outside)
-        aside = np.cross(axis, outside)
-        seen = 1.0 if normal @ aside >= 0 else -1.0
-        return 0.8 * axis + 0.6 * seen * aside + 0.3 * outside, outside
-    along = patch.points.mean(axis=0) - points.mean(axis=0)
-    along -= normal * (along @ normal)
-    if np.linalg.norm(along) < 1e-6 * np.ptp(points, axis=0).max():
-        along = patch.frames[:, 0].mean(axis=0)
-    along = along / np.linalg.norm(along)
-    aside = np.cross(normal, along)
-    return 0.5 * normal + 0.45 * along + 0.9 * aside, -normal
+        sideways = np.cross(axis, outside)
+        side = 1.0 if normal @ sideways >= 0 else -1.0
+        return 0.8 * axis + 0.6 * side * sideways + 0.3 * outside, outside
+    lengthwise = patch.points.mean(axis=0) - points.mean(axis=0)
+    lengthwise -= normal * (lengthwise @ normal)
+    if np.linalg.norm(lengthwise) < 1e-6 * np.ptp(points, axis=0).max():
+        lengthwise = patch.frames[:, 0].mean(axis=0)
+    lengthwise = lengthwise / np.linalg.norm(lengthwise)
+    sideways = np.cross(normal, lengthwise)
+    return 0.5 * normal + 0.45 * lengthwise + 0.9 * sideways, -normal

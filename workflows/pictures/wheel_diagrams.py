@@ -48,8 +48,8 @@ class Crossing:
 
 def diameter_of(engine_order: int, n_sectors: int) -> int:
     """The nodal diameter that an engine order excites on a wheel of identical sectors."""
-    rest = engine_order % n_sectors
-    return min(rest, n_sectors - rest)
+    remainder = engine_order % n_sectors
+    return min(remainder, n_sectors - remainder)
 
 
 def crossings(
@@ -66,9 +66,9 @@ def crossings(
     slow, fast : ends of the range [Hz], slow above 0; highest : engine order, None for any
     against : the same for waves against the rotation, where they differ
     """
-    found: list[Crossing] = []
+    matches: list[Crossing] = []
     if np.isnan(frequency).all():
-        return found
+        return matches
     top = int(np.nanmax(frequency) / slow)
     for order in range(1, (top if highest is None else min(top, highest)) + 1):
         diameter = diameter_of(order, n_sectors)
@@ -77,8 +77,8 @@ def crossings(
         backward = against is not None and 2 * (order % n_sectors) <= n_sectors
         for family, hertz in enumerate((against if backward else frequency)[diameter]):  # type: ignore[index]
             if slow <= hertz / order <= fast:
-                found.append(Crossing(order, diameter, family, float(hertz / order), float(hertz)))
-    return found
+                matches.append(Crossing(order, diameter, family, float(hertz / order), float(hertz)))
+    return matches
 
 
 def meetings(families: Families, n_sectors: int, slow: float, fast: float) -> dict[str, list[Crossing]]:
@@ -116,7 +116,7 @@ def _families(axes: Any, values: np.ndarray, style: str, color: str, label: str)
 
 def campbell(
     speeds: np.ndarray,
-    found: Mapping[str, np.ndarray],
+    frequencies: Mapping[str, np.ndarray],
     orders: Sequence[int],
     critical: Mapping[int, Sequence[float]],
     scene: str = "",
@@ -130,15 +130,19 @@ def campbell(
     """
     with axes_of(7.2, 4.8) as (figure, axes):
         rpm = 60 * speeds
-        free = found["free"][:, 0]
+        free = frequencies["free"][:, 0]
         if np.isfinite(np.diff(free, axis=0)).any():  # of what only the contact holds they are known at rest alone
             axes.plot(rpm, free, "--", color=GREY, label=_first("free", free))
-        top = 1.08 * max(float(np.nanmax(found["stuck"])), *(s * abs(o) for o, at in critical.items() for s in at), 0.0)
+        top = 1.08 * max(
+            float(np.nanmax(frequencies["stuck"])), *(s * abs(o) for o, at in critical.items() for s in at), 0.0
+        )
         for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
-            own = found["stuck"][:, i]
-            axes.plot(rpm, own, color=color, label=_first(f"stuck, wave {order}", own))
-            if (other := found.get("stuck" + AGAINST)) is not None and -order not in orders:
-                axes.plot(rpm, other[:, i], "--", color=color, label=_first(f"stuck, wave {-order}", own))
+            wave_frequencies = frequencies["stuck"][:, i]
+            axes.plot(rpm, wave_frequencies, color=color, label=_first(f"stuck, wave {order}", wave_frequencies))
+            if (backward := frequencies.get("stuck" + AGAINST)) is not None and -order not in orders:
+                axes.plot(
+                    rpm, backward[:, i], "--", color=color, label=_first(f"stuck, wave {-order}", wave_frequencies)
+                )
             axes.plot(rpm, abs(order) * speeds, ":", color=color)
             end = min(1.0, top / (abs(order) * speeds[-1]))
             axes.annotate(
@@ -168,27 +172,29 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
     """
     if not 0 < slow < fast:
         raise Refusal(f"a SAFE diagram from {slow:g} to {fast:g} Hz: give two speeds above 0, the lower one first")
-    most = max(len(values) for values in families.values()) - 1
+    max_diameter = max(len(values) for values in families.values()) - 1
     top = _top(families)
     with axes_of(7.6, 5.2) as (figure, axes):
         orders = np.arange(1, min(int(top / slow) + 1, n_sectors) + 1)
         places = np.array([diameter_of(int(order), n_sectors) for order in orders])
-        there = places <= most
+        is_shown = places <= max_diameter
         for speed, style in ((slow, "-"), (fast, "--")):
             label = f"engine orders to {orders[-1]} at {60 * speed:.5g} rpm"
             axes.plot(
-                places[there], orders[there] * speed, style, color=ORANGE, label=label, zorder=1,
+                places[is_shown], orders[is_shown] * speed, style, color=ORANGE, label=label, zorder=1,
             )  # fmt: skip
-        axes.vlines(places[there], orders[there] * slow, orders[there] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1)
+        axes.vlines(
+            places[is_shown], orders[is_shown] * slow, orders[is_shown] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1
+        )
         for state, values in families.items():
             _families(axes, values, *STATES[state])
-        rings = [met for found in meetings(families, n_sectors, slow, fast).values() for met in found]
+        rings = [match for matches in meetings(families, n_sectors, slow, fast).values() for match in matches]
         if rings:
             axes.plot(
                 [m.diameter for m in rings], [m.frequency for m in rings], "o", ms=10, mfc="none", color=RED,
                 label=f"met by an engine order ({len(rings)})",
             )  # fmt: skip
-        for order, place in zip(orders[there], places[there], strict=True):
+        for order, place in zip(orders[is_shown], places[is_shown], strict=True):
             if order * fast < top:
                 axes.annotate(
                     f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center",
@@ -196,7 +202,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
                 )  # fmt: skip
         axes.set(xlabel="nodal diameter", ylabel="frequency / Hz")
         axes.set_title(named(scene, f"SAFE diagram of {n_sectors} sectors"))
-        axes.set_xlim(-0.5, most + 0.5)
+        axes.set_xlim(-0.5, max_diameter + 0.5)
         axes.set_ylim(0, top)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         figure.legend(loc="outside lower center", ncols=2, labelcolor=INK)

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tribodyn.workflows.pictures.exploded import apart
+from tribodyn.workflows.pictures.exploded import explosion_offsets
 from tribodyn.workflows.pictures.figures import status_name
-from tribodyn.workflows.pictures.plots import loop_size, pair_name, with_gaps
+from tribodyn.workflows.pictures.loop_plots import loop_size, pair_name
 from tribodyn.workflows.pictures.theme import CYCLE, GREY, INK, STATUS
 from tribodyn.workflows.pictures.view import grid_of, looking, wear_scale
+from tribodyn.workflows.pictures.wear_plots import with_gaps
 from tribodyn.workflows.result.faces import bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, shown_states, state_of
@@ -151,7 +152,7 @@ def solid(result: Result) -> dict[str, Any] | None:
     found["camera"] = [plain(1.9 * towards / np.linalg.norm(towards)), plain(up)]
     if part is not None:
         nodes, triangles = _surface(result)
-        offset = apart(result)
+        offset = explosion_offsets(result)
         found["body"] = {
             "xyz": plain(1e3 * part.points[nodes].T, 6),
             "ijk": triangles.T.tolist(),

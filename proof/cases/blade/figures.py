@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.style import BLUE, GREY, INK, ORANGE, RED
+from tribodyn.workflows.pictures.figures import axes_of as plot_axes
 from tribodyn.workflows.pictures.maps import patch_maps
-from tribodyn.workflows.pictures.plots import axes_of as plot_axes
 from tribodyn.workflows.pictures.wheel_diagrams import nodal_diameters as plot_nodal_diameters, shades
 from tribodyn.workflows.result.result import Result
 

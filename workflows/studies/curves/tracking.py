@@ -23,7 +23,7 @@ from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import limited
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.plots import axes_of, length_unit
+from tribodyn.workflows.pictures.figures import axes_of, length_unit
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import modelling, settings

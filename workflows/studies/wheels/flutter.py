@@ -17,7 +17,7 @@ from tribodyn.hbm.time.stepper import IntegrationFailed, Options
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic, with_flow
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.plots import axes_of
+from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.theme import BLUE, GREY, RED
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.settings import OUTPUT

@@ -28,7 +28,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.reduction import mistuning as reduction
 from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.plots import axes_of
+from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED
 from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.run import settings

@@ -23,7 +23,7 @@ from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction.damping import modal_damping_towards
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.plots import axes_of, length_unit
+from tribodyn.workflows.pictures.figures import axes_of, length_unit
 from tribodyn.workflows.pictures.theme import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Number, quantity
