@@ -10,7 +10,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures.figures import (

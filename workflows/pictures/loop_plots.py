@@ -97,6 +97,6 @@ def loop_of(result: Result, at: int, pair: int, component: int) -> Loop:
 
 def pair_name(result: Result, pair: int) -> str:
     """What a pair is called: its number, and its contact where there are several."""
-    named = result.facts.pairs_of_joints
+    named = result.facts.joints
     of = next((name for name, pairs in named.items() if pair in range(pairs.start, pairs.stop)), "")
     return f"pair {pair} of {of.replace('_', ' ')}" if of and len(named) > 1 else f"pair {pair}"
