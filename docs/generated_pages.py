@@ -185,11 +185,11 @@ def numbers_of(kind: PluginKind) -> str:
         lines += [f"## `{path.stem}`", "", _paragraph(head), ""]
         rows = []
         for own in kind.declared(path.stem):
-            default = "required" if own.needed else "" if own.default is None else f"`{own.default:g}`"
+            default = "required" if own.required else "" if own.default is None else f"`{own.default:g}`"
             limits = (("at least", own.low), ("above", own.above), ("at most", own.high))
             bounds = [f"{word} {limit:g}" for word, limit in limits if limit is not None]
             meaning = " ".join(filter(None, [_paragraph(own.meaning), _bounds(bounds)]))
-            rows.append((f"`{own.name}`", own.unit or ("" if own.whole else "ratio"), default, meaning))
+            rows.append((f"`{own.name}`", own.unit or ("" if own.integer else "ratio"), default, meaning))
         lines += _table(("key", "unit", "default", "meaning"), rows) or ["It has no numbers of its own.", ""]
     return "\n".join(lines)
 

@@ -14,8 +14,7 @@ from typing import NoReturn, cast
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.contact_law import ContactParameters
-from tribodyn.hbm.contact.joint import JointSet
+from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.mistuned import Alike, MistunedCompliance
 from tribodyn.reduction.cyclic import ReducedSector, travelling_wave
@@ -23,7 +22,7 @@ from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
 
-Change = Callable[[ContactParameters, np.ndarray], ContactParameters]
+Change = Callable[[Joint, np.ndarray], Joint]
 """Makes the parameters of a joint of sectors that differ from its own and the sector (n_pair,) of each pair."""
 
 
@@ -77,7 +76,7 @@ class MistunedWheel:
         joints = one.contact.repeated(self.n_sectors)
         if change is not None:
             size = one.contact.n_pair
-            joints = tuple(replace(j, parameters=change(j.parameters, j.rows // size)) for j in joints)
+            joints = tuple(change(joint, joint.rows // size) for joint in joints)
         contact = JointSet.of(self._model, joints)
         memory = np.tile(one.memory, (self.n_sectors, 1))
         at_rest = None if one.at_rest is None else np.tile(one.at_rest, (self.n_sectors, 1))

@@ -299,7 +299,7 @@ def load(name: str) -> StatedQuantity:
     """The quantity of this name; raises Refusal with the known names."""
     for file in _files:
         if file.stem == name:
-            quantity = getattr(declarations.run_file(file, FILES.what, FILES.needs), "QUANTITY", None)
+            quantity = getattr(declarations.run_file(file, FILES.title, FILES.functions), "QUANTITY", None)
             break
     else:
         FILES.file_of(name)

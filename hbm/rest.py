@@ -29,7 +29,7 @@ def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None 
     if not balance.basis.has_static:
         raise Refusal("a preload without friction needs harmonic 0: keep it in harmonics.kept")
     few = balance if 1 not in balance.basis.harmonics else balance.with_harmonics((0, 1))
-    smooth = few.contact.with_parameters(lambda p: p.scaled("friction", 0.0) if "friction" in p.numbers else p)
+    smooth = few.contact.with_friction_scaled(0.0)
     still = few.with_contact(smooth).with_load(0.0)
     exact = replace(options or newton.NewtonOptions(), tolerance=EXACT)
 

@@ -16,6 +16,7 @@ from time import process_time
 import numpy as np
 import scipy.linalg as sla
 
+from tribodyn.declarations import Role
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
@@ -198,7 +199,7 @@ def marched(balance: HarmonicBalance, x: np.ndarray, steps: int) -> np.ndarray:
     Each tangential spring has a slider between walls that the normal force moves; the second cycle repeats
     """
     basis, k = balance.basis, balance.contact.stiffness
-    friction = balance.contact.number("friction")[:, None]
+    friction = balance.contact.number(Role.FRICTION)[:, None]
     angle = 2 * np.pi * np.arange(steps) / steps
     shapes = np.stack([np.ones_like(angle)] + [f(h * angle) for h in basis.dynamic for f in (np.cos, np.sin)], axis=1)
     path = (x @ shapes.T).reshape(len(x), len(k), 3, steps)

@@ -95,15 +95,6 @@ class ContactParameters:
         tail = None if self.tail is None else self.tail[pairs]
         return replace(self, stiffness=self.stiffness[pairs], gap=self.gap[pairs], numbers=numbers, tail=tail)
 
-    def scaled(self, name: str, factor: float) -> ContactParameters:
-        """The same with one of the law's own numbers times a factor.
-
-        Raises  ValueError for a number from which the law has tabulated something
-        """
-        if self.tail is not None and name != "friction":
-            raise Refusal(f"{name} cannot be scaled in a contact law with a table: give it in the scene")
-        return replace(self, numbers={**self.numbers, name: factor * self.numbers[name]})
-
     @property
     def tangential(self) -> list[int]:
         """Positions of the tangential components, the ones in which friction works."""
@@ -188,7 +179,7 @@ def check_components(name: str, components: tuple[str, ...]) -> None:
 def checked(name: str, parameters: ContactParameters) -> ContactParameters:
     """The parameters with the law's own numbers complete and in their order; raises ValueError where that fails."""
     check_components(name, parameters.components)
-    values = declarations.checked(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
+    values = declarations.complete(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
     n = parameters.n_pair
     numbers = {key: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for key, v in values.items()}
     complete, law = replace(parameters, numbers=numbers), load(name)

@@ -14,6 +14,8 @@ from types import ModuleType
 
 import numpy as np
 
+from tribodyn import declarations
+from tribodyn.declarations import Role
 from tribodyn.hbm.contact import aft, contact_law
 from tribodyn.hbm.contact.contact_law import ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -39,6 +41,22 @@ class Joint:
     def module(self) -> ModuleType:
         """The contact law."""
         return contact_law.load(self.law)
+
+    def name_of(self, role: Role) -> str | None:
+        """The name of the law's number with a role, None where it has none."""
+        return declarations.name_of(role, contact_law.declared(self.law))
+
+    def with_friction_scaled(self, factor: float | np.ndarray) -> Joint:
+        """The joint whose limit of friction is multiplied by a factor, scalar or (n_pair,)."""
+        names = [name for role in declarations.SLIP_LIMITS if (name := self.name_of(role)) is not None]
+        numbers = self.parameters.numbers
+        numbers = {**numbers, **{name: factor * numbers[name] for name in names}}
+        return replace(self, parameters=replace(self.parameters, numbers=numbers))
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the law limits its tangential force."""
+        return any(self.name_of(role) is not None for role in declarations.SLIP_LIMITS)
 
     @property
     def rows(self) -> np.ndarray:
@@ -135,7 +153,11 @@ class JointSet:
         )
         if not alike:
             return self.only(needed_by)
-        numbers = {name: self.number(name) for name in first.parameters.numbers}
+
+        def gathered(name: str) -> np.ndarray:
+            return self.gathered(lambda joint: joint.parameters.numbers[name])
+
+        numbers = {name: gathered(name) for name in first.parameters.numbers}
         whole = replace(first.parameters, stiffness=self.stiffness, gap=self.gap, numbers=numbers)
         return replace(first, name=needed_by, parameters=whole, pairs=np.arange(self.n_pair))
 
@@ -156,18 +178,29 @@ class JointSet:
     @cached_property
     def gap(self) -> np.ndarray:
         """(n_pair,) opening of the unloaded pairs [m]."""
-        return self._alone.parameters.gap if self._alone is not None else self.gathered(lambda p: p.gap)
+        alone = self._alone
+        return self.gathered(lambda joint: joint.parameters.gap) if alone is None else alone.parameters.gap
 
-    def number(self, name: str) -> np.ndarray:
-        """(n_pair,) one of the laws' own numbers, zero in joints whose law has none of that name."""
-        return self.gathered(lambda p: p.numbers.get(name, np.zeros(p.n_pair)))
+    def number(self, role: Role) -> np.ndarray:
+        """(n_pair,) the laws' numbers with a role, zero in joints whose law has none."""
 
-    def gathered(self, what: Callable[[ContactParameters], np.ndarray]) -> np.ndarray:
+        def value(joint: Joint) -> np.ndarray:
+            name = joint.name_of(role)
+            return np.zeros(len(joint.rows)) if name is None else joint.parameters.numbers[name]
+
+        return self.gathered(value)
+
+    def gathered(self, value: Callable[[Joint], np.ndarray]) -> np.ndarray:
         """(n_pair,) a value of every pair, joint by joint."""
         out = np.zeros(self.n_pair)
         for joint in self.joints:
-            out[joint.rows] = what(joint.parameters)
+            out[joint.rows] = value(joint)
         return out
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether a law limits its tangential force."""
+        return any(joint.has_friction for joint in self.joints)
 
     @cached_property
     def sees(self) -> np.ndarray:
@@ -210,6 +243,10 @@ class JointSet:
     def with_parameters(self, change: Callable[[ContactParameters], ContactParameters]) -> JointSet:
         """The same with the parameters of every joint changed."""
         return self._with(lambda joint: change(joint.parameters))
+
+    def with_friction_scaled(self, factor: float) -> JointSet:
+        """The same with the limit of friction of every pair multiplied by a factor."""
+        return replace(self, joints=tuple(joint.with_friction_scaled(factor) for joint in self.joints))
 
     def _with(self, parameters: Callable[[Joint], ContactParameters]) -> JointSet:
         return replace(self, joints=tuple(replace(joint, parameters=parameters(joint)) for joint in self.joints))

@@ -8,5 +8,5 @@ from __future__ import annotations
 
 from tribodyn.plugins import PluginKind
 
-KIND = PluginKind("continuation", "tribodyn.hbm.continuation.methods", ("follow", "Options"), declares="Options")
+KIND = PluginKind("continuation", "tribodyn.hbm.continuation.methods", ("follow", "Options"), class_name="Options")
 names, file_of, load, declared = KIND.names, KIND.file_of, KIND.load, KIND.declared

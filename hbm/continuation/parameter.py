@@ -102,18 +102,16 @@ def stiffness(balance: HarmonicBalance, omega: float) -> Parameter:
 
 
 def friction(balance: HarmonicBalance, omega: float) -> Parameter:
-    """Factor on the coefficient of friction of every law that has one, at one frequency [rad/s].
+    """Factor on the limit of friction of every law that has one, at one frequency [rad/s].
 
     Raises ValueError where none has
     """
-    contact, name = balance.contact, "friction"
-    if not any(name in joint.parameters.numbers for joint in contact.joints):
+    contact = balance.contact
+    if not contact.has_friction:
         raise Refusal("no contact law here has a coefficient of friction to change")
 
     def make(value: float) -> HarmonicBalance:
-        return balance.with_contact(
-            contact.with_parameters(lambda p: p.scaled(name, value) if name in p.numbers else p)
-        )
+        return balance.with_contact(contact.with_friction_scaled(value))
 
     return Parameter("friction factor", make, omega)
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tribodyn.declarations import Role
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import amplitude
@@ -171,11 +172,11 @@ def _check(balance: HarmonicBalance) -> list[int]:
 def _reach(balance: HarmonicBalance, state: State, tangential: list[int]) -> np.ndarray:
     """(n_pair, n_tangential) travel of a slider from one end of its range to the other, at most [m]."""
     contact = balance.contact
-    load = contact.number("normal_load")
+    load = contact.number(Role.NORMAL_LOAD)
     if "n" in contact.components:
         load = np.maximum(load, np.abs(state.cycle.force[:, -1]).sum(axis=1))
     k = contact.stiffness[:, tangential]
-    limit = (contact.number("friction") * load)[:, None]
+    limit = (contact.number(Role.FRICTION) * load + contact.number(Role.SLIP_FORCE))[:, None]
     return np.divide(2 * limit, k, out=np.zeros_like(k), where=k > 0) + np.abs(state.x[:, tangential]).sum(axis=2)
 
 

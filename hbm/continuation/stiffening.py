@@ -21,14 +21,12 @@ import scipy.linalg as sla
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
-from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
-FRICTION = "friction"  # what laws call their coefficient
 ROUGH = (3.0, 2.5, 2.0, 1.5, 1.0, 0.5)  # decimal logarithms of friction over its own, tried in turn
 SLIDING_STEPS = 400  # of Newton on the whole way to its own friction
 
@@ -167,7 +165,7 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
     solution moves with it. A wedge that a load presses between two bodies is the example: from the stuck state Newton's
     method lets go of one of its faces, and nothing holds it any more.
     """
-    if not any(FRICTION in joint.parameters.numbers for joint in balance.contact.joints):
+    if not balance.contact.has_friction:
         return None
     x, spent, products = balance.stuck(omega), 0, 0
     found: Solution | None = None
@@ -191,10 +189,4 @@ def _with_friction(balance: HarmonicBalance, level: float) -> HarmonicBalance:
     """The same problem with all coefficients of friction times ten to the level."""
     if level == 0.0:
         return balance
-
-    def rougher(p: ContactParameters) -> ContactParameters:
-        if FRICTION not in p.numbers:
-            return p
-        return replace(p, numbers={**p.numbers, FRICTION: p.numbers[FRICTION] * 10.0**level})
-
-    return replace(balance, contact=balance.contact.with_parameters(rougher))
+    return replace(balance, contact=balance.contact.with_friction_scaled(10.0**level))

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tribodyn.declarations import Role, name_of
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.outcome import SolveEnd
-from tribodyn.hbm.wear import fewer_harmonics
+from tribodyn.hbm.wear import fewer_harmonics, law as wear_law
 from tribodyn.hbm.wear.evolution import WearProblem, WearState, worn_state
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
@@ -145,7 +146,8 @@ def depth_per_work(problem: WearProblem, state: WearState) -> np.ndarray:
         works = work > 0
         if np.any(rate[~works] > 0):
             raise Refusal(f'wear law "{wear.law}" wears pairs without friction work: take the thesis\'s rule')
-        own = problem.numbers(name).get("coefficient", np.ones(len(pairs))) / area[pairs]
+        coefficient = name_of(Role.WEAR_COEFFICIENT, wear_law.declared(wear.law))
+        own = (np.ones(len(pairs)) if coefficient is None else problem.numbers(name)[coefficient]) / area[pairs]
         known = works & (own > 0)
         factor = np.mean(rate[known] / (work[known] * own[known])) if known.any() else 1.0
         gain[pairs] = np.divide(rate, work, out=factor * own, where=works)

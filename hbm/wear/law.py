@@ -42,7 +42,7 @@ class JointWear:
 
         Raises  ValueError where there is no such law, or a number is missing, unknown or out of its limits
         """
-        given = declarations.checked(declared(law), numbers, f"wear law '{Path(law).stem}'")
+        given = declarations.complete(declared(law), numbers, f"wear law '{Path(law).stem}'")
         return cls(law, given)
 
 

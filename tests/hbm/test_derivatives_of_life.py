@@ -97,7 +97,7 @@ from tribodyn.declarations import number
 
 @dataclass(frozen=True)
 class Parameters:
-    coefficient: float = number("m3/J", low=0.0)
+    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0)
     depth: float = number("m", low=0.0)
     cycles: float = number("", low=0.0)
 

@@ -115,9 +115,9 @@ def test_friction_and_gap_that_differ_by_blade_are_the_dense_wheel(reduced):
     factor, gap, deviation = 1 + 5 * DIFFERENT, 5e-5 * DIFFERENT, 0.5 * DIFFERENT
     n_pair = len(springs(reduced))
 
-    def change(own, sector):
-        numbers = {**own.numbers, "friction": own.numbers["friction"] * factor[sector]}
-        return replace(own, numbers=numbers, gap=own.gap + gap[sector])
+    def change(joint, sector):
+        opened = replace(joint.parameters, gap=joint.parameters.gap + gap[sector])
+        return replace(joint, parameters=opened).with_friction_scaled(factor[sector])
 
     dense = whole(reduced, deviation, np.repeat(0.3 * factor, n_pair), np.repeat(gap, n_pair))
     there = newton.solve_from_rest(dense, 2 * np.pi * 250, EXACT)

@@ -83,7 +83,7 @@ from tribodyn.declarations import number
 
 @dataclass(frozen=True)
 class Parameters:
-    coefficient: float = number("m3/J", low=0.0)
+    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0)
     exponent: float = number("", default=1.0, above=0.0)
 
 def depth_rate(exposure):
@@ -246,7 +246,7 @@ def test_every_number_of_a_contact_law_changes_its_force(name: str) -> None:
 
 def test_every_file_of_a_kind_declares_what_it_takes() -> None:
     for name in wear_law.names():
-        assert [n.name for n in wear_law.declared(name) if n.needed] == ["coefficient"]
+        assert [n.name for n in wear_law.declared(name) if n.required] == ["coefficient"]
     for name in parts.names():
         assert declarations.read(parts.file_of(name))
     for name in continuation.names():

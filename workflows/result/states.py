@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tribodyn.declarations import SLIP_LIMITS
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.history import WearHistory
@@ -100,33 +101,36 @@ def counted(number: float) -> str:
     return f"{digits}·10{str(int(power)).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
-def friction_of(result: Result) -> np.ndarray:
-    """(n_pair,) friction coefficient that the scene gives each pair's contact, nan where it gives none."""
-    found = np.full(len(result.patch.area), np.nan)
+def slip_limits(result: Result, normal: np.ndarray) -> np.ndarray:
+    """Tangential force (n_pair, n_sample) [N] at which pairs slip under a normal force, nan where no law has a limit.
+
+    normal : (n_pair, n_sample) [N]
+    """
+    limit = np.full(normal.shape, np.nan)
     for name, contact in result.scene.joints.items():
-        mu = contact.numbers.get("friction")
-        if mu is not None:
-            found[result.facts.joints.get(name, slice(None))] = mu
-    return found
+        friction, force = (contact.number(role) for role in SLIP_LIMITS)
+        if friction is not None or force is not None:
+            pairs = result.facts.joints.get(name, slice(None))
+            limit[pairs] = (friction or 0.0) * normal[pairs] + (force or 0.0)
+    return limit
 
 
 def instant_status(result: Result, at: int) -> np.ndarray:
     """(n_pair, n_sample) whether each pair sticks, slips or is separated at the instants of a kept loop.
 
-    A closed pair slips where its tangential force is at mu N; without one mu it counts as sticking
+    A closed pair slips where its tangential force is at the limit of its law; without a limit it counts as sticking
     """
     loops, patch = result.loops, result.patch
     assert loops is not None
     force = loops.force[at]
     status = np.full(force[:, 0].shape, STICKS)
-    mu = friction_of(result)
     tangential = [c for c, name in enumerate(patch.components) if name != "n"]
     if "n" not in patch.components:
         return status
     normal = force[:, patch.components.index("n")]
     largest = max(float(np.abs(normal).max()), 1e-300)
-    if np.isfinite(mu).any() and tangential:
-        limit = mu[:, None] * normal
+    limit = slip_limits(result, normal)
+    if np.isfinite(limit).any() and tangential:
         near = limit - 1e3 * CLOSE * np.abs(limit) - CLOSE * largest
         along, both = np.abs(force[:, tangential]).max(axis=1), np.linalg.norm(force[:, tangential], axis=1)
         # where the limit holds for each direction alone, both together may pass it: then they are no sign of slip

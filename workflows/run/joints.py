@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.declarations import Role, name_of
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import Part
@@ -88,7 +89,8 @@ def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
         parameters = parameters_of(contact, interface, pairs, springs[pairs][:, seen])
         found.append(Joint(name, contact.law_name, parameters, pairs))
     if not found:  # a structure that touches nothing: a joint of no pairs
-        nothing = contact_law.ContactParameters.of(interface.components, springs, gap=interface.gap, friction=0.0)
+        zeros = {number.name: 0.0 for number in contact_law.declared("jenkins")}
+        nothing = contact_law.ContactParameters.of(interface.components, springs, gap=interface.gap, **zeros)
         found.append(Joint("none", "jenkins", nothing))
     return found
 
@@ -98,8 +100,9 @@ def parameters_of(
 ) -> contact_law.ContactParameters:
     """The parameters of a joint with springs (n_pair, n_component); a law that counts by area has that of each pair."""
     numbers: dict[str, Any] = dict(contact.numbers)
-    if any(n.name == "area" for n in contact_law.declared(contact.law_name)):
-        numbers.setdefault("area", interface.area[pairs])
+    area = name_of(Role.AREA, contact_law.declared(contact.law_name))
+    if area is not None:
+        numbers.setdefault(area, interface.area[pairs])
     return contact_law.ContactParameters.of(
         contact.components,
         springs,

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ConfigDict, PrivateAttr, ValidationInfo, model_validator
 
-from tribodyn.declarations import Number, read
+from tribodyn.declarations import Number, Role, name_of, read
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Table, unknown_key
 from tribodyn.workflows.scene.units import to_si
@@ -55,15 +55,15 @@ def numbers(
             raise Refusal(unknown_key(f"{table}{name}", [*others, *known]))
         found[name] = _in_si(f"{table}{name}", known[name], value)
     for name, number in known.items():
-        if number.needed and name not in found:
+        if number.required and name not in found:
             raise Refusal(f"{table}{name} is missing: its numbers here are {', '.join(known)}")
     return found
 
 
 def _in_si(key: str, number: Number, value: Any) -> int | float:
-    if number.whole and type(value) is not int:
+    if number.integer and type(value) is not int:
         raise Refusal(f"{key}: expected a whole number, got {value!r}")
-    converted = value if number.whole else _converted(key, number, value)
+    converted = value if number.integer else _converted(key, number, value)
     if fault := number.fault(converted):
         raise Refusal(f"{key}: {fault}")
     return converted
@@ -130,6 +130,12 @@ class LawTable(Table):
     def law_name(self) -> str:
         """Name of the law for hbm: that of the package, or the path of the file beside the scene."""
         return self.law if self._own is None else str(self._own)
+
+    def number(self, role: Role) -> float | None:
+        """The law's number with a role, None where it has none, or is a user's file that is not beside this result."""
+        if is_file(self.law) and self._own is None:
+            return None
+        return self.numbers.get(name_of(role, read(self.LAWS.file_of(self.law_name))) or "")
 
     @property
     def numbers(self) -> dict[str, float]:

@@ -41,7 +41,7 @@ SIMPLER = "jenkins"
 class Parameters:
     """The law's own numbers."""
 
-    friction: float = number("", low=0.0)
+    friction: float = number("", role="friction", low=0.0)
     """Coulomb coefficient."""
 
 

@@ -24,9 +24,9 @@ located = transitions.cycle
 class Parameters:
     """The law's own numbers."""
 
-    friction: float = number("", low=0.0)
+    friction: float = number("", role="friction", low=0.0)
     """Coulomb coefficient."""
-    normal_load: float = number("N", low=0.0)
+    normal_load: float = number("N", role="normal_load", low=0.0)
     """Constant normal load of every pair, 0 for no contact."""
 
 

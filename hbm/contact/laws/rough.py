@@ -44,15 +44,15 @@ FRICTION, POISSON = 4, 7  # places in a packed row
 class Parameters:
     """The law's own numbers."""
 
-    friction: float = number("", low=0.0)
+    friction: float = number("", role="friction", low=0.0)
     """Coulomb coefficient."""
-    area: float = number("m2", default=1.0, above=0.0)
+    area: float = number("m2", role="area", default=1.0, above=0.0)
     """Area that a pair stands for; a scene gives each pair its own."""
     young: float = number("Pa", above=0.0)
     """Young's modulus of both bodies."""
     poisson: float = number("", low=0.0, high=0.5)
     """Poisson's ratio of both bodies."""
-    radius: float = number("m", above=0.0)
+    radius: float = number("m", role="asperity_radius", above=0.0)
     """Effective radius of the asperities: half the radius of two alike."""
     yield_stress: float = number("Pa", default=0.0, low=0.0)
     """Yield stress; 0 for asperities that never yield."""

@@ -17,7 +17,7 @@ from tribodyn.hbm.wear.law import Exposure
 class Parameters:
     """The law's own numbers."""
 
-    coefficient: float = number("m3/J", low=0.0)
+    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0)
     """Worn volume per friction work, alpha."""
 
 

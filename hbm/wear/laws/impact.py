@@ -23,7 +23,7 @@ from tribodyn.refusal import Refusal
 class Parameters:
     """The law's own numbers."""
 
-    coefficient: float = number("m3/J", low=0.0)
+    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0)
     """Worn volume per work of impacts."""
 
 

@@ -18,7 +18,7 @@ from tribodyn.declarations import number
 class Parameters:
     """The law's own numbers."""
 
-    coefficient: float = number("m3/J", low=0.0)
+    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0)
     """Worn volume per friction work of run-in faces."""
     ratio: float = number("", default=4.0, low=0.0)
     """Wear of a fresh face over that of a run-in one."""

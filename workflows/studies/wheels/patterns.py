@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from tribodyn.fem.constraints import named
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.contact_law import ContactParameters
+from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation import highest_peak
 from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
@@ -96,7 +96,7 @@ class MistunedBlades:
         shapes = reduction.nominal_shapes(wheel.reduced, wheel.springs, K, asked.families, loads, asked.left_out)
         reduced = reduction.with_ports(wheel.reduced, K, shapes)
         wave = replace(wheel, reduced=reduced).wave()
-        if asked.friction and not any("friction" in joint.parameters.numbers for joint in wave.contact.joints):
+        if asked.friction and not wave.contact.has_friction:
             raise SceneError("mistuning.friction: no contact of this scene has friction: leave it out")
         ports = tuple(reduction.port_name(k) for k in range(shapes.shape[1]))
         return cls(file, wheel.part, reduced, MistunedWheel(wave, ports))
@@ -129,12 +129,10 @@ class MistunedBlades:
     def balance(self, pattern: Pattern) -> HarmonicBalance:
         """The whole wheel of a pattern."""
 
-        def change(own: ContactParameters, sector: np.ndarray) -> ContactParameters:
-            made = replace(own, gap=own.gap + pattern.gap[sector])
-            if not pattern.friction.any() or "friction" not in own.numbers:
-                return made
-            factor = 1 + pattern.friction[sector]
-            return replace(made, numbers={**own.numbers, "friction": factor * own.numbers["friction"]})
+        def change(joint: Joint, sector: np.ndarray) -> Joint:
+            opened = replace(joint.parameters, gap=joint.parameters.gap + pattern.gap[sector])
+            changed = replace(joint, parameters=opened)
+            return changed.with_friction_scaled(1 + pattern.friction[sector]) if pattern.friction.any() else changed
 
         return self.wheel.balance(pattern.stiffness, change)
 
