@@ -131,6 +131,7 @@ class Bed:
     k, g, dk, dg : (n_pair, SPRINGS) as of `bed`; peak, angle : (n_pair,) deepest approach of the cycle [m] and where
     grows : (n_pair,) whether that is deeper than all before
     sliders : (n_pair, SPRINGS, n_component - 1) their memory [m]; ratio : (n_pair,) tangential over normal stiffness
+    friction : (n_pair,) coefficient
     """
 
     parameters: ContactParameters
@@ -143,9 +144,12 @@ class Bed:
     grows: np.ndarray
     sliders: np.ndarray
     ratio: np.ndarray
+    friction: np.ndarray
 
     @classmethod
-    def of(cls, x, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, located: bool) -> Bed:
+    def of(
+        cls, x, parameters: ContactParameters, friction, memory: np.ndarray, basis: HarmonicBasis, located: bool
+    ) -> Bed:
         """The bed at the deepest approach of the cycle x (n_pair, n_component, n_coeff) [m] and its past."""
         peak, angle = deepest_of(x[:, -1], basis, located)
         peak = peak - parameters.gap
@@ -153,7 +157,7 @@ class Bed:
         springs = bed(parameters.packed(), np.where(grows, peak, memory[:, 0]))
         sliders = memory[:, 1:].reshape(len(x), -1, SPRINGS).transpose(0, 2, 1)
         ratio = tangential_ratio(parameters.numbers["poisson"])
-        return cls(parameters, *springs, peak, angle, grows, sliders, ratio)
+        return cls(parameters, *springs, peak, angle, grows, sliders, ratio, friction)
 
     @property
     def touch(self) -> np.ndarray:
@@ -164,9 +168,8 @@ class Bed:
         """Some of the springs as Jenkins elements."""
         k = self.k[pair, spring]
         tangential = [self.ratio[pair] * k] * self.sliders.shape[2]
-        friction = {"friction": self.parameters.numbers["friction"][pair]}
         stiff = np.stack([*tangential, k], axis=1)
-        return ContactParameters(self.parameters.components, stiff, self.touch[pair, spring], friction)
+        return ContactParameters(self.parameters.components, stiff, self.touch[pair, spring], {})
 
     def at_rest(self, x: np.ndarray, basis: HarmonicBasis) -> tuple[np.ndarray, np.ndarray]:
         """(n_pair, SPRINGS) whether a spring sticks all through the cycle x, and whether it never touches.
@@ -175,7 +178,7 @@ class Bed:
         """
         samples = basis.to_time(x)
         n, t, start = samples[:, -1], samples[:, :-1], self.sliders[:, -1]
-        mu, ratio = self.parameters.numbers["friction"], self.ratio
+        mu, ratio = self.friction, self.ratio
         off = np.abs(t - start[:, :, None]).max(axis=1, initial=0.0)
         slips_below = (ratio[:, None] * off - mu[:, None] * n).max(axis=1)  # sticks if below - mu touch
         opens_below = n.min(axis=1)
@@ -190,16 +193,16 @@ class Bed:
 
 
 def sliders(
-    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis
+    x: np.ndarray, parameters: ContactParameters, friction: np.ndarray, memory: np.ndarray, basis: HarmonicBasis
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the sliders of all springs over the periodic cycle x (n_pair, n_component, n_coeff), and their load.
 
     Returns (n_pair, SPRINGS, n_component - 1, n_samples) [m], (n_pair, SPRINGS, n_samples) normal force [N]
     """
-    made = Bed.of(x, parameters, memory, basis, located=False)
+    made = Bed.of(x, parameters, friction, memory, basis, located=False)
     moved = basis.to_time(x)
     pressed = np.maximum(moved[:, None, -1] - made.touch[:, :, None], 0.0)
-    reach = (parameters.numbers["friction"] / made.ratio)[:, None, None] * pressed  # at which one slips
+    reach = (friction / made.ratio)[:, None, None] * pressed  # at which one slips
     at, found = made.sliders, np.empty((*made.sliders.shape, basis.n_samples))
     for _ in range(2):  # the memory of Jenkins elements repeats after the first
         for i in range(basis.n_samples):
@@ -208,13 +211,13 @@ def sliders(
     return found, made.k[:, :, None] * pressed
 
 
-def cycle(x, parameters, memory, basis, jacobian, located: bool) -> ContactCycle:
+def cycle(x, parameters, friction, memory, basis, jacobian, located: bool) -> ContactCycle:
     """The bed at the deepest approach of the cycle and its past.
 
     Springs that stick all through it are one spring; the others go by the cycle of Jenkins elements.
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start
     """
-    made = Bed.of(x, parameters, memory, basis, located)
+    made = Bed.of(x, parameters, friction, memory, basis, located)
     sticks, open_ = made.at_rest(x, basis)
     force, slope = _stuck(made, made.k * sticks, x, basis, jacobian)
     add = _add_located if located else _add_sampled
@@ -242,7 +245,8 @@ def _add_located(made, active, x, basis, force, slope, by_deepest, status):
     pair, spring = np.nonzero(active)
     own = np.ascontiguousarray(made.sliders[pair, spring])
     elements = made.elements(pair, spring)
-    each = transitions.cycle(np.ascontiguousarray(x[pair]), elements, own, basis, slope is not None)
+    moved, friction = np.ascontiguousarray(x[pair]), made.friction[pair]
+    each = transitions.cycle(moved, elements, own, basis, slope is not None, friction=friction)
     force += _by_pair(each.force, pair, n_pair)
     np.bitwise_or.at(status, pair, each.status & ~SEPARATES)
     # the deepest spring is the last to let go: only where it opens the pair does
@@ -264,7 +268,7 @@ def _add_sampled(made, active, x, basis, force, slope, by_deepest, status):
     sums, weighted = np.zeros_like(samples), np.zeros_like(samples)
     jac = np.zeros((0, 0, 0)) if slope is None else slope
     column = np.zeros(x.shape)
-    springs = (made.k, made.touch, made.dk, made.dg, made.ratio, made.parameters.numbers["friction"])
+    springs = (made.k, made.touch, made.dk, made.dg, made.ratio, made.friction)
     start = np.ascontiguousarray(made.sliders)
     _sum(samples, *springs, start, active, basis.synthesis, *basis.prefix_sums, sums, weighted, jac, column, status)
     force += basis.from_time(sums)

@@ -56,6 +56,8 @@ def test_a_scene_that_was_written_out_reads_again() -> None:
         ((f"{ROOT}.friction=0.4",), r"contacts\.root_right\.friction: by_temperature gives it too"),
         ((f"{ROOT}.by_temperature.friction=[0.5, 0.4]",), "friction: give 3 values, one for each temperature"),
         ((f'{ROOT}.by_temperature.temperature=["0 K", "9 K", "5 K"]',), "ascending order"),
+        ((f"{ROOT}.by_temperature.friction=[0.5, 0.4, -0.2]",), "friction: expected a value at least 0"),
+        ((f"{ROOT}.by_temperature.fricton=[0.5, 0.4, 0.2]",), "did you mean friction"),
         (('loads.static.map={field="t.csv"}',), "give the contact's own temperature"),
         (("contacts.root_left.temperature=400 K",), "is for by_temperature, which is not there"),
     ],

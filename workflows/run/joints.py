@@ -89,7 +89,7 @@ def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
         parameters = parameters_of(contact, interface, pairs, springs[pairs][:, seen])
         found.append(Joint(name, contact.law_name, parameters, pairs))
     if not found:  # a structure that touches nothing: a joint of no pairs
-        zeros = {number.name: 0.0 for number in contact_law.declared("jenkins")}
+        zeros: dict[str, Any] = {number.name: 0.0 for number in contact_law.declared("jenkins")}
         nothing = contact_law.ContactParameters.of(interface.components, springs, gap=interface.gap, **zeros)
         found.append(Joint("none", "jenkins", nothing))
     return found

@@ -7,12 +7,12 @@ from types import ModuleType
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
+from pydantic import ConfigDict, Field, StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
 from tribodyn import declarations
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
+from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table, quantity
 from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
 from tribodyn.workflows.scene.stages import CONTACT, PART, SMOOTH, SceneStage
 
@@ -27,16 +27,20 @@ def rows_of(path: Path) -> list[list[float]]:
 
 
 Change = Annotated[float, quantity("K")]
-GIVEN = ("friction", "tangential_stiffness", "normal_stiffness")
 
 
 class ByTemperature(Table, stage=CONTACT):
-    """Numbers of a contact at several changes of temperature, linear between them; none beyond their ends."""
+    """Numbers of a contact at several changes of temperature, linear between them; refused beyond their ends.
+
+    Numbers of the contact's law, such as its coefficient of friction, are further keys, each with a value for every
+    temperature.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    NUMBERS_STAGE: ClassVar[SceneStage] = CONTACT
 
     temperature: Annotated[tuple[Change, ...], Field(min_length=1)]
     """Changes of temperature, ascending, counted as those of the loads."""
-    friction: tuple[Annotated[Number, Field(ge=0)], ...] | None = None
-    """Coefficient of friction at each."""
     tangential_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
     """Tangential stiffness of the contact at each."""
     normal_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
@@ -47,7 +51,7 @@ class ByTemperature(Table, stage=CONTACT):
         if any(np.diff(self.temperature) <= 0):
             raise Refusal("temperature: give the changes of temperature in ascending order")
         if not self.columns:
-            raise Refusal(f"give at least one of {', '.join(GIVEN)} at each temperature")
+            raise Refusal("give numbers of the contact at each temperature, such as normal_stiffness")
         for name, values in self.columns.items():
             if len(values) != len(self.temperature):
                 raise Refusal(f"{name}: give {len(self.temperature)} values, one for each temperature")
@@ -55,8 +59,14 @@ class ByTemperature(Table, stage=CONTACT):
 
     @property
     def columns(self) -> dict[str, tuple[float, ...]]:
-        """The numbers that are given, by name."""
-        return {name: values for name in GIVEN if (values := getattr(self, name)) is not None}
+        """The values of each number by its name."""
+        stiffness = {"tangential_stiffness": self.tangential_stiffness, "normal_stiffness": self.normal_stiffness}
+        return {name: values for name, values in (self.numbers | stiffness).items() if values is not None}
+
+    @property
+    def numbers(self) -> dict[str, tuple[float, ...]]:
+        """The values of each number of the law."""
+        return {name: tuple(values) for name, values in (self.model_extra or {}).items()}
 
     def at(self, temperature: float) -> dict[str, float]:
         """The numbers at a change of temperature [K]; raises ValueError beyond the ends."""

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from tribodyn import declarations
+from tribodyn.declarations import Role
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.contact import ByTemperature, Change, Surfaces
-from tribodyn.workflows.scene.fields import Table
-from tribodyn.workflows.scene.own import is_file
+from tribodyn.workflows.scene.contact import ByTemperature, Change, ContactTable, Surfaces
+from tribodyn.workflows.scene.fields import Table, unknown_key
+from tribodyn.workflows.scene.own import in_si, is_file
 
 if TYPE_CHECKING:  # most scenes name no faces and start sooner without
     from tribodyn.geometry.surface import HeightMap
@@ -29,13 +30,16 @@ class _Heat(Table):
     temperature: Change
 
 
-def with_numbers_when_hot(key: str, contact: Mapping[str, Any], static: Any) -> dict[str, Any]:
+def with_numbers_when_hot(key: str, contact: Mapping[str, Any], static: Any, folder: Path | None) -> dict[str, Any]:
     """The table of a contact as it stands in the file, with the numbers of its temperature.
 
     key : of the contact; static : the table of the static loads
-    Raises  ValueError where its temperature is not known or a number is given twice
+    folder : of the scene, None for the scene of a result, whose numbers are in SI units
+    Raises  Refusal where its temperature is not known or a number is given twice
     """
     own = {name: contact[name] for name in ("temperature", "by_temperature") if name in contact}
+    if folder is not None and isinstance(own["by_temperature"], Mapping):
+        own["by_temperature"] = _in_si(f"{key}.by_temperature", own["by_temperature"], contact, folder)
     try:
         read = _OfContact.model_validate(own)
     except ValidationError as error:  # before the numbers that it should have given are missed
@@ -50,7 +54,25 @@ def with_numbers_when_hot(key: str, contact: Mapping[str, Any], static: Any) -> 
     twice = [name for name, value in found.items() if contact.get(name, value) not in (None, value)]
     if twice:
         raise Refusal(f"{key}.{twice[0]}: by_temperature gives it too: leave one of them out")
-    return {**contact, **found}
+    return {**contact, **own, **found}
+
+
+def _in_si(key: str, table: Mapping[str, Any], contact: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A table by temperature whose numbers of the law are in SI units."""
+    general, law = ByTemperature.model_fields, contact.get("law", "")
+    if not isinstance(law, str):
+        return dict(table)  # refused where the contact is read
+    declared = {number.name: number for number in ContactTable.declared_numbers(contact, folder)}
+    result = dict(table)
+    for name, values in table.items():
+        if name in general:
+            continue
+        if name not in declared:
+            raise Refusal(unknown_key(f"{key}.{name}", [*general, *declared]))
+        if not isinstance(values, list | tuple):
+            raise Refusal(f"{key}.{name}: expected a list with one value for each temperature, got {values!r}")
+        result[name] = [in_si(f"{key}.{name}", declared[name], value) for value in values]
+    return result
 
 
 def _warmed(contact: Mapping[str, Any], static: Any) -> float:
@@ -114,7 +136,8 @@ def with_asperities(contact: Mapping[str, Any], surfaces: Surfaces, folder: Path
         radius, table = _asperities(surfaces, folder)
     except (ValueError, OSError) as error:
         raise Refusal(f"surfaces: no asperities for the law '{contact['law']}': {error}") from None
-    return {"radius": radius, **contact, "table": table}
+    name = declarations.name_of(Role.ASPERITY_RADIUS, contact_law.declared(contact["law"]))
+    return {**({} if name is None else {name: radius}), **contact, "table": table}
 
 
 @lru_cache(maxsize=8)  # a scene is read again for every change of a study

@@ -53,14 +53,15 @@ def numbers(
     for name, value in given.items():
         if name not in known:
             raise Refusal(unknown_key(f"{table}{name}", [*others, *known]))
-        found[name] = _in_si(f"{table}{name}", known[name], value)
+        found[name] = in_si(f"{table}{name}", known[name], value)
     for name, number in known.items():
         if number.required and name not in found:
             raise Refusal(f"{table}{name} is missing: its numbers here are {', '.join(known)}")
     return found
 
 
-def _in_si(key: str, number: Number, value: Any) -> int | float:
+def in_si(key: str, number: Number, value: Any) -> int | float:
+    """A value of a declared number in SI units; key : of the scene, for sentences."""
     if number.integer and type(value) is not int:
         raise Refusal(f"{key}: expected a whole number, got {value!r}")
     converted = value if number.integer else _converted(key, number, value)
@@ -115,11 +116,15 @@ class LawTable(Table):
             return table
         general = {name: value for name, value in table.items() if name in fields}
         given = {name: value for name, value in table.items() if name not in fields}
-        law = general.get("law", fields["law"].default)
-        if not isinstance(law, str):
+        if not isinstance(general.get("law", ""), str):
             return general  # refused by the field itself
-        path = beside(folder, law, f"{cls.TABLE}.law") if is_file(law) else cls.LAWS.file_of(law)
-        return general | numbers(f"{cls.TABLE}.", read(path), given, fields)
+        return general | numbers(f"{cls.TABLE}.", cls.declared_numbers(general, folder), given, fields)
+
+    @classmethod
+    def declared_numbers(cls, table: Mapping[str, Any], folder: Path) -> tuple[Number, ...]:
+        """The numbers that the law of a table, as it stands in the scene's file, declares."""
+        law = table.get("law", cls.model_fields["law"].default)
+        return read(beside(folder, law, f"{cls.TABLE}.law") if is_file(law) else cls.LAWS.file_of(law))
 
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:

@@ -188,7 +188,7 @@ class MeshScene(Scene):
         prefix = "contacts." if several is contacts else ""
         static = loads.get("static") if isinstance(loads, dict) else None
         found = {
-            name: with_numbers_when_hot(prefix + name, contact, static)
+            name: with_numbers_when_hot(prefix + name, contact, static, folder)
             for name, contact in contacts.items()
             if isinstance(contact, dict) and contact.get("by_temperature") is not None
         }

@@ -22,9 +22,6 @@ LINEAR_WHERE_STUCK = True
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3  # kinds of samples; slip by its sense
 SIDE = np.array([0.0, 0.0, 1.0, -1.0])  # sign of T in slip
 
-located = transitions.cycle
-
-
 @dataclass(frozen=True)
 class Parameters:
     """The law's own numbers."""
@@ -72,6 +69,13 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
             dsx[c, t] = -sign * mu * kn / kt
             bits |= SLIPS
     return bits
+
+
+def located(
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
+) -> ContactCycle:
+    """The periodic cycle with its transitions located between samples."""
+    return transitions.cycle(x, parameters, memory, basis, jacobian, friction=parameters.numbers["friction"])
 
 
 def cycle(

@@ -9,16 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numba
+import numpy as np
 
 from tribodyn.declarations import number
 from tribodyn.hbm.contact import located as transitions
-from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("t1", "t2"), ("t1",), ("t2",))
 LINEAR_WHERE_STUCK = True
-
-located = transitions.cycle
-
 
 @dataclass(frozen=True)
 class Parameters:
@@ -60,3 +59,11 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
             dsx[c, c] = 1.0
             bits |= SLIPS
     return bits
+
+
+def located(
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
+) -> ContactCycle:
+    """The periodic cycle with its transitions located between samples."""
+    friction, load = parameters.numbers["friction"], parameters.numbers["normal_load"]
+    return transitions.cycle(x, parameters, memory, basis, jacobian, friction=friction, normal_load=load)

@@ -99,7 +99,11 @@ def springs(parameters: ContactParameters) -> np.ndarray:
     return np.stack([stiff if c == "n" else ratio * stiff for c in parameters.components], axis=1)
 
 
-sliders = bed_cycle.sliders
+def sliders(
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of the sliders of all springs over a cycle and their load, see `bed_cycle.sliders`."""
+    return bed_cycle.sliders(x, parameters, parameters.numbers["friction"], memory, basis)
 
 
 def n_state(components: tuple[str, ...]) -> int:
@@ -176,11 +180,11 @@ def cycle(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle at the samples of the basis; see `_cycle`."""
-    return bed_cycle.cycle(x, parameters, memory, basis, jacobian, located=False)
+    return bed_cycle.cycle(x, parameters, parameters.numbers["friction"], memory, basis, jacobian, located=False)
 
 
 def located(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle with the transitions of every spring and the deepest approach located between samples."""
-    return bed_cycle.cycle(x, parameters, memory, basis, jacobian, located=True)
+    return bed_cycle.cycle(x, parameters, parameters.numbers["friction"], memory, basis, jacobian, located=True)
