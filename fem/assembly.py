@@ -48,7 +48,7 @@ class Assembly:
     points : (n_point, 3) reference points [m]; each counts as two nodes, the first for its translation, the second for
         its rotation [rad] about x, y, z
     doflocs, boundaries, subdomains, nelements : as of a mesh; facets and elements are numbered body by body
-    node_sets : "body.group", see `named_in`, -> nodes; "body" -> all nodes of a body; "point" and "point.turn" of a
+    node_sets : "body.group", see `group_name`, -> nodes; "body" -> all nodes of a body; "point" and "point.turn" of a
         reference point
     Raises  ValueError where two bodies have one name
     """
@@ -80,7 +80,9 @@ class Assembly:
                 (body.mesh.boundaries or {}, self.boundaries, piece.facet),
                 (body.mesh.subdomains or {}, self.subdomains, piece.element),
             ):
-                named = {named_in(body.name, name, body.node_sets): np.asarray(of) + start for name, of in own.items()}
+                named = {
+                    group_name(body.name, name, body.node_sets): np.asarray(of) + start for name, of in own.items()
+                }
                 shared.update(named)
         for name, (node, turn) in self.points.items():
             self.node_sets[name] = np.array([node])
@@ -92,7 +94,7 @@ class Assembly:
         return {body.name: body.material for body in self.bodies}
 
 
-def named_in(body: str, group: str, groups: Container[str]) -> str:
+def group_name(body: str, group: str, groups: Container[str]) -> str:
     """Name of a group of a body in an assembly: "body.group"; a group that its deck names so already keeps its name.
 
     groups : of the body; where "group" is one of them too, "body.group" is that one's name

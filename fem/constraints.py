@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 AXES = "xyz"
 
 
-def named(groups: Mapping[str, np.ndarray], name: str, kind: str = "node set") -> np.ndarray:
+def find_group(groups: Mapping[str, np.ndarray], name: str, kind: str = "node set") -> np.ndarray:
     """The group of that name.
 
     Raises  ValueError that lists the names which exist, or that the group is empty
@@ -46,7 +46,7 @@ class Clamp:
 
     def dofs(self, node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
         """DOFs that are held."""
-        nodes = named(node_sets, self.nodes)
+        nodes = find_group(node_sets, self.nodes)
         return (nodes[:, None] * 3 + [AXES.index(a) for a in self.axes]).ravel()
 
 
@@ -87,7 +87,7 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
 
 
 @dataclass(frozen=True)
-class Following:
+class Dependence:
     """DOFs (k,) that follow others: u[dofs] = map @ u with map (k, n_dof); what : which constraint, for errors.
 
     equation : each DOF is of an equation, and another of it may follow where this one is held or follows already
@@ -102,7 +102,7 @@ class Following:
 class Constraint(Protocol):
     """A constraint that knows which DOFs follow which."""
 
-    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following: ...
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence: ...
 
 
 @dataclass(frozen=True)
@@ -113,9 +113,9 @@ class ClampAlong:
     system: Directions
     axes: Sequence[int]
 
-    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The largest displacement along each direction in terms of the others."""
-        nodes, n = named(node_sets, self.nodes), 3 * mesh.doflocs.shape[1]
+        nodes, n = find_group(node_sets, self.nodes), 3 * mesh.doflocs.shape[1]
         rows = self.system.at(mesh.doflocs.T[nodes])[:, list(self.axes)]  # nodes, axes, 3
         dofs = np.broadcast_to(3 * nodes[:, None, None] + np.arange(3), rows.shape).reshape(-1, 3)
         rows = rows.reshape(-1, 3)
@@ -126,10 +126,10 @@ class ClampAlong:
         factors[np.abs(factors) < 1e-12] = 0.0
         matrix = csr_matrix((factors.ravel(), (np.repeat(k, 3), dofs.ravel())), shape=(len(k), n))
         matrix.eliminate_zeros()
-        return Following(dofs[k, pivot], matrix, f"the support of '{self.nodes}'", equation=True)
+        return Dependence(dofs[k, pivot], matrix, f"the support of '{self.nodes}'", equation=True)
 
 
-def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) -> tuple[np.ndarray, csr_matrix]:
+def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Dependence]) -> tuple[np.ndarray, csr_matrix]:
     """The DOFs (n_free,) that are left, and the map (n_dof, n_free) from them to all.
 
     free : DOFs that no clamp holds
@@ -172,7 +172,7 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) 
     return left, follow
 
 
-def _pivoted(constraints: Sequence[Following], held: np.ndarray) -> list[Following]:
+def _pivoted(constraints: Sequence[Dependence], held: np.ndarray) -> list[Dependence]:
     """The constraints, equations last and each for a DOF that neither is held nor follows already, by elimination."""
     found = [one for one in constraints if not one.equation]
     if len(found) == len(constraints):
@@ -196,7 +196,7 @@ def _pivoted(constraints: Sequence[Following], held: np.ndarray) -> list[Followi
         rest = {dof: -value / row[pivot] for dof, value in row.items() if dof != pivot}
         at = ([0] * len(rest), list(rest))
         shape = (1, one.map.shape[1])
-        solved = Following(np.array([pivot]), csr_matrix((list(rest.values()), at), shape), one.what, True)
+        solved = Dependence(np.array([pivot]), csr_matrix((list(rest.values()), at), shape), one.what, True)
         row_of[pivot] = (solved.map, 0)
         found.append(solved)
     return found

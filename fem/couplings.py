@@ -15,10 +15,10 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import coo_matrix, csr_matrix, diags_array, eye_array, kron
 
-from tribodyn.fem.constraints import Following, named
+from tribodyn.fem.constraints import Dependence, find_group
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.mortar import MORTAR, Common, Side, coefficients, common, dual, side
-from tribodyn.fem.mortar_contact import apart
+from tribodyn.fem.mortar import MORTAR, SharedSurface, Side, coefficients, dual, shared_surface, side
+from tribodyn.fem.mortar_contact import describe_separation
 from tribodyn.fem.springs import shares
 from tribodyn.fem.surface import tabulate
 from tribodyn.refusal import Refusal
@@ -41,17 +41,17 @@ class Tie:
     second: str
     reach: float | None = None
 
-    def meeting(self, mesh: Any) -> tuple[Side, Side, Common]:
+    def meeting(self, mesh: Any) -> tuple[Side, Side, SharedSurface]:
         """Both faces and the surface that they share; raises ValueError as `build` does."""
         faces = mesh.boundaries or {}
-        one, two = (side(mesh, named(faces, name, "face")) for name in (self.first, self.second))
+        one, two = (side(mesh, find_group(faces, name, "face")) for name in (self.first, self.second))
         reach = MORTAR.reach * one.length if self.reach is None else self.reach
-        shared = common(one, two, reach)
+        shared = shared_surface(one, two, reach)
         if not len(shared.weight):
-            raise Refusal(f"{self.what}: {apart(one, two, reach)}")
+            raise Refusal(f"{self.what}: {describe_separation(one, two, reach)}")
         return one, two, shared
 
-    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The nodes of the first face in terms of the others.
 
         Raises  ValueError where a face is unknown, or the faces do not meet
@@ -91,7 +91,7 @@ class Tie:
         moved.data[np.abs(moved.data) < SMALL] = 0.0
         moved.eliminate_zeros()
         dofs = (tied[:, None] * 3 + np.arange(3)).ravel()
-        return Following(dofs, csr_matrix(kron(moved, np.eye(3), format="csr")), self.what)
+        return Dependence(dofs, csr_matrix(kron(moved, np.eye(3), format="csr")), self.what)
 
 
 @dataclass(frozen=True)
@@ -104,14 +104,14 @@ class Equation:
     what: str
     terms: Sequence[tuple[str, int, float]]
 
-    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The first displacement in terms of the others; raises ValueError where its factor is zero."""
         if len(self.terms) < 2 or not self.terms[0][2]:
             raise Refusal(f"{self.what} needs two terms or more, the first with a factor that is not zero")
-        dofs = [3 * int(named(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
+        dofs = [3 * int(find_group(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
         factors = [-factor / self.terms[0][2] for _, _, factor in self.terms[1:]]
         row = coo_matrix((factors, ([0] * len(factors), dofs[1:])), shape=(1, 3 * mesh.doflocs.shape[1]))
-        return Following(np.array(dofs[:1]), csr_matrix(row), self.what, equation=True)
+        return Dependence(np.array(dofs[:1]), csr_matrix(row), self.what, equation=True)
 
 
 def _summed(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, n: int) -> csr_matrix:
@@ -127,9 +127,9 @@ class RigidCoupling:
     point: str
     face: str
 
-    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The nodes of the face in terms of the point; raises ValueError where the face is unknown."""
-        nodes = named(node_sets, self.face)
+        nodes = find_group(node_sets, self.face)
         place, turn = mesh.points[self.point]
         arm = coordinates(mesh)[nodes] - coordinates(mesh)[place]
         rows = 3 * len(nodes)
@@ -140,7 +140,7 @@ class RigidCoupling:
         matrix = csr_matrix((values.ravel(), (np.repeat(np.arange(rows), 6), np.tile(columns, rows))),
                             shape=(rows, 3 * mesh.doflocs.shape[1]))  # fmt: skip
         matrix.eliminate_zeros()
-        return Following((nodes[:, None] * 3 + np.arange(3)).ravel(), matrix, f"couplings.{self.point}")
+        return Dependence((nodes[:, None] * 3 + np.arange(3)).ravel(), matrix, f"couplings.{self.point}")
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class DistributedCoupling:
     point: str
     face: str
 
-    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The point in terms of the nodes of the face.
 
         Raises  ValueError where the face is unknown, or its nodes lie on one line, so that it has no turn
@@ -172,7 +172,7 @@ class DistributedCoupling:
         matrix = csr_matrix((values.ravel(), (np.repeat(np.arange(6), len(columns)), np.tile(columns, 6))),
                             shape=(6, 3 * len(points)))  # fmt: skip
         dofs = np.concatenate([3 * place + np.arange(3), 3 * turn + np.arange(3)])
-        return Following(dofs, matrix, f"couplings.{self.point}")
+        return Dependence(dofs, matrix, f"couplings.{self.point}")
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ class Link:
     second: RigidCoupling | DistributedCoupling
     free: Sequence[int] = ()
 
-    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """As many displacements of the first point, or of the face that it follows, in terms of the others."""
         alike = np.setdiff1d(np.arange(6), np.asarray(self.free, int))
         one, two = (self._motion(c, mesh, node_sets)[alike] for c in (self.first, self.second))
@@ -198,7 +198,7 @@ class Link:
         moved = np.linalg.solve(rows[:, pivots].toarray(), -rows.toarray())
         moved[:, pivots] = 0.0
         moved[np.abs(moved) < SMALL] = 0.0
-        return Following(pivots, csr_matrix(moved), self.what)
+        return Dependence(pivots, csr_matrix(moved), self.what)
 
     @staticmethod
     def _motion(

@@ -45,7 +45,7 @@ def _assemble(
     mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], order: int
 ) -> tuple[csr_matrix, csr_matrix]:
     nodes = connectivity(mesh)
-    kinds, _ = of_elements(mesh, material)
+    kinds, _ = element_materials(mesh, material)
     isotropic = all(isinstance(one, Material) for one in kinds)
     rho = densities(mesh, material)
     reduced = [isinstance(one, Material) and one.linear_reduced for one in kinds]
@@ -57,9 +57,9 @@ def _assemble(
         raise Refusal("the hexahedra have eight nodes, which lock in bending: raise the element order, or take them "
                          'as elements = "linear_reduced"')  # fmt: skip
     if isotropic:
-        lam, mu, _ = per_element(mesh, material)
+        lam, mu, _ = element_constants(mesh, material)
     else:
-        C = at_elements(mesh, material, "tensor")
+        C = element_tensors(mesh, material, "tensor")
     n_element, n_a = nodes.shape
     mass = np.empty((n_element, n_a, n_a, 1, 1))
     stiffness = np.empty((n_element, n_a, n_a, 3, 3))
@@ -76,7 +76,7 @@ def _assemble(
 
 def _linear_reduced(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> tuple[csr_matrix, csr_matrix]:
     cells, gradient, volume, hourglass = reduced_elements(mesh)
-    lam, mu, rho = (np.tile(values, len(cells) // mesh.nelements) for values in per_element(mesh, material))
+    lam, mu, rho = (np.tile(values, len(cells) // mesh.nelements) for values in element_constants(mesh, material))
     stiffness = stiffness_blocks(gradient[:, None], volume[:, None], lam, mu)
     stiffness += (mu[:, None, None] * hourglass)[..., None, None] * np.eye(3)
     lumped = (rho * volume / 8)[:, None, None, None, None] * np.eye(8)[None, :, :, None, None]
@@ -85,10 +85,10 @@ def _linear_reduced(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]
     return mass, scatter(cells, n_node, symmetric(stiffness))
 
 
-def strained(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> Iterator[tuple[np.ndarray, ...]]:
+def strain_points(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> Iterator[tuple[np.ndarray, ...]]:
     """Yield (elements, nodes, N, grad N, weight) as `batches` does, nodes (n_e, n_a) of each element besides, where the
     strain of one mesh is taken: for linear reduced elements, once or eight times in each of the mesh, its mean."""
-    if any(isinstance(one, Material) and one.linear_reduced for one in of_elements(mesh, material)[0]):
+    if any(isinstance(one, Material) and one.linear_reduced for one in element_materials(mesh, material)[0]):
         cells, gradient, volume, _ = reduced_elements(mesh)
         parents = np.tile(np.arange(mesh.nelements), len(cells) // mesh.nelements)
         yield parents, cells, np.full((1, 8), 1 / 8), gradient[:, None], volume[:, None]
@@ -134,7 +134,9 @@ def symmetric(blocks: np.ndarray) -> np.ndarray:
     return (blocks + blocks.transpose(0, 2, 1, 4, 3)) / 2
 
 
-def of_elements(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> tuple[list[AnyMaterial], np.ndarray]:
+def element_materials(
+    mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]
+) -> tuple[list[AnyMaterial], np.ndarray]:
     """Materials, and for each element of one mesh (n_element,) which of them it has.
 
     Raises  ValueError for a subdomain the mesh lacks, or an element with no or two materials
@@ -159,16 +161,16 @@ def of_elements(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) ->
 
 def densities(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> np.ndarray:
     """Density of each element of one mesh (n_element,) [kg/m3]; raises ValueError as `of_elements` does."""
-    kinds, kind = of_elements(mesh, material)
+    kinds, kind = element_materials(mesh, material)
     return np.array([one.rho for one in kinds])[kind]
 
 
-def at_elements(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], what: str) -> np.ndarray:
+def element_tensors(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], what: str) -> np.ndarray:
     """A tensor (n_element, 3, ...) of the material at the centre of each element of one mesh.
 
     what : "tensor" [Pa] or "expansion_tensor" [1/K]
     """
-    kinds, kind = of_elements(mesh, material)
+    kinds, kind = element_materials(mesh, material)
     centres = mesh.p[:, mesh.t].mean(axis=1).T
     found = [getattr(one, what)(centres[kind == i]) for i, one in enumerate(kinds)]
     whole = np.empty((len(kind), *found[0].shape[1:]))
@@ -177,11 +179,11 @@ def at_elements(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], wh
     return whole
 
 
-def per_element(
+def element_constants(
     mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lame's constants [Pa] and density [kg/m3] of each element of isotropic materials, three arrays (n_element,)."""
-    kinds, kind = of_elements(mesh, material)
+    kinds, kind = element_materials(mesh, material)
     values = np.array([[*one.lame, one.rho] for one in kinds if isinstance(one, Material)])
     return values[kind, 0], values[kind, 1], values[kind, 2]
 

@@ -38,11 +38,11 @@ def batches(
     mesh: Any, order: int = 5, size: int = 256
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     """Yield elements (n_e,), N (n_q, n_a) [-], grad N (n_e, n_q, 3, n_a) [1/m], weight, as `mapped` does."""
-    for elements, N, dN, J, weight in mapped(mesh, order, size):
+    for elements, N, dN, J, weight in mapped_batches(mesh, order, size):
         yield elements, N, np.linalg.solve(J, dN[None]), weight
 
 
-def mapped(mesh: Any, order: int = 5, size: int = 256) -> Iterator[tuple[np.ndarray, ...]]:
+def mapped_batches(mesh: Any, order: int = 5, size: int = 256) -> Iterator[tuple[np.ndarray, ...]]:
     """Yield (elements, N, dN, J, weight) for some elements at a time.
 
     order : polynomial order of the quadrature rule; 5 is exact for the mass of straight-sided elements, with 27 Gauss

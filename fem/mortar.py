@@ -21,7 +21,7 @@ from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.surface import facet_nodes, outside, tabulate
+from tribodyn.fem.surface import facet_nodes, require_outside, tabulate
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Side:
 
 def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> Side:
     """The side that some facets of one body make, turned by a rotation (3, 3) about the origin."""
-    outside(mesh, facets)
+    require_outside(mesh, facets)
     nodes = facet_nodes(mesh, facets)
     piece, own = piece_of_facets(mesh, facets)
     points, inner = coordinates(mesh)[nodes], piece.mesh.p[:, piece.mesh.t[:, piece.mesh.f2t[0, own]]].mean(axis=1).T
@@ -117,7 +117,7 @@ def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> S
 
 
 @dataclass(frozen=True)
-class Common:
+class SharedSurface:
     """Gauss points of the surface that two sides share, cut by cut.
 
     first, second : (n,) facets; xi, eta : (2, n) places on them; weight : (n,) area [m2] on the first side
@@ -141,7 +141,7 @@ class Common:
             yield int(self.first[start]), int(self.second[start]), slice(start, stop)
 
 
-def common(one: Side, two: Side, reach: float) -> Common:
+def shared_surface(one: Side, two: Side, reach: float) -> SharedSurface:
     """Where two sides face each other.
 
     reach : farthest distance along the normal at which facets still meet [m]
@@ -150,7 +150,9 @@ def common(one: Side, two: Side, reach: float) -> Common:
     i, j = _candidates(one, two, reach)
     if not len(i):
         none, pairs = np.zeros(0), np.zeros((2, 0))
-        return Common(i, j, pairs, pairs, none, np.zeros((0, 3)), none, np.zeros(1, int), np.zeros(len(one.nodes)))
+        return SharedSurface(
+            i, j, pairs, pairs, none, np.zeros((0, 3)), none, np.zeros(1, int), np.zeros(len(one.nodes))
+        )
     frames = _planes(one.normal)[i]
     curved = one.bulge > MORTAR.curved
     outline = _outline(two, two.bulge > MORTAR.curved)[j]
@@ -203,7 +205,7 @@ def common(one: Side, two: Side, reach: float) -> Common:
         kept = np.bincount(i[of], np.where(near, np.abs(weight), 0.0), len(one.nodes))
         everything = np.bincount(i[of], np.abs(weight), len(one.nodes))
         covered = covered * np.divide(kept, everything, out=np.zeros_like(kept), where=everything > 0)
-    return Common(
+    return SharedSurface(
         i[of][near], j[of][near], xi[:, near], eta[:, near], weight[near], normal[near], gap[near],
         starts, covered,
     )  # fmt: skip
@@ -225,7 +227,7 @@ def coefficients(k: int) -> np.ndarray:
     return whole
 
 
-def dual(one: Side, shared: Common) -> tuple[np.ndarray, np.ndarray]:
+def dual(one: Side, shared: SharedSurface) -> tuple[np.ndarray, np.ndarray]:
     """Dual functions of the first side, times the weights of the points, and what each coefficient weighs.
 
     Returns psi (k, n) [m2] and d (n_facet, k) [m2] with sum(psi_a u) = d_a times the Bernstein coefficient a of u, for

@@ -19,7 +19,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
 from tribodyn.fem.matching import Mismatch
-from tribodyn.fem.mortar import MORTAR, Side, common
+from tribodyn.fem.mortar import MORTAR, Side, shared_surface
 from tribodyn.fem.surface import NINE_NODE_QUADS, side_functions, side_polygons, tabulate
 
 
@@ -37,9 +37,9 @@ def mortar_halves(
     reach : farthest distance along the normal at which the faces still meet [m]
     Raises  Mismatch where they do not meet
     """
-    shared = common(one, two, reach)
+    shared = shared_surface(one, two, reach)
     if not len(shared.weight):
-        raise Mismatch(apart(one, two, reach))
+        raise Mismatch(describe_separation(one, two, reach))
     n = one.corners
     whole = (shared.covered >= MORTAR.whole) & (not vertices_only)
     frames = contact_frames(shared.normal, t1)
@@ -100,7 +100,7 @@ def mortar_halves(
     return interface, B_2
 
 
-def apart(one: Side, two: Side, reach: float) -> str:
+def describe_separation(one: Side, two: Side, reach: float) -> str:
     """Why two sides do not meet, in a sentence."""
     distance, other = scipy.spatial.cKDTree(two.centre).query(one.centre)
     nearest = int(distance.argmin())

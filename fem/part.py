@@ -11,18 +11,18 @@ import scipy
 from scipy.sparse import csr_matrix
 
 from tribodyn.fem.assembly import Assembly
-from tribodyn.fem.constraints import AXES, Clamp, Constraint, NoMeanRotation, free_dofs, named, restriction
-from tribodyn.fem.contact import ContactFaces, no_contact
+from tribodyn.fem.constraints import AXES, Clamp, Constraint, NoMeanRotation, find_group, free_dofs, restriction
+from tribodyn.fem.contact_faces import ContactFaces, no_contact
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import ContactInterface, join
-from tribodyn.fem.loads import Load
+from tribodyn.fem.load_vectors import Load
 from tribodyn.fem.springs import Mass
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.refusal import Refusal
 
 
-class Stiff(Protocol):
+class StiffnessElement(Protocol):
     """What adds stiffness (3 n_node, 3 n_node) [N/m]: a spring, a bolt."""
 
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix: ...
@@ -55,7 +55,7 @@ class Part:
 
         Raises  ValueError where the set is unknown or empty, or where one of them is clamped
         """
-        wanted = named(self.node_sets, group) * 3 + AXES.index(axis)
+        wanted = find_group(self.node_sets, group) * 3 + AXES.index(axis)
         place = np.searchsorted(self.free, wanted)
         if not np.array_equal(self.free[np.minimum(place, len(self.free) - 1)], wanted):
             raise Refusal(f"a node of '{group}' is clamped along {axis}; choose nodes that can move")
@@ -97,7 +97,7 @@ def build(
     contacts: Sequence[ContactFaces],
     loads: Mapping[str, Load],
     outputs: Mapping[str, Load],
-    springs: Sequence[Stiff] = (),
+    springs: Sequence[StiffnessElement] = (),
     held: Sequence[NoMeanRotation] = (),
     constraints: Sequence[Constraint] = (),
     masses: Sequence[Mass] = (),

@@ -16,14 +16,14 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
 from tribodyn.fem.assembly import materials_of, pieces
-from tribodyn.fem.elasticity import at_elements, strained, symmetric
+from tribodyn.fem.elasticity import element_tensors, strain_points, symmetric
 from tribodyn.fem.elements import batches, connectivity, scatter
 from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.interface import unit
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
-from tribodyn.geometry.placing import cross
+from tribodyn.geometry.placement import cross
 
 LOWER = "lower the load or the speed"
 UNSTABLE = (
@@ -49,7 +49,7 @@ class Prestress:
     rotation: float
 
 
-def prestressed(
+def solve_prestress(
     part: Part,
     material: Material | Mapping[str, Material],
     at_rest: Callable[[csr_matrix], np.ndarray],
@@ -124,9 +124,9 @@ def geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np
 
 def _geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np.ndarray | None) -> csr_matrix:
     """The same of one mesh, without the factor of three components: (n_node, n_node)."""
-    C, expansion = (at_elements(mesh, material, what) for what in ("tensor", "expansion_tensor"))
+    C, expansion = (element_tensors(mesh, material, what) for what in ("tensor", "expansion_tensor"))
     found = []
-    for elements, nodes, N, gradient, weight in strained(mesh, material):
+    for elements, nodes, N, gradient, weight in strain_points(mesh, material):
         strain = gradient @ u[nodes][:, None]  # d u_j / d x_i; the tensor takes its symmetric part
         if temperature is not None:
             strain = strain - (temperature[nodes] @ N.T)[..., None, None] * expansion[elements, None]

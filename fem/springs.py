@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags_array
 
 from tribodyn.fem.assembly import Assembly
-from tribodyn.fem.constraints import named
+from tribodyn.fem.constraints import find_group
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import unit
 from tribodyn.fem.matching import partners
@@ -59,7 +59,7 @@ class Spring:
 
         if self.opposite is None:
             return along(nodes), share
-        others, points = named(node_sets, self.opposite), coordinates(mesh)
+        others, points = find_group(node_sets, self.opposite), coordinates(mesh)
         what = f"the spring from '{self.nodes}' to '{self.opposite}': its nodes"
         size = np.linalg.norm(np.ptp(points[nodes], axis=0)) or np.linalg.norm(np.ptp(points, axis=0))
         place = partners(points[nodes], points[others], what, float(size))
@@ -78,7 +78,7 @@ class ElongationSpring:
 
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
         """Stiffness (3 n_node, 3 n_node) [N/m]; raises ValueError where a node is unknown."""
-        dofs = [3 * int(named(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
+        dofs = [3 * int(find_group(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
         row = csr_matrix(
             ([factor for *_, factor in self.terms], ([0] * len(dofs), dofs)), (1, 3 * mesh.doflocs.shape[1])
         )
@@ -91,7 +91,7 @@ def shares(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[n
     if name in faces:
         face = surface(mesh, faces[name])
         return face.nodes, face.area / face.area.sum()
-    nodes = named(node_sets, name)
+    nodes = find_group(node_sets, name)
     return nodes, np.full(len(nodes), 1.0 / len(nodes))
 
 

@@ -45,7 +45,7 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     facets = np.asarray(facets, dtype=int)
     if len(facets) == 0:
         raise Refusal("a contact or load surface has no faces; check the geometry that defines it")
-    outside(mesh, facets)
+    require_outside(mesh, facets)
     face_nodes = facet_nodes(mesh, facets)
     sides = face_nodes.shape[1] == 6 and not vertices_only
     weighted, vectors = face_integrals(mesh, facets, vertices_only or sides)
@@ -111,7 +111,7 @@ def _chain(links: list[tuple[int, int]]) -> list[int]:
     return row
 
 
-def outside(mesh: Any, facets: np.ndarray) -> None:
+def require_outside(mesh: Any, facets: np.ndarray) -> None:
     """Raise ValueError where some of the facets lie inside a body."""
     piece, facets = piece_of_facets(mesh, facets)
     inside = int(np.sum(piece.mesh.f2t[1, facets] >= 0))

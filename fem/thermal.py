@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 
 from tribodyn.fem.assembly import Assembly, materials_of
-from tribodyn.fem.elasticity import at_elements, strained
+from tribodyn.fem.elasticity import element_tensors, strain_points
 from tribodyn.refusal import Refusal
 
 
@@ -46,9 +46,9 @@ class Heating:
         for name, (piece, material) in zip(names, materials_of(mesh, self.material), strict=True):
             if self.bodies and name not in self.bodies:
                 continue
-            C, expansion = (at_elements(piece.mesh, material, what) for what in ("tensor", "expansion_tensor"))
+            C, expansion = (element_tensors(piece.mesh, material, what) for what in ("tensor", "expansion_tensor"))
             held_back = np.einsum("eijkl,ekl->eij", C, expansion)
-            for elements, nodes, N, gradient, weight in strained(piece.mesh, material):
+            for elements, nodes, N, gradient, weight in strain_points(piece.mesh, material):
                 at = values[nodes + piece.node] @ N.T
                 own = np.einsum("eq,eij,eqja->eai", weight * at, held_back[elements], gradient, optimize=True)
                 np.add.at(force, nodes + piece.node, own)

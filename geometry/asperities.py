@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import maximum_filter
 
-from tribodyn.geometry.surface import LIMITS, HeightMap, centred, mended, split
+from tribodyn.geometry.height_map import LIMITS, HeightMap, centred, repair, split
 from tribodyn.refusal import Refusal
 
 
@@ -123,7 +123,7 @@ def identify(
             continue
         if shortest is None:
             _refuse_steps(face)
-        rough, changed = mended(face)
+        rough, changed = repair(face)
         if cutoff is not None:
             rough = split(rough, cutoff)[1]
         faces.append(centred(split(rough, shortest)[0] if shortest is not None else rough))

@@ -41,9 +41,7 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self, core=(0.1, 0.7))
         if self.n_around % 12:
-            raise Refusal(
-                f"geometry.n_around is {self.n_around}: give a multiple of 12, for a hexagon about a square"
-            )
+            raise Refusal(f"geometry.n_around is {self.n_around}: give a multiple of 12, for a hexagon about a square")
         if not self.diameter < self.seat_diameter < self.flats:
             raise Refusal("geometry.seat_diameter must lie between geometry.diameter and geometry.flats")
         if not self.grip + self.nut_height < self.length:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from skfem.quadrature import get_quadrature
 
-from tribodyn.geometry.sources import read as sources, solid
+from tribodyn.geometry.sources import foreign_file as sources, solid_body
 from tribodyn.geometry.sources.cad import Sizes
 from tribodyn.geometry.sources.deck import Deck
 from tribodyn.refusal import Refusal
@@ -34,15 +34,19 @@ def read(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, Groups]:
 def read_with_notes(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, Groups, tuple[str, ...]]:
     """The same as `read`, and sentences on what was done to the file and on what of it is not used."""
     raw = sources.read_raw(path, sizes=sizes)
-    body = solid.build(raw)
-    lost = sources.lost(raw, {"": body})
+    body = solid_body.build(raw)
+    lost = sources.missing_groups(raw, {"": body})
     if lost and raw.deck == Deck() and Path(path).suffix.lower() == ".msh":
         raise Refusal(f"mesh file '{path}' has {lost[0]}")
     quality(body.mesh)
     kinds = [f.name for f in fields(Deck) if getattr(raw.deck, f.name)]
     left = [f"its {', '.join(kinds)}: bring it as [decks.NAME] to use them"] if kinds else []
     unused = [f"not used: {clause}" for clause in (*raw.unused, *lost, *left)]
-    return body.mesh, body.node_sets, (*sources.raised(raw), *sources.done(raw, {"the mesh": body}), *unused)
+    return (
+        body.mesh,
+        body.node_sets,
+        (*sources.order_notes(raw), *sources.conversion_notes(raw, {"the mesh": body}), *unused),
+    )
 
 
 @dataclass(frozen=True)
@@ -95,7 +99,7 @@ def quality(mesh: Any) -> Quality:
 
 
 @dataclass(frozen=True)
-class Facts:
+class MeshFacts:
     """low, high : (3,) corners of the box around it [m]; volume [m3]; mass [kg], None without a density
     centre : (3,) of its mass, or of its volume without a density [m]
     scaled_jacobian, worst_centre : of the worst element, see geometry.mesh.quality; (3,) [m]
@@ -110,7 +114,7 @@ class Facts:
     mass: float | None = None
 
 
-def facts(mesh: Any, density: np.ndarray | None = None) -> Facts:
+def facts(mesh: Any, density: np.ndarray | None = None) -> MeshFacts:
     """Measure a mesh. mesh : skfem MeshHex2 or MeshTet2; density : (n_element,) [kg/m3]
 
     Raises  ValueError: an element is inverted or degenerate
@@ -127,7 +131,7 @@ def facts(mesh: Any, density: np.ndarray | None = None) -> Facts:
     centre = np.einsum("ieq,eq->i", x, heavy) / total
     mass = None if density is None else total
     points = mesh.doflocs
-    return Facts(points.min(axis=1), points.max(axis=1), volume, centre, found.scaled_jacobian, worst, mass)
+    return MeshFacts(points.min(axis=1), points.max(axis=1), volume, centre, found.scaled_jacobian, worst, mass)
 
 
 def area(mesh: Any, facets: np.ndarray) -> float:

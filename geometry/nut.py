@@ -30,9 +30,7 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self)
         if self.n_around % 6:
-            raise Refusal(
-                f"geometry.n_around is {self.n_around}: give a multiple of 6, for the corners of a hexagon"
-            )
+            raise Refusal(f"geometry.n_around is {self.n_around}: give a multiple of 6, for the corners of a hexagon")
         if not self.bore < self.seat_diameter < self.flats:
             raise Refusal("geometry.seat_diameter must lie between geometry.bore and geometry.flats")
 

@@ -17,8 +17,8 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.sparse import vstack
 
-from tribodyn.fem import cyclic
-from tribodyn.fem.cyclic import Sector, at_index, seam_map
+from tribodyn.fem import cyclic_symmetry
+from tribodyn.fem.cyclic_symmetry import Sector, seam_map, wave_system
 from tribodyn.fem.modes import StaticDivergence, modes, turning_frequencies
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import craig_bampton
@@ -86,7 +86,7 @@ def nodal_diameters(
     """
     found = []
     for index in diameters:
-        system, B = at_index(sector, index)
+        system, B = wave_system(sector, index)
         K = system.stiffness if stiffness is None else stuck_stiffness(system.stiffness, B, stiffness)
         if system.gyroscopic is None:
             omega = modes(K, system.mass, n_modes)[0]
@@ -125,12 +125,12 @@ def wave_of(reduced: ReducedSector, engine_order: int, index_of: WaveIndex) -> R
 
 
 def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
-    """All sectors at once, real and with contacts between all neighbours; stiffness as in fem.cyclic.assemble_wheel.
+    """All sectors at once, real and with contacts between all neighbours; stiffness as in `assemble_wheel`.
 
     Loads and outputs are named "<name>@<sector>". The basis is left out: sector n moves by
-    reduced.basis @ (fem.cyclic.sector_maps(reduced.sector)[n] @ q) in its own frame
+    reduced.basis @ (fem.cyclic_symmetry.sector_maps(reduced.sector)[n] @ q) in its own frame
     """
-    system, interface = cyclic.assemble_wheel(reduced.sector, stiffness)
+    system, interface = cyclic_symmetry.assemble_wheel(reduced.sector, stiffness)
     return ReducedModel(system, interface, None, _shared_info(reduced))
 
 
@@ -156,7 +156,7 @@ class WaveIndices:
         """The same with all coordinates of the sector."""
         once, of_row = distinct(self._sector)
         if not node_to_node(once):
-            return *at_index(self._sector, index), seam_map(self._sector, index).toarray()
+            return *wave_system(self._sector, index), seam_map(self._sector, index).toarray()
         T = relative_map(once, index)[0]
         system = self._sector.system.projected(T)
         return system, np.eye(len(once.left), system.n_dof)[of_row], T

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.fem.cyclic import at_index, seam_map
+from tribodyn.fem.cyclic_symmetry import seam_map, wave_system
 from tribodyn.fem.modes import modes
 from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.reduction.limits import LIMITS
@@ -45,7 +45,7 @@ def nominal_shapes(
     """
     sector, columns = reduced.sector, []
     for index in range(sector.n_sectors // 2 + 1):
-        system, B = at_index(sector, index)
+        system, B = wave_system(sector, index)
         forces = np.array([system.loads[name] for name in loads]).reshape(len(loads), -1).T
         for share in (1.0, LIMITS.nearly_free):
             K = np.asarray(stuck_stiffness(system.stiffness, np.asarray(B), share * springs))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.fem.cyclic import Sector, at_index
+from tribodyn.fem.cyclic_symmetry import Sector, wave_system
 from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, in_coordinates, reduce_sector, stuck_ritz, wave_of
@@ -144,7 +144,7 @@ class SpeedLine:
 
         def wave(stiffness: np.ndarray) -> tuple[SecondOrderSystem, np.ndarray]:
             sector = self.reduced.sector
-            return at_index(replace(sector, system=replace(sector.system, stiffness=stiffness)), self.engine_order)
+            return wave_system(replace(sector, system=replace(sector.system, stiffness=stiffness)), self.engine_order)
 
         system, B = wave(there)
         omega, phi = modes(stuck_stiffness(system.stiffness, B, self.springs), system.mass, n_modes)

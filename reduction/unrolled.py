@@ -13,7 +13,7 @@ from math import gcd
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.fem.cyclic import of_sector
+from tribodyn.fem.cyclic_symmetry import sector_name
 from tribodyn.fem.interface import join
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
@@ -58,7 +58,7 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
     n_contact, loads, outputs = model.interface.B.shape[0], list(system.loads), list(system.outputs)
     at = n_contact + len(loads)
     named = {
-        kind: {of_sector(name, k): rows[k, first + i] for k in range(n) for i, name in enumerate(names)}
+        kind: {sector_name(name, k): rows[k, first + i] for k in range(n) for i, name in enumerate(names)}
         for kind, first, names in (("loads", n_contact, loads), ("outputs", at, outputs))
     }
     whole = SecondOrderSystem(

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.geometry.placing import rotation
+from tribodyn.geometry.placement import rotation
 from tribodyn.geometry.sources.directions import System, orthogonal
 from tribodyn.geometry.sources.keywords import Card, cards
-from tribodyn.geometry.sources.raw import NOTHING, VOLUMES, Cells, RawMesh
+from tribodyn.geometry.sources.raw_mesh import NOTHING, VOLUMES, Cells, RawMesh
 from tribodyn.refusal import Refusal
 
 # first letters and number of nodes of a solid -> meshio's kind
@@ -80,7 +80,7 @@ class Scope:
 
 
 @dataclass
-class Assembly:
+class DeckAssembly:
     """All scopes of a deck: instances by name (one "" for a deck without parts), and the assembly above them."""
 
     instances: dict[str, Scope]
@@ -131,10 +131,10 @@ class Assembly:
         raise KeyError(item)
 
 
-def load(path: Path) -> Assembly:
+def load(path: Path) -> DeckAssembly:
     """Sort the cards of a deck into parts, instances and the rest. Raises ValueError on what cannot be read."""
     parts: dict[str, Scope] = {}
-    assembly = Assembly({}, {}, Scope(), [], Counter())
+    assembly = DeckAssembly({}, {}, Scope(), [], Counter())
     scope, flat = assembly.top, True
     for card in cards(path):
         if card.name == "PART":
@@ -155,7 +155,7 @@ def load(path: Path) -> Assembly:
     return assembly
 
 
-def _instance(card: Card, parts: dict[str, Scope], assembly: Assembly) -> Scope:
+def _instance(card: Card, parts: dict[str, Scope], assembly: DeckAssembly) -> Scope:
     part, name = card.option("PART"), card.option("NAME")
     if part.upper() not in parts:
         known = ", ".join(parts) or "there is none"
@@ -281,7 +281,7 @@ MESH_CARDS: dict[str, Callable[[Card, Scope], None]] = {
 }
 
 
-def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int], dict[Node, int]]:
+def raw_of(assembly: DeckAssembly) -> tuple[RawMesh, dict[Node, int], dict[Node, int]]:
     """Mesh, sets and surfaces of a deck, lengths as in the file, the row of each node and the number of each solid.
 
     Raises  ValueError: an element that names a node that is not there
@@ -347,7 +347,7 @@ def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int], dict[Node, int
 class _Sets:
     """Sets and surfaces of all scopes, resolved to rows and element numbers."""
 
-    assembly: Assembly
+    assembly: DeckAssembly
     row: dict[Node, int]
     number: dict[Node, int]
     blocks: Sequence[Cells]

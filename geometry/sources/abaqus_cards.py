@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry.sources import abaqus, deck
-from tribodyn.geometry.sources.abaqus import Assembly, Node
-from tribodyn.geometry.sources.card_table import CardTable, Met
-from tribodyn.geometry.sources.directions import Directions, Listed, System, orthogonal, turned
+from tribodyn.geometry.sources.abaqus import DeckAssembly, Node
+from tribodyn.geometry.sources.card_table import CardTable, SkippedCards
+from tribodyn.geometry.sources.directions import Directions, ElementAxes, System, axis_rotation, orthogonal
 from tribodyn.geometry.sources.keywords import Card
-from tribodyn.geometry.sources.raw import VOLUMES, RawMesh
+from tribodyn.geometry.sources.raw_mesh import VOLUMES, RawMesh
 from tribodyn.refusal import Refusal
 
 # named supports -> axes that they hold
@@ -72,15 +72,15 @@ def read(path: Path) -> RawMesh:
 class _Cards:
     """Cards taken one after the other; what they name is turned into groups of the mesh."""
 
-    assembly: Assembly
+    assembly: DeckAssembly
     raw: RawMesh
     row: dict[Node, int]
     number: dict[Node, int]
     materials: dict[str, deck.DeckMaterial] = field(default_factory=dict)
-    ties: list[deck.Tie] = field(default_factory=list)
-    contacts: list[deck.Tie] = field(default_factory=list)
+    ties: list[deck.DeckTie] = field(default_factory=list)
+    contacts: list[deck.DeckTie] = field(default_factory=list)
     couplings: list[deck.Coupling] = field(default_factory=list)
-    equations: list[deck.Equation] = field(default_factory=list)
+    equations: list[deck.DeckEquation] = field(default_factory=list)
     forces: list[deck.Force] = field(default_factory=list)
     pressures: list[deck.FacePressure] = field(default_factory=list)
     supports: list[deck.Support] = field(default_factory=list)
@@ -88,8 +88,8 @@ class _Cards:
     faces: dict[str, list[np.ndarray]] = field(default_factory=dict)
     references: dict[int, str] = field(default_factory=dict)
     unused: list[str] = field(default_factory=list)
-    springs: list[deck.Spring] = field(default_factory=list)
-    met: Met = field(default_factory=lambda: Met(TABLE, "*"))
+    springs: list[deck.DeckSpring] = field(default_factory=list)
+    met: SkippedCards = field(default_factory=lambda: SkippedCards(TABLE, "*"))
     steps: int = 0
     frictions: dict[str, float] = field(default_factory=dict)  # of surface interactions
     interaction: str = ""
@@ -179,7 +179,7 @@ class _Cards:
                 raise Refusal(f"{card.where} needs a slave and a master surface: complete the line")
             tolerance = card.option("POSITIONTOLERANCE")
             self.ties.append(
-                deck.Tie(
+                deck.DeckTie(
                     card.option("NAME") or f"tie{len(self.ties) + 1}",
                     self._place(line[0], card, face=True),
                     self._place(line[1], card, face=True),
@@ -206,7 +206,7 @@ class _Cards:
             for i in range(max(map(len, members))):
                 picked = [rows[min(i, len(rows) - 1)] for rows in members]
                 self.equations.append(
-                    deck.Equation(
+                    deck.DeckEquation(
                         tuple((self._node(r), axis, value) for r, (_, axis, value) in zip(picked, terms, strict=True))
                     )
                 )
@@ -329,7 +329,7 @@ class _Cards:
             with suppress(ValueError):  # of faces of what is no solid
                 slave, master = (self._place(name, card, face=True) for name in line)
                 friction = self.frictions.get(card.option("INTERACTION").upper())
-                self.contacts.append(deck.Tie(" on ".join(line), slave, master, friction=friction))
+                self.contacts.append(deck.DeckTie(" on ".join(line), slave, master, friction=friction))
 
     def _surface_interaction(self, card: Card) -> None:
         self.interaction = card.option("NAME").upper()
@@ -500,7 +500,7 @@ class _Cards:
             axis, angle = card.floats(card.data[1], 2)
             if axis not in (1.0, 2.0, 3.0):
                 raise Refusal(f"{card.where} turns about axis {axis:g}: give 1, 2 or 3")
-            own = turned(int(axis) - 1, angle)
+            own = axis_rotation(int(axis) - 1, angle)
         table = scope.distributions.get(card.data[0][0].upper())
         if table is not None:
             return self._listed(table, instance, turn, own)
@@ -520,7 +520,7 @@ class _Cards:
             return None
         return system.moved(turn, shift)
 
-    def _listed(self, card: Card, instance: str, turn: np.ndarray, own: np.ndarray) -> Listed:
+    def _listed(self, card: Card, instance: str, turn: np.ndarray, own: np.ndarray) -> ElementAxes:
         """Axes element by element; those that no line names have those of the first line."""
         centres = np.vstack([self.raw.points[block.nodes].mean(axis=1) for block in self.raw.cells])
         mine = [number for (where, _), number in self.number.items() if where == instance]  # labels are those of a part
@@ -535,9 +535,9 @@ class _Cards:
                     raise Refusal(f"{card.where} names the elements '{line[0]}', which the deck has not") from None
                 which[[self.number[key] for key in named if key in self.number]] = len(axes)
             axes.append(own @ orthogonal(*points) @ turn.T)
-        return Listed(centres[mine], np.array(axes)[which[mine]])
+        return ElementAxes(centres[mine], np.array(axes)[which[mine]])
 
-    def _springs(self) -> Iterator[deck.Spring]:
+    def _springs(self) -> Iterator[deck.DeckSpring]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
             for card in scope.springs:
                 if not card.data or {"NONLINEAR", "ORIENTATION"} & set(card.options):
@@ -556,7 +556,7 @@ class _Cards:
                     else:
                         terms = [(r, axis, s) for r, axis, s in zip(rows, axes, (1.0, -1.0), strict=False)]
                     kept = tuple((self._node(r), axis, float(factor)) for r, axis, factor in terms if factor)
-                    yield deck.Spring(kept, card.number(card.data[-1][0]))
+                    yield deck.DeckSpring(kept, card.number(card.data[-1][0]))
 
     def _masses(self) -> Iterator[deck.PointMass]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry.sources import deck
-from tribodyn.geometry.sources.card_table import CardTable, Met, words
-from tribodyn.geometry.sources.directions import Listed, System, turned
-from tribodyn.geometry.sources.raw import LabelledMesh, RawMesh, Terms
+from tribodyn.geometry.sources.card_table import CardTable, SkippedCards, words
+from tribodyn.geometry.sources.directions import ElementAxes, System, axis_rotation
+from tribodyn.geometry.sources.raw_mesh import LabelledMesh, RawMesh, Terms
 from tribodyn.refusal import Refusal
 
 # equal corners of a brick I..P -> (kind, its corners, its edge nodes) among the twenty nodes
@@ -39,7 +39,7 @@ BONDED = {2: ("2",), 12: ("5", "6")}  # options of a contact that glues: constra
 def read(path: Path) -> RawMesh:
     """Read an archive. Raises ValueError: one sentence that names the block and the cure."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    return _Archive(path, lines, LabelledMesh(Met(TABLE))).taken()
+    return _Archive(path, lines, LabelledMesh(SkippedCards(TABLE))).taken()
 
 
 @dataclass
@@ -47,7 +47,7 @@ class _Archive:
     """A file that is read line by line.
 
     i : the next line; types, options : of elements, by the number of their kind; constants : of materials by name
-    systems : local ones; of_solids : volume group -> its material and local system; turned : node -> its own axes
+    systems : local ones; of_solids : volume group -> its material and local system; node_axes : node -> its axes
     equations : by number, and the number of the last; alike : set of CP -> its first node
     loads : on nodes, along axes that may be turned
     """
@@ -61,7 +61,7 @@ class _Archive:
     constants: dict[int, dict[str, float]] = field(default_factory=dict)
     systems: dict[int, System] = field(default_factory=dict)
     of_solids: dict[str, tuple[int, int]] = field(default_factory=dict)
-    turned: dict[int, np.ndarray] = field(default_factory=dict)
+    node_axes: dict[int, np.ndarray] = field(default_factory=dict)
     equations: dict[str, Terms] = field(default_factory=dict)
     equation: str = ""
     alike: dict[str, int] = field(default_factory=dict)
@@ -88,10 +88,10 @@ class _Archive:
             if system and system not in self.systems:
                 raise Refusal(f"'{self.path}' has elements in system {system}, which it has not: add its LOCAL")
             self.constants.setdefault(material, {})
-        if self.turned:
-            places = np.array([self.mesh.points[label] for label in self.turned])
-            own = Listed(places, np.array(list(self.turned.values())))
-            self.mesh.frames = dict.fromkeys(self.turned, own)
+        if self.node_axes:
+            places = np.array([self.mesh.points[label] for label in self.node_axes])
+            own = ElementAxes(places, np.array(list(self.node_axes.values())))
+            self.mesh.frames = dict.fromkeys(self.node_axes, own)
         for node, axis, value in self.loads:
             self.mesh.force(node, axis, value)
         return self.mesh.raw(self.path, tuple(self._material(number) for number in self.constants))
@@ -149,7 +149,7 @@ class _Archive:
         x, y, z, *angles = (values + [0.0] * 6)[:6]
         self.mesh.points[label] = [x, y, z]
         if any(angles):
-            self.turned[label] = _turned(angles)
+            self.node_axes[label] = _turned(angles)
 
     def eblock(self, words: list[str]) -> None:
         """Elements."""
@@ -338,7 +338,7 @@ def _floats(words: list[str]) -> list[float]:
 def _turned(angles: list[float]) -> np.ndarray:
     """Axes (3, 3), rows, turned by angles [degrees] about z, about the new x, and about the y after both."""
     z, x, y = angles
-    return np.asarray(turned(1, y) @ turned(0, x) @ turned(2, z))
+    return np.asarray(axis_rotation(1, y) @ axis_rotation(0, x) @ axis_rotation(2, z))
 
 
 CONSTANTS = words("EX, EY, EZ, DENS, ALPX, ALPY, ALPZ") | {f"{of}{at}" for of in ("NU", "PR", "G") for at in _PAIRS}

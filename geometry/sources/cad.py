@@ -15,7 +15,7 @@ import numpy as np
 
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.geometry.sources import msh
-from tribodyn.geometry.sources.raw import RawMesh
+from tribodyn.geometry.sources.raw_mesh import RawMesh
 from tribodyn.refusal import Refusal
 
 ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")

@@ -46,7 +46,7 @@ class CardTable:
 
 
 @dataclass
-class Met:
+class SkippedCards:
     """Cards of a file that were met and not carried over. mark : what stands before a card's name in sentences"""
 
     table: CardTable

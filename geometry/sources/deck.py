@@ -35,7 +35,7 @@ class DeckMaterial:
 
 
 @dataclass(frozen=True)
-class Tie:
+class DeckTie:
     """Two faces glued, or that may touch, as the deck calls them.
 
     tolerance : of glued ones [m]; friction : of ones that may touch; None where the deck leaves it
@@ -63,14 +63,14 @@ class Coupling:
 
 
 @dataclass(frozen=True)
-class Equation:
+class DeckEquation:
     """sum of coefficient * displacement = 0; each term is (group of one node, axis 0..5, coefficient)."""
 
     terms: tuple[tuple[str, int, float], ...]
 
 
 @dataclass(frozen=True)
-class Spring:
+class DeckSpring:
     """A stiffness [N/m] against the elongation sum of factor * displacement; terms as of an equation.
 
     Rotations are counted with a length of 1 m; a spring of rotations alone has [N m]
@@ -140,11 +140,11 @@ class Deck:
     """All of it; empty for files that hold a mesh alone. contacts : pairs of faces, of which a scene makes contacts"""
 
     materials: tuple[DeckMaterial, ...] = ()
-    ties: tuple[Tie, ...] = ()
-    contacts: tuple[Tie, ...] = ()
+    ties: tuple[DeckTie, ...] = ()
+    contacts: tuple[DeckTie, ...] = ()
     couplings: tuple[Coupling, ...] = ()
-    equations: tuple[Equation, ...] = ()
-    springs: tuple[Spring, ...] = ()
+    equations: tuple[DeckEquation, ...] = ()
+    springs: tuple[DeckSpring, ...] = ()
     forces: tuple[Force, ...] = ()
     pressures: tuple[FacePressure, ...] = ()
     supports: tuple[Support, ...] = ()

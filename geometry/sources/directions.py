@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from tribodyn.geometry.placing import rotation
+from tribodyn.geometry.placement import rotation
 from tribodyn.refusal import Refusal
 
 
@@ -106,7 +106,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class Listed:
+class ElementAxes:
     """Directions that a file lists by element or node; at a place those of the nearest centre hold, or their mean.
 
     centres : (n, 3); rows : (n, 3, 3)
@@ -124,11 +124,11 @@ class Listed:
             (equally_near.sum(axis=1) > 1)[:, None, None], orthogonal(mean[:, 0], mean[:, 1]), self.rows[which[:, 0]]
         )
 
-    def scaled(self, metre: float) -> Listed:
+    def scaled(self, metre: float) -> ElementAxes:
         """The same where lengths are counted in another unit."""
-        return Listed(metre * self.centres, self.rows)
+        return ElementAxes(metre * self.centres, self.rows)
 
 
-def turned(axis: int, degrees: float) -> np.ndarray:
+def axis_rotation(axis: int, degrees: float) -> np.ndarray:
     """(3, 3) rows of directions that are turned about one of them, 0..2, by the right hand."""
     return rotation(np.eye(3)[axis], np.radians(degrees)).T

@@ -7,7 +7,7 @@ from pathlib import Path
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.geometry.sources import msh
 from tribodyn.geometry.sources.cad import one_line
-from tribodyn.geometry.sources.raw import RawMesh
+from tribodyn.geometry.sources.raw_mesh import RawMesh
 from tribodyn.refusal import Refusal
 
 

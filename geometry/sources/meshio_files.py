@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry.sources.raw import SURFACES, VOLUMES, Cells, RawMesh
+from tribodyn.geometry.sources.raw_mesh import SURFACES, VOLUMES, Cells, RawMesh
 from tribodyn.refusal import Refusal
 
 MOST_VALUES = 100  # an array of integers with more different values is a number, not a group

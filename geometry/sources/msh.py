@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.geometry.gmsh_session import session
-from tribodyn.geometry.sources.raw import SURFACES, Cells, RawMesh
+from tribodyn.geometry.sources.raw_mesh import SURFACES, Cells, RawMesh
 from tribodyn.refusal import Refusal
 
 _ORDER_19 = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]

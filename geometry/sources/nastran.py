@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry.sources import deck
-from tribodyn.geometry.sources.card_table import CardTable, Met
+from tribodyn.geometry.sources.card_table import CardTable, SkippedCards
 from tribodyn.geometry.sources.directions import System
-from tribodyn.geometry.sources.raw import LabelledMesh, RawMesh
+from tribodyn.geometry.sources.raw_mesh import LabelledMesh, RawMesh
 from tribodyn.refusal import Refusal
 
 # card -> (kind of first order, kind of second order, where meshio's nodes stand)
@@ -38,7 +38,7 @@ def read(path: Path) -> RawMesh:
     control = "\n".join(lines[:start])
     parameters = [line.strip() for line in lines[:start] if line.strip().upper().startswith("PARAM")]
     cards = list(cards_of([*parameters, *lines[start:]]))
-    reader = _Bulk(path, LabelledMesh(Met(TABLE)), _chosen(control) if start else None)
+    reader = _Bulk(path, LabelledMesh(SkippedCards(TABLE)), _chosen(control) if start else None)
     reader.common = next((fields for name, fields in cards if name == "GRDSET"), reader.common)
     for name, fields in cards:
         if name in FIRST:
@@ -150,9 +150,7 @@ class _Bulk:
         nodes = [_int(x, card) for x in fields[2:] if x]
         low, high, order = SOLIDS[card]
         if len(nodes) < CORNERS[card]:
-            raise Refusal(
-                f"{card} {fields[0]} of '{self.path}' has {len(nodes)} nodes: the file is cut off or broken"
-            )
+            raise Refusal(f"{card} {fields[0]} of '{self.path}' has {len(nodes)} nodes: the file is cut off or broken")
         whole = len(nodes) >= len(order)
         kept = [nodes[i] for i in order] if whole else nodes[: CORNERS[card]]
         self.mesh.solid(high if whole else low, _int(fields[0], card), kept, f"PSOLID {_int(fields[1], card)}")

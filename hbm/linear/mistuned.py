@@ -22,7 +22,7 @@ import numpy as np
 from scipy import fft
 from scipy.linalg import inv, lu_factor, lu_solve
 
-from tribodyn.fem.cyclic import of_sector
+from tribodyn.fem.cyclic_symmetry import sector_name
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import Expansion
@@ -118,7 +118,7 @@ class MistunedCompliance:
             raise Refusal(f"mistuning needs {alike.n_sectors} deviations of stiffness above -1, one per sector")
         self.k = np.tile(alike.k, alike.n_sectors)
         self.n_contact = len(self.k)
-        self.output_names = tuple(of_sector(name, n) for name in alike.outputs for n in range(alike.n_sectors))
+        self.output_names = tuple(sector_name(name, n) for name in alike.outputs for n in range(alike.n_sectors))
         self.error = alike.error
         self._force = alike.force
         self._points: OrderedDict[float, MistunedPoint] = OrderedDict()

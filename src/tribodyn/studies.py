@@ -4,7 +4,7 @@ A scene is a name, the path of a .toml file, its tables as a dict, or one that w
 and `study` are made from these functions.
 """
 
-from tribodyn.geometry.surface import HeightMap as HeightMap
+from tribodyn.geometry.height_map import HeightMap as HeightMap
 from tribodyn.workflows.studies.convergence import Convergence as Convergence, converge as converge
 from tribodyn.workflows.studies.curves.backbones import SceneBackbone as SceneBackbone, backbone as backbone
 from tribodyn.workflows.studies.curves.decay import Decay as Decay, ring_down as ring_down

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import skfem
 
-from tribodyn.fem import cyclic
-from tribodyn.fem.cyclic import Sector, at_index
+from tribodyn.fem import cyclic_symmetry
+from tribodyn.fem.cyclic_symmetry import Sector, wave_system
 from tribodyn.fem.elasticity import assemble
-from tribodyn.fem.loads import NodalForce
+from tribodyn.fem.load_vectors import NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import turning_frequencies
 from tribodyn.fem.part import build
@@ -38,7 +38,7 @@ def ring() -> Sector:
     part = build(mesh, sets, STEEL, [], [], watched, watched)
     mass, _ = assemble(mesh, STEEL)
     turning = replace(part.system, gyroscopic=coriolis(mass, AXIS, SPEED))
-    return cyclic.cut_from(replace(part, system=turning), [], N, ("right", "left"), AXIS)
+    return cyclic_symmetry.cut_sector(replace(part, system=turning), [], N, ("right", "left"), AXIS)
 
 
 @pytest.mark.parametrize("waves", [2, 3, 4])
@@ -64,7 +64,7 @@ def test_waves_of_a_rotating_ring_split_as_the_closed_form_says(waves: int) -> N
 
 def test_frequencies_are_those_of_the_first_order_system() -> None:
     """Against a general eigenvalue solver on the first-order form, complex as a wave sees it."""
-    system, _ = at_index(ring(), 2)
+    system, _ = wave_system(ring(), 2)
     K, M, G = (np.asarray(m.todense()) for m in (system.stiffness, system.mass, system.gyroscopic))
     n = len(K)
     companion = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, G)]])

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.helpers import small_wheel as small
-from tribodyn.fem import cyclic
+from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.constraints import Clamp
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.modes import modes
-from tribodyn.geometry.placing import rotation
+from tribodyn.geometry.placement import rotation
 from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel
@@ -33,7 +33,7 @@ def test_rotation_is_right_handed_about_its_axis():
 def test_every_nodal_diameter_is_that_of_the_assembled_wheel(sector):
     """Item 1 of the issue, unreduced: all modes of the wheel below a bound are those of the sector, to 1e-8."""
     k = sector.interface.stiffness(*small.STIFFNESS)
-    system, interface = cyclic.assemble_wheel(sector)
+    system, interface = cyclic_symmetry.assemble_wheel(sector)
     for springs, all_springs in ((None, None), (k, np.tile(k, (small.N, 1)))):
         half = nodal_diameters(sector, range(small.N // 2 + 1), 4, springs)
         mine = np.concatenate([half, half[1:-1]])  # waves forwards and backwards
@@ -46,17 +46,17 @@ def test_every_nodal_diameter_is_that_of_the_assembled_wheel(sector):
 
 def test_opposite_waves_are_mirror_images(sector):
     for index in (1, 3):
-        system, B = cyclic.at_index(sector, index)
-        other, B_other = cyclic.at_index(sector, small.N - index)
+        system, B = cyclic_symmetry.wave_system(sector, index)
+        other, B_other = cyclic_symmetry.wave_system(sector, small.N - index)
         assert abs(system.stiffness - other.stiffness.conj()).max() <= 1e-12 * abs(system.stiffness).max()
         assert abs(B - B_other.conj()).max() < 1e-14
         assert abs(system.stiffness - system.stiffness.conj().T).max() == 0
     for index in (0, small.N // 2, small.N, -small.N):
-        system, B = cyclic.at_index(sector, index)
+        system, B = cyclic_symmetry.wave_system(sector, index)
         assert not np.iscomplexobj(system.stiffness)
         assert not np.iscomplexobj(B)
-    assert cyclic.phase(3, 8) == pytest.approx(np.exp(-2j * np.pi * 3 / 8))
-    assert cyclic.phase(-3, 8) == pytest.approx(np.conj(cyclic.phase(3, 8)))
+    assert cyclic_symmetry.phase(3, 8) == pytest.approx(np.exp(-2j * np.pi * 3 / 8))
+    assert cyclic_symmetry.phase(-3, 8) == pytest.approx(np.conj(cyclic_symmetry.phase(3, 8)))
 
 
 def test_an_unclamped_wheel_moves_rigidly_in_the_waves_it_should(tmp_path):
@@ -69,8 +69,8 @@ def test_an_unclamped_wheel_moves_rigidly_in_the_waves_it_should(tmp_path):
     tilt = plus * points[:, :1] - np.outer(points @ [0, 1, -1j], [1, 0, 0])
     along_axis = np.tile([1.0, 0, 0], (len(points), 1))
     for index, field in ((0, along_axis), (0, about_axis), (1, plus), (1, tilt), (7, plus.conj())):
-        T = cyclic.seam_map(free, index)
-        system, B = cyclic.at_index(free, index)
+        T = cyclic_symmetry.seam_map(free, index)
+        system, B = cyclic_symmetry.wave_system(free, index)
         q = field.ravel()
         kept = np.setdiff1d(np.arange(len(q)), free.seam_left)
         assert np.abs(T @ q[kept] - q).max() < 1e-12 * np.abs(q).max()
@@ -80,7 +80,7 @@ def test_an_unclamped_wheel_moves_rigidly_in_the_waves_it_should(tmp_path):
 
 
 def test_wheel_is_closed_and_named(sector):
-    system, interface = cyclic.assemble_wheel(sector)
+    system, interface = cyclic_symmetry.assemble_wheel(sector)
     assert interface.n_pair == small.N * sector.interface.n_pair
     assert set(system.loads) == {f"{name}@{n}" for name in small.LOADS for n in range(small.N)}
     radius = np.hypot(*interface.points[:, 1:].T).reshape(small.N, -1)
@@ -92,11 +92,11 @@ def test_a_stiffer_blade_takes_its_own_frequency_with_it(tmp_path):
     """On a rigid disk with open shrouds blades are alone: each frequency scales with the root of its factor."""
     sector = small.full_sector(tmp_path / "s.msh")[1]
     factors = np.linspace(0.9, 1.1, small.N)
-    system, _ = cyclic.assemble_wheel(sector, factors)
+    system, _ = cyclic_symmetry.assemble_wheel(sector, factors)
     alone = modes(sector.system.stiffness, sector.system.mass, 1)[0][0]
     assert modes(system.stiffness, system.mass, small.N)[0] == pytest.approx(alone * np.sqrt(factors), rel=1e-9)
     with pytest.raises(ValueError, match="mistuning needs 8 positive stiffness factors"):
-        cyclic.assemble_wheel(sector, [1.0, 2.0])
+        cyclic_symmetry.assemble_wheel(sector, [1.0, 2.0])
 
 
 def test_faces_that_do_not_match_are_one_sentence(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import Clamp, NoMeanRotation
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.material import Material
 from tribodyn.fem.springs import Spring
 from tribodyn.geometry import mesh as mesh_file

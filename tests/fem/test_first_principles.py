@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import skfem
 
-from tribodyn.fem import cyclic
+from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.bolts import Bolt
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.elasticity import assemble
-from tribodyn.fem.loads import NodalForce, Sum
+from tribodyn.fem.load_vectors import NodalForce, Sum
 from tribodyn.fem.material import Material, Orthotropic
 from tribodyn.fem.prestress import coriolis, geometric_stiffness, spin_softening
 from tribodyn.fem.springs import Mass
@@ -136,7 +136,7 @@ def test_a_bolt_is_in_balance_and_pulls_its_faces_together_with_one_newton(block
 
 def test_a_sector_that_is_ahead_repeats_its_right_neighbour_later():
     """q_n = q_0 exp(-i 2 pi j n / N) is the wave cos(w t - 2 pi j n / N): it runs towards sectors that are ahead."""
-    phase = cyclic.phase(1, 12)
+    phase = cyclic_symmetry.phase(1, 12)
     time = np.linspace(0, 1, 50)
     ours = (phase * np.exp(2j * np.pi * time)).real
     np.testing.assert_allclose(ours, np.cos(2 * np.pi * (time - 1 / 12)), atol=1e-12)

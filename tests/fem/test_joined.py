@@ -13,7 +13,7 @@ from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import factorise
-from tribodyn.fem.loads import Moment, NodalForce, Pressure
+from tribodyn.fem.load_vectors import Moment, NodalForce, Pressure
 from tribodyn.fem.material import Material, Orthotropic
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part, build

@@ -8,10 +8,10 @@ import skfem
 from scipy.sparse import csr_matrix, diags_array
 
 from tribodyn.fem.constraints import Clamp, free_dofs, partition
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import factorise, pardiso_available
-from tribodyn.fem.loads import BodyForce, NodalForce, Pressure
+from tribodyn.fem.load_vectors import BodyForce, NodalForce, Pressure
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import build

@@ -9,10 +9,10 @@ import pytest
 import skfem
 
 from tribodyn.fem.assembly import Assembly, Body
-from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.loads import Pressure
+from tribodyn.fem.contact_faces import ContactFaces
+from tribodyn.fem.load_vectors import Pressure
 from tribodyn.fem.material import Material
-from tribodyn.fem.mortar import coefficients, common, dual, side, tabulate
+from tribodyn.fem.mortar import coefficients, dual, shared_surface, side, tabulate
 
 STEEL = Material(210e9, 0.3, 7860.0)
 L = np.linspace
@@ -175,7 +175,7 @@ def test_dual_functions_hold_where_a_cut_is_hollow_and_weights_are_below_zero():
     """Meshes of bolts give such cuts: the weights were taken for areas, and a root of them was no number."""
     both = pair(False)
     one, two = (side(both, both.boundaries[name]) for name in ("upper.bottom", "lower.top"))
-    shared = common(one, two, 0.1)
+    shared = shared_surface(one, two, 0.1)
     weight = shared.weight.copy()
     weight[::7] *= -0.1
     shared = replace(shared, weight=weight)

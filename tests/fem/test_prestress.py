@@ -7,14 +7,14 @@ import pytest
 import skfem
 
 from tribodyn.fem.constraints import Clamp
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import SingularStiffness, factorise
-from tribodyn.fem.loads import Centrifugal, NodalForce
+from tribodyn.fem.load_vectors import Centrifugal, NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import StaticDivergence, modes
 from tribodyn.fem.part import build
-from tribodyn.fem.prestress import check_stability, geometric_stiffness, prestressed, spin_softening
+from tribodyn.fem.prestress import check_stability, geometric_stiffness, solve_prestress, spin_softening
 
 SOFT = Material(E=1e9, nu=0.0, rho=1000.0)
 LENGTH, DEPTH = 1.0, 0.01  # slender: shear changes the first frequency by some 1e-4
@@ -34,7 +34,7 @@ def beam():
 def loaded(part, force, softening=0):
     """The stiffness of the part in its equilibrium under a force (n_free,)."""
     linear = factorise(part.system.stiffness).solve(force)
-    rest = prestressed(part, SOFT, lambda k: factorise(k, definite=False).solve(force), linear, softening)
+    rest = solve_prestress(part, SOFT, lambda k: factorise(k, definite=False).solve(force), linear, softening)
     check_stability(rest.stiffness)
     return rest.stiffness
 

@@ -9,7 +9,7 @@ import pytest
 from tests.helpers import foreign_files
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.material import Material
-from tribodyn.geometry.sources import read
+from tribodyn.geometry.sources import foreign_file
 
 FORMATS = [
     ("a.msh", "4.1"),
@@ -37,14 +37,14 @@ def reference():
 
     with tempfile.TemporaryDirectory() as folder:
         mesh = foreign_files.bricks(Path(folder))
-        (body,) = read.read(foreign_files.write(mesh, Path(folder) / "a.msh", "4.1")).bodies.values()
+        (body,) = foreign_file.read(foreign_files.write(mesh, Path(folder) / "a.msh", "4.1")).bodies.values()
         return mesh, squared_frequencies(body.mesh)
 
 
 @pytest.mark.parametrize(("name", "kind"), FORMATS)
 def test_every_format_gives_the_same_frequencies_and_set(name, kind, tmp_path):
     mesh, expected = reference()
-    source = read.read(foreign_files.write(mesh, tmp_path / name, kind))
+    source = foreign_file.read(foreign_files.write(mesh, tmp_path / name, kind))
     (body,) = source.bodies.values()
     np.testing.assert_allclose(squared_frequencies(body.mesh), expected, rtol=1e-7 if name == "d.bdf" else 2e-9)
     if name[-3:] not in ("msh", "med"):
@@ -72,7 +72,7 @@ def test_broken_files_are_refused_in_one_sentence(name, old, new, sentence, tmp_
     assert old.encode() in data
     path.write_bytes(data.replace(old.encode(), new.encode(), 1))
     with pytest.raises(ValueError, match=sentence) as said:
-        read.read(path)
+        foreign_file.read(path)
     assert "\n" not in str(said.value)
 
 
@@ -85,7 +85,7 @@ def test_a_free_line_with_a_star_has_four_fields(more, tmp_path):
     (tmp_path / "free.bdf").write_text(free)
     if more:
         with pytest.raises(ValueError, match="more than the four fields of a star"):
-            read.read(tmp_path / "free.bdf")
+            foreign_file.read(tmp_path / "free.bdf")
         return
-    own, other = (next(iter(read.read(tmp_path / name).bodies.values())).mesh for name in ("d.bdf", "free.bdf"))
+    own, other = (next(iter(foreign_file.read(tmp_path / name).bodies.values())).mesh for name in ("d.bdf", "free.bdf"))
     assert np.array_equal(own.doflocs, other.doflocs)

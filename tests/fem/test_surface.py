@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import skfem
 
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import batches
 from tribodyn.fem.interface import contact_frames, join
-from tribodyn.fem.loads import BodyForce, Centrifugal, NodalForce, Pressure
+from tribodyn.fem.load_vectors import BodyForce, Centrifugal, NodalForce, Pressure
 from tribodyn.fem.material import Material
 from tribodyn.fem.surface import face_integrals, facet_nodes, surface
 

@@ -13,7 +13,7 @@ import tribodyn as td
 from tests.helpers.command import leave
 from tests.helpers.rough_faces import caps, gaussian
 from tribodyn.geometry.asperities import Moments, identify, moments, summits
-from tribodyn.geometry.surface import HeightMap
+from tribodyn.geometry.height_map import HeightMap
 
 RADIUS, APART, STEP = 200e-6, 41e-6, 1e-6
 

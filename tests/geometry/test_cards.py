@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.small_decks import archive, bricks, bulk, cut, frequencies, straight
-from tribodyn.geometry.sources import abaqus_cards, ansys, nastran, read
+from tribodyn.geometry.sources import abaqus_cards, ansys, foreign_file, nastran
 
 TABLES = {"inp": abaqus_cards.TABLE, "bdf": nastran.TABLE, "cdb": ansys.TABLE}
 SMALL = (2, 1, 1)
@@ -142,7 +142,7 @@ def said(text: str, ending: str) -> tuple[object, ...]:
         folder = Path(name)
         (folder / f"more.{ending}").write_text(MORE[ending])
         (folder / f"own.{ending}").write_text(text)
-        found = read.read(folder / f"own.{ending}", "mm")
+        found = foreign_file.read(folder / f"own.{ending}", "mm")
     bodies = {
         name: (body.mesh.doflocs.tolist(), {key: of.tolist() for key, of in body.node_sets.items()})
         for name, body in found.bodies.items()
@@ -342,5 +342,5 @@ def test_a_table_of_a_material_is_taken_at_the_initial_temperature(tmp_path: Pat
 @pytest.mark.parametrize("warm", ["", WARM + "3, 60.\n", WARM.replace("EVERY", "FOOT")])
 def test_a_table_is_refused_where_one_temperature_is_not_given_to_all(warm: str, tmp_path: Path) -> None:
     (tmp_path / "own.inp").write_text(TABLED + warm)
-    refused = read.read(tmp_path / "own.inp", "mm").refused
+    refused = foreign_file.read(tmp_path / "own.inp", "mm").refused
     assert list(refused) == ["*ELASTIC, at several temperatures", "*DENSITY, at several temperatures"]

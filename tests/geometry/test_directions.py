@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.small_decks import ENDING, bricks, by_calculix, frequencies, straight
-from tribodyn.geometry.sources.directions import System, turned
+from tribodyn.geometry.sources.directions import System, axis_rotation
 
 TENSOR = """*ELASTIC, TYPE=ANISO
 150000., 4000., 12000., 5000., 4200., 13000., 3000., 100.,
@@ -81,4 +81,4 @@ def test_a_cylinder_has_radial_tangential_and_axial_directions() -> None:
     at = system.places(np.array([[2.0, 90.0, 5.0]]))
     np.testing.assert_allclose(at, [[1, 2, 5]], atol=1e-12)
     np.testing.assert_allclose(system.at(at)[0], [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], atol=1e-12)
-    np.testing.assert_allclose(turned(2, 90.0), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], atol=1e-12)
+    np.testing.assert_allclose(axis_rotation(2, 90.0), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], atol=1e-12)

@@ -10,7 +10,7 @@ import skfem
 from tribodyn.geometry import bolt, mesh as mesh_file, nut
 from tribodyn.geometry.gmsh_session import save, session
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
-from tribodyn.geometry.placing import overlap
+from tribodyn.geometry.placement import overlap
 
 EDGES = (1.0, 0.7, 0.4)
 CELLS = ("tetra10", "hexahedron20", "hexahedron27")

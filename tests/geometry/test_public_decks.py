@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.small_decks import Shape, archive, bricks, bulk, by_calculix, cut, frequencies, straight
-from tribodyn.geometry.sources import read
+from tribodyn.geometry.sources import foreign_file
 
 N, FINE = (12, 4, 2), (16, 4, 4)
 
@@ -109,7 +109,7 @@ DECKS = {
 def test_a_deck_is_read_or_refused_by_the_names_of_its_cards(name: str, tmp_path: Path) -> None:
     ending, text, refused = DECKS[name]
     (tmp_path / f"own.{ending}").write_text(text)
-    assert list(read.read(tmp_path / f"own.{ending}", "mm").refused) == refused
+    assert list(foreign_file.read(tmp_path / f"own.{ending}", "mm").refused) == refused
     if refused:
         with pytest.raises(ValueError, match="not carried over") as raised:
             frequencies(text, 2, tmp_path, ending)
@@ -119,7 +119,7 @@ def test_a_deck_is_read_or_refused_by_the_names_of_its_cards(name: str, tmp_path
 def test_a_set_of_supports_that_the_case_control_does_not_select_holds_nothing(tmp_path: Path) -> None:
     ending, text, _ = DECKS["normal modes"]
     (tmp_path / f"own.{ending}").write_text(text)
-    assert any("set SPC 2" in clause for clause in read.read(tmp_path / f"own.{ending}", "mm").unused)
+    assert any("set SPC 2" in clause for clause in foreign_file.read(tmp_path / f"own.{ending}", "mm").unused)
     first, *_ = text.rpartition("SPC1,2")
     np.testing.assert_allclose(
         frequencies(text, 2, tmp_path, ending), frequencies(first, 2, tmp_path, ending), rtol=1e-9

@@ -11,7 +11,7 @@ import skfem
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.material import Material
 from tribodyn.fem.surface import surface
-from tribodyn.geometry.refine import halved
+from tribodyn.geometry.subdivision import subdivide
 
 L = np.linspace
 
@@ -41,7 +41,7 @@ def bent(tets: bool):
 @pytest.mark.parametrize("tets", [False, True])
 def test_the_refined_mesh_is_the_same_body_with_the_same_groups(tets):
     mesh, sets = bent(tets)
-    fine, finer_sets = halved(mesh, sets)
+    fine, finer_sets = subdivide(mesh, sets)
     assert fine.nelements == 8 * mesh.nelements
     np.testing.assert_array_equal(fine.doflocs[:, : mesh.doflocs.shape[1]], mesh.doflocs)
     volume = [assemble(of, Material(1.0, 0.0, 1.0))[0].sum() / 3 for of in (mesh, fine)]
@@ -67,7 +67,7 @@ def test_the_refined_mesh_is_the_same_body_with_the_same_groups(tets):
 def test_what_the_mesh_can_represent_the_refined_one_can(tets):
     """The spaces are nested: a displacement of the mesh has the same strain and kinetic energy on the refined one."""
     mesh, _ = bent(tets)
-    fine, _ = halved(mesh, {})
+    fine, _ = subdivide(mesh, {})
     steel = Material(210e9, 0.3, 7860.0)
     u = [np.stack([of.doflocs[1], 0.3 * of.doflocs[0], -of.doflocs[2]], axis=1).ravel() for of in (mesh, fine)]
     for one, other in zip(assemble(mesh, steel), assemble(fine, steel), strict=True):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.small_decks import ENDING, bricks, frequencies, straight
-from tribodyn.geometry.sources import read
+from tribodyn.geometry.sources import foreign_file
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene.structure import DeckTable
 
@@ -26,7 +26,7 @@ def test_a_card_that_changes_the_structure_is_refused(name: str, tmp_path: Path)
     with pytest.raises(ValueError, match="not carried over") as raised:
         frequencies(BAR + CARDS[name], 2, tmp_path)
     assert f'"{name}"' in str(raised.value)
-    assert list(read.read(tmp_path / "own.inp", "mm").refused) == [name]
+    assert list(foreign_file.read(tmp_path / "own.inp", "mm").refused) == [name]
     made = decks.structure("d", DeckTable(file="own.inp", unit=1e-3, ignore=(name,)), {}, tmp_path)
     assert any("by ignore" in note for note in made.notes)
     with pytest.raises(ValueError, match="ignore"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tribodyn.geometry.mesh import quality
-from tribodyn.geometry.sources import deck, read
+from tribodyn.geometry.sources import deck, foreign_file
 from tribodyn.geometry.sources.abaqus_cards import engineering_constants
 
 LAP = Path(__file__).parent / "decks" / "lap.inp"
@@ -14,7 +14,7 @@ LAP = Path(__file__).parent / "decks" / "lap.inp"
 
 @pytest.fixture(scope="module")
 def lap():
-    return read.read(LAP, "mm")
+    return foreign_file.read(LAP, "mm")
 
 
 def test_instances_are_bodies_in_their_places(lap):
@@ -25,7 +25,7 @@ def test_instances_are_bodies_in_their_places(lap):
     np.testing.assert_allclose(first.p.max(axis=1), [0.02, 0.01, 0.01])
     np.testing.assert_allclose(second.p.min(axis=1), [-0.01, 0.0, 0.01], atol=1e-12)  # moved up, then turned about z
     np.testing.assert_allclose(second.p.max(axis=1), [0.0, 0.02, 0.02], atol=1e-12)
-    assert any("16" not in said and "4 hexahedra of first order" in said for said in lap.raised)
+    assert any("16" not in said and "4 hexahedra of first order" in said for said in lap.order_notes)
 
 
 def test_sets_and_surfaces_are_where_the_deck_puts_them(lap):
@@ -45,9 +45,9 @@ def test_what_the_deck_says_beside_its_mesh(lap):
     assert said.materials == (
         deck.DeckMaterial("Steel", 210e9, 0.3, pytest.approx(7850.0), 1.2e-5, groups=("Block-1.All", "Block-2.All")),
     )
-    assert said.ties == (deck.Tie("glue", "Lower", "Upper", 0.5e-3),)
+    assert said.ties == (deck.DeckTie("glue", "Lower", "Upper", 0.5e-3),)
     assert said.couplings == (deck.Coupling("carried", "distributing", "RP", "End"),)
-    assert said.equations == (deck.Equation((("node Block-2.11", 0, 1.0), ("node Block-2.12", 0, -1.0))),)
+    assert said.equations == (deck.DeckEquation((("node Block-2.11", 0, 1.0), ("node Block-2.12", 0, -1.0))),)
     assert said.forces == (deck.Force("RP", 1, -100.0),)
     assert said.pressures == (deck.FacePressure("Upper", pytest.approx(3e6)),)
     assert said.supports == tuple(deck.Support("Foot", axis) for axis in range(3))
@@ -119,6 +119,6 @@ def test_broken_decks_are_refused_in_one_sentence(case, tmp_path):
     broken = tmp_path / "broken.inp"
     broken.write_text(text.replace(old, new))
     with pytest.raises(ValueError, match=sentence) as said:
-        read.read(broken, "mm")
+        foreign_file.read(broken, "mm")
     assert "\n" not in str(said.value)
     assert ":" in str(said.value)

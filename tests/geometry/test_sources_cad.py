@@ -7,7 +7,7 @@ import pytest
 
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.geometry.mesh import area, facts
-from tribodyn.geometry.sources import picking, read
+from tribodyn.geometry.sources import face_rules, foreign_file
 from tribodyn.geometry.sources.cad import Sizes
 
 
@@ -33,7 +33,7 @@ def blocks(tmp_path_factory):
 
 
 def test_solids_are_bodies_that_stay_apart(blocks):
-    source = read.read(blocks, "mm")
+    source = foreign_file.read(blocks, "mm")
     assert len(source.bodies) == 2
     for body in source.bodies.values():
         found = facts(body.mesh)
@@ -46,11 +46,11 @@ def test_solids_are_bodies_that_stay_apart(blocks):
 
 
 def test_sizes_by_body_and_by_face_refine_there(blocks):
-    coarse = read.read(blocks, "mm", Sizes(15.0))
+    coarse = foreign_file.read(blocks, "mm", Sizes(15.0))
     first, second = coarse.bodies
     number = int(next(iter(coarse.bodies[second].mesh.boundaries)).split()[1])
-    fine = read.read(blocks, "mm", Sizes(15.0, bodies={first: 5.0}))
-    at_face = read.read(blocks, "mm", Sizes(15.0, faces={number: 3.0}))
+    fine = foreign_file.read(blocks, "mm", Sizes(15.0, bodies={first: 5.0}))
+    at_face = foreign_file.read(blocks, "mm", Sizes(15.0, faces={number: 3.0}))
     assert fine.bodies[first].mesh.nelements > 4 * coarse.bodies[first].mesh.nelements
     face = f"face {number}"
     count = {s: len(one.bodies[second].mesh.boundaries[face]) for s, one in (("coarse", coarse), ("fine", at_face))}
@@ -58,9 +58,9 @@ def test_sizes_by_body_and_by_face_refine_there(blocks):
 
 
 def test_one_solid_alone_with_edges_of_the_size_that_is_asked_for(blocks):
-    name = next(iter(read.read(blocks, "mm", Sizes(20.0)).bodies))
+    name = next(iter(foreign_file.read(blocks, "mm", Sizes(20.0)).bodies))
     for size in (5.0, 8.0):
-        (body,) = read.read(blocks, "mm", Sizes(size, only=name)).bodies.values()
+        (body,) = foreign_file.read(blocks, "mm", Sizes(size, only=name)).bodies.values()
         a, b = (body.mesh.p[:, end] for end in body.mesh.edges)
         length = 1e3 * np.linalg.norm(a - b, axis=0)
         assert np.median(length) == pytest.approx(size, rel=0.2)
@@ -76,21 +76,21 @@ def test_one_solid_alone_with_edges_of_the_size_that_is_asked_for(blocks):
 )
 def test_sizes_that_cannot_be_are_refused(blocks, sizes, sentence):
     with pytest.raises(ValueError, match=sentence):
-        read.read(blocks, "mm", sizes)
+        foreign_file.read(blocks, "mm", sizes)
 
 
 def test_broken_cad_files_are_refused_in_one_sentence(tmp_path, blocks):
     broken = tmp_path / "broken.step"
     broken.write_text("ISO-10303-21;\nhello\n")
     with pytest.raises(ValueError, match=r"cannot be read|has no solid") as said:
-        read.read(broken)
+        foreign_file.read(broken)
     assert "\n" not in str(said.value)
     drawing = tmp_path / "broken.geo"
     drawing.write_text("Box(1) = {0, 0, 0};")
     with pytest.raises(ValueError, match=r"cannot be meshed|no volume"):
-        read.read(drawing)
+        foreign_file.read(drawing)
     with pytest.raises(ValueError, match="meshed already"):
-        read.read(Path(__file__).parent / "decks" / "lap.inp", "mm", Sizes(1.0))
+        foreign_file.read(Path(__file__).parent / "decks" / "lap.inp", "mm", Sizes(1.0))
 
 
 def test_drawings_are_meshed(tmp_path):
@@ -103,22 +103,22 @@ def test_drawings_are_meshed(tmp_path):
         "Mesh.MeshSizeMax = 1;",
     )
     drawing.write_text("\n".join(text) + "\n")
-    (body,) = read.read(drawing, "mm").bodies.values()
+    (body,) = foreign_file.read(drawing, "mm").bodies.values()
     assert facts(body.mesh).volume == pytest.approx(6e-9)
     assert area(body.mesh, body.mesh.boundaries["end"]) == pytest.approx(6e-6)
 
 
 def test_faces_are_picked_by_rule(blocks):
-    source = read.read(blocks, "mm")
+    source = foreign_file.read(blocks, "mm")
     body = min(source.bodies.values(), key=lambda one: one.mesh.p[2].min())
     mesh = body.mesh
-    top = picking.by_normal(mesh, (0, 0, 1), 5.0)
+    top = face_rules.by_normal(mesh, (0, 0, 1), 5.0)
     assert area(mesh, top) == pytest.approx(60e-3 * 20e-3)
-    np.testing.assert_array_equal(np.sort(picking.nearest(mesh, (0.03, 0.01, 0.02))), np.sort(top))
-    np.testing.assert_array_equal(np.sort(picking.within_box(mesh, (0, 0, 0.01), (0.06, 0.02, 0.01))), np.sort(top))
+    np.testing.assert_array_equal(np.sort(face_rules.nearest(mesh, (0.03, 0.01, 0.02))), np.sort(top))
+    np.testing.assert_array_equal(np.sort(face_rules.within_box(mesh, (0, 0, 0.01), (0.06, 0.02, 0.01))), np.sort(top))
     with pytest.raises(ValueError, match="no face of the boundary lies within the box"):
-        picking.within_box(mesh, (1, 1, 1), (2, 2, 2))
+        face_rules.within_box(mesh, (1, 1, 1), (2, 2, 2))
     with pytest.raises(ValueError, match="no face of the boundary faces"):
-        picking.by_normal(mesh, (1, 1, 1), 5.0)
+        face_rules.by_normal(mesh, (1, 1, 1), 5.0)
     with pytest.raises(ValueError, match="not all zero"):
-        picking.by_normal(mesh, (0, 0, 0), 5.0)
+        face_rules.by_normal(mesh, (0, 0, 0), 5.0)

@@ -9,8 +9,8 @@ import skfem
 from tests.helpers.mixed_meshes import mixed_cells, write_mixed
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.geometry.mesh import quality
-from tribodyn.geometry.sources import msh, read, solid
-from tribodyn.geometry.sources.raw import Cells, RawMesh
+from tribodyn.geometry.sources import foreign_file, msh, solid_body
+from tribodyn.geometry.sources.raw_mesh import Cells, RawMesh
 
 
 def area(mesh, facets):
@@ -27,7 +27,7 @@ def outside(mesh):
 @pytest.mark.parametrize(("version", "save_all"), [(4.1, False), (4.1, True), (2.2, False)])
 def test_every_gmsh_file_gives_the_same_body(order, complete, version, save_all, named, tmp_path):
     path = write_mixed(tmp_path / "box.msh", order, complete, version, save_all, named)
-    source = read.read(path)
+    source = foreign_file.read(path)
     (name, body), *others = source.bodies.items()
     assert not others
     assert name == ("box" if named else "body")
@@ -41,44 +41,44 @@ def test_every_gmsh_file_gives_the_same_body(order, complete, version, save_all,
         assert area(mesh, mesh.boundaries[face]) == pytest.approx(4.0, rel=1e-12)
         np.testing.assert_array_equal(body.node_sets[face], np.flatnonzero(abs(mesh.doflocs[2] - height) < 1e-9))
     assert any("cut into 96 tetrahedra" in sentence for sentence in source.notes)
-    assert any("first order" in sentence for sentence in source.raised) == (order == 1)
+    assert any("first order" in sentence for sentence in source.order_notes) == (order == 1)
     assert source.unused == ()
 
 
 @pytest.mark.parametrize("complete", [True, False])
 def test_curved_elements_of_mixed_kinds_keep_their_shape(complete, tmp_path):
     """x + 0.3 z^2 is in every element space: a node taken for its neighbour would fold an element."""
-    raw = read.read_raw(write_mixed(tmp_path / "box.msh", 2, complete))
+    raw = foreign_file.read_raw(write_mixed(tmp_path / "box.msh", 2, complete))
     bent = raw.points.copy()
     bent[:, 0] += 0.3 * raw.points[:, 2] ** 2
-    body = solid.build(replace(raw, points=bent))
+    body = solid_body.build(replace(raw, points=bent))
     found = quality(body.mesh)
     assert found.volume == pytest.approx(12.0, rel=1e-12)
     assert found.scaled_jacobian > 0.1
-    straight = solid.build(raw).mesh.doflocs
+    straight = solid_body.build(raw).mesh.doflocs
     straight[0] += 0.3 * straight[2] ** 2
     np.testing.assert_allclose(body.mesh.doflocs, straight, atol=1e-14)
 
 
 def test_unit_and_version_and_missing_volume(tmp_path):
     path = write_mixed(tmp_path / "box.msh", 2)
-    assert quality(read.read(path, "mm").bodies["box"].mesh).volume == pytest.approx(12e-9)
+    assert quality(foreign_file.read(path, "mm").bodies["box"].mesh).volume == pytest.approx(12e-9)
     with pytest.raises(ValueError, match=r'unit = "inch".* is no length'):
-        read.read(path, "inch")
+        foreign_file.read(path, "inch")
     with session() as gmsh:
         gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
         gmsh.model.occ.synchronize()
         gmsh.model.mesh.generate(2)
         gmsh.write(str(tmp_path / "flat.msh"))
     with pytest.raises(ValueError, match="no volume elements"):
-        read.read(tmp_path / "flat.msh")
+        foreign_file.read(tmp_path / "flat.msh")
 
 
 def test_prisms_numbered_in_a_mirror_are_turned():
     points, cells, _ = mixed_cells()
     kinds = dict(cells, wedge=cells["wedge"][:, [3, 4, 5, 0, 1, 2]])
     blocks = [Cells(kind, nodes, np.arange(len(nodes))) for kind, nodes in kinds.items()]
-    body = solid.build(RawMesh(points, np.arange(len(points)), blocks))
+    body = solid_body.build(RawMesh(points, np.arange(len(points)), blocks))
     assert quality(body.mesh).volume == pytest.approx(12.0, rel=1e-12)
 
 
@@ -99,11 +99,11 @@ def test_parts_that_share_no_nodes_are_bodies_named_by_their_groups():
         blocks,
         volumes={"all": np.arange(start), "left": number[0], "half": number[1][:2], "rest": number[1][2:]},
     )
-    found = solid.bodies(raw)
+    found = solid_body.bodies(raw)
     assert set(found) == {"left", "half+rest", "body1"}
     np.testing.assert_array_equal(found["left"], number[0])
     np.testing.assert_array_equal(found["body1"], number[2])
-    body = solid.build(raw, found["half+rest"])
+    body = solid_body.build(raw, found["half+rest"])
     assert set(body.mesh.subdomains) == {"all", "half", "rest"}
     assert quality(body.mesh).volume == pytest.approx(3.0)
 
@@ -116,7 +116,7 @@ def test_sets_of_corner_nodes_hold_the_nodes_added_between_them():
     raw = RawMesh(
         points, np.arange(len(points)), blocks, nodes={"ground": ground, "edge": edge}, skins=frozenset(["ground"])
     )
-    body = solid.build(raw)
+    body = solid_body.build(raw)
     _, y, z = body.mesh.doflocs
     np.testing.assert_array_equal(body.node_sets["ground"], np.flatnonzero(z == 0))
     np.testing.assert_array_equal(body.node_sets["edge"], np.flatnonzero((z == 0) & (y == 0)))
@@ -146,7 +146,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, version, bi
         for damaged in (whole[:place], bytes(turned), whole[:place] + whole[place + 3 :]):
             path.write_bytes(damaged)
             try:
-                for body in read.read(path).bodies.values():
+                for body in foreign_file.read(path).bodies.values():
                     assert np.isfinite(quality(body.mesh).volume)
             except ValueError as refusal:
                 refusals.append(str(refusal))

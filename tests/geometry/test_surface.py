@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tribodyn.geometry.surface import (
+from tribodyn.geometry.height_map import (
     HeightMap,
     centred,
     check,
@@ -22,7 +22,7 @@ from tribodyn.geometry.surface import (
     split,
     synthetic_pair,
 )
-from tribodyn.geometry.surface_io import read
+from tribodyn.geometry.height_map_files import read
 
 MICRO = 1e-6
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import tiny_wheel as tiny
-from tribodyn.fem.cyclic import at_index, seam_map, seam_parts
+from tribodyn.fem.cyclic_symmetry import seam_map, seam_parts, wave_system
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
@@ -57,7 +57,7 @@ def wheel_with_flow(reduced: ReducedSector, wheel: ReducedModel, springs: np.nda
     own = seam_parts(sector)[0].T  # a sector's own coordinates from all of them
     total = [np.zeros((wheel.system.n_dof, wheel.system.n_dof), complex) for _ in range(4)]
     for index in range(n):
-        system, B = at_index(sector, index)
+        system, B = wave_system(sector, index)
         _, omega, shape = family(system, np.asarray(B), springs, flow.mode)
         there = own @ (seam_map(sector, index) @ shape)
         turns = np.exp(-2j * np.pi * (index * np.arange(n) % n) / n) / np.sqrt(n)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import small_wheel as small
-from tribodyn.fem.cyclic import sector_maps
+from tribodyn.fem.cyclic_symmetry import sector_maps
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import SLIPS, ContactParameters

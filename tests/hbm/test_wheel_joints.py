@@ -10,7 +10,7 @@ from scipy.linalg import eigvalsh
 
 from proof.dense import DenseBalance
 from tests.helpers import small_wheel as small
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.prestress import coriolis
 from tribodyn.hbm import newton

@@ -4,8 +4,8 @@ import numpy as np
 import skfem
 
 from tribodyn.fem.constraints import Clamp
-from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.loads import NodalForce, Pressure
+from tribodyn.fem.contact_faces import ContactFaces
+from tribodyn.fem.load_vectors import NodalForce, Pressure
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import build
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tribodyn.geometry.asperities import Moments
-from tribodyn.geometry.surface import HeightMap
+from tribodyn.geometry.height_map import HeightMap
 
 
 def caps(radius: float, heights: np.ndarray, apart: float, step: float) -> HeightMap:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tribodyn.fem import cyclic
+from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.constraints import Clamp
-from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.loads import NodalForce, Sum
+from tribodyn.fem.contact_faces import ContactFaces
+from tribodyn.fem.load_vectors import NodalForce, Sum
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import build
 from tribodyn.geometry import mesh as mesh_file
@@ -74,9 +74,9 @@ def full_sector(path, disk_radius=0.0, clamps=CLAMPS, contact=CONTACT):
 
 def sector_of(mesh, node_sets, clamps, contacts, n_sectors, seam=None, axis=(1.0, 0.0, 0.0)):
     """Part and sector of any mesh; all contacts are those of neighbours."""
-    right = cyclic.turned(contacts, n_sectors, axis)
+    right = cyclic_symmetry.with_neighbours(contacts, n_sectors, axis)
     part = build(mesh, node_sets, STEEL, clamps, right, LOADS, OUTPUTS)
-    return part, cyclic.cut_from(part, right, n_sectors, seam, axis)
+    return part, cyclic_symmetry.cut_sector(part, right, n_sectors, seam, axis)
 
 
 def reduced_sector(path, disk_radius=0.0):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.cyclic_symmetry import Sector
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.geometry.placing import rotation
+from tribodyn.geometry.placement import rotation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint

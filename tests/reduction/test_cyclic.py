@@ -7,9 +7,9 @@ import pytest
 import scipy.linalg as sla
 
 from tests.helpers import small_wheel as small
-from tribodyn.fem import cyclic
-from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.cyclic import at_index
+from tribodyn.fem import cyclic_symmetry
+from tribodyn.fem.contact_faces import ContactFaces
+from tribodyn.fem.cyclic_symmetry import wave_system
 from tribodyn.fem.modes import modes
 from tribodyn.reduction import cyclic as waves
 from tribodyn.reduction.damping import modal_damping
@@ -35,8 +35,8 @@ def published():
 def test_reduced_sector_and_reduced_wheel_agree_to_rounding(reduced):
     """Item 1 of the issue, reduced: every frequency of the wheel, free and stuck, is one of a sector."""
     k = reduced.sector.interface.stiffness(*small.STIFFNESS)
-    system, interface = cyclic.assemble_wheel(reduced.sector)
-    n = at_index(reduced.sector, 0)[0].n_dof
+    system, interface = cyclic_symmetry.assemble_wheel(reduced.sector)
+    n = wave_system(reduced.sector, 0)[0].n_dof
     for springs, all_springs in ((None, None), (k, np.tile(k, (small.N, 1)))):
         mine = np.sort(waves.nodal_diameters(reduced.sector, range(small.N), n, springs).ravel())
         theirs, _ = linear_modes(ReducedModel(system, interface), all_springs, system.n_dof)
@@ -72,8 +72,8 @@ def test_relative_coordinates_are_the_contact_itself(reduced):
     for index in (0, 1, 3, 4, 7):
         T, n_masters = waves.relative_map(reduced.sector, index)
         n_contact = len(reduced.sector.left)
-        S = cyclic.seam_map(reduced.sector, index)
-        system, B = at_index(reduced.sector, index)
+        S = cyclic_symmetry.seam_map(reduced.sector, index)
+        system, B = wave_system(reduced.sector, index)
         z = np.random.default_rng(index).normal(size=T.shape[1])
         q = T @ z
         kept = np.setdiff1d(np.arange(len(q)), reduced.sector.seam_left)
@@ -91,7 +91,7 @@ def test_contact_of_fewer_components_leaves_the_others_free(tmp_path):
     _, full = small.full_sector(tmp_path / "s.msh", contact=contact)
     sector = waves.reduce_sector(full, n_modes=4).sector
     T, _ = waves.relative_map(sector, 1)
-    _, B = at_index(sector, 1)
+    _, B = wave_system(sector, 1)
     assert T.shape == (sector.system.n_dof, sector.system.n_dof)
     assert np.linalg.matrix_rank(T) == sector.system.n_dof
     x = np.eye(len(B), T.shape[1])
@@ -107,7 +107,7 @@ def test_model_of_a_wave(reduced):
         system, B = model.at_harmonic(h)
         assert (np.eye(n_contact, system.n_dof) == B).all()
         assert system is model.at_harmonic(h + small.N)[0]
-        expected = modes(*(getattr(at_index(reduced.sector, index)[0], m) for m in ("stiffness", "mass")), 3)
+        expected = modes(*(getattr(wave_system(reduced.sector, index)[0], m) for m in ("stiffness", "mass")), 3)
         assert modes(system.stiffness, system.mass, 3)[0] == pytest.approx(expected[0], rel=1e-8)
         assert np.iscomplexobj(system.stiffness) == (index not in (0, 4))
         lam, phi = sla.eigh(system.stiffness, system.mass)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tribodyn.fem import part as fem_part
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.interface import COMPONENTS
-from tribodyn.fem.loads import NodalForce
+from tribodyn.fem.load_vectors import NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.springs import Spring
 from tribodyn.geometry import blocks, mesh as mesh_file

@@ -16,7 +16,7 @@ from PIL import Image
 import tribodyn as td
 from tests.helpers.command import leave
 from tests.helpers.pages import ROOT
-from tribodyn.fem.assembly import named_in
+from tribodyn.fem.assembly import group_name
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.theme import BLUE, RED
@@ -117,10 +117,10 @@ def test_contact_pairs_of_a_deck_come_first_under_the_names_that_it_has(tmp_path
 
 
 def test_a_group_that_bears_the_name_of_its_body_keeps_it_unless_another_has_it() -> None:
-    assert named_in("A", "A.Top", ["A.Top"]) == "A.Top"
-    assert named_in("A", "A.Top", ["A.Top", "Top"]) == "A.A.Top"
-    assert named_in("A", "Top", ["A.Top", "Top"]) == "A.Top"
-    assert named_in("", "Top", ["Top"]) == "Top"
+    assert group_name("A", "A.Top", ["A.Top"]) == "A.Top"
+    assert group_name("A", "A.Top", ["A.Top", "Top"]) == "A.A.Top"
+    assert group_name("A", "Top", ["A.Top", "Top"]) == "A.Top"
+    assert group_name("", "Top", ["Top"]) == "Top"
 
 
 def test_what_is_no_file_of_a_mesh_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,7 @@ from tests.helpers.wheel_scene import WHEEL
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.prestress import geometric_stiffness
-from tribodyn.geometry.placing import rotation
+from tribodyn.geometry.placement import rotation
 from tribodyn.workflows.run import part_reduction
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import wheel_model

@@ -33,7 +33,7 @@ class Around:
     @property
     def turn(self) -> np.ndarray:
         """(3, 3) rotation by one pitch, from a sector to the one on its left."""
-        from tribodyn.geometry.placing import rotation
+        from tribodyn.geometry.placement import rotation
 
         return rotation(self.axis, 2 * np.pi / self.sectors)
 

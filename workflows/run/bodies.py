@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem.assembly import Assembly, Body, Materials
-from tribodyn.fem.constraints import Clamp, Constraint, named
+from tribodyn.fem.constraints import Clamp, Constraint, find_group
 from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
-from tribodyn.fem.loads import Load
+from tribodyn.fem.load_vectors import Load
 from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
-from tribodyn.fem.part import Stiff
+from tribodyn.fem.part import StiffnessElement
 from tribodyn.fem.springs import Mass, Spring
 from tribodyn.fem.surface import surface
-from tribodyn.geometry import mesh as mesh_reader, parts, placing, refine
-from tribodyn.geometry.placing import overlap, rotation
-from tribodyn.geometry.sources import cad, picking
+from tribodyn.geometry import mesh as mesh_reader, parts, placement, subdivision
+from tribodyn.geometry.placement import overlap, rotation
+from tribodyn.geometry.sources import cad, face_rules
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
@@ -51,7 +51,7 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
     if scene.geometry is not None:
         assert scene.material is not None
         mesh, node_sets, notes = _read(scene.geometry, folder, scratch / "mesh.msh")
-        mesh, node_sets = refine.halved(mesh, node_sets, scene.geometry.halved)
+        mesh, node_sets = subdivision.subdivide(mesh, node_sets, scene.geometry.halved)
         bodies = [Body("", mesh, node_sets, solid(scene.material), notes)]
     else:
         bodies = []
@@ -95,15 +95,15 @@ def of_decks(scene: MeshScene, folder: Path) -> dict[str, decks.CarriedDeck]:
 def _placed(table: structure.BodyTable, folder: Path, path: Path) -> Noted:
     mesh, node_sets, notes = _read(table, folder, path, _sizes(table))
     if table.volume is not None:
-        mesh, node_sets = placing.taken(mesh, node_sets, table.volume)
-    mesh = placing.placed(mesh, table.unit, np.eye(3), np.zeros(3))
-    mesh, node_sets = picking.with_faces(mesh, node_sets, {name: face.rule for name, face in table.faces.items()})
-    mesh, node_sets = refine.halved(mesh, node_sets, table.halved)
+        mesh, node_sets = placement.extract_volume(mesh, node_sets, table.volume)
+    mesh = placement.place(mesh, table.unit, np.eye(3), np.zeros(3))
+    mesh, node_sets = face_rules.add_faces(mesh, node_sets, {name: face.rule for name, face in table.faces.items()})
+    mesh, node_sets = subdivision.subdivide(mesh, node_sets, table.halved)
     turn, shift = np.eye(3), np.zeros(3)
     for one in table.turns:
         R, point = rotation(one.axis, one.angle), np.array(one.point)
         turn, shift = R @ turn, R @ (shift - point) + point
-    return placing.placed(mesh, 1.0, turn, shift + np.array(table.translation)), node_sets, notes
+    return placement.place(mesh, 1.0, turn, shift + np.array(table.translation)), node_sets, notes
 
 
 def _sizes(table: structure.BodyTable) -> cad.Sizes | None:
@@ -148,7 +148,7 @@ def _middle(whole: Assembly, table: structure.CouplingTable) -> list[float]:
         face = surface(whole, whole.boundaries[table.face], vertices_only=True)
         middle = face.area @ face.points / face.area.sum()
     else:
-        middle = whole.doflocs.T[named(whole.node_sets, table.face)].mean(axis=0)
+        middle = whole.doflocs.T[find_group(whole.node_sets, table.face)].mean(axis=0)
     return [float(c) for c in middle]
 
 
@@ -158,7 +158,7 @@ class Joined:
 
     clamps: list[Clamp] = field(default_factory=list)
     constraints: list[Constraint] = field(default_factory=list)
-    springs: list[Stiff] = field(default_factory=list)
+    springs: list[StiffnessElement] = field(default_factory=list)
     masses: list[Mass] = field(default_factory=list)
     loads: dict[str, Load] = field(default_factory=dict)
 

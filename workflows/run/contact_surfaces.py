@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.geometry.surface import centred, facing_gap, onto_nodes, prepare
+from tribodyn.geometry.height_map import centred, facing_gap, onto_nodes, prepare
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.scene.contact_numbers import faces

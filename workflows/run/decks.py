@@ -14,20 +14,20 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem.assembly import Assembly, Body, named_in
+from tribodyn.fem.assembly import Assembly, Body, group_name
 from tribodyn.fem.constraints import AXES, Clamp, ClampAlong, Constraint
 from tribodyn.fem.couplings import DistributedCoupling, Equation, RigidCoupling, Tie
-from tribodyn.fem.loads import Load, Moment, NodalForce, Pressure, Sum
+from tribodyn.fem.load_vectors import Load, Moment, NodalForce, Pressure, Sum
 from tribodyn.fem.material import Anisotropic, AnyMaterial, Material, Orthotropic
 from tribodyn.fem.part import Part, build
 from tribodyn.fem.springs import ElongationSpring, Mass
-from tribodyn.geometry import refine
-from tribodyn.geometry.sources import between, deck, picking, read
+from tribodyn.geometry import subdivision
+from tribodyn.geometry.sources import added_nodes, deck, face_rules, foreign_file
 from tribodyn.geometry.sources.directions import Directions
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.structure import EVERYTHING, DeckTable as Table
 
-UNITS = {metres: name for name, (metres, _) in read.UNITS.items()}
+UNITS = {metres: name for name, (metres, _) in foreign_file.UNITS.items()}
 ALL_AXES = (0, 1, 2, 3, 4, 5)
 
 
@@ -59,7 +59,7 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
     """
     path = folder / table.file
     if table.unit not in UNITS:
-        raise Refusal(f"decks.{name}.unit: expected one of {', '.join(read.UNITS)}")
+        raise Refusal(f"decks.{name}.unit: expected one of {', '.join(foreign_file.UNITS)}")
     try:
         return _Carrying(name, table, materials, source(path, UNITS[table.unit])).done()
     except ValueError as trouble:
@@ -67,36 +67,36 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
         raise Refusal(clause if clause.startswith("decks.") else f"decks.{name}: {clause}") from None
 
 
-def source(path: Path, unit: str) -> read.Source:
+def source(path: Path, unit: str) -> foreign_file.Source:
     """What a file holds, read once as long as it does not change; raises ValueError as `read.read` does."""
     return _read(path, unit, path.stat().st_mtime_ns if path.is_file() else 0)
 
 
 @lru_cache(maxsize=4)
-def _read(path: Path, unit: str, stamp: int) -> read.Source:
-    return read.read(path, unit)
+def _read(path: Path, unit: str, stamp: int) -> foreign_file.Source:
+    return foreign_file.read(path, unit)
 
 
-def said(source: read.Source, table: Table) -> tuple[str, ...]:
+def notes_of(source: foreign_file.Source, table: Table) -> tuple[str, ...]:
     """Sentences on what was done to a deck."""
     corners = ("its hexahedra are computed on their eight corners, with reduced integration",)
-    return (*(corners if table.elements == "linear_reduced" else source.raised), *source.notes)
+    return (*(corners if table.elements == "linear_reduced" else source.order_notes), *source.notes)
 
 
-def as_computed(mesh: Any, node_sets: dict[str, np.ndarray], table: Table, body: str) -> tuple[Any, Any]:
+def with_elements(mesh: Any, node_sets: dict[str, np.ndarray], table: Table, body: str) -> tuple[Any, Any]:
     """Mesh and node sets of a body in the elements that its table asks for.
 
     Raises  ValueError, which names the body, where it has others than those can stand for
     """
-    return refine.corners_alone(mesh, node_sets, body) if table.elements == "linear_reduced" else (mesh, node_sets)
+    return subdivision.first_order(mesh, node_sets, body) if table.elements == "linear_reduced" else (mesh, node_sets)
 
 
 class _Carrying:
     """One deck on its way into a structure."""
 
-    def __init__(self, name: str, table: Table, materials: Mapping[str, AnyMaterial], source: read.Source):
+    def __init__(self, name: str, table: Table, materials: Mapping[str, AnyMaterial], source: foreign_file.Source):
         if table.elements != "linear_reduced" and "equations" in table.use:
-            source = between.with_added_nodes(source)
+            source = added_nodes.with_added_nodes(source)
         self.name, self.table, self.source, self.deck = name, table, source, source.deck
         self.materials = materials
         self.faces: dict[str, list[str]] = {}  # group of the deck -> its names in the assembly
@@ -122,7 +122,9 @@ class _Carrying:
         self.made.clamps += [Clamp(group, axes) for group, axes in self.table.fixed_axes.items()]
         left = [f"{self.source.refused[name]}, by ignore" for name in self.table.ignore]
         unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes, *left)]
-        self.made.notes = [f"decks.{self.name}: {sentence}" for sentence in (*said(self.source, self.table), *unused)]
+        self.made.notes = [
+            f"decks.{self.name}: {sentence}" for sentence in (*notes_of(self.source, self.table), *unused)
+        ]
         return self.made
 
     def _refuse(self) -> None:
@@ -151,20 +153,20 @@ class _Carrying:
                 raise Refusal(f"faces.{face}: the deck has no body '{rule.body}'; it has {known}")
             if rule.body == name:
                 rules[face] = rule.rule
-        mesh, node_sets = picking.with_faces(found.mesh, found.node_sets, rules)
-        mesh, node_sets = refine.halved(mesh, node_sets, self.table.halved)
-        mesh, node_sets = as_computed(mesh, node_sets, self.table, name)
+        mesh, node_sets = face_rules.add_faces(found.mesh, found.node_sets, rules)
+        mesh, node_sets = subdivision.subdivide(mesh, node_sets, self.table.halved)
+        mesh, node_sets = with_elements(mesh, node_sets, self.table, name)
         made = material(self.deck, name, mesh, self.table, self.materials, self.name)
         for group in {*node_sets, *(mesh.boundaries or {})}:
             kept = self.faces if group in (mesh.boundaries or {}) else self.sets
-            place = named_in(name, group, node_sets)
+            place = group_name(name, group, node_sets)
             kept.setdefault(group, []).append(place)
             self.body_of[place] = name
         return Body(name, mesh, node_sets, made)
 
     # constraints
 
-    def _ties(self, ties: Sequence[deck.Tie]) -> None:
+    def _ties(self, ties: Sequence[deck.DeckTie]) -> None:
         for tie in ties:
             what = f"tie '{tie.name}' of deck {self.name}"
             slaves, masters = (self._faces(place, what) for place in (tie.slave, tie.master))
@@ -190,12 +192,12 @@ class _Carrying:
             self.carried.add(one.point)
             self.made.constraints += [kind(one.point, place) for place in places]
 
-    def _equations(self, equations: Sequence[deck.Equation]) -> None:
+    def _equations(self, equations: Sequence[deck.DeckEquation]) -> None:
         for number, one in enumerate(equations, 1):
             what = f"equation {number} of deck {self.name}"
             self.made.constraints.append(Equation(what, self._terms(one.terms, what)))
 
-    def _springs(self, springs: Sequence[deck.Spring]) -> None:
+    def _springs(self, springs: Sequence[deck.DeckSpring]) -> None:
         for number, one in enumerate(springs, 1):
             terms = self._terms(one.terms, f"spring {number} of deck {self.name}")
             self.made.springs.append(ElongationSpring(terms, one.stiffness))

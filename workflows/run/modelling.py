@@ -15,7 +15,7 @@ from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import NoMeanRotation
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import COMPONENTS
-from tribodyn.fem.loads import BodyForce, Centrifugal, Load, Moment, NodalForce, Pressure, Sum
+from tribodyn.fem.load_vectors import BodyForce, Centrifugal, Load, Moment, NodalForce, Pressure, Sum
 from tribodyn.fem.part import Part, unbalanced_load
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at

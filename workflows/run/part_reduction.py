@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem import cyclic
+from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.assembly import pieces
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.factor import SingularStiffness
 from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.part import Part
@@ -51,7 +51,7 @@ def contacts(scene: MeshScene) -> list[ContactFaces]:
             for face in c.groups
         ]  # fmt: skip
         outward = scene.wheel if c.meets_next else None
-        found += own if outward is None else cyclic.turned(own, outward.sectors, outward.axis)
+        found += own if outward is None else cyclic_symmetry.with_neighbours(own, outward.sectors, outward.axis)
     return found
 
 

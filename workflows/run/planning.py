@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem.constraints import free_dofs, named
+from tribodyn.fem.constraints import find_group, free_dofs
 from tribodyn.fem.couplings import Tie
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.limits import LIMITS
@@ -204,8 +204,8 @@ def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free
             masters.append(body_1_dofs(interface).ravel())
         else:
             masters += [np.unique(half.indices) for half in (interface.B, *second)]
-    masters += [named(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
-    touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
+    masters += [find_group(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
+    touched = [(find_group(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= LIMITS.point_load]
     return pairs, len(np.intersect1d(np.concatenate([*masters, []]).astype(int), free))
 

@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from tribodyn.fem import cyclic
-from tribodyn.fem.constraints import named
-from tribodyn.fem.cyclic import Sector, at_index, seam_map
+from tribodyn.fem import cyclic_symmetry
+from tribodyn.fem.constraints import find_group
+from tribodyn.fem.cyclic_symmetry import Sector, seam_map, wave_system
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.matching import Mismatch
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
-from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, prestressed, spin_softening
+from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, solve_prestress, spin_softening
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.stiffening import solve_along_friction
@@ -53,7 +53,7 @@ def sector(scene: MeshScene, part: Part) -> Sector:
             f'give wheel.seam = ["{right}", "{left}"]'
         )
     try:
-        found = cyclic.cut_from(part, part_reduction.contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+        found = cyclic_symmetry.cut_sector(part, part_reduction.contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
     except Mismatch as miss:
         raise Refusal(
             f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
@@ -153,7 +153,7 @@ def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
         return replace(cut, system=replace(cut.system, stiffness=stiffness, gyroscopic=turning))
 
     start = stuck_at_rest(scene, stiffened(csr_matrix(cut.system.stiffness + softening)))
-    found = prestressed(
+    found = solve_prestress(
         part, material, lambda k: at_rest(scene, stiffened(k)), start, softening, temperature(scene, part)
     )
     spinning = replace(stiffened(found.stiffness), prestress=found)
@@ -163,7 +163,7 @@ def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
 
 def stuck_index_0(scene: MeshScene, sector: Sector) -> csr_matrix:
     """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck."""
-    system, B = at_index(sector, 0)
+    system, B = wave_system(sector, 0)
     model = ReducedModel(sector.system, sector.interface, info=ModelInfo(joints=sector.joints))
     return stuck_stiffness(system.stiffness, B, joints.contact_stiffness(scene, model))
 
@@ -184,7 +184,7 @@ def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples:
     contact: a traction on every pair makes them exact.
     tolerance : of the balance at rest; samples : of a cycle in which nothing moves
     """
-    system, B = at_index(sector, 0)
+    system, B = wave_system(sector, 0)
     static = static_loads(scene)
     still = replace(system, gyroscopic=None, loads={name: system.loads[name] for name in static}, outputs={})
     interface = replace(sector.interface, B=csr_matrix(B))
@@ -232,6 +232,6 @@ def temperature(scene: MeshScene, part: Part) -> np.ndarray | None:
             raise Refusal(f"loads.static.{name}: in a wheel that turns, heat whole bodies instead of a field")
         if load.temperature is not None:
             found = np.zeros(len(part.points)) if found is None else found
-            heated = [named(part.node_sets, body) for body in load.bodies] or [np.arange(len(found))]
+            heated = [find_group(part.node_sets, body) for body in load.bodies] or [np.arange(len(found))]
             found[np.concatenate(heated)] += load.temperature
     return found

@@ -226,7 +226,7 @@ class FaceContact(ContactTable, stage=PART):
 
 
 class SyntheticPair(Table, stage=CONTACT):
-    """A made-up pair of faces, see geometry.surface.synthetic_pair."""
+    """A made-up pair of faces, see geometry.height_map.synthetic_pair."""
 
     seed: Annotated[StrictInt, Field(ge=0)]
     """Seed of the random numbers."""

@@ -18,7 +18,7 @@ from tribodyn.workflows.scene.fields import Table, unknown_key
 from tribodyn.workflows.scene.own import in_si, is_file
 
 if TYPE_CHECKING:  # most scenes name no faces and start sooner without
-    from tribodyn.geometry.surface import HeightMap
+    from tribodyn.geometry.height_map import HeightMap
 
 
 class _OfContact(Table):
@@ -96,15 +96,15 @@ def _warmed(contact: Mapping[str, Any], static: Any) -> float:
 
 def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:
     """The face of body 1, and that of body 2 unless it is flat, in the same coordinates."""
-    from tribodyn.geometry import surface_io
-    from tribodyn.geometry.surface import mirrored, synthetic_pair
+    from tribodyn.geometry import height_map_files
+    from tribodyn.geometry.height_map import mirrored, synthetic_pair
 
     if surfaces.synthetic is not None:
         made = surfaces.synthetic
         pair = synthetic_pair(made.seed, made.size, ridge=made.ridge, waviness=made.waviness, roughness=made.roughness)
         return list(pair)
     read = [
-        surface_io.read(
+        height_map_files.read(
             folder / name,
             spacing=surfaces.spacing,
             lateral_unit=surfaces.lateral_unit,

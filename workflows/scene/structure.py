@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
-from tribodyn.geometry.sources.picking import Rule
+from tribodyn.geometry.sources.face_rules import FacetRule
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.body import Meshed
 from tribodyn.workflows.scene.contact import FaceContact
@@ -56,9 +56,9 @@ class FaceRule(Table, stage=PART):
         return self
 
     @property
-    def rule(self) -> Rule:
-        """The rule for geometry.sources.picking."""
-        return Rule(self.box, self.nearest, self.normal, self.within, self.cad)
+    def rule(self) -> FacetRule:
+        """The rule for geometry.sources.face_rules."""
+        return FacetRule(self.box, self.nearest, self.normal, self.within, self.cad)
 
 
 Use = Literal["ties", "couplings", "equations", "springs", "masses", "supports", "forces", "pressures"]

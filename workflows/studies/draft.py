@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import scipy
 
-from tribodyn.fem.assembly import named_in
-from tribodyn.geometry.sources import cad, read as sources
-from tribodyn.geometry.sources.picking import outline
+from tribodyn.fem.assembly import group_name
+from tribodyn.geometry.sources import cad, foreign_file as sources
+from tribodyn.geometry.sources.face_rules import outline
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.json_schema import json_schema
 from tribodyn.workflows.scene.source import AnyPath
@@ -147,7 +147,7 @@ def _candidates(source: Any) -> Iterator[Candidate]:
     found = []
     for one, two in combinations(faces, 2):
         if one[0] != two[0] and (met := _near(one[3:], two[3:], near)) is not None:
-            names = [named_in(body, face, source.bodies[body].node_sets) for body, face, *_ in (one, two)]
+            names = [group_name(body, face, source.bodies[body].node_sets) for body, face, *_ in (one, two)]
             faced = frozenset((one[1], two[1]))
             found.append((Candidate(names[0], names[1], *met, faced in declared, declared.get(faced)), one, two))
     taken: dict[tuple[str, str], set[int]] = defaultdict(set)  # bodies that touch -> facets of the first one
@@ -196,7 +196,7 @@ def _text(
     for at, (name, body) in enumerate(source.bodies.items()):
         faces = sorted(body.mesh.boundaries or {}) or sorted(body.node_sets)
         if is_deck:
-            named = [named_in(name, group, body.node_sets) for group in body.node_sets if group != name]
+            named = [group_name(name, group, body.node_sets) for group in body.node_sets if group != name]
             named = [group for group in named if not group.removeprefix(f"{name}.").startswith("_")]  # Abaqus's own
             yield f"# {name}: {', '.join(named) or 'no group'}"
             continue
@@ -215,7 +215,7 @@ def _text(
         yield "friction = 0.5  # GUESS" if pair.friction is None else f"friction = {pair.friction}  # of the deck"
     held = {name for name, body in source.bodies.items() for s in source.deck.supports if s.group in body.node_sets}
     moved = [*held, *(name for name in source.bodies if name not in held)][-1]
-    face = json.dumps(named_in(moved, first_face[moved], source.bodies[moved].node_sets))
+    face = json.dumps(group_name(moved, first_face[moved], source.bodies[moved].node_sets))
     own = [(pair, end) for pair in candidates for end in (pair.first, pair.second) if end.startswith(f"{moved}.")]
     if own and not (source.deck.forces or source.deck.pressures):
         pair, end = own[0]
@@ -238,7 +238,7 @@ def _far(source: Any, candidates: Sequence[Candidate]) -> dict[str, str]:
     found = {}
     for body, solid in source.bodies.items():
         mesh, groups = solid.mesh, solid.node_sets
-        names = {name: named_in(body, name, groups) for name in groups}
+        names = {name: group_name(body, name, groups) for name in groups}
         near = [mesh.doflocs[:, nodes] for name, nodes in groups.items() if names[name] in touching]
         centre = np.concatenate(near, axis=1).mean(axis=1) if near else mesh.doflocs.mean(axis=1)
         far = {

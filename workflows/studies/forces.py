@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem.constraints import named
+from tribodyn.fem.constraints import find_group
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import spin_softening
@@ -106,7 +106,7 @@ def of_scene(file: SceneFile, scene: MeshScene) -> Forces:
     load = _loads(scene, part, balance.excitation, q)
     contact = _contact_forces(scene, part, force[:, :, 0])
     bodies = [b.name for b in part.mesh.bodies if b.name]
-    sets = {name: named(part.node_sets, name) for name in bodies} or {"part": np.arange(len(part.points))}
+    sets = {name: find_group(part.node_sets, name) for name in bodies} or {"part": np.arange(len(part.points))}
     free = np.zeros(3 * len(part.points), bool)
     free[part.free] = True
     for given in scene.prescribed.values():

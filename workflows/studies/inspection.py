@@ -10,13 +10,13 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from tribodyn.fem.assembly import Assembly, Body, named_in
+from tribodyn.fem.assembly import Assembly, Body, group_name
 from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes, stiffest
 from tribodyn.geometry.mesh import area, facts
-from tribodyn.geometry.sources import read as sources
+from tribodyn.geometry.sources import foreign_file as sources
 from tribodyn.geometry.sources.deck import Deck
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import groups as group_pictures
@@ -155,13 +155,13 @@ def _of_file(
     table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=material_name, elements=elements)
     solids, lacking = [], ""
     for name, body in source.bodies.items():
-        mesh, node_sets = decks.as_computed(body.mesh, dict(body.node_sets), table, name)
+        mesh, node_sets = decks.with_elements(body.mesh, dict(body.node_sets), table, name)
         try:
             made = decks.material(source.deck, name, mesh, table, named)
         except ValueError as sentence:  # no or no whole material
             made, lacking = {}, str(sentence)
         solids.append(Body(name, mesh, node_sets, made))
-    found = measured(solids, decks.said(source, table), source.unused)
+    found = measured(solids, decks.notes_of(source, table), source.unused)
     pairs, apart, remarks = _pairs_of(source.deck, solids)
     ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
     found = replace(found, pairs=pairs, refused=(*ignored, *apart))
@@ -199,7 +199,7 @@ def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, flo
             [
                 face
                 for solid in solids
-                if (face := named_in(solid.name, group, solid.node_sets)) in whole.boundaries
+                if (face := group_name(solid.name, group, solid.node_sets)) in whole.boundaries
                 and group in solid.node_sets
             ]
             for group in (one.slave, one.master)

@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from tribodyn.geometry import surface_io
+from tribodyn.geometry import height_map_files
 from tribodyn.geometry.asperities import Asperities, identify
-from tribodyn.geometry.surface import HeightMap, mirrored
+from tribodyn.geometry.height_map import HeightMap, mirrored
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.readable import named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
@@ -108,7 +108,7 @@ def asperities(
     def face(of: Face) -> HeightMap:
         if isinstance(of, HeightMap):
             return of
-        return surface_io.read(Path(of), spacing=steps, lateral_unit=lateral_unit, height_unit=height_unit)
+        return height_map_files.read(Path(of), spacing=steps, lateral_unit=lateral_unit, height_unit=height_unit)
 
     other = None if second is None else face(second)
     if mirror is not None:

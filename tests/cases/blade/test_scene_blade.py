@@ -9,9 +9,9 @@ import scipy.linalg as sla
 from tests.helpers.coarse_scenes import BLADE as COARSE
 from tests.helpers.nodes_of_pairs import node_of_pair
 from tests.helpers.pictures import assert_not_blank
-from tribodyn.fem.constraints import named
+from tribodyn.fem.constraints import find_group
 from tribodyn.fem.elasticity import assemble
-from tribodyn.geometry.placing import rotation
+from tribodyn.geometry.placement import rotation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.hbm.outcome import WearEnd
@@ -101,7 +101,7 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
     wheel, patch, wear = finished.facts.around, finished.patch, finished.wear
     _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
     left = node_of_pair(meetings_of(finished)[0].faces[1])
-    clamp = named(model.part.node_sets, "clamp")
+    clamp = find_group(model.part.node_sets, "clamp")
     row = int(finished.fields.row[0])
     field = finished.fields.displacement[0, ..., 0]
     force = (K @ field.ravel()).reshape(field.shape)  # that acts on each node from outside
@@ -193,7 +193,7 @@ def test_flexible_disk_couples_through_its_seam(folder):
     disk = ("geometry.disk_radius=0.15", 'wheel.seam=["cyclic_right", "cyclic_left"]')
     scene = scene_file.read("blade_thesis", (*COARSE, *disk))
     mesh, nodes = modelling.make_mesh(scene, folder)
-    assert len(named(nodes, "cyclic_left")) > 0
+    assert len(find_group(nodes, "cyclic_left")) > 0
     part = modelling.make_part(scene.mesh_scene, mesh, nodes)
     reduced = sector.reduced(scene.mesh_scene, sector.sector(scene.mesh_scene, part))
     free = nodal_diameters(reduced.sector, (0, 5, 10), 1)[:, 0]

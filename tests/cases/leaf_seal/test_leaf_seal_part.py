@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.geometry import mesh as mesh_file
 from tribodyn.workflows.cases.leaf_seal import leaf_seal
 

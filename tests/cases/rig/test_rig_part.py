@@ -5,8 +5,8 @@ import pytest
 
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import Clamp
-from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.loads import NodalForce
+from tribodyn.fem.contact_faces import ContactFaces
+from tribodyn.fem.load_vectors import NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_file

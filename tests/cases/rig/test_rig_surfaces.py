@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
-from tribodyn.geometry.surface import synthetic_pair
+from tribodyn.geometry.height_map import synthetic_pair
 from tribodyn.workflows.scene import scene_file
 
 MICRO = 1e6

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.fem.constraints import named
+from tribodyn.fem.constraints import find_group
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
@@ -197,7 +197,7 @@ def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
     if wheel.part.follow is not None:
         raise SceneError("mistuning.body: bodies that are glued or tied have no stiffness of their own: leave it out")
     nodes = np.zeros(len(wheel.part.points), bool)
-    nodes[named(wheel.part.node_sets, body)] = True
+    nodes[find_group(wheel.part.node_sets, body)] = True
     own = np.flatnonzero(np.repeat(nodes, 3)[wheel.part.free])
     basis = reduced.basis[own]
     return np.asarray(basis.T @ (wheel.full.system.stiffness[own][:, own] @ basis))

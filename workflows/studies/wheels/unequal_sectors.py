@@ -16,7 +16,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.fem.cyclic import sector_maps
+from tribodyn.fem.cyclic_symmetry import sector_maps
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.cyclic_symmetry import Sector
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.extras import package
-from tribodyn.geometry.surface import HeightMap
+from tribodyn.geometry.height_map import HeightMap
 from tribodyn.refusal import Refusal
 
 TEXT_ENDINGS = (".txt", ".xyz", ".csv", ".asc", ".dat", ".tsv", ".prn")

@@ -89,7 +89,7 @@ class HeightMap:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedMap:
     """A height map ready for contact.
 
     waviness, roughness : levelled parts; their sum is the levelled surface
@@ -101,18 +101,18 @@ class Prepared:
     repairs: tuple[str, ...]
 
 
-def prepare(surface: HeightMap, cutoff: float, expected_size: tuple[float, float] | None = None) -> Prepared:
+def prepare(surface: HeightMap, cutoff: float, expected_size: tuple[float, float] | None = None) -> PreparedMap:
     """Check, mend, level and split a measured surface.
 
     cutoff : wavelength that parts waviness from roughness [m]
     expected_size : sides of the face it should cover [m]
     Raises  ValueError: what the steps refuse
     """
-    levelled, repairs = mended(surface, expected_size)
-    return Prepared(*split(levelled, cutoff), repairs)
+    levelled, repairs = repair(surface, expected_size)
+    return PreparedMap(*split(levelled, cutoff), repairs)
 
 
-def mended(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> tuple[HeightMap, tuple[str, ...]]:
+def repair(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> tuple[HeightMap, tuple[str, ...]]:
     """The map without spikes and holes, levelled, and what was changed; arguments and errors as of `prepare`."""
     check(surface, expected_size)
     without_spikes, spikes = remove_outliers(surface)

@@ -13,7 +13,7 @@ import numpy as np
 
 from tribodyn.geometry.numbering import HEX_EDGES, HEX_FACES, TET_EDGES
 from tribodyn.geometry.sources import deck
-from tribodyn.geometry.sources.card_table import Met
+from tribodyn.geometry.sources.card_table import SkippedCards
 from tribodyn.geometry.sources.directions import Directions
 from tribodyn.refusal import Refusal
 
@@ -74,7 +74,7 @@ class LabelledMesh:
     held : (axis, value) -> nodes that are held there; equations, springs : terms, and a stiffness
     """
 
-    met: Met
+    met: SkippedCards
     points: dict[int, list[float]] = field(default_factory=dict)
     solids: dict[str, list[tuple[int, list[int]]]] = field(default_factory=dict)
     volumes: dict[str, list[int]] = field(default_factory=dict)
@@ -162,8 +162,8 @@ class LabelledMesh:
         made = deck.Deck(
             materials=materials,
             couplings=tuple(self.couplings),
-            equations=tuple(deck.Equation(self._terms(terms)) for terms in self.equations),
-            springs=tuple(deck.Spring(self._terms(terms), value) for terms, value in self.springs),
+            equations=tuple(deck.DeckEquation(self._terms(terms)) for terms in self.equations),
+            springs=tuple(deck.DeckSpring(self._terms(terms), value) for terms, value in self.springs),
             forces=tuple(self.forces),
             supports=tuple(self._supports(labels_of_solids)),
             masses=tuple(self.masses),

@@ -9,10 +9,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from tribodyn.fem.assembly import Assembly
-from tribodyn.fem.constraints import named
+from tribodyn.fem.constraints import find_group
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import unit
-from tribodyn.fem.surface import face_integrals, facet_nodes, outside
+from tribodyn.fem.surface import face_integrals, facet_nodes, require_outside
 from tribodyn.refusal import Refusal
 
 
@@ -37,7 +37,7 @@ class NodalForce:
 
     def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
         """Force vector (3 n_node,) [N/N]."""
-        nodes = named(node_sets, self.nodes)
+        nodes = find_group(node_sets, self.nodes)
         force = np.zeros((mesh.doflocs.shape[1], 3))
         direction = unit(self.direction, f"the direction at node set '{self.nodes}'")
         if self.shared == "area" and self.nodes in (mesh.boundaries or {}):
@@ -74,8 +74,8 @@ class Pressure:
 
     def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
         """Force vector (3 n_node,) [N/Pa]."""
-        facets = named(mesh.boundaries or {}, self.face, "face")
-        outside(mesh, facets)
+        facets = find_group(mesh.boundaries or {}, self.face, "face")
+        require_outside(mesh, facets)
         force = np.zeros((mesh.doflocs.shape[1], 3))
         np.add.at(force, facet_nodes(mesh, facets), -face_integrals(mesh, facets)[1])
         return force.ravel()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, eye_array, kron
 
-from tribodyn.fem.constraints import named
+from tribodyn.fem.constraints import find_group
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames, unit
 from tribodyn.fem.matching import facing_partners, partners
 from tribodyn.fem.mortar import MORTAR, side
@@ -76,7 +76,7 @@ class ContactFaces:
         if self.opposite is not None:
             interface, B_2 = self.halves(mesh)
             return interface if self.turn is not None else replace(interface, B=interface.B - B_2)
-        face = surface(mesh, named(mesh.boundaries or {}, self.face, "face"), self.vertices_only)
+        face = surface(mesh, find_group(mesh.boundaries or {}, self.face, "face"), self.vertices_only)
         gap: float | np.ndarray = 0.0 if self.gap is None else self.gap
         if self.plane is not None:
             normal = unit(self.plane, "the direction in which a plane contact closes")
@@ -110,7 +110,7 @@ class ContactFaces:
         assert self.opposite is not None
         faces = mesh.boundaries or {}
         try:
-            first, second = (named(faces, name, "face") for name in (self.face, self.opposite))
+            first, second = (find_group(faces, name, "face") for name in (self.face, self.opposite))
             return self._facing(mesh, first, second)
         except ValueError as trouble:
             raise type(trouble)(f"contact of '{self.face}' and '{self.opposite}': {trouble}") from None

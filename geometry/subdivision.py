@@ -19,7 +19,7 @@ from tribodyn.refusal import Refusal
 Groups = dict[str, np.ndarray]
 
 
-def halved(mesh: Any, node_sets: Mapping[str, np.ndarray], times: int = 1) -> tuple[Any, Groups]:
+def subdivide(mesh: Any, node_sets: Mapping[str, np.ndarray], times: int = 1) -> tuple[Any, Groups]:
     """The mesh with elements of half the size, once or several times; a node keeps its number.
 
     mesh : skfem MeshHex2 or MeshTet2; node_sets : name -> node numbers
@@ -31,7 +31,7 @@ def halved(mesh: Any, node_sets: Mapping[str, np.ndarray], times: int = 1) -> tu
     return mesh, dict(node_sets)
 
 
-def corners_alone(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[Any, Groups]:
+def first_order(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[Any, Groups]:
     """A mesh of hexahedra with straight edges as one of 8-node ones (MeshHex1); a corner keeps its number.
 
     Raises  ValueError, which names the body, for tetrahedra or curved elements
@@ -42,9 +42,7 @@ def corners_alone(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> 
     middle = points[:, mesh.edges].mean(axis=1)
     off = np.abs(points[:, mesh.dofs.edge_dofs[0]] - middle).max(axis=0)
     if (off > 1e-6 * np.linalg.norm(np.ptp(points[:, mesh.edges], axis=1), axis=0)).any():
-        raise Refusal(
-            f"elements = \"linear_reduced\" needs elements of first order, and body '{name}' has curved ones"
-        )
+        raise Refusal(f"elements = \"linear_reduced\" needs elements of first order, and body '{name}' has curved ones")
     plain: Any = MeshHex(points[:, :n].copy(), mesh.t, sort_t=False)
     plain = plain.with_boundaries(mesh.boundaries or {}).with_subdomains(mesh.subdomains or {})
     return plain, {key: np.asarray(of)[np.asarray(of) < n] for key, of in node_sets.items()}

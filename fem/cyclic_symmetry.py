@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, issparse, kron, vstack
 
-from tribodyn.fem.constraints import named
-from tribodyn.fem.contact import ContactFaces
+from tribodyn.fem.constraints import find_group
+from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.interface import ContactInterface, join, unit
 from tribodyn.fem.matching import partners
 from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import Prestress
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.geometry.placing import rotation
+from tribodyn.geometry.placement import rotation
 from tribodyn.refusal import Refusal
 
 AXIS = (1.0, 0.0, 0.0)
@@ -65,9 +65,11 @@ def phase(index: int, n_sectors: int) -> complex:
     return complex(np.exp(-2j * np.pi * index / n_sectors))
 
 
-def turned(contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[float] = AXIS) -> list[ContactFaces]:
+def with_neighbours(
+    contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[float] = AXIS
+) -> list[ContactFaces]:
     """Contacts of a sector, face on its right, with the opposite faces of its neighbours on the left, which each meets
-    after a turn by one pitch about the axis; raises ValueError as `cut_from` does.
+    after a turn by one pitch about the axis; raises ValueError as `cut_sector` does.
     """
     if n_sectors < 2:
         raise Refusal(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
@@ -78,7 +80,7 @@ def turned(contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[floa
     return [replace(contact, turn=turn) for contact in contacts]
 
 
-def cut_from(
+def cut_sector(
     part: Part,
     contacts: Sequence[ContactFaces],
     n_sectors: int,
@@ -114,7 +116,7 @@ def _left_halves(part: Part, contacts: Sequence[ContactFaces]) -> csr_matrix:
 
 def _seams(part: Part, seam: tuple[str, str], turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Free DOFs (k, 3) of the right seam and of its partners on the left."""
-    right, left = (named(part.node_sets, name) for name in seam)
+    right, left = (find_group(part.node_sets, name) for name in seam)
     what = f"the cyclic faces '{seam[0]}' and '{seam[1]}'"
     if len(right) != len(left):
         raise Refusal(f"{what} have {len(right)} and {len(left)} nodes; mesh both with the same grid")
@@ -151,14 +153,14 @@ def seam_map(sector: Sector, index: int) -> csr_matrix:
     return own + sector.phase(index) * following  # 3.12, 3.15
 
 
-def at_index(sector: Sector, index: int) -> tuple[SecondOrderSystem, Any]:
+def wave_system(sector: Sector, index: int) -> tuple[SecondOrderSystem, Any]:
     """The system and the contact map (n_c, m) that a wave of this index sees; Hermitian, real for 0 and N/2."""
     T = seam_map(sector, index)
     ahead = np.conj(sector.phase(index))
     return sector.system.projected(T), (sector.interface.B - ahead * sector.left) @ T  # 3.17
 
 
-def of_sector(name: str, n: int) -> str:
+def sector_name(name: str, n: int) -> str:
     """Name of a load or output of sector n in the wheel."""
     return f"{name}@{n}"
 
@@ -198,8 +200,8 @@ def assemble_wheel(
         summed(system.mass, ones),
         summed(system.stiffness, factors),
         None if system.damping is None else summed(system.damping, ones),
-        {of_sector(name, k): P.T @ load for name, load in system.loads.items() for k, P in enumerate(maps)},
-        {of_sector(name, k): P.T @ row for name, row in system.outputs.items() for k, P in enumerate(maps)},
+        {sector_name(name, k): P.T @ load for name, load in system.loads.items() for k, P in enumerate(maps)},
+        {sector_name(name, k): P.T @ row for name, row in system.outputs.items() for k, P in enumerate(maps)},
         None if system.gyroscopic is None else summed(system.gyroscopic, ones),
         None if system.circulatory is None else summed(system.circulatory, ones),
     )

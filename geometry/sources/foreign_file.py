@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry.sources import cad, solid
+from tribodyn.geometry.sources import cad, solid_body
 from tribodyn.geometry.sources.deck import Deck, in_si
-from tribodyn.geometry.sources.raw import COMMON_NAMES, VOLUMES, RawMesh
-from tribodyn.geometry.sources.solid import SolidBody
+from tribodyn.geometry.sources.raw_mesh import COMMON_NAMES, VOLUMES, RawMesh
+from tribodyn.geometry.sources.solid_body import SolidBody
 from tribodyn.refusal import Refusal
 
 # unit of length -> [m], and the force [N] that decks in it count in
@@ -53,7 +53,7 @@ class Source:
     deck: Deck
     points: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    raised: tuple[str, ...] = ()
+    order_notes: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
@@ -67,14 +67,14 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
     Raises  ValueError: one sentence that names the file and the cure
     """
     raw = read_raw(path, unit, sizes)
-    parts = solid.bodies(raw)
-    built = {name: solid.build(raw, elements) for name, elements in parts.items()}
+    parts = solid_body.bodies(raw)
+    built = {name: solid_body.build(raw, elements) for name, elements in parts.items()}
     counts = {
         group: {name: int((body.node_of[rows] >= 0).sum()) for name, body in built.items()}
         for group, rows in raw.nodes.items()
     }
-    unused = (*raw.unused, *lost(raw, built))
-    said = done(raw, built), raised(raw)
+    unused = (*raw.unused, *missing_groups(raw, built))
+    said = conversion_notes(raw, built), order_notes(raw)
     return Source(built, raw.deck, raw.points_of_reference, *said, unused, counts, raw.refused)
 
 
@@ -97,12 +97,10 @@ def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) 
         raw = _reader(ending)(file) if sizes is None else cad.read(file, sizes)
     except (IndexError, KeyError) as problem:
         where = f"near {problem.args[0]!r}" if isinstance(problem, KeyError) else "in the middle of a line"
-        raise Refusal(
-            f"mesh file '{path}' cannot be read {where}: it is cut off or broken, write it again"
-        ) from None
+        raise Refusal(f"mesh file '{path}' cannot be read {where}: it is cut off or broken, write it again") from None
     if not raw.cells:
         raise Refusal(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
-    return scaled(raw, *UNITS[unit])
+    return in_metres(raw, *UNITS[unit])
 
 
 def _reader(ending: str) -> Callable[[Path], RawMesh]:
@@ -112,7 +110,7 @@ def _reader(ending: str) -> Callable[[Path], RawMesh]:
     return function
 
 
-def scaled(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
+def in_metres(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
     """A mesh and its deck in SI units where the file counts in a unit of so many metres and one of so many newton."""
     if metre == 1.0:
         return raw
@@ -121,7 +119,7 @@ def scaled(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
     return replace(raw, points=metre * raw.points, points_of_reference=points, deck=made)
 
 
-def lost(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
+def missing_groups(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
     """A clause for each group of the file that no body has."""
     clauses = []
     for name in raw.faces:
@@ -139,7 +137,7 @@ def lost(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
     return tuple(clauses)
 
 
-def raised(raw: RawMesh) -> tuple[str, ...]:
+def order_notes(raw: RawMesh) -> tuple[str, ...]:
     """The sentence on elements of first order, where there are some."""
     low = [cells for cells in raw.cells if not VOLUMES[cells.kind][1]]
     count = sum(len(cells.nodes) for cells in low)
@@ -147,7 +145,7 @@ def raised(raw: RawMesh) -> tuple[str, ...]:
     return (f"{count} {names} of first order are computed as second order, with straight edges",) if low else ()
 
 
-def done(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
+def conversion_notes(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
     """Sentences on what was done to a file on the way to bodies."""
     notes = list(raw.notes)
     for name, body in built.items():

@@ -19,7 +19,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from tribodyn.geometry.numbering import REFERENCE_POINTS, TET_EDGES, permutation
-from tribodyn.geometry.sources.raw import HEXA, PYRAMID, TETRA, VOLUMES, WEDGE, Cells, RawMesh, Solid
+from tribodyn.geometry.sources.raw_mesh import HEXA, PYRAMID, TETRA, VOLUMES, WEDGE, Cells, RawMesh, Solid
 from tribodyn.refusal import Refusal
 
 Groups = dict[str, np.ndarray]

@@ -17,7 +17,7 @@ SMOOTH = np.cos(np.radians(30.0))  # facets that meet at less belong to one face
 
 
 @dataclass(frozen=True)
-class Rule:
+class FacetRule:
     """Which facets of the boundary belong to a face: those that satisfy all that is given.
 
     box : two corners [m], within which all corners of a facet lie; nearest : (3,) point [m] whose nearest smooth face
@@ -43,7 +43,7 @@ def outline(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return facets, centre.T, (normal / np.linalg.norm(normal, axis=0)).T
 
 
-def picked(mesh: Any, rule: Rule) -> np.ndarray:
+def select_facets(mesh: Any, rule: FacetRule) -> np.ndarray:
     """Facets that satisfy a rule; raises ValueError where none does, or where the rule is empty."""
     found = []
     if rule.box is not None:
@@ -62,8 +62,8 @@ def picked(mesh: Any, rule: Rule) -> np.ndarray:
     return _some(common, mesh, "satisfies all its rules together")
 
 
-def with_faces(
-    mesh: Any, node_sets: Mapping[str, np.ndarray], rules: Mapping[str, Rule]
+def add_faces(
+    mesh: Any, node_sets: Mapping[str, np.ndarray], rules: Mapping[str, FacetRule]
 ) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh and its node sets with a face for each rule.
 
@@ -74,7 +74,7 @@ def with_faces(
         if name in sets or name in boundaries:
             raise Refusal(f"faces.{name} has the name of a group of the mesh: give it another")
         try:
-            boundaries[name] = picked(mesh, rule)
+            boundaries[name] = select_facets(mesh, rule)
         except ValueError as trouble:
             raise Refusal(f"faces.{name}: {trouble}") from None
         sets[name] = np.unique(mesh.dofs.get_facet_dofs(boundaries[name]).flatten())

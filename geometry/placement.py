@@ -27,14 +27,14 @@ def cross(a: np.ndarray) -> np.ndarray:
     return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
 
 
-def placed(mesh: Any, scale: float, turn: np.ndarray, shift: np.ndarray) -> Any:
+def place(mesh: Any, scale: float, turn: np.ndarray, shift: np.ndarray) -> Any:
     """The mesh with nodes at turn @ (scale x) + shift; turn (3, 3) is a rotation, shift (3,) [m]."""
     if scale == 1.0 and not shift.any() and np.array_equal(turn, np.eye(3)):
         return mesh
     return replace(mesh, doflocs=np.ascontiguousarray(turn @ (scale * mesh.doflocs) + shift[:, None]))
 
 
-def taken(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) -> tuple[Any, dict[str, np.ndarray]]:
+def extract_volume(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) -> tuple[Any, dict[str, np.ndarray]]:
     """One volume group of a mesh as a mesh of its own, which shares no nodes with the rest.
 
     Returns mesh and node_sets as geometry.mesh.read gives them, of the groups that reach into the volume; a surface

@@ -14,8 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tribodyn.geometry.sources.deck import Equation
-from tribodyn.geometry.sources.read import Source
+from tribodyn.geometry.sources.deck import DeckEquation
+from tribodyn.geometry.sources.foreign_file import Source
 
 Place = tuple[str, int]  # body and node, or point and -1
 Form = tuple[tuple[int, float], ...]  # axis and factor of each term
@@ -35,7 +35,7 @@ def with_added_nodes(source: Source) -> Source:
     equations, used = [], set()
     for form, table in _tables(source, at).items():
         for places in _means(form, table, source, between):
-            equations.append(Equation(tuple((names[p], *term) for p, term in zip(places, form, strict=True))))
+            equations.append(DeckEquation(tuple((names[p], *term) for p, term in zip(places, form, strict=True))))
             used |= new.intersection(places)
     bodies = {
         name: replace(body, node_sets=body.node_sets | {names[p]: np.array([p[1]]) for p in used if p[0] == name})
