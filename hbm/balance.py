@@ -17,16 +17,15 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.sparse import issparse
 
-from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.contact.contact_law import STICKS, ContactCycle
 from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.linear import pair_slopes
-from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
-from tribodyn.hbm.linear.speed_line import LineCompliance, compliance_of
+from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance, compliance_of
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.residual_flexibility import FlexibleModel
 from tribodyn.refusal import Refusal
 
 ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
@@ -110,8 +109,10 @@ class HarmonicBalance:
         contact = JointSet.of(model, joints)
         if memory is None:
             memory = np.zeros((contact.n_pair, contact.n_state))
-        held = model.residual
-        springs = _reference(contact.stiffness, model, basis, omega_max) if held is None else held.stiffness
+        if isinstance(model, FlexibleModel):
+            springs = model.residual.stiffness
+        else:
+            springs = _reference(contact.stiffness, model, basis, omega_max)
         if like is not None and like._serves(model, springs, basis, excitation, omega_max):
             compliance = like.compliance.under(excitation)
         else:
@@ -125,10 +126,7 @@ class HarmonicBalance:
         own, loads = self.compliance, {name for _, name in excitation.loads}
         if (own.basis, {*own.load_names}, self.omega_max) != (basis, loads, omega_max):
             return False
-        sides = ((self.model, own.k), (model, springs.ravel()))
-        kinds = {(m.info.engine_order, m.info.n_sectors, m.per_index is None, id(m.residual)) for m, _ in sides}
-        one, two = ([k, *(x for h in basis.harmonics for x in m.at_harmonic(h))] for m, k in sides)
-        return len(kinds) == 1 and self.model.along is model.along is None and all(map(_same, one, two))
+        return np.array_equal(own.k, springs.ravel()) and self.model.matches(model, basis.harmonics)
 
     @property
     def n_unknown(self) -> int:
@@ -181,10 +179,8 @@ class HarmonicBalance:
 
     def standing(self, omega: float) -> HarmonicBalance:
         """The same problem at the speed that belongs to a frequency [rad/s], whatever frequency is asked for then."""
-        if not isinstance(self.compliance, LineCompliance):
-            return self
-        model, compliance = self.compliance.there(omega)
-        return replace(self, model=model, compliance=compliance)
+        model = self.model.at_frequency(omega)
+        return self if model is self.model else replace(self, model=model, compliance=self.compliance.at_model(model))
 
     def at(self, omega: float) -> CompliancePoint:
         """The linear side at one frequency."""
@@ -281,15 +277,6 @@ class HarmonicBalance:
     def history(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Displacement [m] and contact force [N] over one period, both (n_pair, n_component, n_samples)."""
         return self.contact.history(state.x, self.basis, self.memory)
-
-
-def _same(one: Any, two: Any) -> bool:
-    """Whether two arrays, or two systems in all that they hold, are equal to the last bit."""
-    if isinstance(one, SecondOrderSystem):
-        return _same(vars(one), vars(two))
-    if isinstance(one, dict):
-        return list(one) == list(two) and all(map(_same, one.values(), two.values()))
-    return one is two or np.array_equal(one, two)
 
 
 class LinearSide(Protocol):

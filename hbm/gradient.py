@@ -29,6 +29,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.krylov import gmres
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.residual_flexibility import FlexibleModel
 from tribodyn.refusal import SolverFailure
 
 
@@ -326,8 +327,8 @@ class Gradient:
 
     def _besides(self, posed: Posed) -> np.ndarray | float:
         """What there is in x besides the motion of the coordinates."""
-        base, residual = posed.excitation.base, posed.model.residual
-        x = 0.0 if residual is None else residual.apply(self._pull(posed))
+        base, model = posed.excitation.base, posed.model
+        x = model.residual.apply(self._pull(posed)) if isinstance(model, FlexibleModel) else 0.0
         return x if base is None else x - self.balance.loaded(base)
 
     def _force(self, contact: JointSet, memory: np.ndarray) -> np.ndarray:

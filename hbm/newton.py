@@ -14,7 +14,7 @@ from tribodyn.hbm.balance import NEARLY_ALL, HarmonicBalance, Linearisation, Sta
 from tribodyn.hbm.contact.contact_law import ContactCycle
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
-from tribodyn.reduction.residual_flexibility import ResidualFlexibility
+from tribodyn.reduction.residual_flexibility import FlexibleModel, ResidualFlexibility
 
 
 @dataclass(frozen=True)
@@ -155,9 +155,9 @@ def solve(
     """
     options = options or NewtonOptions()
     if isinstance(balance, HarmonicBalance) and isinstance(omega, float):
-        residual = balance.model.residual
-        if residual is not None and residual.left_out <= NEARLY_ALL:
-            return cast(Solved[Evaluated], _solve_with_rest(balance, residual, omega, start, options))
+        model = balance.model
+        if isinstance(model, FlexibleModel) and model.residual.left_out <= NEARLY_ALL:
+            return cast(Solved[Evaluated], _solve_with_rest(balance, model.residual, omega, start, options))
     return _solve(balance, omega, balance.evaluate(omega, start), options)
 
 

@@ -53,7 +53,7 @@ class DenseBalance:
 
     def __post_init__(self) -> None:
         self.problem.model.require_masters("the dense reference")
-        if self.problem.model.per_harmonic is not None:
+        if not self.problem.model.has_one_system:
             raise ValueError("the dense reference serves models whose harmonics share one real system")
         system, b = self.problem.model.at_harmonic(0)
         basis, excitation = self.problem.basis, self.problem.excitation

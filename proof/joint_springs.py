@@ -86,7 +86,7 @@ def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None 
         stretch[name] = (rows[:, part.free], share)
     masters = np.unique(np.concatenate([rows.nonzero()[1] for rows, _ in stretch.values()]))
     model = hold(craig_bampton(system, interface, scene.reduction.modes, scene.reduction.cutoff, masters), part.held)
-    basis = model.basis if back is None else back @ model.basis
+    basis = model.origin.basis if back is None else back @ model.origin.basis
     units = {}
     for name, (rows, share) in stretch.items():
         e = np.asarray(rows @ basis)

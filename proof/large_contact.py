@@ -33,7 +33,7 @@ from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.linear import all_harmonics
 from tribodyn.hbm.linear.compliance import CompliancePoint
 from tribodyn.reduction import residual_flexibility
-from tribodyn.reduction.residual_flexibility import ResidualFlexibility
+from tribodyn.reduction.residual_flexibility import FlexibleModel, ResidualFlexibility
 from tribodyn.workflows.run import memory, modelling, settings
 from tribodyn.workflows.scene import scene_file
 
@@ -143,7 +143,7 @@ def measure(n_patch: int, points: int, way: str, modes: int) -> tuple[ContactCos
         with watched(spent):
             branch = natural.follow(balance, first, last, options)
         clock.append(time.process_time())
-        peak, remainder = memory.peak(), reduced.residual
+        peak, remainder = memory.peak(), reduced.residual if isinstance(reduced, FlexibleModel) else None
         parts = () if remainder is None else _parts(balance, spent, len(branch.omega))  # before its factor is let go
     row = ContactCost(
         way=way,
@@ -188,7 +188,7 @@ def watched(spent: dict[str, list[float]]) -> Iterator[None]:
 def _parts(balance: HarmonicBalance, spent: dict[str, list[float]], points: int) -> tuple[Part, ...]:
     """The parts of a curve of so many points, `rest` and `modes` shared out to factor and modes."""
     n, m, r = balance.compliance.n_contact, balance.basis.n_coeff, balance.compliance.groups[0][0].n_mode
-    assert balance.model.residual is not None
+    assert isinstance(balance.model, FlexibleModel)
     remainder = balance.model.residual
     read = 4 * len(np.unique(remainder.B.indices)) ** 2  # of the factor, each of two times
     if isinstance(remainder.factor, Pardiso) and not remainder.factor._few:

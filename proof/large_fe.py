@@ -129,8 +129,8 @@ def _measured(scene_of: Callable[[Path], scene_file.SceneFile], way: str, files:
                 reduced = part_reduction.reduce(scene, part)
             clock("rest")
             clock.seconds["rest"] -= sum(of_stages.values())
-            masters = 0 if reduced.residual is not None else len(reduced.info.master_dofs)
-            frequency = np.zeros(0) if reduced.info.free_frequency is None else reduced.info.free_frequency
+            masters = len(reduced.origin.masters)
+            frequency = reduced.free_frequency
             cost = FeCost(
                 way, part.system.n_dof, masters, clock.seconds | of_stages, memory.peak(),
                 first_hz=float(frequency[0]),

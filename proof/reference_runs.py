@@ -29,8 +29,8 @@ from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_share
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.step_control import Tolerance
-from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.linear import linear_modes
+from tribodyn.reduction.linear_damping import modal_damping
 from tribodyn.workflows.errors.limit import limit_of
 from tribodyn.workflows.errors.verdict import with_verdict
 from tribodyn.workflows.run import modelling, pipeline, references

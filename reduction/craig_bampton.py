@@ -20,7 +20,7 @@ from tribodyn.fem.modes import StaticDivergence, modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.refusal import Refusal
 
 
@@ -41,9 +41,8 @@ def craig_bampton(
     solver : see fem.factor
     attached : loads whose static response with the masters held joins the modes, so that statics under them are exact
     Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
-        info: masters (DOFs of the system), n_full, n_masters, n_modes, factorisation, first_omitted_frequency [Hz],
-        free_frequency [Hz] of the first ten modes
-    Raises  ValueError where n_modes and cutoff are both or neither given, too many modes are asked, or a body can move
+        its origin is a `Reduction`
+    Raises  Refusal where n_modes and cutoff are both or neither given, too many modes are asked, or a body can move
         rigidly with its masters held
     """
     K, M = csr_matrix(system.stiffness), csr_matrix(system.mass)
@@ -80,21 +79,15 @@ def craig_bampton(
         {name: basis.T @ row for name, row in system.outputs.items()},
         turning,
     )
-    model = ReducedModel(reduced, replace(interface, B=np.asarray(interface.B @ basis)), basis)
-    info = ModelInfo(
-        masters=m,
-        n_full=system.n_dof,
-        n_masters=n_m,
-        n_modes=len(omega),
-        factorisation=factor.name,
-        first_omitted_frequency=omitted / (2 * np.pi),
-    )
+    origin = Reduction(basis, m, len(omega), factor.name, omitted / (2 * np.pi))
+    model = ReducedModel(reduced, replace(interface, B=np.asarray(interface.B @ basis)), origin)
     try:
-        info = replace(info, free_frequency=linear_modes(model, None, min(LIMITS.reported_modes, reduced.n_dof))[0])
+        frequency, _ = linear_modes(model, None, min(LIMITS.reported_modes, reduced.n_dof))
     except StaticDivergence:  # rotation carries away what only the contact holds
         if not interface.n_pair:
             raise
-    return replace(model, info=info)
+        return model
+    return replace(model, free_frequency=frequency)
 
 
 def master_dofs(

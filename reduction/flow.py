@@ -22,8 +22,7 @@ import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.model import ReducedModel
-from tribodyn.refusal import Refusal
+from tribodyn.reduction.wave_model import WaveModel
 
 
 @dataclass(frozen=True)
@@ -47,26 +46,16 @@ class Flow:
         return replace(self, influence={k: factor * c for k, c in self.influence.items()})
 
 
-def with_flow(wave: ReducedModel, springs: np.ndarray, flow: Flow) -> ReducedModel:
-    """A travelling wave with the forces of a flow, in every index; springs : (n_pair, n_component) of stuck contacts.
+def with_flow(wave: WaveModel, springs: np.ndarray, flow: Flow) -> WaveModel:
+    """A travelling wave with the forces of a flow; springs : (n_pair, n_component) of stuck contacts [N/m]."""
 
-    Raises  ValueError for a model that is no travelling wave
-    """
-    if wave.per_index is None or wave.info.n_sectors is None or wave.info.engine_order is None:
-        raise Refusal("influence coefficients of a flow are for a travelling wave of a wheel")
-    n, order, any_wave = wave.info.n_sectors, wave.info.engine_order, wave.per_index
-    made: dict[int, tuple[SecondOrderSystem, np.ndarray]] = {}
+    def flown(index: int, system: SecondOrderSystem, B: np.ndarray) -> SecondOrderSystem:
+        _, omega, shape = family(system, np.asarray(B), springs, flow.mode)
+        parts = parts_of(flow, index, wave.n_sectors, omega)
+        force = np.asarray(system.mass) @ shape
+        return added(system, *(part * np.outer(force, force.conj()) for part in parts))
 
-    def per_index(index: int) -> tuple[SecondOrderSystem, np.ndarray]:
-        if index % n not in made:
-            system, B = any_wave(index)
-            _, omega, shape = family(system, np.asarray(B), springs, flow.mode)
-            parts = parts_of(flow, index, n, omega)
-            force = np.asarray(system.mass) @ shape
-            made[index % n] = added(system, *(part * np.outer(force, force.conj()) for part in parts)), B
-        return made[index % n]
-
-    return replace(wave, system=per_index(order)[0], per_index=per_index, per_harmonic=lambda h: per_index(h * order))
+    return wave.with_index_systems(flown)
 
 
 def family(
@@ -78,19 +67,16 @@ def family(
     return stuck, float(np.sqrt(square[0])), shape[:, 0]
 
 
-def aeroelastic(wave: ReducedModel, springs: np.ndarray, flow: Flow, few: int = 20) -> dict[int, complex]:
+def aeroelastic(wave: WaveModel, springs: np.ndarray, flow: Flow, few: int = 20) -> dict[int, complex]:
     """Eigenvalue lambda [1/s] of the family's wave with the stuck wheel in the flow, for every index from -N/2 + 1.
 
     wave : with its damping and Coriolis forces, without the flow; few : modes of each index that take part
     The frequency is Im lambda > 0: the wave of index j runs with the rotation for j > 0. Re lambda > 0 is flutter
     """
-    n = wave.info.n_sectors
-    assert n is not None
-    flown = with_flow(wave, springs, flow)
-    assert flown.per_index is not None
+    n, flown = wave.n_sectors, with_flow(wave, springs, flow)
     found = {}
     for index in range(-((n - 1) // 2), n // 2 + 1):
-        system, B = flown.per_index(index)
+        system, B = flown.at_index(index)
         stuck, _, shape = family(system, np.asarray(B), springs, flow.mode)
         size = min(few, len(stuck))
         square, shapes = sla.eigh(stuck, np.asarray(system.mass), subset_by_index=(0, size - 1))

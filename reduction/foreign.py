@@ -42,7 +42,7 @@ from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem, dense
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_files
 from tribodyn.reduction.abaqus_matrix import Labels
-from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
 
 NAMES = {"mass": ("M", "MAA", "MAAX"), "stiffness": ("K", "KAA", "KAAX"), "damping": ("C", "BAA", "BAAX")}
@@ -348,8 +348,6 @@ def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> Red
             outputs=dict(system.outputs),
         ),
         interface=ContactInterface(**{**vars(interface), "B": dense(interface.B)}),
-        basis=None,
-        info=ModelInfo(n_full=system.n_dof, source="matrices from files"),
     )
 
 

@@ -17,7 +17,7 @@ import scipy.linalg as sla
 
 from tribodyn.fem.modes import modes
 from tribodyn.reduction.limits import LIMITS
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.refusal import Refusal
 
 
@@ -31,14 +31,13 @@ def interface_modes(
     apart : those of `keep` that must not move the contact by themselves, as a displacement that is to be prescribed
         must not: the static shapes that belong to them are coordinates of their own, as far as the modes lack them
     Returns the model in coordinates: kept masters in ascending order, interface modes, static shapes, fixed-interface
-        modes. Besides the facts of the model, info has masters (those kept), n_interface_modes and
-        interface_omitted_frequency [Hz]
-    Raises  ValueError for a model that differs from harmonic to harmonic, DOFs that are no masters, too many modes, or
+        modes
+    Raises  Refusal for a model that differs from harmonic to harmonic, DOFs that are no masters, too many modes, or
         a boundary that can move rigidly with the kept DOFs held
     """
-    if model.per_harmonic is not None:
+    if not model.has_one_system:
         raise Refusal("interface modes need a model that is the same for all harmonics: leave interface_modes out")
-    masters = model.info.master_dofs
+    masters = model.origin.masters
     kept = np.unique(np.asarray([] if keep is None else keep, dtype=int))
     if not np.all(np.isin(kept, masters)):
         raise Refusal("interface modes: only DOFs that are masters of the reduction can be kept")
@@ -63,15 +62,12 @@ def interface_modes(
     basis[np.ix_(b, len(a) + np.arange(n_contact))] = contact
     basis[np.arange(n_m, n), np.arange(len(a) + n_contact, basis.shape[1])] = 1.0
     omitted = float(omega[n_modes]) / (2 * np.pi) if n_modes < len(b) else np.inf
-    fewer = model.projected(basis)
-    info = replace(
-        fewer.info,
-        masters=masters[a],
-        n_masters=len(a),
-        n_interface_modes=n_modes,
-        interface_omitted_frequency=omitted,
+    reduced = model.projected(basis)
+    assert isinstance(reduced.origin, Reduction)
+    origin = replace(
+        reduced.origin, kept=masters[a], n_interface_modes=n_modes, interface_omitted_frequency=omitted
     )
-    return replace(fewer, info=info)
+    return replace(reduced, origin=origin)
 
 
 def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

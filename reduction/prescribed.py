@@ -11,7 +11,9 @@ so that every system stays symmetric and a height is an amplitude like a force i
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 import scipy.linalg as sla
@@ -21,19 +23,74 @@ from tribodyn.fem.constraints import partition
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.reduction.model import ReducedModel, StaticReaction
+from tribodyn.reduction.model import ReducedModel, Reduction, SystemChange
 from tribodyn.refusal import Refusal
 
 
-def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndarray | float = 0.0) -> ReducedModel:
+@dataclass(frozen=True)
+class StaticReaction:
+    """The static force that keeps prescribed coordinates where they are.
+
+    name : of the load whose static amplitude is the height
+    dofs : (k,) coordinates of the reduced model, each displaced by the height
+    psi : (n, k) static shapes of unit displacements of each; stiffness : (k, k) psi^T K psi [N/m]
+    support : (k,) springs in the model that act about the prescribed position [N/m]
+    """
+
+    name: str
+    dofs: np.ndarray
+    psi: np.ndarray
+    stiffness: np.ndarray
+    support: np.ndarray
+    model: ReducedModel
+
+    def force(self, height: float, contact_force: np.ndarray, loads: Mapping[str, float] | None = None) -> np.ndarray:
+        """Force on each prescribed coordinate (k,) [N], along its displacement.
+
+        height : [m]; contact_force : (n_pair, n_component) static part of the contact force [N]
+        loads : other static loads by name [N]
+        Source  Tamatam 2021, eq. 5.4a after eq. 5.4b is solved for X_u
+        """
+        load = -np.asarray(self.model.interface.B).T @ np.ravel(contact_force)
+        for name, value in (loads or {}).items():
+            load = load + value * self.model.system.loads[name]
+        return (self.stiffness.sum(axis=1) - self.support) * height - self.psi.T @ load
+
+
+@dataclass(frozen=True)
+class PrescribedModel(ReducedModel):
+    """A model with a prescribed static displacement.
+
+    static : the system of harmonic 0; reaction : gives the force that holds the displacement
+    """
+
+    static: SecondOrderSystem = field(kw_only=True)
+    reaction: StaticReaction = field(kw_only=True)
+
+    @property
+    def has_one_system(self) -> bool:
+        """No: harmonic 0 sees another one."""
+        return False
+
+    def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
+        """System and contact map (n_pair * n_component, n) that harmonic h sees."""
+        return (self.static if h == 0 else self.system), np.asarray(self.interface.B)
+
+    def with_systems(self, change: SystemChange) -> Self:
+        """The same model with both systems replaced."""
+        B = np.asarray(self.interface.B)
+        return replace(self, system=change(self.system, B), static=change(self.static, B))
+
+
+def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndarray | float = 0.0) -> PrescribedModel:
     """Prescribe the static displacement of some coordinates of a reduced model; the rest of their motion stays free.
 
     dofs : (k,) physical coordinates, outside the contact
     name : of the new load, whose static amplitude is the height [m]
     support : springs that hold each about the prescribed position, which are in the stiffness for the sake of the other
         harmonics and carry no force at that position [N/m]
-    Returns the model, whose harmonic 0 sees another system, and whose `info.reaction` gives the force
-    Raises  ValueError where a coordinate belongs to the contact, where the name is taken, or where the part can still
+    Returns the model, whose harmonic 0 sees another system
+    Raises  Refusal where a coordinate belongs to the contact, where the name is taken, or where the part can still
         move rigidly
     """
     system, B = model.system, np.asarray(model.interface.B)
@@ -62,12 +119,9 @@ def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndar
     dynamic = replace(system, loads=loads)
     static = _cut(system, free, held, name)
     reaction = StaticReaction(name, held, psi, psi.T @ K @ psi, springs, model)
-
-    def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
-        return (static if h == 0 else dynamic), B
-
-    info = replace(model.info, reaction=reaction)
-    return replace(model, system=dynamic, per_harmonic=per_harmonic, info=info)
+    return PrescribedModel(
+        dynamic, model.interface, model.origin, model.joints, model.free_frequency, static=static, reaction=reaction
+    )
 
 
 def _cut(system: SecondOrderSystem, free: np.ndarray, held: np.ndarray, name: str) -> SecondOrderSystem:
@@ -96,10 +150,10 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     """
     if len(rows) == 0:
         return model
-    if model.basis is None or model.per_harmonic is not None:
+    if not isinstance(model.origin, Reduction) or not model.has_one_system:
         raise Refusal("motions can be held only in a model that was reduced from one mesh for all harmonics")
-    held = rows @ model.basis
+    held = rows @ model.origin.basis
     N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
     held_model = model.projected(N)
     frequency, _ = linear_modes(held_model, n=min(LIMITS.reported_modes, N.shape[1]))
-    return replace(held_model, info=replace(held_model.info, free_frequency=frequency))
+    return replace(held_model, free_frequency=frequency)

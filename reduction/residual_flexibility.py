@@ -22,7 +22,7 @@ Source  residual flexibility of free-interface modes: MacNeal 1971, doi 10.1016/
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -38,7 +38,8 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import fixed_interface_modes
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
-from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.reduction.model import ReducedModel, Reduction
+from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +150,30 @@ class ResidualFlexibility:
         return float(np.max(np.linalg.norm(more, axis=0) / np.linalg.norm(whole, axis=0)))
 
 
+@dataclass(frozen=True)
+class FlexibleModel(ReducedModel):
+    """A model whose coordinates leave out a part of the contact flexibility, which `residual` adds."""
+
+    residual: ResidualFlexibility = field(kw_only=True)
+
+    @property
+    def leaves_flexibility_out(self) -> bool:
+        """Yes."""
+        return True
+
+    def matches(self, other: ReducedModel, harmonics: Sequence[int]) -> bool:
+        """Whether another model has equal matrices and the same residual flexibility."""
+        same = isinstance(other, FlexibleModel) and self.residual is other.residual
+        return same and super().matches(other, harmonics)
+
+    def require_masters(self, needed_by: str) -> None:
+        """Raise Refusal: the coordinates leave out a part of the contact flexibility."""
+        raise Refusal(
+            f"{needed_by} needs a model that keeps every contact DOF, which this one with its "
+            f'{len(self.interface.B)} does not: set reduction.method = "craig_bampton", on a smaller contact'
+        )
+
+
 def residual_flexibility(
     system: SecondOrderSystem,
     interface: ContactInterface,
@@ -157,16 +182,15 @@ def residual_flexibility(
     cutoff: float | None = None,
     clusters: int = LIMITS.clusters,
     solver: str | None = None,
-) -> ReducedModel:
+) -> FlexibleModel:
     """Reduce a full system to modes of its stuck state and Ritz vectors, with the flexibility these leave out.
 
     system : sparse, n_full DOFs; interface : B over the same DOFs
     stiffness : (n_pair, n_component) contact springs [N/m]; n_modes : of the stuck structure
         kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     clusters : of pairs, whose tractions give Ritz vectors; solver : see fem.factor
-    Returns the model; its coordinates are modal, mass = 1; info: n_full, n_modes, factorisation,
-        first_omitted_frequency [Hz], of the stuck modes that were asked for, free_frequency [Hz]
-    Raises  ValueError where the structure can move rigidly with all contacts stuck
+    Returns the model; its coordinates are modal, mass = 1; the first omitted frequency is that of the stuck modes
+    Raises  SingularStiffness where the structure can move rigidly with all contacts stuck
     """
     k = np.ravel(np.asarray(stiffness, float))
     K = system.stiffness
@@ -189,20 +213,15 @@ def residual_flexibility(
         {name: V.T @ row for name, row in system.outputs.items()},
         None if system.gyroscopic is None else V.T @ (system.gyroscopic @ V),
     )
-    info = ModelInfo(
-        n_full=system.n_dof,
-        n_modes=len(squares),
-        factorisation=factor.name,
-        first_omitted_frequency=omitted / (2 * np.pi),
-    )
-    rest = ResidualFlexibility(k, K, B, V, squares, M, solver)
-    rest.__dict__["factor"] = factor
-    model = ReducedModel(reduced, replace(interface, B=at_contact), V, info, residual=rest)
+    origin = Reduction(V, np.zeros(0, int), len(squares), factor.name, omitted / (2 * np.pi))
+    residual = ResidualFlexibility(k, K, B, V, squares, M, solver)
+    residual.__dict__["factor"] = factor
+    model = FlexibleModel(reduced, replace(interface, B=at_contact), origin, residual=residual)
     try:
-        free_frequency = linear_modes(model, None, min(LIMITS.reported_modes, len(squares)))[0]
+        frequency, _ = linear_modes(model, None, min(LIMITS.reported_modes, len(squares)))
     except StaticDivergence:  # rotation carries away what only the contact holds
         return model
-    return replace(model, info=replace(info, free_frequency=free_frequency))
+    return replace(model, free_frequency=frequency)
 
 
 def clustered(interface: ContactInterface, weight: np.ndarray, clusters: int) -> csr_matrix:

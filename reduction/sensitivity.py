@@ -45,7 +45,7 @@ class Sensitivity:
 
     def __init__(self, system: SecondOrderSystem, model: ReducedModel, shapes: np.ndarray):
         self.model, self.shapes, self.system = model, shapes, system
-        masters = model.info.master_dofs
+        masters = model.origin.masters
         self._s, _ = partition(system.n_dof, masters, "master")
         self._n = len(masters)
         self._M = csr_matrix(system.mass)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy.linalg as sla
@@ -17,10 +17,11 @@ import scipy.linalg as sla
 from tribodyn.fem.cyclic_symmetry import Sector, wave_system
 from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, in_coordinates, reduce_sector, stuck_ritz, wave_of
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.model import Damping, ReducedModel
+from tribodyn.reduction.model import Damping, ReducedModel, Reduction
+from tribodyn.reduction.sector_reduction import ReducedSector, in_coordinates, reduce_sector, stuck_ritz
+from tribodyn.reduction.wave_model import IndexSystem, WaveIndices, WaveModel, wave_model
 
 
 def reduce_alike(
@@ -30,15 +31,18 @@ def reduce_alike(
 
     Masters stay; all fixed-interface modes, and what the constraint modes differ by, share one basis of the rest
     """
-    alone = [reduce_sector(sector, n_modes, cutoff, attached) for sector in sectors]
-    first = alone[0]
-    m, energy = len(first.info.master_dofs), np.diag(first.sector.system.stiffness)
-    columns = [one.basis[:, m:] / np.sqrt(np.diag(one.sector.system.stiffness)[m:]) for one in alone]
-    columns += [(one.basis[:, :m] - first.basis[:, :m]) / np.sqrt(energy[:m]) for one in alone[1:]]
-    own = independent(np.concatenate(columns, axis=1), sectors[0].system.stiffness)
-    basis = np.concatenate([first.basis[:, :m], own], axis=1)
-    info = replace(first.info, n_modes=own.shape[1])
-    return in_coordinates(sectors[0], sectors[0].system.projected(basis), basis, info)
+    reduced = [reduce_sector(sector, n_modes, cutoff, attached) for sector in sectors]
+    first, bases = reduced[0], [sector.origin.basis for sector in reduced]
+    m, energy = len(first.origin.masters), np.diag(first.sector.system.stiffness)
+    columns = [
+        basis[:, m:] / np.sqrt(np.diag(sector.sector.system.stiffness)[m:])
+        for basis, sector in zip(bases, reduced, strict=True)
+    ]
+    columns += [(basis[:, :m] - bases[0][:, :m]) / np.sqrt(energy[:m]) for basis in bases[1:]]
+    internal = independent(np.concatenate(columns, axis=1), sectors[0].system.stiffness)
+    basis = np.concatenate([bases[0][:, :m], internal], axis=1)
+    origin: Reduction = replace(first.origin, basis=basis, n_modes=internal.shape[1])
+    return in_coordinates(sectors[0], sectors[0].system.projected(basis), origin)
 
 
 def congruent(K: Any, T: np.ndarray) -> np.ndarray:
@@ -78,13 +82,13 @@ class SpeedLine:
     made: dict[int, Systems] = field(default_factory=dict)
     damping: Damping | None = None
 
-    def __call__(self, omega: float) -> ReducedModel:
+    def __call__(self, omega: float) -> WaveModel:
         """The model at the speed that belongs to a frequency [rad/s]."""
-        return wave_of(self.reduced, self.engine_order, AtSpeed(self, self.between, self.speed(omega)))
+        return wave_model(self.reduced, self.engine_order, AtSpeed(self, self.between, self.speed(omega)))
 
-    def slope(self, omega: float) -> ReducedModel:
+    def slope(self, omega: float) -> WaveModel:
         """Matrices, loads and outputs of the model by the frequency [rad/s]."""
-        return wave_of(self.reduced, self.engine_order, AtSpeed(self, self.by_frequency, self.speed(omega)))
+        return wave_model(self.reduced, self.engine_order, AtSpeed(self, self.by_frequency, self.speed(omega)))
 
     def damped(self, make: Damping) -> SpeedLine:
         """The same with another damping."""
@@ -153,6 +157,39 @@ class SpeedLine:
         return float(np.abs(np.einsum("ij,ij->j", phi.conj(), missed.stiffness @ phi) / (2 * omega**2)).max())
 
 
+@dataclass(frozen=True)
+class SpeedLineModel(WaveModel):
+    """The wave at one speed of a line, which knows the models of the others.
+
+    line_error : largest relative error of the lowest stuck frequencies that interpolation causes
+    """
+
+    line: SpeedLine = field(kw_only=True)
+    line_error: float = field(kw_only=True)
+
+    @property
+    def follows_frequency(self) -> bool:
+        """Yes: the speed belongs to the frequency."""
+        return True
+
+    def at_frequency(self, omega: float) -> WaveModel:
+        """The model at the speed that belongs to an excitation frequency [rad/s]."""
+        return self.line(omega)
+
+    def matches(self, other: ReducedModel, harmonics: Sequence[int]) -> bool:
+        """No: the systems of one speed do not tell."""
+        return False
+
+    def accuracy(self) -> dict[str, float]:
+        """Of the stress at the speeds of the line, and between them."""
+        return {**super().accuracy(), "line_error": self.line_error}
+
+    def with_damping(self, make: Damping) -> Self:
+        """The same with another damping at every speed."""
+        damped = self.with_systems(lambda system, B: replace(system, damping=make(system, B)))
+        return replace(self, system=damped.system, index_of=damped.index_of, line=self.line.damped(make))
+
+
 def _damped(made: Systems, make: Damping) -> Systems:
     systems, B, T = made
     return tuple(replace(one, damping=make(one, B)) for one in systems), B, T
@@ -173,9 +210,9 @@ class AtSpeed:
     line: SpeedLine
     of: Callable[[Sequence[SecondOrderSystem], float], SecondOrderSystem]
     speed: float
-    made: dict[int, tuple[SecondOrderSystem, np.ndarray, np.ndarray]] = field(default_factory=dict)
+    made: dict[int, IndexSystem] = field(default_factory=dict)
 
-    def __call__(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
+    def __call__(self, index: int) -> IndexSystem:
         if index not in self.made:
             systems, B, T = self.line.at_index(index)
             self.made[index] = self.of(systems, self.speed), B, T

@@ -18,7 +18,7 @@ from tribodyn.fem.interface import join
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.refusal import Refusal
+from tribodyn.reduction.wave_model import WaveModel
 
 
 def period(n_sectors: int, engine_order: int) -> int:
@@ -26,24 +26,21 @@ def period(n_sectors: int, engine_order: int) -> int:
     return n_sectors // gcd(n_sectors, engine_order)
 
 
-def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
+def unrolled(model: WaveModel, highest: float) -> ReducedModel:
     """The sectors of a travelling wave until it repeats itself, in modal coordinates: unit mass, diagonal stiffness.
 
-    model : of a wave, see `cyclic.travelling_wave`, damped or not
+    model : of a wave, see `wave_model.travelling_wave`, damped or not
     highest : angular frequency [rad/s] up to which modes of the wheel without contact keep their inertia; of an index
         with many more modes than contacts, loads and outputs the others are replaced by as many shapes of the same
         compliance there
     Returns the model; contact rows sector by sector, loads and outputs "<name>@<sector>"
-    Raises  ValueError for a model that is no travelling wave
     """
-    if model.per_index is None or model.info.n_sectors is None or model.info.engine_order is None:
-        raise Refusal("only a travelling wave of a wheel can be unrolled")
-    N, order = model.info.n_sectors, model.info.engine_order
+    N, order = model.n_sectors, model.engine_order
     step = gcd(N, order)
     n = N // step
     lam, ports, damping, gyroscopic, circulatory = [], [], [], [], []
     for index in range(0, N // 2 + 1, step):
-        squares, rows, c, g, flow = _modes(*model.per_index(index), highest)
+        squares, rows, c, g, flow = _modes(*model.at_index(index), highest)
         pair = 0 < 2 * index < N
         lam.append(np.tile(squares, 1 + pair))
         turned = np.stack([rows * np.exp(-2j * np.pi * (index * k % N) / N) for k in range(n)])
@@ -54,7 +51,7 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
         gyroscopic.append(_real_matrix(g, pair))
         circulatory.append(_real_matrix(flow, pair))
     squares, rows = np.concatenate(lam), np.concatenate(ports, axis=2)  # (n_mode,), (n, n_port, n_mode)
-    system, _ = model.per_index(0)
+    system, _ = model.at_index(0)
     n_contact, loads, outputs = model.interface.B.shape[0], list(system.loads), list(system.outputs)
     at = n_contact + len(loads)
     named = {
@@ -71,7 +68,7 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
         _together(circulatory),
     )
     interface = join([replace(model.interface, B=own[:n_contact]) for own in rows])
-    return ReducedModel(whole, interface, None, replace(model.info, joints={}))
+    return ReducedModel(whole, interface)
 
 
 def _modes(

@@ -142,7 +142,7 @@ class FreeVibration:
     def __init__(self, balance: HarmonicBalance, mode: int | None, output: str | None):
         model, self.balance, self.basis, self.mode = balance.model, balance, balance.basis, mode
         model.require_masters("nonlinear modes")
-        if model.per_harmonic is not None and model.per_index is None:
+        if not model.has_one_system and not model.is_wave:
             raise Refusal(
                 "nonlinear modes need one system for all harmonics: this model has one of its own per harmonic"
             )

@@ -21,11 +21,12 @@ import scipy.linalg as sla
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
+from tribodyn.hbm.linear.compliance import compliance_of
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
-from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
+from tribodyn.reduction.residual_flexibility import FlexibleModel
 
 ROUGH = (3.0, 2.5, 2.0, 1.5, 1.0, 0.5)  # decimal logarithms of friction over its own, tried in turn
 SLIDING_STEPS = 400  # of Newton on the whole way to its own friction
@@ -118,9 +119,10 @@ def _softened(balance: HarmonicBalance, level: float, other: HarmonicBalance | N
     """
     most = float(balance.contact.stiffness.max()) * 10.0**level
     contact = balance.contact.with_parameters(lambda p: replace(p, stiffness=np.minimum(p.stiffness, most)))
-    residual = balance.model.residual  # made with springs of its own
-    own = np.minimum(contact.stiffness, body_stiffness(balance.model, balance.basis))
-    reference = own if residual is None else residual.stiffness
+    if isinstance(balance.model, FlexibleModel):  # made with springs of its own
+        reference = balance.model.residual.stiffness
+    else:
+        reference = np.minimum(contact.stiffness, body_stiffness(balance.model, balance.basis))
     if other is not None and np.array_equal(other.reference_stiffness, reference.ravel()):
         return other.with_contact(contact)
     compliance = compliance_of(balance.model, reference, balance.basis, balance.excitation, balance.omega_max)

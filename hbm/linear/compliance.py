@@ -26,6 +26,7 @@ from tribodyn.hbm.linear.all_harmonics import few_rows
 from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
 from tribodyn.hbm.linear.ritz_expansion import RitzExpansion
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.residual_flexibility import FlexibleModel
 
 
 @dataclass(frozen=True)
@@ -75,14 +76,14 @@ class ContactCompliance:
         self.load_names = sorted({name for _, name in excitation.loads})
         self.n_load = len(self.load_names)
         self._excite(excitation)
-        self.residual = model.residual
+        self.residual = model.residual if isinstance(model, FlexibleModel) else None
         self.groups: list[tuple[Expansion, list[int]]] = []
-        for positions, mirrored in _sharing(model, basis.harmonics):
+        for positions, mirrored in model.shared_systems(basis.harmonics):
             system, b = model.at_harmonic(basis.harmonics[positions[0]])
             ports = self.port_rows(system, np.asarray(b))
             s_max = basis.harmonics[max([*positions, *mirrored])] * omega_max
-            if model.residual is not None:
-                ritz = RitzExpansion(system, np.asarray(b), self.k, ports, s_max, model.residual)
+            if self.residual is not None:
+                ritz = RitzExpansion(system, np.asarray(b), self.k, ports, s_max, self.residual)
                 self.groups.append((ritz, positions))
                 continue
             self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max, wanted), positions))
@@ -119,6 +120,10 @@ class ContactCompliance:
         other._points = {omega: point.under(other, same) for omega, point in self._points.items()}
         self._points = {}
         return other
+
+    def at_model(self, model: ReducedModel) -> ContactCompliance:
+        """The compliance, for all frequencies, of the model at one of them."""
+        return self
 
     def port_rows(self, system: SecondOrderSystem, b: np.ndarray) -> np.ndarray:
         """(n_port, n) rows of the contacts b, the loads and the outputs of a system."""
@@ -275,20 +280,20 @@ class Outside:
     left: np.ndarray
 
 
-def _sharing(model: ReducedModel, harmonics: tuple[int, ...]) -> list[tuple[list[int], list[int]]]:
-    """Positions of the harmonics that share a system, and of those that see its conjugate: a wave of index -j."""
-    sharing: dict[int, tuple[list[int], list[int]]] = {}
-    order, n = model.info.engine_order, model.info.n_sectors
-    if model.per_index is None or order is None or n is None:
-        for position, h in enumerate(harmonics):
-            sharing.setdefault(id(model.at_harmonic(h)[0]), ([], []))[0].append(position)
-        return list(sharing.values())
-    first: dict[int, int] = {}
-    for position, h in enumerate(harmonics):
-        index = h * order % n
-        key = min(index, n - index)
-        sharing.setdefault(key, ([], []))[first.setdefault(key, index) != index].append(position)
-    return list(sharing.values())
+def compliance_of(
+    model: ReducedModel,
+    stiffness: np.ndarray,
+    basis: HarmonicBasis,
+    excitation: Excitation,
+    omega_max: float,
+    wanted: float | None = None,
+) -> ContactCompliance:
+    """The contact compliance of a model; arguments as for `ContactCompliance`."""
+    if model.follows_frequency:
+        from tribodyn.hbm.linear.line_compliance import line_compliance  # only operating lines of wheels need it
+
+        return line_compliance(model, stiffness, basis, excitation, omega_max, wanted)
+    return ContactCompliance(model, stiffness, basis, excitation, omega_max, wanted)
 
 
 class CompliancePoint:

@@ -6,6 +6,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
+from tribodyn.reduction.residual_flexibility import FlexibleModel
 
 
 def coordinates(
@@ -43,9 +44,9 @@ def full_displacement(
     harmonics = balance.basis.harmonics
     full = [balance.model.reconstruct(q, h) for h, q in zip(harmonics, amplitudes, strict=True)]
     moved: np.ndarray = balance.basis.to_real(np.stack(full, axis=-1))
-    residual = balance.model.residual
-    if residual is not None:
+    model = balance.model
+    if isinstance(model, FlexibleModel):
         base = balance.excitation.base
         stretch = displacement if base is None else displacement + balance.loaded(base)
-        moved += residual.field(residual.stiffness[:, None] * stretch - force)
+        moved += model.residual.field(model.residual.stiffness[:, None] * stretch - force)
     return moved

@@ -147,9 +147,9 @@ def stability(balance: HarmonicBalance, state: State, n_modes: int | None = None
     balance = balance.standing(state.omega)
     model = balance.model
     model.require_masters("stability")
-    if model.per_index is not None:
+    if model.is_wave:
         return _of_wave(balance, state, n_modes, top)
-    if model.per_harmonic is not None and model.info.reaction is None:
+    if not model.has_motion_in_time:
         raise Refusal(
             "stability needs one system for all harmonics: perturbations of a stored cyclic part see other systems "
             "than the solution does"

@@ -15,7 +15,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import STICKS
 from tribodyn.hbm.stability.exponents import stability
-from tribodyn.hbm.time import period_search, wave_in_time
+from tribodyn.hbm.time import period_search
 from tribodyn.hbm.time.period_search import Period, PeriodSearch, push
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import integrate
@@ -103,7 +103,7 @@ def stays(balance: HarmonicBalance, state: State, found: Verification | None, op
     in a cycle that may miss what grows, so that it serves only where there are no multipliers
     """
     same = found is not None and found.motion.periodic and found.contact <= SAME
-    if same and not wave_in_time.is_wave(balance):
+    if same and not balance.model.is_wave:
         with suppress(ValueError):
             return not leaves(balance, state, options), MULTIPLIERS
     return stability(balance, state).stable, HILL

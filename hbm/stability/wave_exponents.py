@@ -27,6 +27,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.linear.expansion import stuck_modes
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.wave_model import as_wave
 
 COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: how far truncation drives copies apart
 
@@ -46,10 +47,9 @@ class WaveModes:
     """
 
     def __init__(self, model: ReducedModel, stiffness: np.ndarray, n_modes: int):
-        assert model.per_index is not None
-        assert model.info.n_sectors is not None
-        self.n_sectors = model.info.n_sectors
-        self._per_index, self._k, self.m = model.per_index, np.asarray(stiffness, float).ravel(), n_modes
+        wave = as_wave(model)
+        self.n_sectors = wave.n_sectors
+        self._per_index, self._k, self.m = wave.at_index, np.asarray(stiffness, float).ravel(), n_modes
         self._made: dict[int, _Index] = {}
 
     def __call__(self, index: int) -> _Index:
@@ -92,8 +92,7 @@ def exponents(
         the perturbation; answer : as of `settled`
     Returns exponents (n,) [1/s] and the index d (n,) of each perturbation, from -N/2 + 1 to N/2
     """
-    order, n = balance.model.info.engine_order, modes.n_sectors
-    assert order is not None
+    order, n = as_wave(balance.model).engine_order, modes.n_sectors
     active = np.flatnonzero(np.abs(slope).max(axis=(1, 2, 3, 4)) > 0)
     blocks = of_exponentials(slope[active])
     c = slope.shape[1]

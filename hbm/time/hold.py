@@ -25,6 +25,7 @@ import scipy.linalg as sla
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.time.time_step import Record
+from tribodyn.reduction.prescribed import PrescribedModel
 
 SOFTEST = 1e-3  # of the contact springs: a platform that nothing else carries has no height without any
 
@@ -51,9 +52,9 @@ class Hold:
     def of(cls, balance: HarmonicBalance, load: np.ndarray, base: np.ndarray) -> Hold | None:
         """What a balance prescribes in harmonic 0, under static forces and ground motion; None where nothing."""
         model = balance.model
-        reaction = model.info.reaction
-        if reaction is None or not balance.basis.has_static:
+        if not isinstance(model, PrescribedModel) or not balance.basis.has_static:
             return None
+        reaction = model.reaction
         height = float(np.real(balance.excitation.loads.get((0, reaction.name), 0.0)))
         K, B = np.asarray(model.system.stiffness), np.asarray(model.interface.B)
         return cls(reaction.dofs, np.full(len(reaction.dofs), height), height, K, B, balance.compliance.k, load, base)

@@ -14,7 +14,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.time import time_integration, wave_in_time
+from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.period_search import Period, PeriodSearch, Pushed, push
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion
@@ -92,7 +92,7 @@ class Follower:
 
         Raises  ValueError for models with no equation of motion in time; IntegrationFailed
         """
-        if wave_in_time.is_wave(balance):
+        if balance.model.is_wave:
             raise Refusal("means over a motion serve one part or several bodies, not a travelling wave of a wheel")
         self._motion = self._at(balance, state.omega).start_from(state)
         self._regular, self._passing = True, False

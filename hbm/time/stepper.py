@@ -75,7 +75,7 @@ class TimeStepper:
     ):
         model = balance.model
         model.require_masters("time integration")
-        if model.per_harmonic is not None and model.info.reaction is None:
+        if not model.has_motion_in_time:
             raise Refusal(
                 "time integration needs one system for all harmonics: a cyclic part alone has no equation of motion in "
                 "time"

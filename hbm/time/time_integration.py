@@ -169,7 +169,7 @@ def in_time(
     balance: HarmonicBalance, omega: float, start: State | None, options: Options
 ) -> tuple[HarmonicBalance, State | None]:
     """The problem that has an equation of motion in time, and the start: a wave as the sectors until it repeats."""
-    if not wave_in_time.is_wave(balance):
+    if not balance.model.is_wave:
         return balance, start
     whole = wave_in_time.unroll(balance, RESOLVED * options.steps * omega / (2 * np.pi))
     return whole, None if start is None else wave_in_time.state_of(balance, whole, start)
@@ -177,7 +177,7 @@ def in_time(
 
 def _of_sector(balance: HarmonicBalance, motion: PeriodicMotion) -> PeriodicMotion:
     """The motion of the first sector of a wave; any other motion is left as it is."""
-    if not wave_in_time.is_wave(balance):
+    if not balance.model.is_wave:
         return motion
     pairs = slice(0, balance.contact.n_pair)
     return replace(

@@ -9,29 +9,21 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.reduction.unrolled import period, unrolled
-
-
-def is_wave(balance: HarmonicBalance) -> bool:
-    """Whether the problem is that of one sector under a travelling wave."""
-    return balance.model.per_index is not None
+from tribodyn.reduction.wave_model import WaveModel, as_wave
 
 
 def sectors_of(balance: HarmonicBalance) -> int:
     """Sectors that the problem stands for in time: one, or those of a wave until it repeats itself."""
-    info = balance.model.info
-    if not is_wave(balance) or info.n_sectors is None or info.engine_order is None:
-        return 1
-    return period(info.n_sectors, info.engine_order)
+    model = balance.model
+    return period(model.n_sectors, model.engine_order) if isinstance(model, WaveModel) else 1
 
 
 def unroll(balance: HarmonicBalance, highest: float) -> HarmonicBalance:
     """The problem of a wave on all sectors until it repeats itself; `highest` as in `reduction.unrolled`."""
-    info, n = balance.model.info, sectors_of(balance)
-    assert info.n_sectors is not None
-    assert info.engine_order is not None
-    load = waves.on_wheel(balance.excitation, info.engine_order, info.n_sectors, n)
+    wave, n = as_wave(balance.model), sectors_of(balance)
+    load = waves.on_wheel(balance.excitation, wave.engine_order, wave.n_sectors, n)
     whole = HarmonicBalance.of(
-        unrolled(balance.model, highest),
+        unrolled(wave, highest),
         balance.contact.repeated(n),
         balance.basis,
         load,
@@ -44,8 +36,6 @@ def unroll(balance: HarmonicBalance, highest: float) -> HarmonicBalance:
 
 def state_of(balance: HarmonicBalance, whole: HarmonicBalance, state: State) -> State:
     """The state of a wave as that of all its sectors."""
-    info, basis = balance.model.info, balance.basis
-    assert info.n_sectors is not None
-    assert info.engine_order is not None
-    x = [waves.at_sector(basis, state.x, info.engine_order, info.n_sectors, n) for n in range(sectors_of(balance))]
+    wave, basis = as_wave(balance.model), balance.basis
+    x = [waves.at_sector(basis, state.x, wave.engine_order, wave.n_sectors, n) for n in range(sectors_of(balance))]
     return whole.evaluate(state.omega, np.concatenate(x))

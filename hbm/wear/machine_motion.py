@@ -70,7 +70,7 @@ class MachineMotion:
         self._options = MeanOptions(_steps(problem), accuracy=RULES.accuracy, contact=contact)
         self._followers: list[Follower] = []
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
-        self._serves = fits and not wave_in_time.is_wave(problem.balance)
+        self._serves = fits and not problem.balance.model.is_wave
         if always and not self._serves:
             raise Refusal(
                 f"a wheel's wave and a contact of more than {RULES.most_components} components are not worn in time"
@@ -216,7 +216,7 @@ def with_growth(problem: WearProblem, state: WearState, always: bool = False) ->
     balance = problem.balance
     sectors = wave_in_time.sectors_of(balance)
     few = balance.contact.stiffness.size * balance.basis.n_coeff * sectors <= MOST_UNKNOWNS
-    if state.failure or not (few or (always and not wave_in_time.is_wave(balance))):
+    if state.failure or not (few or (always and not balance.model.is_wave)):
         return state
     growth = -float("inf")
     try:

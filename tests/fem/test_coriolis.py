@@ -16,7 +16,7 @@ from tribodyn.fem.material import Material
 from tribodyn.fem.modes import turning_frequencies
 from tribodyn.fem.part import build
 from tribodyn.fem.prestress import coriolis
-from tribodyn.reduction.cyclic import nodal_diameters
+from tribodyn.reduction.sector_reduction import nodal_diameters
 
 STEEL = Material(210e9, 0.3, 7860.0)
 N, RADIUS, DEPTH = 24, 1.0, 0.01

@@ -11,9 +11,9 @@ from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.modes import modes
 from tribodyn.geometry.placement import rotation
-from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.sector_reduction import nodal_diameters
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.02], ids=["rigid disk", "flexible disk"])

@@ -43,7 +43,7 @@ def test_held_rotation_leaves_two_rigid_modes_and_every_elastic_one(leaf):
     envelope, shapes = linear_modes(hold(reduced, made.held), n=10)
     assert (envelope[:2] < 1e-3 * envelope[2]).all()
     np.testing.assert_allclose(envelope[2:8], whole[3:9], rtol=2e-3)
-    np.testing.assert_allclose(made.held @ hold(reduced, made.held).basis @ shapes, 0.0, atol=1e-9)
+    np.testing.assert_allclose(made.held @ hold(reduced, made.held).origin.basis @ shapes, 0.0, atol=1e-9)
     free, _ = linear_modes(reduced, n=11)
     np.testing.assert_allclose(envelope[2:], free[3:], rtol=1e-9)  # exactly those without the turn
 

@@ -54,8 +54,8 @@ def spring_chain(n: int) -> csr_matrix:
 @pytest.mark.usefixtures("two_processes")
 def test_two_processes_give_the_model_of_the_direct_solver() -> None:
     found = [plain(scene_file.read("beam", (*SMALL, f"reduction.solver={s}"))) for s in ("direct", "mumps")]
-    assert "2 MPI processes" in str(found[1].info.factorisation)
-    assert found[1].info.free_frequency == pytest.approx(found[0].info.free_frequency, rel=1e-9)
+    assert "2 MPI processes" in str(found[1].origin.factorisation)
+    assert found[1].free_frequency == pytest.approx(found[0].free_frequency, rel=1e-9)
     K, own = (model.system.stiffness for model in found)
     np.testing.assert_allclose(own, K, atol=1e-11 * np.abs(K).max())
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.helpers.reduced import HarmonicModel
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
@@ -53,7 +54,7 @@ def balance():
         systems[1][1],
         np.zeros((0, 4), int),
     )
-    model = ReducedModel(systems[1][0], interface, per_harmonic=lambda h: systems[SYSTEM_OF[h]])
+    model = HarmonicModel(systems[1][0], interface, system_of=lambda h: systems[SYSTEM_OF[h]])
     parameters = ContactParameters.of(interface.components, np.full((N_PAIR, 3), 3e3), friction=0.4)
     load = Excitation.of({"rest": 2e3}, {1: {"shaker": 900 - 300j}, 3: {"shaker": 200j}})
     return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), HarmonicBasis(HARMONICS, 64), load, OMEGA)

@@ -20,10 +20,11 @@ from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import leave_alone
-from tribodyn.reduction.cyclic import ReducedSector, travelling_wave, wheel_model
-from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.flow import Flow, added, aeroelastic, family, parts_of, with_flow
+from tribodyn.reduction.linear_damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.sector_reduction import ReducedSector
+from tribodyn.reduction.wave_model import travelling_wave, wheel_model
 
 FLOW = Flow({1: 0.012 + 0.002j, -1: -0.012 + 0.002j, 0: 0.004j})
 SPRINGS = np.array([[4e3, 6e3]])

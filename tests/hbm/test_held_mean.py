@@ -25,7 +25,7 @@ from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import cycles_to_preload
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.step_control import Tolerance
-from tribodyn.reduction.prescribed import prescribe
+from tribodyn.reduction.prescribed import PrescribedModel, prescribe
 
 HEIGHT = 1.5e-4
 STEPS = 128
@@ -57,8 +57,8 @@ def test_motion_in_time_is_that_of_many_harmonics(height: float, force: float) -
     assert np.abs(found.motion.off).max() < 1e-7 * height  # of the displacement as it was marched
     stepper = TimeStepper(balance, OMEGA, Options(512))
     assert stepper.hold is not None
-    reaction = balance.model.info.reaction
-    assert reaction is not None
+    assert isinstance(balance.model, PrescribedModel)
+    reaction = balance.model.reaction
     in_time = reaction.force(height, found.motion.force.mean(axis=2))  # another formula than that of the hold
     np.testing.assert_allclose(in_time, reaction.force(height, state.cycle.force[:, :, 0]), rtol=2e-3)
     own = reaction.support * height  # of the springs that act about the height
@@ -70,8 +70,8 @@ def test_a_force_that_is_known_makes_the_same_motion() -> None:
     balance = held(12.0, height=4e-5)
     options = Options(STEPS, tolerance=1e-10)
     exact = time_integration.integrate(balance, OMEGA, solved(balance), options)
-    reaction = balance.model.info.reaction
-    assert reaction is not None
+    assert isinstance(balance.model, PrescribedModel)
+    reaction = balance.model.reaction
     free = two_bodies()
     push = np.zeros(free.system.n_dof)
     push[reaction.dofs] = reaction.force(4e-5, exact.force.mean(axis=2)) + reaction.support * 4e-5

@@ -16,10 +16,10 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import recovery, travelling_wave as waves
-from tribodyn.hbm.mistuning import MistunedWheel
-from tribodyn.reduction import mistuning
-from tribodyn.reduction.cyclic import travelling_wave, wheel_model
-from tribodyn.reduction.damping import modal_damping
+from tribodyn.hbm.mistuned_wheel import MistunedWheel
+from tribodyn.reduction import nominal_modes
+from tribodyn.reduction.linear_damping import modal_damping
+from tribodyn.reduction.wave_model import travelling_wave, wheel_model
 
 ORDER = 1
 BASIS, HIGHEST = HarmonicBasis((0, 1), 64), 2 * np.pi * 1000
@@ -55,12 +55,12 @@ def on_sector(reduced, families=None, left_out=1e-6):
     """The wheel on its sector, with so many families of shapes; all shapes by default."""
     K, k = np.asarray(reduced.sector.system.stiffness), springs(reduced)
     if families is None:
-        shapes = mistuning.orthonormal(K, np.eye(len(K)), 1e-13)
+        shapes = nominal_modes.orthonormal(K, np.eye(len(K)), 1e-13)
     else:
-        shapes = mistuning.nominal_shapes(reduced, k, K, families, list(small.LOADS), left_out)
-    model = damped(travelling_wave(mistuning.with_ports(reduced, K, shapes), ORDER))
+        shapes = nominal_modes.nominal_shapes(reduced, k, K, families, list(small.LOADS), left_out)
+    model = damped(travelling_wave(nominal_modes.with_ports(reduced, K, shapes), ORDER))
     wave = HarmonicBalance.of(model, joint(k), BASIS, small.excitation(), HIGHEST)
-    return MistunedWheel(wave, tuple(mistuning.port_name(i) for i in range(shapes.shape[1])))
+    return MistunedWheel(wave, tuple(nominal_modes.port_name(i) for i in range(shapes.shape[1])))
 
 
 def whole(reduced, deviation, friction=0.3, gap=0.0):
@@ -145,12 +145,13 @@ def test_every_node_moves_as_on_the_dense_wheel(reduced):
     assert (here.cycle.status & SLIPS).any()
     flat = here.cycle.force.reshape(here.flat.shape)
     K = np.asarray(reduced.sector.system.stiffness)
-    made_of = mistuning.with_ports(reduced, K, mistuning.orthonormal(K, np.eye(len(K)), 1e-13))
+    made_of = nominal_modes.with_ports(reduced, K, nominal_modes.orthonormal(K, np.eye(len(K)), 1e-13))
     found = wheel.full_displacement(made_of, ours, here.flat, flat, here.omega)
     state = there.state
     q = recovery.coordinates(dense, state.flat, state.cycle.force.reshape(state.flat.shape), state.omega)
     maps = sector_maps(reduced.sector)
-    expected = np.stack([BASIS.to_real(np.stack([reduced.basis @ (P @ one) for one in q], axis=-1)) for P in maps])
+    basis = reduced.origin.basis
+    expected = np.stack([BASIS.to_real(np.stack([basis @ (P @ amplitude) for amplitude in q], axis=-1)) for P in maps])
     assert found.shape == expected.shape
     for part in (slice(0, 1), slice(1, None)):
         assert apart(found[..., part], expected[..., part]) < 1e-6

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.floquet import multipliers
+from tests.helpers.reduced import HarmonicModel
 from tests.helpers.stability_in_time import stability_in_time
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
 from tests.helpers.verification_models import interface, oscillator
@@ -149,7 +150,7 @@ def test_names_and_refusals():
         model, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
     )
     state = newton.solve_from_rest(balance, 100.0).state
-    cyclic = ReducedModel(model.system, model.interface, per_harmonic=lambda h: (model.system, np.eye(2)))
+    cyclic = HarmonicModel(model.system, model.interface, system_of=lambda h: (model.system, np.eye(2)))
     other = HarmonicBalance.of(
         cyclic, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
     )

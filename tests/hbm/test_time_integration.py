@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.helpers.reduced import HarmonicModel
 from tests.helpers.verification_models import interface, oscillator, random_structure
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
@@ -18,7 +19,6 @@ from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_step import Contact, Space, sweep
-from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 300.0
 
@@ -213,8 +213,8 @@ def test_what_has_no_equation_of_motion_is_refused():
     model = oscillator(1.0, 1e4, 0.01)
     parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]], friction=0.0)
     excitation = Excitation.of({"normal": 1.0}, {1: {"force": 1.0}})
-    cyclic = ReducedModel(
-        model.system, model.interface, per_harmonic=lambda h: (model.system, np.asarray(model.interface.B))
+    cyclic = HarmonicModel(
+        model.system, model.interface, system_of=lambda h: (model.system, np.asarray(model.interface.B))
     )
     balance = HarmonicBalance.of(
         cyclic, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0

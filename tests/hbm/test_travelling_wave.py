@@ -14,7 +14,8 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.linear.recovery import coordinates, full_displacement
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.reduction.cyclic import nodal_diameters, relative_map, travelling_wave
+from tribodyn.reduction.sector_reduction import nodal_diameters, relative_map
+from tribodyn.reduction.wave_model import travelling_wave
 
 EXACT = newton.NewtonOptions(tolerance=1e-11)
 
@@ -156,8 +157,8 @@ def test_full_field_of_a_sector_holds_its_outputs(sectors):
     one, _ = small.wave_and_wheel(reduced, 3)
     state = solved(one, 250.0)
     field = full_displacement(one, state.flat, state.cycle.force.reshape(state.flat.shape), state.omega)
-    assert field.shape == (len(reduced.basis), one.basis.n_coeff)
-    masters = reduced.info.master_dofs
+    assert field.shape == (len(reduced.origin.basis), one.basis.n_coeff)
+    masters = reduced.origin.masters
     output = one.outputs(state)
     for i, name in enumerate(one.compliance.output_names):
         row = reduced.sector.system.outputs[name][: len(masters)]

@@ -13,8 +13,8 @@ from tribodyn.hbm.contact.contact_law import SLIPS
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import integrate, leave_alone
 from tribodyn.hbm.time.verify import verify
-from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.unrolled import period, unrolled
+from tribodyn.reduction.wave_model import travelling_wave
 
 OMEGA = 120.0
 

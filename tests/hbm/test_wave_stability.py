@@ -12,7 +12,8 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.stability.exponents import stability
-from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction.linear_damping import modal_damping
+from tribodyn.reduction.wave_model import as_wave
 
 EXACT = newton.NewtonOptions(tolerance=1e-12)
 
@@ -101,7 +102,7 @@ def test_a_wave_whose_contacts_stick_is_as_stable_as_the_stuck_wheel():
     exponents = stability(dragged, state).exponents
     assert exponents.real.max() < 0
     for index in range(tiny.N):
-        system, b = one.model.per_index(index)
+        system, b = as_wave(one.model).at_index(index)
         k = one.compliance.k
         stuck = system.stiffness + b.conj().T @ (k[:, None] * b)
         n = len(stuck)

@@ -20,8 +20,9 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import expansion, travelling_wave as waves
 from tribodyn.reduction import linear
-from tribodyn.reduction.cyclic import reduce_sector, travelling_wave
-from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction.linear_damping import modal_damping
+from tribodyn.reduction.sector_reduction import reduce_sector
+from tribodyn.reduction.wave_model import travelling_wave
 
 EXACT = newton.NewtonOptions(tolerance=1e-13, krylov=1e-6)
 
@@ -37,7 +38,7 @@ def outputs(mesh, node_sets, faces, order):
     k = model.interface.stiffness(*small.STIFFNESS)
     joints = [
         Joint(name, "jenkins", ContactParameters.of(("t1", "t2", "n"), k[pairs], friction=0.3), pairs)
-        for name, pairs in model.info.joints.items()
+        for name, pairs in model.joints.items()
     ]
     assert len(joints) == len(faces)
     balance = HarmonicBalance.of(model, joints, HarmonicBasis((0, 1, 2, 3), 128), small.excitation(), 2 * np.pi * 1000)

@@ -14,7 +14,7 @@ from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction.linear_damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
 
 N_PAIR = 3

@@ -57,8 +57,8 @@ def tell(scene: str, overrides: list[str]) -> None:
         "memory": balance.memory.size,
         "systems": len(balance.compliance.groups),
         "coordinates": balance.model.system.n_dof,
-        "masters": balance.model.info.n_masters,
-        "modes": balance.model.info.n_modes,
+        "masters": len(balance.model.origin.masters),
+        "modes": balance.model.origin.n_modes,
         "delta_max": result.facts.delta_max_m,
     }
     print(json.dumps(told), flush=True)

@@ -15,8 +15,9 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import travelling_wave as waves
-from tribodyn.reduction.cyclic import reduce_sector, travelling_wave, wheel_model
-from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction.linear_damping import modal_damping
+from tribodyn.reduction.sector_reduction import reduce_sector
+from tribodyn.reduction.wave_model import travelling_wave, wheel_model
 from tribodyn.workflows.cases.blade import blade
 
 N = 8

@@ -14,8 +14,10 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import on_wheel
-from tribodyn.reduction.cyclic import ReducedSector, travelling_wave, wheel_model
-from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction.linear_damping import modal_damping
+from tribodyn.reduction.model import Reduction
+from tribodyn.reduction.sector_reduction import ReducedSector
+from tribodyn.reduction.wave_model import travelling_wave, wheel_model
 
 N = 5
 NONE = np.empty((0, 3), dtype=int)
@@ -40,7 +42,7 @@ def sector(components: tuple[str, ...], turning: float = 0.0, n_sectors: int = N
     )  # fmt: skip
     turn = rotation((1, 0, 0), 2 * np.pi / n_sectors)
     whole = Sector(system, interface, left, NONE, NONE, turn, n_sectors, {"contact": slice(0, 1)})
-    return ReducedSector(whole, np.eye(4))
+    return ReducedSector(whole, Reduction(np.eye(4), np.zeros(0, int), 0, "", np.inf))
 
 
 def wave_and_wheel(

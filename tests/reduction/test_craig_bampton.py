@@ -11,9 +11,9 @@ from tests.helpers.coarse_beam import make
 from tribodyn.fem.factor import factorise
 from tribodyn.reduction import craig_bampton as craig_bampton_module
 from tribodyn.reduction.craig_bampton import craig_bampton
-from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.limits import ReductionLimits
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
+from tribodyn.reduction.linear_damping import modal_damping, rayleigh
 
 SPRINGS = (470e6, 583e6)
 
@@ -30,8 +30,8 @@ def model(part):
 
 def test_masters(part, model):
     """25 pairs with 3 DOFs, the 2 DOFs of the point load, the 25 of the mean tip displacement; not the pressure."""
-    masters = model.info.masters
-    assert model.info.n_masters == len(masters) == 75 + 2 + 25 - 5  # the patch and the tip share 5 nodes
+    masters = model.origin.masters
+    assert len(masters) == 75 + 2 + 25 - 5  # the patch and the tip share 5 nodes
     assert model.system.n_dof == len(masters) + 15
     q = np.zeros(model.system.n_dof)
     q[3] = 1.0
@@ -45,7 +45,7 @@ def test_masters(part, model):
 def test_all_modes_are_exact():
     part = make(nx=2, patch=1)
     n = part.system.n_dof
-    masters = craig_bampton(part.system, part.interface, n_modes=1).info.n_masters
+    masters = len(craig_bampton(part.system, part.interface, n_modes=1).origin.masters)
     model = craig_bampton(part.system, part.interface, n_modes=n - masters)
     assert model.system.n_dof == n
     k = part.interface.stiffness(*SPRINGS)
@@ -60,7 +60,7 @@ def test_all_modes_are_exact():
     x = np.linalg.solve(part_K - w**2 * part.system.mass.toarray(), part.system.loads["pressure"])
     q = np.linalg.solve(model_K - w**2 * model.system.mass, model.system.loads["pressure"])
     assert np.abs(model.reconstruct(q) - x).max() < 1e-9 * np.abs(x).max()
-    assert model.info.first_omitted_frequency == np.inf
+    assert model.origin.first_omitted_frequency == np.inf
 
 
 def test_statics_are_exact_with_few_modes(part, model):
@@ -94,22 +94,22 @@ def test_few_modes_are_enough(part, model):
 
 
 def test_a_cutoff_with_too_many_modes_is_refused_before_they_are_computed(part, model, monkeypatch):
-    omitted = model.info.first_omitted_frequency
-    found = craig_bampton(part.system, part.interface, cutoff=2 * omitted).info.n_modes
+    omitted = model.origin.first_omitted_frequency
+    found = craig_bampton(part.system, part.interface, cutoff=2 * omitted).origin.n_modes
     monkeypatch.setattr(craig_bampton_module, "LIMITS", ReductionLimits(most_modes=found))
-    assert craig_bampton(part.system, part.interface, cutoff=2 * omitted).info.n_modes == found
+    assert craig_bampton(part.system, part.interface, cutoff=2 * omitted).origin.n_modes == found
     monkeypatch.setattr(craig_bampton_module, "LIMITS", ReductionLimits(most_modes=found - 1))
     with pytest.raises(ValueError, match=rf"is above {found - 1} modes: {found} of its \d+ modes lie below it"):
         craig_bampton(part.system, part.interface, cutoff=2 * omitted)
 
 
 def test_cutoff_keeps_the_modes_below_it(part, model):
-    omitted = model.info.first_omitted_frequency
-    assert craig_bampton(part.system, part.interface, cutoff=omitted * 0.9999).info.n_modes == 15
+    omitted = model.origin.first_omitted_frequency
+    assert craig_bampton(part.system, part.interface, cutoff=omitted * 0.9999).origin.n_modes == 15
     several = craig_bampton(part.system, part.interface, cutoff=2 * omitted)
-    assert several.info.n_modes > 15
-    assert several.info.first_omitted_frequency > 2 * omitted
-    assert craig_bampton(part.system, part.interface, cutoff=1.0).info.n_modes == 0
+    assert several.origin.n_modes > 15
+    assert several.origin.first_omitted_frequency > 2 * omitted
+    assert craig_bampton(part.system, part.interface, cutoff=1.0).origin.n_modes == 0
     with pytest.raises(
         ValueError, match=r"beyond what the mesh resolves: mode 17 of \d+ has .* Hz; lower reduction.cutoff"
     ):

@@ -11,11 +11,12 @@ from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.cyclic_symmetry import wave_system
 from tribodyn.fem.modes import modes
-from tribodyn.reduction import cyclic as waves
-from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction import sector_reduction as waves
 from tribodyn.reduction.limits import ReductionLimits
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
+from tribodyn.reduction.linear_damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.wave_model import travelling_wave
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
@@ -54,7 +55,7 @@ def test_reduced_against_full_sector(published):
         assert error.max() < 5e-3
         assert error[:, :2].max() < 1.5e-3
     assert reduced.sector.system.n_dof < 150
-    assert reduced.basis.shape == (full.system.n_dof, reduced.sector.system.n_dof)
+    assert reduced.origin.basis.shape == (full.system.n_dof, reduced.sector.system.n_dof)
 
 
 def test_blade_is_what_the_scene_says(published):
@@ -99,7 +100,7 @@ def test_contact_of_fewer_components_leaves_the_others_free(tmp_path):
 
 
 def test_model_of_a_wave(reduced):
-    undamped = waves.travelling_wave(reduced, 3)
+    undamped = travelling_wave(reduced, 3)
     model = undamped.with_damping(lambda system, B: modal_damping(system, 0.02))
     assert undamped.at_harmonic(1)[0].damping is None
     n_contact = len(reduced.sector.left)
@@ -124,9 +125,9 @@ def test_model_of_a_wave(reduced):
 def test_stuck_ritz_shapes_keep_statics_exact_and_the_contact_near(reduced, monkeypatch):
     """Contacts, loads and outputs of a wave in few coordinates, against all of them; above the first mode, too."""
     k = reduced.sector.interface.stiffness(*small.STIFFNESS)
-    fine = waves.travelling_wave(reduced, 3)
+    fine = travelling_wave(reduced, 3)
     monkeypatch.setattr(waves, "LIMITS", ReductionLimits(many=0, ritz_modes=12))
-    coarse = waves.travelling_wave(reduced, 3, springs=k)
+    coarse = travelling_wave(reduced, 3, springs=k)
 
     def response(model, h, hertz):
         system, B = model.at_harmonic(h)
@@ -141,7 +142,7 @@ def test_stuck_ritz_shapes_keep_statics_exact_and_the_contact_near(reduced, monk
             exact = response(fine, h, hertz)
             assert np.abs(response(coarse, h, hertz) - exact).max() < bound * np.abs(exact).max()
     q = np.random.default_rng(0).normal(size=coarse.at_harmonic(1)[0].n_dof)
-    B, basis = np.asarray(reduced.sector.interface.B), reduced.basis
+    B, basis = np.asarray(reduced.sector.interface.B), reduced.origin.basis
     assert coarse.reconstruct(q).shape == (len(basis),)
     slid = B - np.conj(reduced.sector.phase(3)) * reduced.sector.left
     inside, *_ = np.linalg.lstsq(basis, coarse.reconstruct(q), rcond=None)

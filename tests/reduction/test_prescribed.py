@@ -102,7 +102,7 @@ def test_equals_the_rearranged_equations_of_the_thesis(height, force):
 
     x = (free.interface.B @ X).reshape(state.x.shape)
     np.testing.assert_allclose(x, state.x, atol=1e-9 * np.abs(state.x).max())
-    np.testing.assert_allclose(model.info.reaction.force(height, state.cycle.force[:, :, 0]), F_k, rtol=1e-8)
+    np.testing.assert_allclose(model.reaction.force(height, state.cycle.force[:, :, 0]), F_k, rtol=1e-8)
     output = balance.outputs(state)[0]
     np.testing.assert_allclose(X[10], output, atol=1e-9 * np.abs(X[10]).max())
 
@@ -113,7 +113,7 @@ def test_reaction_is_the_preload_when_the_support_acts_about_the_height():
         balance = problem(model, height, force)
         solution = newton.solve_from_rest(balance, OMEGA)
         assert solution.converged
-        held = model.info.reaction.force(height, solution.state.cycle.force[:, :, 0])
+        held = model.reaction.force(height, solution.state.cycle.force[:, :, 0])
         assert balance.preload(solution.state) > 1.0
         assert held.sum() == pytest.approx(balance.preload(solution.state), rel=1e-9)
 
@@ -124,7 +124,7 @@ def test_no_interference_means_no_preload_and_lost_contact_the_open_response():
     solution = newton.solve_from_rest(balance, OMEGA)
     assert solution.converged
     assert balance.preload(solution.state) == pytest.approx(0.0, abs=1e-12)
-    assert np.abs(model.info.reaction.force(0.0, solution.state.cycle.force[:, :, 0])).max() < 1e-9
+    assert np.abs(model.reaction.force(0.0, solution.state.cycle.force[:, :, 0])).max() < 1e-9
 
     open_ = problem(model, 1e-5, 1.0, gap=(1.0, 1.0, 1.0))
     solution = newton.solve_from_rest(open_, OMEGA)
@@ -155,7 +155,7 @@ def test_other_static_loads_enter_the_reaction():
     q[u] = np.linalg.solve(closed[np.ix_(u, u)], load[u] - closed[np.ix_(u, PLATFORM)] @ q[PLATFORM])
     force = (k * B @ q).reshape(N_PAIR, 3)
     expected = (K @ q)[PLATFORM]
-    np.testing.assert_allclose(model.info.reaction.force(1e-4, force, {"shaker": 2.0}), expected, rtol=1e-9)
+    np.testing.assert_allclose(model.reaction.force(1e-4, force, {"shaker": 2.0}), expected, rtol=1e-9)
     system, _ = model.at_harmonic(0)
     pushed = 1e-4 * system.loads["height"] + 2.0 * system.loads["shaker"]
     static = np.linalg.solve(system.stiffness + k * B.T @ B, pushed)

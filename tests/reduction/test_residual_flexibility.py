@@ -59,8 +59,7 @@ def _balance(file: scene_file.SceneFile, model: ReducedModel, harder: float = 1.
 def _full(part: Part, model: ReducedModel) -> ReducedModel:
     """Every DOF of the part, dense, with the damping of the reduced model on the same shapes."""
     M = part.system.mass.toarray()
-    assert model.basis is not None
-    lifted = M @ model.basis
+    lifted = M @ model.origin.basis
     system = SecondOrderSystem(
         M, part.system.stiffness.toarray(), lifted @ model.system.damping @ lifted.T, part.system.loads,
         part.system.outputs,

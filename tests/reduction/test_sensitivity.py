@@ -51,7 +51,7 @@ def test_the_reduced_model_follows_as_one_that_is_reduced_anew(key: str) -> None
         return np.vstack([B, s.outputs["mean"]]) @ moved
 
     model = reduced(0.0)
-    following = Sensitivity(system(0.0), model, model.basis)
+    following = Sensitivity(system(0.0), model, model.origin.basis)
     way = following.towards(_less(system(STEP), system(0.0)))
 
     def difference(at) -> np.ndarray:
@@ -70,7 +70,7 @@ def _less(new: SecondOrderSystem, old: SecondOrderSystem) -> SecondOrderSystem:
 
 
 def _projected(system: SecondOrderSystem, model):
-    T, own = model.basis, model.system
+    T, own = model.origin.basis, model.system
     changed = replace(
         own, mass=T.T @ (system.mass @ T), stiffness=T.T @ (system.stiffness @ T),
         loads={"weight": T.T @ system.loads["weight"]},

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.wheel_scene import FLOW, WHEEL
-from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic
+from tribodyn.reduction.wave_model import travelling_wave
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.scene import scene_file

@@ -22,7 +22,7 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear.history import cycles_to_share
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import energy
-from tribodyn.reduction.damping import rayleigh, rayleigh_of_ratios
+from tribodyn.reduction.linear_damping import rayleigh, rayleigh_of_ratios
 from tribodyn.workflows.errors.limit import limit_of
 from tribodyn.workflows.errors.states import relative
 from tribodyn.workflows.errors.verdict import error_of

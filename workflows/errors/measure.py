@@ -273,7 +273,7 @@ def life_of(worn: WearHistory, model: Model, wear: Wear) -> float | None:
     share = wear.lost_below or LIFE_SHARE
     if wear.lost_of != "any":
         return cycles_to_preload(worn, share)
-    forces = (worn.normal_force[:, pairs].sum(axis=1) for pairs in model.reduced.info.joints.values())
+    forces = (worn.normal_force[:, pairs].sum(axis=1) for pairs in model.reduced.joints.values())
     lives = [cycles_to_share(worn.cycles, force, share) for force in forces]
     return min((life for life in lives if life is not None), default=None)
 

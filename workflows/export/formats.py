@@ -52,7 +52,7 @@ def write_npz(result: Result, folder: Path) -> list[Path]:
     """reduced.npz, that a scene's [model] reads again."""
     model, path = reduced_model(result), folder / "reduced.npz"
     found = arrays(model)
-    if 0 in result.harmonics and model.per_harmonic is not None:
+    if 0 in result.harmonics and not model.has_one_system:
         static = arrays(model, 0)
         found |= {f"{name}_harmonic_0": static[name] for name in ("M", "K", "C", "B") if name in static}
     np.savez_compressed(path, components=np.array(model.interface.components), **found)  # type: ignore[arg-type]

@@ -16,6 +16,7 @@ from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.threads import usable
+from tribodyn.reduction.model import Reduction
 from tribodyn.version import package_version
 from tribodyn.workflows.result.facts import Around, Facts, Stage
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
@@ -45,32 +46,33 @@ def described(
     free = free_deflection(balance) if wears else np.full(i.n_pair, np.nan)
     patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free)
     facts = Facts(
-        full_dofs=reduced.info.n_full or reduced.system.n_dof,
+        full_dofs=reduced.n_full,
         model_dofs=reduced.system.n_dof,
         contact_pairs=i.n_pair,
         unknowns=balance.n_unknown,
         harmonics=tuple(balance.basis.harmonics),
-        free_hz=np.zeros(0) if reduced.info.free_frequency is None else reduced.info.free_frequency,
+        free_hz=reduced.free_frequency,
         stuck_hz=balance.compliance.stuck_frequencies(next(filter(None, balance.basis.harmonics)))[:SHOWN],
         compliance_error=balance.compliance.error,
-        prestress_residual=reduced.info.prestress_residual,
-        prestress_rotation=reduced.info.prestress_rotation,
-        interface_modes=reduced.info.n_interface_modes,
+        prestress_residual=reduced.accuracy().get("prestress_residual"),
+        prestress_rotation=reduced.accuracy().get("prestress_rotation"),
     )
     if part is not None:
         worst = min(mesh_reader.quality(piece.mesh).scaled_jacobian for piece in pieces(part.mesh))
         facts = replace(facts, elements=int(part.mesh.nelements), nodes=len(part.points), scaled_jacobian=worst)
-    if reduced.info.factorisation is not None:  # reduced here, not as the matrices came
+    origin = reduced.origin
+    if isinstance(origin, Reduction):
         facts = replace(
             facts,
-            retained_modes=reduced.info.n_modes,
-            first_omitted_hz=reduced.info.first_omitted_frequency,
-            factorisation=reduced.info.factorisation,
+            retained_modes=origin.n_modes,
+            first_omitted_hz=origin.first_omitted_frequency,
+            factorisation=origin.factorisation,
+            interface_modes=origin.n_interface_modes or None,
         )
     if isinstance(file.scene, MeshScene) and file.scene.contacts:
         pairs = {name: slice(0, i.n_pair) for name in file.scene.contacts}  # a single joint has them all
         pairs |= {joint.name: joint.pairs for joint in balance.contact.joints if isinstance(joint.pairs, slice)}
-        pairs |= {name: own for name, own in reduced.info.joints.items() if name in pairs}
+        pairs |= {name: own for name, own in reduced.joints.items() if name in pairs}
         facts = replace(facts, joints=pairs)
     if file.scene.wear is not None:
         depth = delta_max(file.scene, free, i.area)  # none where nothing holds the part without its contact

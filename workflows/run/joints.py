@@ -14,7 +14,7 @@ from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.excitation import Excitation
-from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import bodies, decks
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact
@@ -42,14 +42,14 @@ def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
 
 def unreduced(part: Part) -> ReducedModel:
     """The part itself in the place of a reduced model, sparse."""
-    return ReducedModel(part.system, part.interface, info=ModelInfo(joints=dict(part.joints)))
+    return ReducedModel(part.system, part.interface, joints=dict(part.joints))
 
 
 def joint_pairs(scene: Scene, reduced: ReducedModel) -> dict[str, slice]:
     """Pairs of every joint; all of them where there is one."""
     if len(scene.joints) == 1:
         return {name: slice(0, reduced.interface.n_pair) for name in scene.joints}
-    return dict(reduced.info.joints)
+    return dict(reduced.joints)
 
 
 def joint_stiffness(scene: Scene, contact: ContactTable) -> tuple[float, float]:

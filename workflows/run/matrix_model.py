@@ -68,7 +68,7 @@ def make(scene: MatrixScene, folder: Path) -> ReducedModel:
         return craig_bampton(system, interface, scene.reduction.modes, scene.reduction.cutoff)
     model = reduced_model(system, interface)
     free = linear_modes(model, n=min(10, model.system.n_dof))[0]
-    return replace(model, info=replace(model.info, free_frequency=free))
+    return replace(model, free_frequency=free)
 
 
 def _table(rows: Any, take: Take) -> Any:

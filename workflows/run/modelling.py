@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,11 +25,10 @@ from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.continuation.harmonic_choice import ChoiceOptions, HarmonicChoice
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import SingularStuckSystem, UnbalancedLoad
-from tribodyn.reduction.cyclic import travelling_wave
-from tribodyn.reduction.damping import modal_damping, rayleigh, rayleigh_of_ratios
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.linear_damping import modal_damping, rayleigh, rayleigh_of_ratios
+from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.reduction.prescribed import hold
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import (
@@ -40,7 +39,6 @@ from tribodyn.workflows.run import (
     matrix_model,
     memory,
     part_reduction,
-    sector,
     settings,
     tightening,
 )
@@ -52,6 +50,8 @@ from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
 from tribodyn.workflows.scene.solution import HIGHEST
+
+Kind = TypeVar("Kind", bound=ReducedModel)
 
 
 @dataclass(frozen=True)
@@ -88,10 +88,10 @@ def build(file: SceneFile, progress: Progress, chosen: tuple[int, ...] = ()) -> 
         try:
             model = make_model(scene, part, reduced, chosen)
         except UnbalancedLoad as unbalanced:
-            if part is None or reduced.basis is None:
+            if part is None or reduced.is_wave or not isinstance(reduced.origin, Reduction):
                 raise
             force = joints.excite(scene, None).force(0, part.system.loads, len(part.free)).real
-            raise Refusal(unbalanced_load(force, part, reduced.basis @ unbalanced.shapes)) from None
+            raise Refusal(unbalanced_load(force, part, reduced.origin.basis @ unbalanced.shapes)) from None
         except SingularStuckSystem as singular:
             remarks = [] if part is None else check_size(np.ptp(part.points, axis=0), "give its numbers a unit")
             raise Refusal("; ".join([str(singular), *remarks])) from None
@@ -133,7 +133,10 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
 
 def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path | None = None) -> Part:
     """Mass, stiffness, loads, outputs and contact of the mesh, held as the scene asks; its files are in `folder`."""
-    sector.check_sectors(scene)
+    if scene.wheel is not None:
+        from tribodyn.workflows.run import sector  # only wheels need it
+
+        sector.check_sectors(scene)
     material = part_reduction.material(scene, mesh)
     loads = {
         name: make_load(load, mesh, material, folder or Path())
@@ -208,18 +211,15 @@ def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
 
 def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, not damped, nothing prescribed; of a wheel one wave."""
-    if scene.wheel is not None and scene.wheel.along_speed:
-        return sector.along_speed(scene, part)
     if scene.wheel is not None:
-        small = sector.reduced(scene, sector.sector(scene, part))
-        contact = ReducedModel(small.sector.system, small.sector.interface, info=small.info)
-        springs = joints.contact_stiffness(scene, contact)
-        return travelling_wave(small, scene.wheel.engine_order, springs=springs)
+        from tribodyn.workflows.run import sector  # only wheels need it
+
+        return sector.along_speed(scene, part) if scene.wheel.along_speed else sector.at_one_speed(scene, part)
     reduced = hold(part_reduction.reduce(scene, part), part.held)
-    return replace(reduced, info=replace(reduced.info, joints=dict(part.joints)))
+    return replace(reduced, joints=dict(part.joints))
 
 
-def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
+def damped(scene: Scene, reduced: Kind) -> Kind:
     """The model with the scene's damping; raises ValueError where its files hold another one."""
     if reduced.system.damping is None:
         return reduced.with_damping(partial(damping_matrix, scene, joints.contact_stiffness(scene, reduced)))

@@ -16,7 +16,7 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.interface_modes import interface_modes
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.residual_flexibility import residual_flexibility
@@ -79,14 +79,17 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
         extra = np.union1d(extra, anchors(part, relative_dofs))
         reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra, **how)
     if wanted.interface_modes is not None:
-        masters = reduced.info.master_dofs
+        masters = reduced.origin.masters
         touched = np.flatnonzero(np.abs(np.asarray(reduced.interface.B)[:, : len(masters)]).max(axis=0))
         keep = np.union1d(np.delete(masters, touched), extra)
         if wanted.interface_keep is not None:
             named = [part.dofs(group, axis) for group in wanted.interface_keep for axis in "xyz"]
             keep = np.union1d(np.intersect1d(np.concatenate([[], *named]), masters), extra)
         reduced = interface_modes(reduced, wanted.interface_modes, keep.astype(int), apart=extra)
-    return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
+    if back is None:
+        return reduced
+    assert isinstance(reduced.origin, Reduction)
+    return replace(reduced, origin=replace(reduced.origin, basis=back @ reduced.origin.basis))
 
 
 def without_masters(scene: MeshScene, contact_dofs: int, held: bool) -> bool:
@@ -135,6 +138,6 @@ def with_prescribed(scene: MeshScene, part: Part, reduced: ReducedModel) -> Redu
         for spring in (scene.springs[spring] for spring in given.springs):
             matrix = Spring(spring.group, spring.direction, spring.stiffness).matrix(part.mesh, part.node_sets)
             support += matrix.diagonal()[part.free[dofs]]
-        masters = np.searchsorted(reduced.info.master_dofs, dofs)
+        masters = np.searchsorted(reduced.origin.masters, dofs)
         reduced = prescribe(reduced, masters, name, support=support)
     return reduced

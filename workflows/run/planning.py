@@ -111,7 +111,7 @@ def plan(file: SceneFile) -> Plan:
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
         pairs, masters = reduced.interface.n_pair, reduced.system.n_dof
-        full = reduced.info.n_full or masters
+        full = reduced.n_full
         modes: int | None = 0
     else:
         built = file.mesh_scene

@@ -45,8 +45,8 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
 
 def highest_linear(balance: HarmonicBalance, output: str, start: float, stop: float) -> float:
     """Largest amplitude of an output between two frequencies [rad/s], free or stuck [m]; infinite if unconstrained."""
-    if balance.model.along is not None:  # at each of its speeds: more than on the line itself
-        speeds = [balance.model.along(float(omega)) for omega in np.linspace(start, stop, LINEAR.speeds)]
+    if balance.model.follows_frequency:  # at each of its speeds: more than on the line itself
+        speeds = [balance.model.at_frequency(float(omega)) for omega in np.linspace(start, stop, LINEAR.speeds)]
         return max(highest_linear(replace(balance, model=one), output, start, stop) for one in speeds)
     states = (None, balance.contact.stiffness)
     found = np.concatenate([_resonances(balance, springs) for springs in states])
@@ -83,13 +83,13 @@ def _resonances(balance: HarmonicBalance, springs: np.ndarray | None) -> np.ndar
 
 def _on_line(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
     """As `_amplitudes`, where the speed of a wheel goes with the frequency at that speed."""
-    if balance.model.along is None:
+    if not balance.model.follows_frequency:
         return _amplitudes(balance, springs, output, omega)
     speeds, found = np.linspace(omega[0], omega[-1], LINEAR.speeds), np.zeros(len(omega))
     for own in speeds:
         weight = np.maximum(1 - np.abs(omega - own) / (speeds[1] - speeds[0]), 0.0)
         near = weight > 0
-        there = replace(balance, model=balance.model.along(float(own)))
+        there = replace(balance, model=balance.model.at_frequency(float(own)))
         found[near] += weight[near] * _amplitudes(there, springs, output, omega[near])
     return found
 

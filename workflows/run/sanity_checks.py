@@ -81,12 +81,12 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
             yield f"gap of {name}: {1e6 * gap.min():.4g} to {1e6 * gap.max():.4g} um"
     yield from notes(file, part)
     remarks = [*check_size(size, "scale the mesh to metres"), *check_materials(plain)]
-    if model.reduced.per_harmonic is None:
+    if model.reduced.has_one_system:
         reduced = model.reduced
         remarks += check_deflection(
             scene, reduced.system, lambda q: part.largest(reduced.reconstruct(q)), float(np.linalg.norm(size))
         )
-    remarks += check_speed(scene, model.reduced.info.line_error)
+    remarks += check_speed(scene, model.reduced.accuracy().get("line_error"))
     if model.reduced.at_harmonic(1)[0].damping is None:
         remarks.append("there is no damping but that of friction: give [damping]")
     if _unpressed(model.balance, 2 * np.pi * max(scene.response.range)):

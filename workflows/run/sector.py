@@ -25,12 +25,13 @@ from tribodyn.hbm.continuation.stiffening import solve_along_friction
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
-from tribodyn.reduction.cyclic import ReducedSector, reduce_sector
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.residual_flexibility import residual_flexibility
-from tribodyn.reduction.speed_line import SpeedLine, congruent, reduce_alike
+from tribodyn.reduction.sector_reduction import ReducedSector, reduce_sector
+from tribodyn.reduction.speed_line import SpeedLine, SpeedLineModel, congruent, reduce_alike
+from tribodyn.reduction.wave_model import travelling_wave
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import joints, part_reduction
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
@@ -88,6 +89,14 @@ def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
         raise Refusal(f"at wheel.speed = {60 * speed:.6g} rpm {trouble}, or let it turn slower") from None
 
 
+def at_one_speed(scene: MeshScene, part: Part) -> ReducedModel:
+    """The model of the wheel's wave at one speed, not damped."""
+    assert scene.wheel is not None
+    small = reduced(scene, sector(scene, part))
+    springs = joints.contact_stiffness(scene, small.model)
+    return travelling_wave(small, scene.wheel.engine_order, springs=springs)
+
+
 def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
     """The model of the wheel's wave on its operating line, not damped: that of the speed in the middle, and `along`.
 
@@ -111,26 +120,26 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
         except ValueError as trouble:
             raise Refusal(f"at {60 * speed:.6g} rpm of the operating line {trouble}") from None
         if len(turning) == 2:
-            springs = joints.contact_stiffness(
-                scene, ReducedModel(ends.sector.system, ends.sector.interface, info=ends.info)
-            )
+            springs = joints.contact_stiffness(scene, ends.model)
             stiffness = (ends.sector.system.stiffness,)
             line = SpeedLine(ends, stiffness, (speeds[0],), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
         if len(turning) > 1:
-            there = congruent(turning[-1].system.stiffness, ends.basis)
+            there = congruent(turning[-1].system.stiffness, ends.origin.basis)
             error = line.error(speed, there) if len(turning) > 3 else np.inf
             line = replace(line, stiffness=(*line.stiffness, there), speeds=(*line.speeds, speed))
             if error <= LIMITS.speeds_apart:
                 break
-    model = line(2 * np.pi * abs(wheel.engine_order) * wheel.speed)
-    rest = [one.prestress for one in turning if one.prestress is not None]
-    info = replace(
-        model.info,
-        prestress_residual=max(one.residual for one in rest),
-        prestress_rotation=max(one.rotation for one in rest),
-        line_error=error,
-    )
-    return replace(model, info=info, along=line)
+    static = [cut.prestress for cut in turning if cut.prestress is not None]
+    accuracy = {
+        "prestress_residual": max(each.residual for each in static),
+        "prestress_rotation": max(each.rotation for each in static),
+    }
+    wave = line(2 * np.pi * abs(wheel.engine_order) * wheel.speed)
+    return SpeedLineModel(
+        wave.system, wave.interface, wave.origin, wave.joints, wave.free_frequency,
+        reduced=replace(wave.reduced, accuracy=accuracy), engine_order=wave.engine_order, index_of=wave.index_of,
+        line=line, line_error=error,
+    )  # fmt: skip
 
 
 def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
@@ -164,7 +173,7 @@ def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
 def stuck_index_0(scene: MeshScene, sector: Sector) -> csr_matrix:
     """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck."""
     system, B = wave_system(sector, 0)
-    model = ReducedModel(sector.system, sector.interface, info=ModelInfo(joints=sector.joints))
+    model = ReducedModel(sector.system, sector.interface, joints=sector.joints)
     return stuck_stiffness(system.stiffness, B, joints.contact_stiffness(scene, model))
 
 
@@ -188,12 +197,12 @@ def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples:
     static = static_loads(scene)
     still = replace(system, gyroscopic=None, loads={name: system.loads[name] for name in static}, outputs={})
     interface = replace(sector.interface, B=csr_matrix(B))
-    springs = joints.contact_stiffness(scene, ReducedModel(still, interface, info=ModelInfo(joints=sector.joints)))
+    springs = joints.contact_stiffness(scene, ReducedModel(still, interface, joints=sector.joints))
     try:
         model = residual_flexibility(still, interface, springs, n_modes=1, clusters=interface.n_pair)
     except SingularStiffness:
         raise StaticDivergence(UNSTABLE) from None
-    model = replace(model, info=replace(model.info, joints=dict(sector.joints)))
+    model = replace(model, joints=dict(sector.joints))
     basis = HarmonicBasis((0, 1), samples)
     made = joints.make_joints(scene, model)
     omega = 2 * np.pi  # any frequency: nothing vibrates

@@ -17,10 +17,10 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.contact.joint import JointSet
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed
-from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, wave_of
 from tribodyn.reduction.limits import LIMITS
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.reduction.relative import body_1_dofs, relative
+from tribodyn.reduction.sector_reduction import ReducedSector
 from tribodyn.reduction.sensitivity import Sensitivity
 from tribodyn.workflows.run import bodies, joints, matrix_model, modelling, part_reduction, sector
 from tribodyn.workflows.run.progress import Progress
@@ -181,24 +181,28 @@ class Varying:
     def _sensitivity(self) -> Sensitivity | None:
         """None where the model is no plain reduction by Craig and Bampton of a part that stands still."""
         part, plain, wave = self.part, self.plain, self._sector
-        if part is None or plain.info.masters is None or len(part.held) or self._spins:
+        if part is None or len(part.held) or self._spins or (plain.is_wave and wave is None):
             return None
-        if wave is not None:
-            plain = ReducedModel(wave.sector.system, wave.sector.interface, wave.basis, wave.info)
-        if plain.basis is None or plain.info.n_interface_modes is not None or plain.residual is not None:
+        plain = plain if wave is None else wave.model
+        origin = plain.origin
+        if not isinstance(origin, Reduction) or origin.n_interface_modes or plain.leaves_flexibility_out:
             return None
-        (system, _, back), shapes = self._here, plain.basis
+        (system, _, back), shapes = self._here, origin.basis
         if back is not None:
             shapes = shapes.copy()
-            shapes[body_1_dofs(part.interface).ravel()] = part.interface.B @ plain.basis
+            shapes[body_1_dofs(part.interface).ravel()] = part.interface.B @ origin.basis
         return Sensitivity(system, plain, shapes)
 
     @cached_property
     def _sector(self) -> ReducedSector | None:
         """The reduced sector of a wheel whose waves have all coordinates of it, None for other models."""
-        wave: Any = getattr(self.plain.per_harmonic, "__self__", None)
-        small = wave.reduced if isinstance(getattr(wave, "index_of", None), WaveIndices) else None
-        return None if small is None or small.sector.system.n_dof > LIMITS.many else small
+        if not self.plain.is_wave:
+            return None
+        from tribodyn.reduction.wave_model import WaveIndices, as_wave
+
+        wave = as_wave(self.plain)
+        has_all = isinstance(wave.index_of, WaveIndices) and wave.reduced.sector.system.n_dof <= LIMITS.many
+        return wave.reduced if has_all else None
 
     @cached_property
     def _here(self) -> tuple[SecondOrderSystem, ContactInterface, csr_matrix | None]:
@@ -233,7 +237,9 @@ class Varying:
             return moved
         left = wave.sector.left + (turned[1] if turned else 0.0)
         small = replace(wave, sector=replace(wave.sector, system=moved.system, interface=moved.interface, left=left))
-        return wave_of(small, cast(int, self.plain.info.engine_order), WaveIndices(small))
+        from tribodyn.reduction.wave_model import WaveIndices, as_wave, wave_model
+
+        return wave_model(small, as_wave(self.plain).engine_order, WaveIndices(small))
 
     def _way(self, key: str) -> SecondOrderSystem:
         """What the reduced model moves by where a key is doubled."""

@@ -34,7 +34,7 @@ from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.step_control import Tolerance
-from tribodyn.reduction import damping, foreign
+from tribodyn.reduction import foreign, linear_damping as damping
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.foreign import ForeignMatrices, Terms
 from tribodyn.reduction.linear import linear_modes

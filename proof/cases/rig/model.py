@@ -165,6 +165,6 @@ def check(file: SceneFile) -> None:
 
 def _reaction(file: SceneFile, model: Model, state: State) -> float:
     """Static force at the prescribed nodes of a scene in a solved state of its model [N]."""
-    given, found = next(iter(file.mesh_scene.prescribed.values())), model.balance.model.info.reaction
+    given, found = next(iter(file.mesh_scene.prescribed.values())), model.balance.model.reaction
     assert found is not None
     return float(found.force(given.displacement, state.cycle.force[:, :, 0]).sum())

@@ -73,7 +73,7 @@ def test_exactly_one_unknown_for_each_pair_and_coefficient(leaf):
     assert balance.memory.size == 0
     assert leaf.state(0).cycle.jacobian.size == 126 * 3 * 3
     assert (np.diff(leaf.part.interface.B.indptr) == 1).all()
-    assert balance.model.info.n_modes == 20
+    assert balance.model.origin.n_modes == 20
     assert "378 unknowns = 126 pairs x 1 component x 3 coefficients" in leaf_study.sizes(leaf)
     assert "friction memory 0" in leaf_study.sizes(leaf)
 
@@ -87,7 +87,7 @@ def test_the_plan_counts_what_the_run_builds(leaf):
 def test_free_leaf_has_two_rigid_modes_and_contact_alone_holds_it(tmp_path):
     model = built(tmp_path, "springs=")
     part, balance = model.part, model.balance
-    frequency = balance.model.info.free_frequency
+    frequency = balance.model.free_frequency
     assert (frequency[:2] < 1e-4 * frequency[2]).all()
     assert frequency[2] == pytest.approx(163.0, abs=2.0)
     solution = newton.solve_from_rest(balance, 2 * np.pi * UNIQUE)

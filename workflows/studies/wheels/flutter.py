@@ -14,8 +14,8 @@ from tribodyn.hbm.continuation.limit_cycles import LimitCycle, in_time, limit_cy
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options
-from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic, with_flow
+from tribodyn.reduction.wave_model import travelling_wave
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.theme import BLUE, GREY, RED

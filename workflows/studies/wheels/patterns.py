@@ -23,10 +23,10 @@ from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.linear.travelling_wave import at_sector
-from tribodyn.hbm.mistuning import MistunedWheel
+from tribodyn.hbm.mistuned_wheel import MistunedWheel
 from tribodyn.hbm.threads import limited
-from tribodyn.reduction import mistuning as reduction
-from tribodyn.reduction.cyclic import ReducedSector
+from tribodyn.reduction import nominal_modes as reduction
+from tribodyn.reduction.sector_reduction import ReducedSector
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED
@@ -118,12 +118,11 @@ class MistunedBlades:
     @cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """(n_pair, n_component, n_coeff) of sectors alike at both ends of the range, where patterns begin."""
-        one, info = self.wheel.wave, self.wheel.wave.model.info
-        assert info.engine_order is not None
+        one, order = self.wheel.wave, self.wheel.model.engine_order
         found, n = [], self.wheel.n_sectors
         for omega in settings.response_range(self.file.scene):
             x = arc_length.solve_along_load(one, omega, settings.newton_options(self.file.scene)).state.x
-            found.append(np.concatenate([at_sector(one.basis, x, info.engine_order, n, k) for k in range(n)]))
+            found.append(np.concatenate([at_sector(one.basis, x, order, n, k) for k in range(n)]))
         return found[0], found[1]
 
     def balance(self, pattern: Pattern) -> HarmonicBalance:
@@ -199,7 +198,7 @@ def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
     nodes = np.zeros(len(wheel.part.points), bool)
     nodes[find_group(wheel.part.node_sets, body)] = True
     own = np.flatnonzero(np.repeat(nodes, 3)[wheel.part.free])
-    basis = reduced.basis[own]
+    basis = reduced.origin.basis[own]
     return np.asarray(basis.T @ (wheel.full.system.stiffness[own][:, own] @ basis))
 
 

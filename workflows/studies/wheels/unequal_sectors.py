@@ -21,7 +21,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.threads import limited
-from tribodyn.reduction.damping import modal_damping_towards
+from tribodyn.reduction.linear_damping import modal_damping_towards
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit
 from tribodyn.workflows.pictures.theme import INK, WEAR_MAP

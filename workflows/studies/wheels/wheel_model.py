@@ -15,7 +15,8 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.linear.travelling_wave import on_wheel
-from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
+from tribodyn.reduction.sector_reduction import ReducedSector, nodal_diameters
+from tribodyn.reduction.wave_model import travelling_wave, wheel_model
 from tribodyn.workflows.run import joints, modelling, sector as sectors
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress

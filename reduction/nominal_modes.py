@@ -17,9 +17,9 @@ import scipy.linalg as sla
 
 from tribodyn.fem.cyclic_symmetry import seam_map, wave_system
 from tribodyn.fem.modes import modes
-from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
+from tribodyn.reduction.sector_reduction import ReducedSector
 
 PORT = "mistuning"
 

@@ -1,8 +1,7 @@
 """The linear side of a wheel whose sectors differ in stiffness: that of sectors alike, corrected on a few shapes.
 
 Sectors alike have a block-circulant compliance H(s): a discrete Fourier transform over the sectors leaves a small
-matrix for every nodal diameter. Sector n deviates by P^H d_n P, P its rows on a few shapes (`reduction.mistuning`), so
-that
+matrix for every nodal diameter. Sector n deviates by P^H d_n P, P its rows on a few shapes (`reduction.nominal_modes`):
 
     G = H - H P^H (I + d P H P^H)^-1 d P H
 
@@ -26,7 +25,7 @@ from tribodyn.fem.cyclic_symmetry import sector_name
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import Expansion
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.wave_model import WaveModel
 from tribodyn.refusal import Refusal
 
 ROOM = 2e8  # bytes of matrices of sectors alike that are kept for frequencies met again
@@ -42,18 +41,16 @@ class Alike:
 
     def __init__(
         self,
-        model: ReducedModel,
+        model: WaveModel,
         springs: np.ndarray,
         basis: HarmonicBasis,
         excitation: Excitation,
         omega_max: float,
         ports: tuple[str, ...],
     ):
-        if model.per_index is None or model.info.n_sectors is None or model.info.engine_order is None:
-            raise Refusal("only a travelling wave of a wheel has sectors that can differ")
-        self.n_sectors = N = model.info.n_sectors
+        self.n_sectors = N = model.n_sectors
         self.k = np.asarray(springs, float).ravel()
-        system, _ = model.per_index(0)
+        system, _ = model.at_index(0)
         excitation.check(basis, system.loads)
         self.load_names = names = tuple(sorted({name for _, name in excitation.loads}))
         self.outputs = tuple(name for name in system.outputs if name not in ports)
@@ -62,7 +59,7 @@ class Alike:
         self.n_port = int(counts[-1])
         self._of_index: list[Expansion] = []
         for index in range(N // 2 + 1):
-            system, B = model.per_index(index)
+            system, B = model.at_index(index)
             rows = [np.conj(system.loads[name]) for name in names]
             rows += [system.outputs[name] for name in (*self.outputs, *ports)]
             together = np.concatenate([np.asarray(B), np.array(rows).reshape(len(rows), -1)])
@@ -71,7 +68,7 @@ class Alike:
         self._mirrored = [None if one.hermitian else one.mirrored() for one in self._of_index]
         self.error = max(one.error for one in self._of_index)
         self.force = np.zeros((len(basis.harmonics), N, len(names)), complex)
-        order = model.info.engine_order
+        order = model.engine_order
         for (h, name), value in excitation.loads.items():
             if h in basis.harmonics:
                 turned = value * np.exp(-2j * np.pi * (h * order * np.arange(N) % N) / N)

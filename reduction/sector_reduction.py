@@ -1,4 +1,4 @@
-"""Craig-Bampton of a sector, and the models of its wheel: travelling waves by harmonic index, or all sectors at once.
+"""Craig-Bampton of a sector: one small system from which the waves of every harmonic index follow.
 
 One real reduction of the sector, with both shroud faces, both seams and the accessories as masters, serves all harmonic
 indices: the phase constraints act on the small system. Where neighbours touch node to node and nothing touches inside
@@ -10,36 +10,37 @@ Source  Tamatam 2021, eq. 3.12 to 3.22
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg as sla
 from scipy.sparse import vstack
 
-from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.cyclic_symmetry import Sector, seam_map, wave_system
-from tribodyn.fem.modes import StaticDivergence, modes, turning_frequencies
+from tribodyn.fem.modes import modes, turning_frequencies
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.refusal import Refusal
-
-WaveIndex = Callable[[int], tuple[SecondOrderSystem, np.ndarray, np.ndarray]]
-"""Small system, contact map and way back T (q = T z) of a harmonic index."""
 
 
 @dataclass(frozen=True)
 class ReducedSector:
-    """sector : dense, in reduced coordinates; basis : (n_full, n) to the DOFs of the full sector; info : as
-    `craig_bampton` gives it.
+    """sector : dense, in reduced coordinates; origin : these coordinates among the DOFs of the full sector;
+    accuracy : as `ReducedModel.accuracy`.
     """
 
     sector: Sector
-    basis: np.ndarray
-    info: ModelInfo = field(default_factory=ModelInfo)
+    origin: Reduction
+    accuracy: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def model(self) -> ReducedModel:
+        """The sector by itself, joined to nothing."""
+        return ReducedModel(self.sector.system, self.sector.interface, self.origin, self.sector.joints)
 
 
 def reduce_sector(
@@ -47,31 +48,32 @@ def reduce_sector(
 ) -> ReducedSector:
     """Reduce a full sector; n_modes or cutoff [Hz], and attached loads, as in `craig_bampton`.
 
-    Raises  ValueError as `craig_bampton` does
+    Raises  Refusal as `craig_bampton` does
     """
-    both = replace(sector.interface, B=vstack([sector.interface.B, sector.left], format="csr"))
+    both_faces = replace(sector.interface, B=vstack([sector.interface.B, sector.left], format="csr"))
     seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
-    model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
-    assert model.basis is not None
-    info = replace(model.info, joints=dict(sector.joints))
-    if (rest := sector.prestress) is not None:
-        info = replace(info, prestress_residual=rest.residual, prestress_rotation=rest.rotation)
-    return in_coordinates(sector, model.system, model.basis, info)
+    model = craig_bampton(sector.system, both_faces, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
+    assert isinstance(model.origin, Reduction)
+    return in_coordinates(sector, model.system, model.origin)
 
 
-def in_coordinates(sector: Sector, system: SecondOrderSystem, basis: np.ndarray, info: ModelInfo) -> ReducedSector:
-    """A full sector as the system it is in the coordinates of a basis (n_full, n), its masters first."""
-    masters = info.master_dofs
+def in_coordinates(sector: Sector, system: SecondOrderSystem, origin: Reduction) -> ReducedSector:
+    """A full sector as the system it is in the coordinates of a reduction, its masters first."""
     small = replace(
         sector,
         system=system,
-        interface=replace(sector.interface, B=np.asarray(sector.interface.B @ basis)),
-        left=np.asarray(sector.left @ basis),
-        seam_right=np.searchsorted(masters, sector.seam_right),
-        seam_left=np.searchsorted(masters, sector.seam_left),
+        interface=replace(sector.interface, B=np.asarray(sector.interface.B @ origin.basis)),
+        left=np.asarray(sector.left @ origin.basis),
+        seam_right=np.searchsorted(origin.masters, sector.seam_right),
+        seam_left=np.searchsorted(origin.masters, sector.seam_left),
         prestress=None,
     )
-    return ReducedSector(small, basis, info)
+    if sector.prestress is None:
+        return ReducedSector(small, origin)
+    static = sector.prestress
+    return ReducedSector(
+        small, origin, {"prestress_residual": static.residual, "prestress_rotation": static.rotation}
+    )
 
 
 def nodal_diameters(
@@ -94,106 +96,6 @@ def nodal_diameters(
             omega = turning_frequencies(K, system.mass, system.gyroscopic, n_modes)
         found.append(omega / (2 * np.pi))
     return np.array(found)
-
-
-def travelling_wave(reduced: ReducedSector, engine_order: int, springs: np.ndarray | None = None) -> ReducedModel:
-    """The model of one sector under a wave of this engine order: harmonic h sees the index h EO modulo N.
-
-    springs : (n_pair, n_component) contact springs [N/m]; where they are given, more than `LIMITS.many` coordinates are
-        replaced by those of `stuck_ritz`
-    Returns the model whose system and interface are those of harmonic 1; coordinates, but for those of `stuck_ritz`,
-        are the relative displacements, then accessories, then the rest; `reconstruct` takes the harmonic. One object
-        serves all harmonics of one index
-    """
-    model = wave_of(reduced, engine_order, WaveIndices(reduced, springs))
-    try:
-        system = model.system
-        omega, _ = modes(system.stiffness, system.mass, min(LIMITS.reported_modes, system.n_dof))
-        model = replace(model, info=replace(model.info, free_frequency=omega / (2 * np.pi)))
-    except StaticDivergence:  # rotation carries away what only the contact holds
-        pass
-    return model
-
-
-def wave_of(reduced: ReducedSector, engine_order: int, index_of: WaveIndex) -> ReducedModel:
-    """The model of a wave from the small system, contact map and way back of every harmonic index."""
-    wave = _Wave(reduced, engine_order, index_of)
-    system, B = wave.model(1)
-    info = replace(_shared_info(reduced), engine_order=engine_order)
-    interface = replace(reduced.sector.interface, B=B)
-    return ReducedModel(system, interface, None, info, wave.model, wave.moved, wave.at_index)
-
-
-def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
-    """All sectors at once, real and with contacts between all neighbours; stiffness as in `assemble_wheel`.
-
-    Loads and outputs are named "<name>@<sector>". The basis is left out: sector n moves by
-    reduced.basis @ (fem.cyclic_symmetry.sector_maps(reduced.sector)[n] @ q) in its own frame
-    """
-    system, interface = cyclic_symmetry.assemble_wheel(reduced.sector, stiffness)
-    return ReducedModel(system, interface, None, _shared_info(reduced))
-
-
-def _shared_info(reduced: ReducedSector) -> ModelInfo:
-    """Facts that hold for any model of the wheel; frequencies of a sector that is joined to nothing do not."""
-    return replace(reduced.info, n_sectors=reduced.sector.n_sectors, free_frequency=None)
-
-
-class WaveIndices:
-    """Small system, contact map and way back T (q = T z) of each harmonic index, each made once."""
-
-    def __init__(self, reduced: ReducedSector, springs: np.ndarray | None = None):
-        self._sector = reduced.sector
-        self._springs = springs
-        self._made: dict[int, tuple[SecondOrderSystem, np.ndarray, np.ndarray]] = {}
-
-    def __call__(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
-        if index not in self._made:
-            self._made[index] = self._small(*self._whole(index))
-        return self._made[index]
-
-    def _whole(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
-        """The same with all coordinates of the sector."""
-        once, of_row = distinct(self._sector)
-        if not node_to_node(once):
-            return *wave_system(self._sector, index), seam_map(self._sector, index).toarray()
-        T = relative_map(once, index)[0]
-        system = self._sector.system.projected(T)
-        return system, np.eye(len(once.left), system.n_dof)[of_row], T
-
-    def _small(
-        self, system: SecondOrderSystem, B: np.ndarray, T: np.ndarray
-    ) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
-        """The same in fewer coordinates where there are many."""
-        if self._springs is None or system.n_dof <= LIMITS.many:
-            return system, B, T
-        try:
-            V = stuck_ritz(system, B, self._springs)
-        except np.linalg.LinAlgError:  # it can move with its contacts stuck, which the compliance reports
-            return system, B, T
-        return system.projected(V), B @ V, T @ V
-
-
-@dataclass(frozen=True)
-class _Wave:
-    """What a harmonic of a wave of an engine order sees of a sector; a class, so that the model can be stored."""
-
-    reduced: ReducedSector
-    engine_order: int
-    index_of: WaveIndex
-
-    def model(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
-        """Small system and contact map of harmonic h."""
-        return self.at_index(h * self.engine_order)
-
-    def at_index(self, index: int) -> tuple[SecondOrderSystem, np.ndarray]:
-        """Small system and contact map of any wave of the wheel."""
-        return self.index_of(index % self.reduced.sector.n_sectors)[:2]
-
-    def moved(self, q: np.ndarray, h: int) -> np.ndarray:
-        """Full coordinates (n_full,) or (n_full, k) of the small ones q (n,) or (n, k) of harmonic h."""
-        own = self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)[2] @ q
-        return self.reduced.basis @ own.real + 1j * (self.reduced.basis @ own.imag)
 
 
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:

@@ -1,7 +1,7 @@
 """Blades that differ: the balance of a whole wheel with contact on every blade, at the cost of its reduced sector.
 
-Sectors differ in stiffness on a few shapes (`hbm.linear.mistuned`) and in any parameter of their contacts. Rows of the
-contact and outputs "<name>@<sector>" are those of the whole wheel, sector by sector.
+Sectors differ in stiffness on a few shapes (`hbm.linear.mistuned_compliance`) and in any parameter of their contacts.
+Rows of the contact and outputs "<name>@<sector>" are those of the whole wheel, sector by sector.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.linear.compliance import ContactCompliance
-from tribodyn.hbm.linear.mistuned import Alike, MistunedCompliance
-from tribodyn.reduction.cyclic import ReducedSector, travelling_wave
+from tribodyn.hbm.linear.mistuned_compliance import Alike, MistunedCompliance
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.sector_reduction import ReducedSector
+from tribodyn.reduction.wave_model import WaveModel, as_wave, travelling_wave
 from tribodyn.refusal import Refusal
 
 Change = Callable[[Joint, np.ndarray], Joint]
@@ -27,11 +28,32 @@ Change = Callable[[Joint, np.ndarray], Joint]
 
 
 @dataclass(frozen=True)
+class MistunedModel(ReducedModel):
+    """All sectors of a wheel whose blades differ: no harmonic has a system of its own."""
+
+    @property
+    def has_one_system(self) -> bool:
+        """No."""
+        return False
+
+    @property
+    def has_motion_in_time(self) -> bool:
+        """No."""
+        return False
+
+    def at_harmonic(self, h: int) -> NoReturn:
+        """Raise Refusal."""
+        raise Refusal(
+            "sectors that differ have no system of one harmonic: stability and integration in time need one"
+        )
+
+
+@dataclass(frozen=True)
 class MistunedWheel:
     """Sectors alike, ready to be made different.
 
     wave : balance of one sector under a travelling wave, whose model has the outputs `ports`, see
-        `reduction.mistuning.with_ports`
+        `reduction.nominal_modes.with_ports`
     """
 
     wave: HarmonicBalance
@@ -42,15 +64,20 @@ class MistunedWheel:
         """Number of sectors."""
         return self.alike.n_sectors
 
+    @property
+    def model(self) -> WaveModel:
+        """The model of the wave."""
+        return as_wave(self.wave.model)
+
     @cached_property
     def alike(self) -> Alike:
         """The linear side of sectors alike, made once."""
         one = self.wave
-        return Alike(one.model, one.contact.stiffness, one.basis, one.excitation, one.omega_max, self.ports)
+        return Alike(self.model, one.contact.stiffness, one.basis, one.excitation, one.omega_max, self.ports)
 
     @cached_property
-    def _model(self) -> ReducedModel:
-        n, one = self.n_sectors, self.wave.model
+    def _model(self) -> MistunedModel:
+        n, one = self.n_sectors, self.model
         i = one.interface
         faces = np.concatenate([i.faces + k * i.n_pair for k in range(n)])
         whole = replace(
@@ -62,8 +89,7 @@ class MistunedWheel:
             B=np.tile(np.asarray(i.B), (n, 1)),
             faces=faces,
         )
-        info = replace(one.info, joints={}, engine_order=None)
-        return replace(one, interface=whole, info=info, per_harmonic=_no_system, per_index=None, harmonic_basis=None)
+        return MistunedModel(one.system, whole, one.origin, free_frequency=one.free_frequency)
 
     def balance(self, deviation: np.ndarray, change: Change | None = None) -> HarmonicBalance:
         """The wheel with relative deviations (N,) of stiffness, and contacts that are the sector's or changed ones.
@@ -101,12 +127,11 @@ class MistunedWheel:
         pushed[:, :, a.loads] = np.where(vibrates, balance.load_factor, 1.0)[:, None, None] * compliance.force
         pushed[:, :, a.ports] = compliance.at(omega).deviating(pushed)
         waves = np.fft.ifft(pushed, axis=1)
-        assert self.wave.model.per_index is not None
         springs, found = self.wave.reference_stiffness, []
         for h, of_harmonic in zip(basis.harmonics, waves, strict=True):
             s, each = 1j * h * omega, []
             for index, wave in enumerate(of_harmonic):
-                system, B = self.wave.model.per_index(index)
+                system, B = self.model.at_index(index)
                 B = np.asarray(B)
                 dynamic = stuck_dynamic_stiffness(system, B, springs, s)
                 loads = np.array([system.loads[name] for name in a.load_names]).reshape(-1, len(dynamic))
@@ -135,7 +160,3 @@ class MistunedWheel:
             for each in waves
         ]
         return balance.basis.to_real(np.stack(amplitudes, axis=-1))
-
-
-def _no_system(h: int) -> NoReturn:
-    raise Refusal("sectors that differ have no system of one harmonic: stability and integration in time need one")

@@ -10,43 +10,34 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.speed_line import SpeedLineModel
 
 
-def compliance_of(
-    model: ReducedModel,
-    stiffness: np.ndarray,
-    basis: HarmonicBasis,
-    excitation: Excitation,
-    omega_max: float,
-    wanted: float | None = None,
-) -> ContactCompliance:
-    """The contact compliance of a model, along its speeds where these go with the frequency."""
-    kind = ContactCompliance if model.along is None else LineCompliance
-    return kind(model, stiffness, basis, excitation, omega_max, wanted)
+def line_compliance(model: ReducedModel, *settings: Any) -> LineCompliance:
+    """The compliance of a speed line; settings : the other arguments of `ContactCompliance`."""
+    if not isinstance(model, SpeedLineModel):
+        raise TypeError(f"a speed line is needed, not a {type(model).__name__}")
+    return LineCompliance(model, *settings)
 
 
 class LineCompliance(ContactCompliance):
     """Contact compliance along a line of speeds; what does not ask for a frequency is that of the model itself."""
 
-    def __init__(self, model: ReducedModel, *made_of: Any):
-        super().__init__(model, *made_of)
-        self.model, self._made_of = model, made_of
+    def __init__(self, model: SpeedLineModel, *settings: Any):
+        super().__init__(model, *settings)
+        self.model, self._settings = model, settings
 
     def _one_real(self) -> bool:
         """Never: every speed has systems of its own."""
         return False
 
-    def there(self, omega: float) -> tuple[ReducedModel, ContactCompliance]:
-        """Model and compliance, for all frequencies, at the speed that belongs to one [rad/s]."""
-        assert self.model.along is not None
-        model = self.model.along(omega)
-        compliance = ContactCompliance(model, *self._made_of)
-        return model, compliance if compliance.basis == self.basis else compliance.restricted(self.basis)
+    def at_model(self, model: ReducedModel) -> ContactCompliance:
+        """The compliance, for all frequencies, of the model at one speed."""
+        compliance = ContactCompliance(model, *self._settings)
+        return compliance if compliance.basis == self.basis else compliance.restricted(self.basis)
 
     def _make(self, omega: float) -> CompliancePoint:
         return LinePoint(self, omega)
@@ -60,8 +51,7 @@ class LinePoint(CompliancePoint):
 
     def _solved(self) -> list[list[LinePorts]]:
         line = self.compliance
-        assert line.model.along is not None
-        there, changes = line.model.along(self.omega), line.model.along.slope(self.omega)
+        there, changes = line.model.line(self.omega), line.model.line.slope(self.omega)
 
         def ports(h: int) -> LinePorts:
             (system, B), (change, _) = there.at_harmonic(h), changes.at_harmonic(h)
