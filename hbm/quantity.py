@@ -1,8 +1,9 @@
 """Numbers that a run can state: what one is computed from, what it declares, and how it is found by its name.
 
-A quantity is a file `hbm/quantities/<name>.py` that ends with `QUANTITY = ...`, one of the four classes below. Which
-class says what the number belongs to: a solved cycle, a worn contact, a response curve or a nonlinear mode. No other
-file names a quantity: summary, JSON, text, report, errors, columns of studies and derivatives are loops over them.
+A quantity is a file `hbm/quantities/<name>.py` that ends with `QUANTITY = ...`, one of the five classes below. Which
+class says what the number belongs to: a solved cycle, a worn contact, a response curve, a fold of it or a nonlinear
+mode. No other file names a quantity: summary, JSON, text, report, errors, columns of studies and derivatives are loops
+over them.
 """
 
 from __future__ import annotations
@@ -125,11 +126,13 @@ class Slopes:
 
     by_x, by_force : (n_pair, n_component, n_coeff) by displacement and by contact force, the others fixed
     by_response : (n_output, n_coeff); None where it does not depend on one of these
+    by_omega : by the frequency [rad/s]
     """
 
     by_x: np.ndarray | None = None
     by_force: np.ndarray | None = None
     by_response: np.ndarray | None = None
+    by_omega: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -263,6 +266,17 @@ class CurveQuantity(StatedQuantity):
     """A number of a whole response curve; value : SolvedCurve -> number, None where there is none."""
 
     value: Callable[[SolvedCurve], float | None]
+
+
+@dataclass(frozen=True)
+class FoldQuantity(StatedQuantity):
+    """A number of a fold of a response curve.
+
+    value : frequency of the fold [rad/s] -> number; slope : the same -> derivative of the number by that frequency
+    """
+
+    value: Callable[[float], float]
+    slope: Callable[[float], float] | None = None
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ pair, and one factor of
 
 serves all parameters: dh/dp goes on from step to step, of as many directions as there are parameters. The slopes of
 the rate r are differences of the wear law itself, pair by pair, whatever it asks of a cycle. The frequency of a peak
-moves with p and h, dw = w_p dp + w_h dh, see `hbm.derivatives`. The life Z ends where N(h(Z), p) is a share of
-the first preload. Its steps keep their shares of it, so that all cycles times c act as all wear coefficients would:
+moves with p and h, dw = w_p dp + w_h dh, see `hbm.derivatives.cycle_derivatives`. The life Z ends where N(h(Z), p) is a
+share of the first preload. Its steps keep their shares of it, so that all cycles times c act as all wear coefficients
+would:
 
     d ln Z / dp = (N0_p / N0 - N_p / N) / (N_c / N)
 
@@ -31,8 +32,11 @@ import scipy.linalg as sla
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.sites import BesidePeak
-from tribodyn.hbm.derivatives import RULES as EXACT, Derivatives, peak_moves
-from tribodyn.hbm.gradient import RULES as GRADIENT, Change, Gradient, NoDerivative, Posed
+from tribodyn.hbm.derivatives.cycle_derivatives import peak_moves
+from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
+from tribodyn.hbm.derivatives.derivative_table import Derivatives
+from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
+from tribodyn.hbm.derivatives.parameter_effects import ParameterEffects
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.dirk_stages import GAMMA, Search, begun, depth_per_work, first_stage
@@ -47,7 +51,7 @@ from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 def of_life(
     problem: WearProblem,
     worn: WearHistory,
-    changes: Iterable[Change],
+    changes: Iterable[ParameterChange],
     numbers: Mapping[str, tuple[str, Sequence[str]]],
     share: float = LIFE_SHARE,
 ) -> Derivatives:
@@ -133,7 +137,7 @@ class _Tangent:
     """
 
     problem: WearProblem
-    changes: tuple[Change, ...]
+    changes: tuple[ParameterChange, ...]
     by_law: tuple[tuple[WearProblem, WearProblem, float], ...]
     opens: np.ndarray
     corners: list[float] = field(default_factory=list)
@@ -162,7 +166,7 @@ class _Tangent:
             balance, there = problem.in_duty(duty, after.depth), new.state
             status = replace(there, cycle=replace(there.cycle, status=old.state.cycle.status))
             rate, other = (wear_of(problem, balance, s, after.depth, after.cycles)[0] for s in (there, status))
-            if np.abs(other - rate).max() > EXACT.corner * np.abs(rate).max():
+            if np.abs(other - rate).max() > RULES.corner * np.abs(rate).max():
                 raise NoDerivative(f"before {after.cycles:.4g} cycles a wear law jumps as a pair lifts, slips or stops")
 
     def moved(self, state: WearState, base: np.ndarray, stretch: float) -> tuple[np.ndarray, ...]:
@@ -226,15 +230,15 @@ class _Cycle:
         return self.tangent.problem.in_duty(self.duty, self.state.depth)
 
     @cached_property
-    def changes(self) -> list[Change]:
+    def changes(self) -> list[ParameterChange]:
         """Of the worn contact."""
         return [_worn(change, self.tangent.problem.balance, self.balance) for change in self.tangent.changes]
 
     def slopes(self, n: int) -> tuple[np.ndarray, ...]:
         """Changes of force and x (n_pair, n_component * n_coeff, n) at the same x and forces by n columns, d rate / d x
         (n_pair, n_component * n_coeff), d rate (n_pair, n), and d rate (n_pair,) by gap and by depth."""
-        gradient, problem = Gradient(self.balance, self.solved, ()), self.tangent.problem
-        above, below = gradient.of_gap()
+        effects, problem = ParameterEffects(self.balance, self.solved), self.tangent.problem
+        above, below = effects.of_gap()
         both, by_work = [(2 * (above - below), above + below)], {w.law for w in problem.wearing.values()} == {"energy"}
         if by_work:  # in closed form by x and gap, which is faster; at a corner both are of the same side
             solved, basis, contact = self.solved, self.balance.basis, self.balance.contact
@@ -246,19 +250,19 @@ class _Cycle:
             by_gap = by_depth = gain * work.sum(axis=1)
         else:
             by_gap, by_depth = self._by_depth(0.0), self._by_depth(1.0)
-            both.append((self._by_depth(0.0, EXACT.of_law) - by_gap, by_gap))
+            both.append((self._by_depth(0.0, RULES.law_step) - by_gap, by_gap))
             along = self._by_x()
-        if any(np.abs(differ).max() > EXACT.corner * np.abs(size).max() for differ, size in both):
+        if any(np.abs(differ).max() > RULES.corner * np.abs(size).max() for differ, size in both):
             self.tangent.corners.append(self.state.cycles)
         force, x, rate = (np.zeros((*shape, n)) for shape in (along.shape, along.shape, (len(along),)))
         for i, change in enumerate(self.changes):
-            effect = np.mean(gradient.effects(change), axis=0)
+            effect = np.mean(effects.of_change(change), axis=0)
             force[..., i], x[..., i] = effect[: 2 * along.size].reshape(2, *along.shape)
             rate[:, i] = self._by(change)
         for i, (up, down, step) in enumerate(self.tangent.by_law, len(self.changes)):
             rate[:, i] = (self._rate(problem=up) - self._rate(problem=down)) / (2 * step)
-        later = EXACT.of_law * self.state.cycles  # steps that are longer begin later, too
-        aged = (self._rate(later=later) - self._rate(later=-later)) / (2 * EXACT.of_law)
+        later = RULES.law_step * self.state.cycles  # steps that are longer begin later, too
+        aged = (self._rate(later=later) - self._rate(later=-later)) / (2 * RULES.law_step)
         rate[:, len(self.changes) + len(self.tangent.by_law)] = aged
         return force, x, along, rate, by_gap, by_depth
 
@@ -276,7 +280,7 @@ class _Cycle:
         depth, cycles = self.state.depth + deeper, self.state.cycles + later
         return self.duty.share * wear_of(problem or self.tangent.problem, there, state, depth, cycles)[0]
 
-    def _by(self, change: Change) -> np.ndarray:
+    def _by(self, change: ParameterChange) -> np.ndarray:
         """(n_pair,) d rate by a parameter, at the same x."""
         own, sides, problem = self.balance, (change.above, change.below), self.tangent.problem
         found = np.zeros(len(self.solved.x))
@@ -292,9 +296,9 @@ class _Cycle:
                 for one in sides
             )
             found = (up - down) / (2 * change.step)
-        return found if change.touching is None else found + self._by(change.touching)
+        return found if change.contact_part is None else found + self._by(change.contact_part)
 
-    def _by_depth(self, worn: float, reach: float = GRADIENT.of_gap) -> np.ndarray:
+    def _by_depth(self, worn: float, reach: float = RULES.gap_step) -> np.ndarray:
         """(n_pair,) d rate by the gap at the same x, which a depth opens that a law may ask for (worn = 1)."""
         own, gap, step = self.balance, self.balance.contact.gap, reach * self._size
         up, down = (self._rate(own.with_gap(gap + s), deeper=worn * s) for s in (step, -step))
@@ -302,7 +306,7 @@ class _Cycle:
 
     def _by_x(self) -> np.ndarray:
         """(n_pair, n_component * n_coeff) d rate of each pair by its own x, one coefficient of all pairs at a time."""
-        x, step = self.solved.x, GRADIENT.of_gap * self._size
+        x, step = self.solved.x, RULES.gap_step * self._size
         moves = (step[:, None, None] * unit for unit in np.eye(x[0].size).reshape(-1, *x[0].shape))
         return np.stack([(self._rate(x=x + d) - self._rate(x=x - d)) / (2 * step) for d in moves], axis=1)
 
@@ -330,7 +334,7 @@ def _by_numbers(
     found = []
     for name, joints in numbers.values():
         value = problem.wearing[joints[0]].numbers[name]
-        step = EXACT.of_law * float(np.max(value))
+        step = RULES.law_step * float(np.max(value))
         laws = [
             {
                 of: replace(law, numbers={**law.numbers, name: value + s})
@@ -344,19 +348,21 @@ def _by_numbers(
     return tuple(found)
 
 
-def _worn(change: Change, unworn: HarmonicBalance, balance: HarmonicBalance) -> Change:
+def _worn(change: ParameterChange, unworn: HarmonicBalance, balance: HarmonicBalance) -> ParameterChange:
     """A change of a worn contact."""
     opened = balance.contact.gap - unworn.contact.gap
 
-    def there(posed: Posed) -> Posed:
+    def there(posed: BalanceInputs) -> BalanceInputs:
         same = posed.contact is unworn.contact
         return replace(
             posed, contact=balance.contact if same else posed.contact.with_gap(posed.contact.gap + opened), balance=None
         )
 
-    twice = None if change.twice is None else tuple(there(one) for one in change.twice)
-    touching = None if change.touching is None else _worn(change.touching, unworn, balance)
-    return replace(change, above=there(change.above), below=there(change.below), twice=twice, touching=touching)
+    twice = None if change.double_step is None else tuple(there(one) for one in change.double_step)
+    touching = None if change.contact_part is None else _worn(change.contact_part, unworn, balance)
+    return replace(
+        change, above=there(change.above), below=there(change.below), double_step=twice, contact_part=touching
+    )
 
 
 def _solved(linear: Linearisation, right: Sequence[np.ndarray]) -> np.ndarray:

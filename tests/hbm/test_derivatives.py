@@ -12,15 +12,18 @@ from tests.helpers.contact_draws import LAWS, LOCATED, own
 from tests.helpers.continuation_models import Lifting
 from tests.helpers.verification_models import interface, modal_damping, random_structure
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm import derivatives, newton
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.derivatives import at_frequency
+from tribodyn.hbm.derivatives.adjoint_gradient import Gradient, cycle_numbers
+from tribodyn.hbm.derivatives.cycle_derivatives import at_frequency, at_peak, peak_moves
+from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
+from tribodyn.hbm.derivatives.fold_derivatives import at_fold
+from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.gradient import Change, NoDerivative, Posed
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.reduction.model import ReducedModel
@@ -64,9 +67,10 @@ def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again
     assert solved.converged
     springs = ["tangential stiffness", "normal stiffness"][: 1 + ("n" in components)]
     names = [*springs, *(n.name for n in contact_law.declared(name) if not n.whole)]
-    step, posed = 1e-6, Posed.of(balance)
+    step, posed = 1e-6, BalanceInputs.of(balance)
     changes = [
-        Change(p, step, *(replace(posed, contact=with_number(balance, p, 1 + s)) for s in (step, -step))) for p in names
+        ParameterChange(p, step, *(replace(posed, contact=with_number(balance, p, 1 + s)) for s in (step, -step)))
+        for p in names
     ]
 
     def loaded(name, factor):
@@ -80,12 +84,14 @@ def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again
         return replace(made, memory=balance.memory)
 
     driven = ["loads", "base"]
-    changes += [Change(p, step, *(replace(posed, excitation=loaded(p, 1 + s)) for s in (step, -step))) for p in driven]
+    changes += [
+        ParameterChange(p, step, *(replace(posed, excitation=loaded(p, 1 + s)) for s in (step, -step))) for p in driven
+    ]
     found = at_frequency(balance, solved.state, "tip", changes)
 
     def again(other):
         state = newton.solve(other, OMEGA, found.state.x, EXACT).state
-        return np.array([q.value for q in derivatives.quantities(other, state, "tip")])
+        return np.array([q.value for q in cycle_numbers(other, state, "tip") if q.moves_with_state])
 
     for i, p in enumerate([*names, *driven]):
         h = 2e-5
@@ -128,41 +134,38 @@ def test_a_peak_that_is_a_corner_follows_first_slip():
     omega, step = brentq(lambda omega: stuck(omega)[1] - friction / 0.2, 0.8, 0.82), 1e-6
     tip, slider = (stuck(omega + step) - stuck(omega - step)) / (2 * step)
     state = newton.solve_from_rest(balance, omega * (1 + 1e-4), EXACT).state
-    posed, h = Posed.of(balance), 1e-6
+    posed, h = BalanceInputs.of(balance), 1e-6
     sides = (replace(posed, contact=with_number(balance, "friction", 1 + s)) for s in (h, -h))
-    found = derivatives.at_peak(balance, state, "tip", [Change("friction", h * friction, *sides)])
+    found = at_peak(balance, state, "tip", [ParameterChange("friction", h * friction, *sides)])
     assert found.follows_corner
-    assert found.names[:2] == ("frequency", "amplitude")
+    assert found.names[:2] == ("peak_frequency", "amplitude")
     np.testing.assert_allclose(found.values[:2], [omega / (2 * np.pi), stuck(omega)[0]], rtol=1e-6)
     np.testing.assert_allclose(found.slopes[:2, 0], np.array([1 / (2 * np.pi), tip]) / slider / 0.2, rtol=5e-6)
     with pytest.raises(NoDerivative, match="peak is a corner of the curve"):
-        derivatives.peak_moves(balance, state, "tip", ())
+        peak_moves(balance, state, "tip", ())
 
 
 def test_a_fold_moves_as_folds_found_anew_and_tells_both_sides_of_a_corner():
     balance, h = Lifting().balance((0, 1, 2, 3), how="located"), 1e-6
     branch = arc_length.follow(balance, 0.9, 4.0)
-    at, posed = branch.folds[0], Posed.of(balance)
+    at, posed = branch.folds[0], BalanceInputs.of(balance)
     state = balance.evaluate(branch.omega[at], balance.shaped(branch.contact[at]))
 
     def sides(above, below):
         return tuple(replace(posed, contact=balance.contact.with_gap(balance.contact.gap + s)) for s in (above, below))
 
-    changes = [Change("gap", h, *sides(h, -h)), Change("twice above zero", h, *sides(2 * h, -h))]
-    found = derivatives.at_fold(balance, state, changes)
-    there, here = (
-        derivatives.at_fold(balance.with_gap(balance.contact.gap + s), state, ()).values[0] for s in (1e-4, -1e-4)
-    )
+    changes = [ParameterChange("gap", h, *sides(h, -h)), ParameterChange("twice above zero", h, *sides(2 * h, -h))]
+    found = at_fold(balance, state, changes)
+    there, here = (at_fold(balance.with_gap(balance.contact.gap + s), state, ()).values[0] for s in (1e-4, -1e-4))
     slope = (there - here) / 2e-4
     np.testing.assert_allclose([found.slopes[0, 0], found.by_gap[0, 0]], slope, rtol=1e-6)
     assert found.corner.tolist() == [False, True]
     np.testing.assert_allclose([found.above[0, 1], found.below[0, 1]], [2 * slope, slope], rtol=2e-4)
 
 
-def test_a_fold_has_no_derivative():
-    """An adjoint that is no solution is refused, not returned."""
+def test_an_adjoint_that_is_no_solution_is_refused(monkeypatch):
     balance = balance_of("jenkins", ("t1", "t2", "n"), "located")
     state = newton.solve_from_rest(balance, OMEGA, EXACT).state
-    gradient = derivatives.Gradient(balance, state, tuple(derivatives.quantities(balance, state, "tip")))
-    with pytest.raises(NoDerivative, match="fold"):
-        gradient._transposed_solve(lambda v: np.zeros_like(v), np.ones_like(state.flat))
+    monkeypatch.setattr(Gradient, "_residual_transposed", lambda _, v: np.zeros_like(v))
+    with pytest.raises(NoDerivative, match="as at a fold"):
+        Gradient(balance, state, tuple(cycle_numbers(balance, state, "tip"))).by_frequency()

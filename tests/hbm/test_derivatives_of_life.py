@@ -14,7 +14,8 @@ from tests.helpers.steps_again import EXACT, elasticity_anew
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.continuation.sites import BesidePeak
-from tribodyn.hbm.gradient import Change, NoDerivative, Posed
+from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
+from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.wear import error_controlled_rule, tangent, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
 from tribodyn.hbm.wear.law import JointWear
@@ -56,13 +57,13 @@ def problem_of(site, name="", factor=1.0, **changes) -> WearProblem:
 
 
 def found_of(problem, worn, site, names, share=SHARE, numbers=None):
-    own = Posed.of(problem.balance)
+    own = BalanceInputs.of(problem.balance)
 
     def posed(name, factor):
         there = problem_of(site, name, factor).balance
         return replace(own, excitation=there.excitation) if name in LOADS else replace(own, contact=there.contact)
 
-    changes = [Change(name, STEP, *(posed(name, 1 + side) for side in (STEP, -STEP))) for name in names]
+    changes = [ParameterChange(name, STEP, *(posed(name, 1 + side) for side in (STEP, -STEP))) for name in names]
     return tangent.of_life(problem, worn, changes, numbers or {"coefficient": ("coefficient", ["contact"])}, share)
 
 

@@ -11,8 +11,8 @@ import pytest
 import tribodyn as td
 from tests.helpers.coarse_scenes import BEAM, BLADE, RIG
 from tests.helpers.steps_again import elasticity_anew, exactly
-from tribodyn.hbm import derivatives as exact
-from tribodyn.hbm.gradient import NoDerivative
+from tribodyn.hbm.derivatives import cycle_derivatives, fold_derivatives
+from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
 from tribodyn.workflows.command import main as cli
@@ -48,14 +48,14 @@ def test_the_laws_of_scaling_hold(beam):
     All mass times c, damping as a ratio, is all time times sqrt(c); all stiffness times c, loads too, time over sqrt(c)
     """
     rows, names = beam.elasticities, beam.found.names
-    wanted = {"frequency": 0.0, "amplitude": 1.0, "phase": 0.0, "energy": 2.0, "preload": 1.0, "wear rate": 2.0}
+    wanted = {"peak_frequency": 0.0, "amplitude": 1.0, "phase": 0.0, "energy": 2.0, "preload": 1.0, "wear_rate": 2.0}
     loads = sum(row for key, row in rows.items() if key.startswith("loads."))
     np.testing.assert_allclose(loads, [wanted[name] for name in names], atol=2e-6)
-    heavier = [-0.5 if name == "frequency" else 0.0 for name in names]
+    heavier = [-0.5 if name == "peak_frequency" else 0.0 for name in names]
     np.testing.assert_allclose(rows["material.density"], heavier, atol=1e-6)
     stiffer = sum(row for key, row in rows.items() if key.endswith(("_stiffness", "young")))
-    softens = {"frequency": 0.5, "amplitude": -1.0, "phase": 0.0, "energy": -1.0, "preload": 0.0, "wear rate": -1.0}
-    np.testing.assert_allclose(stiffer, [softens[name] for name in names], atol=1e-5)
+    softens = {"peak_frequency": 0.5, "amplitude": -1.0, "energy": -1.0, "wear_rate": -1.0}
+    np.testing.assert_allclose(stiffer, [softens.get(name, 0.0) for name in names], atol=1e-5)
 
 
 LENGTHS = tuple(f"geometry.{name}" for name in ("length", "width", "height", "patch_length"))
@@ -72,7 +72,7 @@ def test_the_law_of_similarity_holds_of_lengths():
     """Bodies that are alike have time and displacements by c, work by c^3, forces by c^2."""
     file = scene_file.read("beam", COARSE["beam"])
     found = td.studies.derivatives(file, only=(*keys(file.scene), *LENGTHS))
-    wanted = {"frequency": -1.0, "amplitude": 1.0, "phase": 0.0, "energy": 3.0, "preload": 2.0, "wear rate": 3.0}
+    wanted = {"peak_frequency": -1.0, "amplitude": 1.0, "phase": 0.0, "energy": 3.0, "preload": 2.0, "wear_rate": 3.0}
     total = similar(found.elasticities, LENGTHS, {})
     np.testing.assert_allclose(total, [wanted[name] for name in found.found.names], atol=2e-6)
 
@@ -139,7 +139,7 @@ def test_the_law_of_scaling_holds_of_springs_that_the_reduction_follows(modes):
     found = td.studies.derivatives("rig", overrides=(*COARSE["rig"], f"reduction.modes={modes}"))
     rows = found.elasticities
     total = sum(row for key, row in rows.items() if key.endswith((".stiffness", ".young", "shaker.value")))
-    wanted = {"frequency": 0.5, "energy": 1.0, "preload": 1.0, "wear rate": 1.0}
+    wanted = {"peak_frequency": 0.5, "energy": 1.0, "preload": 1.0, "wear_rate": 1.0}
     np.testing.assert_allclose(total, [wanted.get(name, 0.0) for name in found.found.names], atol=1e-5)
 
 
@@ -152,7 +152,8 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
     ratio = friction * 0.5 / record["quantities"]["amplitude"]
     assert record["elasticities"]["contact.friction"]["amplitude"] == pytest.approx(ratio)
     assert all(path.stat().st_size > 0 for path in beam.write(tmp_path))
-    marked = replace(beam.found, names=("life", *beam.found.names[1:]), corner=np.ones_like(beam.found.corner))
+    names = ("mode_frequency", "life", *beam.found.names[2:])
+    marked = replace(beam.found, names=names, corner=np.ones_like(beam.found.corner))
     assert sum("the table is that of one side" in line for line in replace(beam, found=marked).lines()) == 1
 
 
@@ -178,8 +179,8 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, ste
     def solved(key, factor):
         with limited(1):
             balance = Varying(file.changed(f"{key}={value[key] * factor!r}"), Progress()).model.balance
-            there = exact.at_frequency(balance, fixed.state, "response", ())
-            return there.values, exact.at_peak(balance, along.state, "response", ()).values
+            there = cycle_derivatives.at_frequency(balance, fixed.state, "response", ())
+            return there.values, cycle_derivatives.at_peak(balance, along.state, "response", ()).values
 
     floor = 0.2 if "geometry.shroud_angle" in only else 0.1  # below it differences are rounding; of this one, 3e-6
     for i, key in enumerate(along.parameters):
@@ -233,7 +234,7 @@ def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
     file = scene_file.read("leaf_seal", LEAF)
     found = td.studies.derivatives(file, of="fold")
     rows = {key: row[0] for key, row in found.elasticities.items()}
-    assert found.found.names == ("frequency",)
+    assert found.found.names == ("fold_frequency",)
     stiffness, loads = (
         sum(row for key, row in rows.items() if key.endswith(end)) for end in (("stiffness", "young"), "pressure")
     )
@@ -244,7 +245,7 @@ def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
         changed = file.changed(f"damping.modal={value['damping.modal'] * factor!r}")
         with limited(1):
             balance = Varying(changed, Progress()).model.balance
-            return exact.at_fold(balance, found.found.state, ()).values[0]
+            return fold_derivatives.at_fold(balance, found.found.state, ()).values[0]
 
     difference = (again(1 + h) - again(1 - h)) / (2 * h) / found.found.values[0]
     assert rows["damping.modal"] == pytest.approx(difference, rel=1e-5)
@@ -258,7 +259,7 @@ def test_a_mode_follows_the_laws_of_scaling():
     all mass is.
     """
     found = td.studies.derivatives("beam", **MODE)
-    assert found.found.names == ("frequency", "damping")
+    assert found.found.names == ("mode_frequency", "damping")
     assert found.lines()[0].endswith(f"damping {found.found.values[1]:.6g}")
     stiffer = sum(
         row for key, row in found.elasticities.items() if key.endswith(("_stiffness", "young", "press.value"))

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from tests.helpers.wheel_scene import WHEEL
-from tribodyn.hbm import derivatives as exact, newton
+from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.derivatives import cycle_derivatives
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import unequal_sectors, wheel_model as wheels
@@ -72,7 +73,7 @@ def test_derivatives_by_the_factors_are_those_of_other_wheels(scene: Path, dampi
     assert found.values[3] > 0
     step = 3e-5
     ends = (wheel.whole([float(one) for one in factors + side * way]) for side in (step, -step))
-    up, down = (exact.at_peak(one, found.state, output, ()).values[:2] for one in ends)
+    up, down = (cycle_derivatives.at_peak(one, found.state, output, ()).values[:2] for one in ends)
     off, size = found.slopes[:2] @ way - (up - down) / (2 * step), np.linalg.norm(found.slopes[:2], axis=1)
     assert (abs(off) < 1e-5 * size).all(), off / size
 

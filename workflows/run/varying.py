@@ -16,7 +16,8 @@ from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.contact.joint import JointSet
-from tribodyn.hbm.gradient import Change, NoDerivative, Posed
+from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
+from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.reduction.relative import body_1_dofs, relative
@@ -77,7 +78,7 @@ class Varying:
             reduced = self._damped = modelling.damped(self.scene, plain)
         self.part, self.plain = part, plain
         self.model = modelling.make_model(self.scene, part, reduced)
-        self.own = Posed.of(self.model.balance)
+        self.own = BalanceInputs.of(self.model.balance)
         self.numbers = smooth_numbers(self.scene)
         self._ways: dict[str, SecondOrderSystem] = {}  # key -> what the reduced model moves by where it doubles
         self._beside: dict[str, tuple[Part, Part]] = {}  # key -> the part with its nodes moved to both sides
@@ -87,7 +88,7 @@ class Varying:
         part, _ = modelling.with_surfaces(file, modelling.part_of(file, Progress()))
         return part, modelling.plain_of(file, part)
 
-    def change(self, key: str, value: float) -> Change:
+    def change(self, key: str, value: float) -> ParameterChange:
         """The problems a step above and below a value of a key."""
         number, anew = self.numbers[key], self._settles or self.anew(key)
         linear = self._scales(key) or self.follows(key)
@@ -95,15 +96,15 @@ class Varying:
         if moves_nodes(number):
             self.nodes_moved(key)  # or refused
             step = (4 if anew else 1) * NODES * abs(value) if anew or self._sector else step
-        far: tuple[Posed, ...] | None = () if anew or linear else None
+        far: tuple[BalanceInputs, ...] | None = () if anew or linear else None
         if self._settles or (anew and number.stage <= REDUCTION):
             far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
         touching = None
         if (anew or linear) and not self._settles and _touches(number):
             small = self.step * abs(value)
             up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
-            touching = Change(key, small, up, down)
-        return Change(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
+            touching = ParameterChange(key, small, up, down)
+        return ParameterChange(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
 
     def _changed(self, key: str, value: float) -> SceneFile:
         """The scene with another value of a key; read again only where other numbers follow from it."""
@@ -119,7 +120,7 @@ class Varying:
             plain = replace(plain, interface=self._interface(plain.interface, key, value))
         return JointSet.of(self.own.model, joints.make_joints(self._changed(key, value).scene, plain))
 
-    def posed(self, key: str, value: float) -> Posed:
+    def posed(self, key: str, value: float) -> BalanceInputs:
         """The problem with another value of a key; nothing is solved but what the preload comes to rest in."""
         file = self._changed(key, value)
         scene, part, plain, number = file.scene, self.part, self.plain, self.numbers[key]
@@ -145,13 +146,13 @@ class Varying:
         if self._settles:
             problem = modelling.Problem.of(scene, part, reduced)
             balance = problem.balance(self.model.balance.basis.harmonics)
-            return replace(Posed.of(balance), balance=balance)
+            return replace(BalanceInputs.of(balance), balance=balance)
         base = None
         if isinstance(scene, MeshScene) and part is not None:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
         contact = self._contact(key, value) if _touches(number) and plain is self.plain else self.own.contact
         loads = self.own.excitation if number.stage is CONTACT else joints.excite(scene, base)
-        return Posed(reduced, contact, loads, self.own.memory, alike=self.follows(key))
+        return BalanceInputs(reduced, contact, loads, self.own.memory, same_coordinates=self.follows(key))
 
     @property
     def _settles(self) -> bool:

@@ -13,14 +13,17 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.hbm import derivatives as exact
+from tribodyn.hbm import quantity
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
-from tribodyn.hbm.derivatives import Derivatives
-from tribodyn.hbm.gradient import Change, NoDerivative
+from tribodyn.hbm.derivatives import cycle_derivatives, fold_derivatives, mode_derivatives
+from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
+from tribodyn.hbm.derivatives.derivative_table import Derivatives
+from tribodyn.hbm.derivatives.parameter_change import ParameterChange
 from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.quantity import CycleQuantity, StatedQuantity, WearQuantity
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
@@ -43,15 +46,10 @@ from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
 SHOWN = 12  # parameters in the picture
-OF_ROWS = {"peak_hz_first": "frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
-PLOTTED = ("frequency", "amplitude", "damping", "energy", "preload", "life", "depth", "volume")
+OF_ROWS = {"peak_hz_first": "peak_frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
 # step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
 OF_MODE = 1e-4
 DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
-UNITS = {
-    "frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3", "damping": "",
-    "life": "cycles", "depth": "m", "volume": "m3",
-}  # fmt: skip
 MICROMETRE = 1e-6
 
 
@@ -84,13 +82,21 @@ class ResponseDerivatives(StudyResult):
         for joint, pairs in self.joints.items():
             if f.by_gap[:, pairs].any():
                 rows[f"gap of {joint}, by um"] = f.by_gap[:, pairs].sum(axis=1) * 100 * MICROMETRE / size
-        first = f.names.index("amplitude") if "amplitude" in f.names else 0
+        first = self._first
         return dict(sorted(rows.items(), key=lambda row: -abs(row[1][first])))
 
     @property
+    def _quantities(self) -> list[StatedQuantity]:
+        return [quantity.load(name.partition(" of ")[0]) for name in self.found.names]
+
+    @property
+    def _first(self) -> int:
+        """The first number that moves at a fixed frequency: amplitude, life, or frequency of a fold or mode."""
+        return int(np.argmax(self.found.above.any(axis=1)))
+
+    @property
     def _size(self) -> np.ndarray:
-        f = self.found
-        return np.where([name == "phase" for name in f.names], 1.0, f.values)
+        return np.where([q.relative for q in self._quantities], self.found.values, 1.0)
 
     @property
     def corners(self) -> tuple[str, ...]:
@@ -117,32 +123,33 @@ class ResponseDerivatives(StudyResult):
     def lines(self) -> list[str]:
         """Elasticities, the strongest on the amplitude or the life first."""
         f = self.found
-        names = ["phase [rad]" if name == "phase" else name for name in f.names]
+        quantities, first = self._quantities, self._first
+        names = [n if q.relative else f"{n} [{q.unit}]" for n, q in zip(f.names, quantities, strict=True)]
         width = [max(12, len(name) + 2) for name in names]
-        values = (f"{n} {v:.6g} {UNITS[n.split()[0]]}".rstrip() for n, v in zip(f.names, f.values, strict=True))
+        values = (f"{n} {v:.6g} {q.unit}".rstrip() for n, v, q in zip(f.names, f.values, quantities, strict=True))
         lines = [", ".join(values), "per cent of each for one per cent of:"]
         lines.append("".join(f"{name:>{w}}" for name, w in zip(names, width, strict=True)))
         for key, row in self.elasticities.items():
             lines.append("".join(f"{value:>+{w}.4f}" for value, w in zip(row, width, strict=True)) + f"  {key}")
         if f.follows_corner:
             lines.append("the peak is a corner of the curve, which moves with the contact transition that begins there")
-        if "life" in f.names and self.corners:
+        is_of_wear, is_of_cycle = (isinstance(quantities[first], kind) for kind in (WearQuantity, CycleQuantity))
+        if is_of_wear and self.corners:
             lines.append(
                 "warning: at a state of the wear a pair is at a corner of its contact force, such as grazing or first "
                 "slip, or touches for so few samples that its wear law is rough: the table is that of one side"
             )
-        for key in self.corners if "life" not in f.names else ():
+        for key in self.corners if not is_of_wear else ():
             i = f.parameters.index(key)
-            first = "amplitude" if "amplitude" in f.names else "frequency"
-            at = f.names.index(first)
-            above, below = (side[at, i] * self.at[key] / f.values[at] for side in (f.above, f.below))
-            where = "" if first == "frequency" else " at a fixed frequency"
+            above, below = (side[first, i] * self.at[key] / f.values[first] for side in (f.above, f.below))
+            where = " at a fixed frequency" if is_of_cycle else ""
             lines.append(
-                f"warning: {key} is at a corner of the contact forces, such as grazing or first slip: the {first} has "
+                f"warning: {key} is at a corner of the contact forces, such as grazing or first slip: the "
+                f"{quantities[first].label} has "
                 f"{above:+.4g} above it and {below:+.4g} below{where}, and the table their mean"
             )
         share = 100 * self.seconds / self.response_seconds
-        what = "life" if "life" in f.names else "response"
+        what = "life" if is_of_wear else "response"
         lines.append(f"{self.seconds:.3g} s, {share:.2g} % of the {self.response_seconds:.3g} s of the {what}")
         lines += [f"without {key}: {why}" for key, why in self.without.items()]
         if self.anew:
@@ -157,9 +164,10 @@ class ResponseDerivatives(StudyResult):
         return write_files(folder, {"derivatives": {**table, **columns}}, {"derivatives": self.plot()})
 
     def plot(self) -> Figure:
-        """Bars of the elasticities of frequency, amplitude, damping, energy and preload."""
+        """Bars of the elasticities of every number of the whole contact."""
         rows = dict(list(self.elasticities.items())[:SHOWN])
-        shown = [name for name in self.found.names if name in PLOTTED]
+        whole_contact = zip(self._quantities, self.found.names, strict=True)
+        shown = [q.name for q, name in whole_contact if q.relative and q.name == name]
         columns = len(shown)
         with axes_of(2.6 + 2.2 * columns, 1.4 + 0.28 * len(rows), columns=columns) as (figure, panes):
             for i, (axes, name) in enumerate(zip(np.atleast_1d(panes), shown, strict=True)):
@@ -223,7 +231,7 @@ def _of_scene(
     see `_changes`."""
     varying = Varying(file, report, OF_MODE if of == "mode" else STEP)
     balance, clock = varying.model.balance, process_time()
-    find: Callable[[Iterator[Change]], Derivatives]
+    find: Callable[[Iterator[ParameterChange]], Derivatives]
     if of == "mode":
         asked = AmplitudeRange.of(file, None if at is None else at / DECADES, at, None, None)
         find = partial(_of_mode, varying, backbones.along(file, balance, asked, report), modal=at is None)
@@ -259,7 +267,7 @@ Advance = Callable[[float, str], None]
 
 def _changes(
     varying: Varying, wanted: Mapping[str, float], advance: Advance, without: dict[str, str] | None
-) -> Iterator[Change]:
+) -> Iterator[ParameterChange]:
     """Of every key but those of wear laws; one without a derivative goes into `without`, where that is given."""
     for i, (key, value) in enumerate(wanted.items()):
         advance(i / len(wanted), key)
@@ -272,14 +280,14 @@ def _changes(
             without[key] = str(reason)
 
 
-def _of_mode(varying: Varying, mode: Backbone, changes: Iterator[Change], modal: bool) -> Derivatives:
+def _of_mode(varying: Varying, mode: Backbone, changes: Iterator[ParameterChange], modal: bool) -> Derivatives:
     """At the last point of a backbone."""
     if mode.end.kind is not BranchEnd.REACHED:
         raise NoDerivative(f"the backbone {mode.end}")
     problem = FreeVibration(varying.model.balance, mode.number, mode.output)
     x = varying.model.balance.shaped(mode.contact[-1])
     point = problem.at(x, mode.omega[-1], mode.damping[-1], mode.modal_amplitude[-1])
-    return exact.at_mode(problem, point, changes, settings.newton_options(varying.scene), modal)
+    return mode_derivatives.at_mode(problem, point, changes, settings.newton_options(varying.scene), modal)
 
 
 def _share(scene: Scene) -> float:
@@ -289,7 +297,7 @@ def _share(scene: Scene) -> float:
 
 
 def _of_life(
-    varying: Varying, worn: WearHistory, changes: Iterator[Change], wanted: Mapping[str, float]
+    varying: Varying, worn: WearHistory, changes: Iterator[ParameterChange], wanted: Mapping[str, float]
 ) -> Derivatives:
     scene, by_key = varying.scene, wear_run.law_numbers(varying.scene)
     problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
@@ -301,7 +309,7 @@ def of_branch(
     scene: Scene,
     balance: HarmonicBalance,
     branch: Branch,
-    changes: Iterator[Change],
+    changes: Iterator[ParameterChange],
     at: float | None = None,
     fold: bool = False,
     output: str = settings.OUTPUT,
@@ -318,8 +326,8 @@ def of_branch(
     x = balance.shaped(branch.contact[near])
     state = balance.evaluate(branch.omega[near] if at is None or fold else 2 * np.pi * at, x)
     if fold:
-        return exact.at_fold(balance, state, changes, options)
-    take = exact.at_peak if at is None else exact.at_frequency
+        return fold_derivatives.at_fold(balance, state, changes, options)
+    take = cycle_derivatives.at_peak if at is None else cycle_derivatives.at_frequency
     return take(balance, state, output, changes, wear_run.coefficients(scene), options)
 
 

@@ -17,11 +17,13 @@ import numpy as np
 from pydantic import Field, StrictBool, StrictInt, model_validator
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm import derivatives, newton
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import State
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
-from tribodyn.hbm.derivatives import Derivatives
-from tribodyn.hbm.gradient import Change, NoDerivative, Posed
+from tribodyn.hbm.derivatives import cycle_derivatives
+from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
+from tribodyn.hbm.derivatives.derivative_table import Derivatives
+from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.refusal import Refusal
@@ -372,7 +374,7 @@ class SceneAnswers:
         if (place, known.load) not in self._derived:
             self._derived[place, known.load] = self._derivatives(place, known.load, sides)
         found = self._derived[place, known.load]
-        wanted = "frequency" if known.of == "peak frequency" else known.of
+        wanted = known.of.replace(" ", "_")
         if wanted not in found.names:
             return [0.0] * len(sides)
         return [float(slope) for slope in found.slopes[found.names.index(wanted)]]
@@ -381,20 +383,20 @@ class SceneAnswers:
         """Of a cycle at a place, at rest where there is none; raises NoDerivative."""
         balance, options = self.model.balance, settings.newton_options(self.file.scene)
         changes = [
-            Change(name, step, Posed.of(above.model.balance), Posed.of(below.model.balance))
+            ParameterChange(name, step, BalanceInputs.of(above.model.balance), BalanceInputs.of(below.model.balance))
             for name, step, above, below in sides
         ]
         if place is None:
-            return derivatives.at_frequency(
+            return cycle_derivatives.at_frequency(
                 balance.with_load(0.0), self._rest, settings.OUTPUT, changes, options=options
             )
         balance, state = balance.with_load(load), self._point(place, load).state
         if place.peak == 1.0:
-            return derivatives.at_peak(balance, state, settings.OUTPUT, changes, options=options)
-        found = derivatives.at_frequency(balance, state, settings.OUTPUT, changes, options=options)
+            return cycle_derivatives.at_peak(balance, state, settings.OUTPUT, changes, options=options)
+        found = cycle_derivatives.at_frequency(balance, state, settings.OUTPUT, changes, options=options)
         if place.peak is not None:  # beside a peak, and moves with it
             peak = self._point(Place(peak=1.0), load).state
-            moves = derivatives.at_peak(balance, peak, settings.OUTPUT, changes, options=options).slopes[0]
+            moves = cycle_derivatives.at_peak(balance, peak, settings.OUTPUT, changes, options=options).slopes[0]
             ride = np.outer(found.by_frequency, 2 * np.pi * place.peak * moves)
             found = replace(found, slopes=found.slopes + ride)
         return found

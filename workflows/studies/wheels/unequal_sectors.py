@@ -19,7 +19,8 @@ from matplotlib.figure import Figure
 from tribodyn.fem.cyclic_symmetry import sector_maps
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.gradient import Change, NoDerivative, Posed
+from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
+from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction.linear_damping import modal_damping_towards
 from tribodyn.refusal import Refusal
@@ -127,12 +128,12 @@ def checked(factors: Sequence[float] | np.ndarray, n_sectors: int) -> np.ndarray
     return values
 
 
-def stiffer(wheel: wheels.Wheel, balance: HarmonicBalance) -> Iterator[Change]:
+def stiffer(wheel: wheels.Wheel, balance: HarmonicBalance) -> Iterator[ParameterChange]:
     """What the factor on the stiffness of every sector does to the balance of a whole wheel, which is linear.
 
     Raises  NoDerivative for Rayleigh's damping of two modes, which may be a pair of the wheel that parts
     """
-    own, model, damping = Posed.of(balance), balance.model, wheel.scene.damping
+    own, model, damping = BalanceInputs.of(balance), balance.model, wheel.scene.damping
     if damping.ratios is not None:
         raise NoDerivative("damping.ratios goes by two modes of the wheel: give damping.modal, or mass and stiffness")
     of_modes = None if damping.modal is None else modal_damping_towards(model.system, damping.modal)
@@ -143,7 +144,9 @@ def stiffer(wheel: wheels.Wheel, balance: HarmonicBalance) -> Iterator[Change]:
             damped = of_modes(change) if of_modes else (damping.stiffness or 0.0) * change
             moved = replace(moved, damping=model.system.damping + damped)
         # from here to there is a step of one half to both sides of their middle
-        yield Change(f"stiffness of sector {n}", 0.5, replace(own, model=replace(model, system=moved)), own, ())
+        yield ParameterChange(
+            f"stiffness of sector {n}", 0.5, replace(own, model=replace(model, system=moved)), own, ()
+        )
 
 
 def mistuned(
