@@ -123,6 +123,11 @@ class ReducedModel:
         return False
 
     @property
+    def sectors_in_time(self) -> int:
+        """Copies that make the motion in time: those of a wave until it repeats itself, otherwise 1."""
+        return 1
+
+    @property
     def follows_frequency(self) -> bool:
         """Whether its matrices depend on the excitation frequency; see `at_frequency`."""
         return False

@@ -8,7 +8,6 @@ complex ones, so that nothing of the size of the wheel is ever decomposed.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import gcd
 
 import numpy as np
 import scipy.linalg as sla
@@ -21,11 +20,6 @@ from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.wave_model import WaveModel
 
 
-def period(n_sectors: int, engine_order: int) -> int:
-    """Number of sectors after which a wave repeats itself."""
-    return n_sectors // gcd(n_sectors, engine_order)
-
-
 def unrolled(model: WaveModel, highest: float) -> ReducedModel:
     """The sectors of a travelling wave until it repeats itself, in modal coordinates: unit mass, diagonal stiffness.
 
@@ -35,9 +29,8 @@ def unrolled(model: WaveModel, highest: float) -> ReducedModel:
         compliance there
     Returns the model; contact rows sector by sector, loads and outputs "<name>@<sector>"
     """
-    N, order = model.n_sectors, model.engine_order
-    step = gcd(N, order)
-    n = N // step
+    N, n = model.n_sectors, model.sectors_in_time
+    step = N // n
     lam, ports, damping, gyroscopic, circulatory = [], [], [], [], []
     for index in range(0, N // 2 + 1, step):
         squares, rows, c, g, flow = _modes(*model.at_index(index), highest)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from math import gcd
 from typing import Self
 
 import numpy as np
@@ -55,6 +56,11 @@ class WaveModel(ReducedModel):
     def is_wave(self) -> bool:
         """Yes."""
         return True
+
+    @property
+    def sectors_in_time(self) -> int:
+        """Sectors after which the wave repeats itself."""
+        return self.n_sectors // gcd(self.n_sectors, self.engine_order)
 
     def at_index(self, index: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """System and contact map of any wave of the wheel; those of index -j are the conjugates of those of j."""

@@ -27,7 +27,6 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.linear.expansion import stuck_modes
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.reduction.wave_model import as_wave
 
 COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: how far truncation drives copies apart
 
@@ -47,8 +46,10 @@ class WaveModes:
     """
 
     def __init__(self, model: ReducedModel, stiffness: np.ndarray, n_modes: int):
+        from tribodyn.reduction.wave_model import as_wave  # only wheels need it
+
         wave = as_wave(model)
-        self.n_sectors = wave.n_sectors
+        self.n_sectors, self.engine_order = wave.n_sectors, wave.engine_order
         self._per_index, self._k, self.m = wave.at_index, np.asarray(stiffness, float).ravel(), n_modes
         self._made: dict[int, _Index] = {}
 
@@ -92,7 +93,7 @@ def exponents(
         the perturbation; answer : as of `settled`
     Returns exponents (n,) [1/s] and the index d (n,) of each perturbation, from -N/2 + 1 to N/2
     """
-    order, n = as_wave(balance.model).engine_order, modes.n_sectors
+    order, n = modes.engine_order, modes.n_sectors
     active = np.flatnonzero(np.abs(slope).max(axis=(1, 2, 3, 4)) > 0)
     blocks = of_exponentials(slope[active])
     c = slope.shape[1]

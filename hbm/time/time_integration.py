@@ -19,7 +19,6 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
-from tribodyn.hbm.time import wave_in_time
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.stepper import RESOLVED, Options, TimeStepper
 from tribodyn.hbm.time.time_step import Moving
@@ -171,6 +170,8 @@ def in_time(
     """The problem that has an equation of motion in time, and the start: a wave as the sectors until it repeats."""
     if not balance.model.is_wave:
         return balance, start
+    from tribodyn.hbm.time import wave_in_time  # only wheels need it
+
     whole = wave_in_time.unroll(balance, RESOLVED * options.steps * omega / (2 * np.pi))
     return whole, None if start is None else wave_in_time.state_of(balance, whole, start)
 

@@ -8,19 +8,14 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.linear import travelling_wave as waves
-from tribodyn.reduction.unrolled import period, unrolled
-from tribodyn.reduction.wave_model import WaveModel, as_wave
-
-
-def sectors_of(balance: HarmonicBalance) -> int:
-    """Sectors that the problem stands for in time: one, or those of a wave until it repeats itself."""
-    model = balance.model
-    return period(model.n_sectors, model.engine_order) if isinstance(model, WaveModel) else 1
+from tribodyn.reduction.unrolled import unrolled
+from tribodyn.reduction.wave_model import as_wave
 
 
 def unroll(balance: HarmonicBalance, highest: float) -> HarmonicBalance:
     """The problem of a wave on all sectors until it repeats itself; `highest` as in `reduction.unrolled`."""
-    wave, n = as_wave(balance.model), sectors_of(balance)
+    wave = as_wave(balance.model)
+    n = wave.sectors_in_time
     load = waves.on_wheel(balance.excitation, wave.engine_order, wave.n_sectors, n)
     whole = HarmonicBalance.of(
         unrolled(wave, highest),
@@ -37,5 +32,5 @@ def unroll(balance: HarmonicBalance, highest: float) -> HarmonicBalance:
 def state_of(balance: HarmonicBalance, whole: HarmonicBalance, state: State) -> State:
     """The state of a wave as that of all its sectors."""
     wave, basis = as_wave(balance.model), balance.basis
-    x = [waves.at_sector(basis, state.x, wave.engine_order, wave.n_sectors, n) for n in range(sectors_of(balance))]
+    x = [waves.at_sector(basis, state.x, wave.engine_order, wave.n_sectors, n) for n in range(wave.sectors_in_time)]
     return whole.evaluate(state.omega, np.concatenate(x))

@@ -21,7 +21,6 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.stability import exponents
-from tribodyn.hbm.time import wave_in_time
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import PeriodicMotion
@@ -214,7 +213,7 @@ def with_growth(problem: WearProblem, state: WearState, always: bool = False) ->
         unknowns
     """
     balance = problem.balance
-    sectors = wave_in_time.sectors_of(balance)
+    sectors = balance.model.sectors_in_time
     few = balance.contact.stiffness.size * balance.basis.n_coeff * sectors <= MOST_UNKNOWNS
     if state.failure or not (few or (always and not balance.model.is_wave)):
         return state

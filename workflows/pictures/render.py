@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
-from tribodyn.workflows.pictures import exploded, maps, offscreen, opened as book, render_wheel, view as drawing
+from tribodyn.workflows.pictures import exploded, maps, offscreen, opened as book, view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.theme import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
@@ -57,6 +57,8 @@ def figures(
         pictures["exploded"] = partial(exploded.exploded_picture, result)
     wheel = result.facts.around
     if wheel is not None and result.fields is not None:
+        from tribodyn.workflows.pictures import render_wheel  # only wheels need it
+
         pictures["wheel"] = partial(render_wheel.wheel_picture, result, wheel, deformation)
     return pictures
 

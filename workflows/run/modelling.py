@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -40,7 +40,6 @@ from tribodyn.workflows.run import (
     memory,
     part_reduction,
     settings,
-    tightening,
 )
 from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
 from tribodyn.workflows.run.progress import Progress
@@ -50,6 +49,9 @@ from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
 from tribodyn.workflows.scene.solution import HIGHEST
+
+if TYPE_CHECKING:
+    from tribodyn.fem.bolts import Bolt
 
 Kind = TypeVar("Kind", bound=ReducedModel)
 
@@ -146,7 +148,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
         loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
     joined = bodies.joined(scene, folder or Path())
     loads |= joined.loads
-    rods = tightening.rods(scene, mesh, node_sets)
+    rods = shanks(scene, mesh, node_sets)
     loads |= rods
     turning = None if scene.geometry is None else scene.geometry.no_turning
     if joined.masses and scene.wheel is not None and scene.wheel.speed:
@@ -165,12 +167,21 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
             name: NodalForce(output.group, output.direction)
             for name, output in {settings.OUTPUT: scene.response, **scene.response.others}.items()
         }
-        | {tightening.output(name): Sum(((rod, -1.0),)) for name, rod in rods.items()},
+        | {f"{part_reduction.BOLTS}{name}": Sum(((rod, -1.0),)) for name, rod in rods.items()},
         springs=[*joined.springs, *(rod for rod in rods.values() if rod.stiffness)],
         held=[] if turning is None else [NoMeanRotation(turning)],
         constraints=joined.constraints,
         masses=joined.masses,
     )
+
+
+def shanks(scene: MeshScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> dict[str, Bolt]:
+    """The shanks of the bolts of a scene, which are loads, springs and outputs."""
+    if not scene.bolts:
+        return {}
+    from tribodyn.workflows.run import tightening  # only bolts need it
+
+    return tightening.rods(scene, mesh, node_sets)
 
 
 def with_surfaces(file: SceneFile, part: Part) -> tuple[Part, tuple[str, ...]]:
@@ -260,8 +271,10 @@ class Problem:
         """The problem of a scene, its bolts tightened."""
         made, bolts = joints.make_joints(scene, reduced), {}
         if isinstance(scene, MeshScene) and scene.bolts and part is not None:
+            from tribodyn.workflows.run import tightening  # only bolts need it
+
             alone = tightening.BoltsAlone(reduced, made, scene.harmonics.samples, settings.highest_frequency(scene))
-            bolts = tightening.tightened(scene, tightening.rods(scene, part.mesh, part.node_sets), alone)
+            bolts = tightening.tightened(scene, shanks(scene, part.mesh, part.node_sets), alone)
         return cls(scene, part, reduced, made, bolts)
 
     def balance(self, harmonics: tuple[int, ...], like: HarmonicBalance | None = None) -> HarmonicBalance:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.assembly import pieces
 from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.factor import SingularStiffness
@@ -50,8 +49,11 @@ def contacts(scene: MeshScene) -> list[ContactFaces]:
             )
             for face in c.groups
         ]  # fmt: skip
-        outward = scene.wheel if c.meets_next else None
-        found += own if outward is None else cyclic_symmetry.with_neighbours(own, outward.sectors, outward.axis)
+        if c.meets_next and scene.wheel is not None:
+            from tribodyn.fem.cyclic_symmetry import with_neighbours  # only wheels need it
+
+            own = with_neighbours(own, scene.wheel.sectors, scene.wheel.axis)
+        found += own
     return found
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -21,9 +21,8 @@ from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterCh
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.reduction.relative import body_1_dofs, relative
-from tribodyn.reduction.sector_reduction import ReducedSector
 from tribodyn.reduction.sensitivity import Sensitivity
-from tribodyn.workflows.run import bodies, joints, matrix_model, modelling, part_reduction, sector
+from tribodyn.workflows.run import bodies, joints, matrix_model, modelling, part_reduction
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.body import Meshed, SolidMaterial
 from tribodyn.workflows.scene.contact import ContactTable
@@ -35,6 +34,9 @@ from tribodyn.workflows.scene.schema import MeshScene, Scene
 from tribodyn.workflows.scene.sectors import WheelTable
 from tribodyn.workflows.scene.stages import CONTACT, REDUCTION
 from tribodyn.workflows.scene.structure import BoltTable
+
+if TYPE_CHECKING:
+    from tribodyn.reduction.sector_reduction import ReducedSector
 
 # relative, of a number that acts on contact, loads or damping alone. With 1e-7 forces round: the law of scaling of the
 # beam's stiffness is 2e-6 off, for 3e-8; with 1e-5 a peak at a corner, seen from 3e-4 half widths, 3e-4, for 3e-6
@@ -231,6 +233,8 @@ class Varying:
             there = self.nodes_moved(key)[int(share < 0)]
             rows = [(self._coordinates(there)[1].B, self._here[1].B)]
             if wave is not None:
+                from tribodyn.workflows.run import sector
+
                 rows.append(tuple(sector.sector(scene, one).left for one in (there, cast(Part, self.part))))
             turned = [abs(share) / NODES * ((new - old) @ following.shapes) for new, old in rows]
             moved = replace(moved, interface=self._interface(moved.interface, key, value, turned[0]))
