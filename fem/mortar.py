@@ -21,6 +21,7 @@ from skfem.quadrature import get_quadrature
 
 from tribodyn.fem.assembly import piece_of_facets
 from tribodyn.fem.elements import coordinates
+from tribodyn.fem.facet_cuts import clip_polygons, locate_on_facets, polygon_areas, reference_corners, tangent_planes
 from tribodyn.fem.surface import facet_nodes, require_outside, tabulate
 
 
@@ -153,22 +154,22 @@ def shared_surface(one: Side, two: Side, reach: float) -> SharedSurface:
         return SharedSurface(
             i, j, pairs, pairs, none, np.zeros((0, 3)), none, np.zeros(1, int), np.zeros(len(one.nodes))
         )
-    frames = _planes(one.normal)[i]
+    frames = tangent_planes(one.normal)[i]
     curved = one.bulge > MORTAR.curved
     outline = _outline(two, two.bulge > MORTAR.curved)[j]
     corners = one.points[:, : one.corners]
     if curved:
-        region = _reference(one.corners)[None].repeat(len(i), axis=0)
+        region = reference_corners(one.corners)[None].repeat(len(i), axis=0)
         m = outline.shape[1]
-        s = _place(one.points[i].repeat(m, 0), outline.reshape(-1, 3), frames.repeat(m, 0))
+        s = locate_on_facets(one.points[i].repeat(m, 0), outline.reshape(-1, 3), frames.repeat(m, 0))
         subject = s.T.reshape(len(i), m, 2)
     else:
         region = np.einsum("pkx,pdx->pkd", corners[i] - one.centre[i][:, None], frames)
         subject = np.einsum("pkx,pdx->pkd", outline - one.centre[i][:, None], frames)
-    whole = _area(region)
+    whole = polygon_areas(region)
     region[whole < 0] = region[whole < 0][:, ::-1]
-    polygon = _clip(subject, region)
-    found = np.abs(_area(polygon)) > MORTAR.sliver * np.abs(whole)
+    polygon = clip_polygons(subject, region)
+    found = np.abs(polygon_areas(polygon)) > MORTAR.sliver * np.abs(whole)
     i, j, frames, polygon, whole = i[found], j[found], frames[found], polygon[found], np.abs(whole[found])
 
     X, w = get_quadrature(ElementTriP1, MORTAR.curved_order if curved else MORTAR.flat_order)
@@ -187,7 +188,7 @@ def shared_surface(one: Side, two: Side, reach: float) -> SharedSurface:
     else:
         e = frames[of]
         at = one.centre[i[of]] + s[0][:, None] * e[:, 0] + s[1][:, None] * e[:, 1]
-        xi = _place(local, at, e)
+        xi = locate_on_facets(local, at, e)
     N, slopes = tabulate(local.shape[1], xi)
     x = np.einsum("an,nax->nx", N, local)
     normal = np.cross(*np.einsum("ain,nax->inx", slopes, local)) * one.sign[i[of]][:, None]
@@ -195,10 +196,10 @@ def shared_surface(one: Side, two: Side, reach: float) -> SharedSurface:
     if curved:
         weight = weight * size
     normal = normal / size[:, None]
-    eta = _place(two.points[j[of]], x, frames[of])
+    eta = locate_on_facets(two.points[j[of]], x, frames[of])
     y = np.einsum("an,nax->nx", tabulate(two.points.shape[1], eta)[0], two.points[j[of]])
     gap = np.einsum("nx,nx->n", y - x, normal)
-    covered = np.bincount(i, np.abs(_area(polygon)) / whole, len(one.nodes))
+    covered = np.bincount(i, np.abs(polygon_areas(polygon)) / whole, len(one.nodes))
     near = np.abs(gap) <= reach
     starts = np.append(np.flatnonzero(np.diff(of[near], prepend=-1)), near.sum())
     if not near.all():
@@ -273,18 +274,6 @@ def _candidates(one: Side, two: Side, reach: float) -> tuple[np.ndarray, np.ndar
     return i[meet], j[meet]
 
 
-def _planes(normal: np.ndarray) -> np.ndarray:
-    """Two directions (n, 2, 3) normal to each normal and to each other."""
-    least = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    first = np.cross(normal, least)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(normal, first)], axis=1)
-
-
-def _reference(corners: int) -> np.ndarray:
-    return np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]) if corners == 4 else np.array([[0.0, 0], [1, 0], [0, 1]])
-
-
 def _outline(of: Side, curved: bool) -> np.ndarray:
     """Points (n_facet, m, 3) around each facet: its corners, and more where edges are curved."""
     n = of.corners
@@ -296,72 +285,3 @@ def _outline(of: Side, curved: bool) -> np.ndarray:
     shape = (1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)
     edge = sum(N * p[:, :, None] for N, p in zip(shape, (corners, middles, following), strict=True))
     return np.asarray(edge).reshape(len(corners), -1, 3)
-
-
-def _area(polygon: np.ndarray) -> np.ndarray:
-    """Signed areas of polygons (n, m, 2)."""
-    x, y = polygon[..., 0], polygon[..., 1]
-    return np.asarray((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2)
-
-
-def _clip(subject: np.ndarray, region: np.ndarray) -> np.ndarray:
-    """Polygons (n, m, 2) cut by convex ones (n, k, 2), counterclockwise; vertices may repeat, none left is all equal.
-
-    Source  Sutherland and Hodgman, Communications of the ACM 17, 1974, for all polygons at once: a vertex that is cut
-        off moves to where its edges cross the line, so that each cut doubles no more than the vertices
-    """
-    for k in range(region.shape[1]):
-        start, end = region[:, k], region[:, (k + 1) % region.shape[1]]
-        edge = end - start
-        away = subject - start[:, None]
-        inside = edge[:, None, 0] * away[..., 1] - edge[:, None, 1] * away[..., 0]
-        following, beyond = np.roll(subject, -1, axis=1), np.roll(inside, -1, axis=1)
-        crosses = (inside >= 0) != (beyond >= 0)
-        t = np.divide(inside, inside - beyond, out=np.zeros_like(inside), where=crosses)
-        crossing = subject + t[..., None] * (following - subject)
-        m = subject.shape[1]
-        candidates = np.stack([subject, crossing], axis=2).reshape(len(subject), 2 * m, 2)
-        kept = np.stack([inside >= 0, crosses], axis=2).reshape(len(subject), 2 * m)
-        count = kept.sum(axis=1)
-        width = max(int(count.max(initial=0)), 1)
-        order = np.argsort(~kept, axis=1, kind="stable")[:, :width]
-        packed = np.take_along_axis(candidates, order[..., None], axis=1)
-        last = np.maximum(count - 1, 0)[:, None]
-        place = np.minimum(np.arange(width)[None], last)
-        subject = np.take_along_axis(packed, place[..., None], axis=1)
-        subject[count == 0] = 0.0
-    return subject
-
-
-def _place(points: np.ndarray, at: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Reference coordinates (2, n) of the point of each facet that lies at `at` as seen along the normal to e.
-
-    points : (n, k, 3) facets; at : (n, 3); e : (n, 2, 3). Far outside a facet its map at the middle is taken as linear
-    """
-    k = points.shape[1]
-    xi = np.full((2, len(at)), 0.5 if k in (9, 4) else 1 / 3)
-    first = None
-    open_ = np.arange(len(at))
-    for _ in range(25):
-        N, slopes = tabulate(k, xi[:, open_])
-        local = points[open_]
-        off = np.einsum("nix,nx->ni", e[open_], at[open_] - np.einsum("an,nax->nx", N, local))
-        J = e[open_] @ (slopes.T @ local).transpose(0, 2, 1)
-        det = J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0]
-        det = np.where(det == 0, np.inf, det)
-        step = (
-            np.stack([J[:, 1, 1] * off[:, 0] - J[:, 0, 1] * off[:, 1], J[:, 0, 0] * off[:, 1] - J[:, 1, 0] * off[:, 0]])
-            / det
-        )
-        xi[:, open_] += step
-        if first is None:
-            first = xi.copy()
-        open_ = open_[np.abs(step).max(axis=0) > 1e-13]
-        if not len(open_):
-            break
-    assert first is not None or not len(at)
-    lost = ~(np.abs(xi - 0.5).max(axis=0, initial=0) < 3.0)
-    lost[open_] |= np.abs(xi[:, open_] - 0.5).max(axis=0, initial=0) > 1.0
-    if lost.any() and first is not None:
-        xi[:, lost] = first[:, lost]
-    return xi

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import maximum_filter
 
-from tribodyn.geometry.height_map import LIMITS, HeightMap, centred, repair, split
+from tribodyn.geometry.height_map import HeightMap, centred
+from tribodyn.geometry.map_repair import LIMITS, repair, split
 from tribodyn.refusal import Refusal
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -20,7 +20,6 @@ import numpy as np
 from tribodyn.geometry.placement import rotation
 from tribodyn.geometry.sources.directions import System, orthogonal
 from tribodyn.geometry.sources.keywords import Card, cards
-from tribodyn.geometry.sources.raw_mesh import NOTHING, VOLUMES, Cells, RawMesh
 from tribodyn.refusal import Refusal
 
 # first letters and number of nodes of a solid -> meshio's kind
@@ -37,7 +36,7 @@ SOLIDS = {
 }
 _SOLID = re.compile(r"^(?:D?C3D|F3D|AC3D|DCC3D|Q3D)(\d+)")
 # Abaqus numbers the nodes of a hexahedron beyond 20: middle, then faces S1 to S6
-_HEXAHEDRON_27 = [*range(20), 26, 24, 23, 25, 21, 22, 20]
+HEXAHEDRON_27 = [*range(20), 26, 24, 23, 25, 21, 22, 20]
 # corners of the faces S1, S2, ... of a solid with so many corners
 FACES: dict[int, tuple[tuple[int, ...], ...]] = {
     4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
@@ -225,7 +224,7 @@ def _nodes(card: Card, scope: Scope) -> None:
 
 def _elements(card: Card, scope: Scope) -> None:
     kind = card.option("TYPE").upper()
-    count = _count(kind)
+    count = solid_node_count(kind)
     labels = []
     numbers: list[int] = []
     for line in card.data:
@@ -241,7 +240,7 @@ def _elements(card: Card, scope: Scope) -> None:
         scope.elsets.setdefault(scope.name(card.option("ELSET")), []).extend(labels)
 
 
-def _count(kind: str) -> int | None:
+def solid_node_count(kind: str) -> int | None:
     """Nodes of a solid element by its type; None for elements that are none."""
     found = _SOLID.match(kind)
     return int(found[1]) if found and int(found[1]) in SOLIDS else None
@@ -279,161 +278,3 @@ MESH_CARDS: dict[str, Callable[[Card, Scope], None]] = {
     "DISTRIBUTION": lambda card, scope: scope.distributions.update({card.option("NAME").upper(): card}),
     **dict.fromkeys(GENERATORS, _generator),
 }
-
-
-def raw_of(assembly: DeckAssembly) -> tuple[RawMesh, dict[Node, int], dict[Node, int]]:
-    """Mesh, sets and surfaces of a deck, lengths as in the file, the row of each node and the number of each solid.
-
-    Raises  ValueError: an element that names a node that is not there
-    """
-    scopes = {**assembly.instances, "": assembly.top}
-    row: dict[Node, int] = {}
-    points: list[np.ndarray] = []
-    for name, scope in scopes.items():
-        turn, shift = assembly.moves.get(name, (np.eye(3), np.zeros(3)))
-        if scope.nodes:
-            start = len(row)
-            row |= {(name, label): start + i for i, label in enumerate(scope.nodes)}
-            points.append(np.array(list(scope.nodes.values())) @ turn.T + shift)
-    number: dict[Node, int] = {}
-    by_kind: dict[str, list[tuple[Node, list[int]]]] = {}
-    other: Counter[str] = Counter()
-    for name, scope in scopes.items():
-        for label, (kind, nodes) in scope.elements.items():
-            count = _count(kind)
-            if count is None:
-                other[kind] += 1
-                continue
-            try:
-                by_kind.setdefault(SOLIDS[count], []).append(
-                    ((name, label), [row[name, node] for node in nodes[:count]])
-                )
-            except KeyError as missing:
-                raise Refusal(
-                    f"element {label}{f' of {name}' if name else ''} names node {missing.args[0][1]}, which the deck "
-                    "has not: the deck is cut off or nodes are missing"
-                ) from None
-    blocks = []
-    for kind, elements in by_kind.items():
-        number |= {key: len(number) + i for i, (key, _) in enumerate(elements)}
-        table = np.array([members for _, members in elements])
-        table = table[:, _HEXAHEDRON_27] if kind == "hexahedron27" else table
-        blocks.append(Cells(kind, table, np.array([key[1] for key, _ in elements])))
-    if not blocks:
-        return NOTHING, row, number
-    refused = {
-        kind: f"{count} elements of type {kind}" for kind, count in other.items() if not kind.startswith(CARRIED)
-    }
-    sets = _Sets(assembly, row, number, blocks)
-    sets.collect(scopes)
-    labels = np.array([label for _, label in row], dtype=int)
-    everything = np.vstack(points) if points else np.empty((0, 3))
-    raw = RawMesh(
-        everything,
-        labels,
-        blocks,
-        sets.volumes,
-        sets.faces,
-        sets.nodes,
-        bodies=tuple(name for name in assembly.instances if name in sets.volumes),
-        skins=frozenset(sets.nodes),
-        unused=sets.unused,
-        refused=refused,
-    )
-    return raw, row, number
-
-
-@dataclass
-class _Sets:
-    """Sets and surfaces of all scopes, resolved to rows and element numbers."""
-
-    assembly: DeckAssembly
-    row: dict[Node, int]
-    number: dict[Node, int]
-    blocks: Sequence[Cells]
-    volumes: dict[str, np.ndarray] = field(default_factory=dict)
-    faces: dict[str, list[np.ndarray]] = field(default_factory=dict)
-    nodes: dict[str, np.ndarray] = field(default_factory=dict)
-    unused: list[str] = field(default_factory=list)
-
-    def collect(self, scopes: dict[str, Scope]) -> None:
-        """Resolve the sets of all scopes; those of an instance bear its name before a dot."""
-        for instance in self.assembly.instances:
-            held = [self.number[key] for key in self.number if key[0] == instance]
-            if held:
-                self.volumes[instance] = np.array(held)
-        for instance, scope in scopes.items():
-            before = f"{instance}." if instance else ""
-            for key in scope.elsets:
-                self._elset(before + scope.names[key], self._try(self.assembly.elements, key, instance, "element set"))
-            for key in scope.nsets:
-                self._nset(before + scope.names[key], self._try(self.assembly.nodes, key, instance, "node set"))
-            for key, (kind, items) in scope.surfaces.items():
-                self._surface(before + scope.names[key], kind, items, instance)
-
-    def _try(self, resolve: Callable[[str, str], list[Node]], key: str, instance: str, what: str) -> list[Node]:
-        try:
-            return list(resolve(key, instance))
-        except KeyError as missing:
-            self.unused.append(f"{what} '{key}', which names '{missing.args[0]}' that the deck has not")
-            return []
-
-    def _elset(self, name: str, members: Iterable[Node]) -> None:
-        members = list(members)
-        solid = [self.number[key] for key in members if key in self.number]
-        if solid:
-            self.volumes.setdefault(name, np.unique(solid))
-
-    def _nset(self, name: str, members: list[Node]) -> None:
-        rows = [self.row[key] for key in members if key in self.row]
-        if len(rows) < len(members):
-            self.unused.append(f"{len(members) - len(rows)} nodes of node set '{name}', which the deck has not")
-        if rows:
-            self.nodes.setdefault(name, np.unique(rows))
-
-    def _surface(self, name: str, kind: str, items: list[tuple[str, str]], instance: str) -> None:
-        if kind == "NODE":
-            members = [node for item, _ in items for node in self._try(self.assembly.nodes, item, instance, "surface")]
-            self._nset(name, members)
-            return
-        if kind != "ELEMENT":
-            self.unused.append(f"surface '{name}' of type {kind}")
-            return
-        corners: list[np.ndarray] = []
-        for item, face in items:
-            members = self._try(self.assembly.elements, item, instance, f"surface '{name}'")
-            numbers = np.array([self.number[key] for key in members if key in self.number], dtype=int)
-            if len(numbers):
-                corners += self._faces(numbers, face, name)
-        if corners:
-            self.faces[name] = corners
-
-    def _faces(self, numbers: np.ndarray, face: str, name: str) -> list[np.ndarray]:
-        found, start = [], 0
-        for block in self.blocks:
-            inside = numbers[(numbers >= start) & (numbers < start + len(block.nodes))] - start
-            start += len(block.nodes)
-            if not len(inside):
-                continue
-            faces = FACES[VOLUMES[block.kind][0].corners]
-            if face in ("", "SPOS"):
-                found += [block.nodes[inside][:, list(corners)] for corners in faces]
-            elif face[1:].isdigit() and 1 <= int(face[1:]) <= len(faces):
-                found.append(block.nodes[inside][:, list(faces[int(face[1:]) - 1])])
-            else:
-                self.unused.append(f"face {face} of {len(inside)} elements of surface '{name}', which they have not")
-        return free_faces(found, self.blocks) if face in ("", "SPOS") else found
-
-
-def free_faces(parts: list[np.ndarray], blocks: Sequence[Cells]) -> list[np.ndarray]:
-    """Those of some faces, corners (k, 3 or 4), that belong to one element of the mesh only."""
-    seen: Counter[tuple[int, ...]] = Counter()
-    for block in blocks:
-        for corners in FACES[VOLUMES[block.kind][0].corners]:
-            seen.update(map(tuple, np.sort(block.nodes[:, list(corners)], axis=1).tolist()))
-    kept = []
-    for part in parts:
-        outer = np.array([seen[tuple(key)] == 1 for key in np.sort(part, axis=1).tolist()], dtype=bool)
-        if outer.any():
-            kept.append(part[outer])
-    return kept

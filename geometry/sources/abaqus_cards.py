@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry.sources import abaqus, deck
-from tribodyn.geometry.sources.abaqus import DeckAssembly, Node
-from tribodyn.geometry.sources.card_table import CardTable, SkippedCards
-from tribodyn.geometry.sources.directions import Directions, ElementAxes, System, axis_rotation, orthogonal
+from tribodyn.geometry.sources.abaqus_materials import MaterialCards
+from tribodyn.geometry.sources.abaqus_sets import raw_of
+from tribodyn.geometry.sources.abaqus_table import TABLE as TABLE
 from tribodyn.geometry.sources.keywords import Card
-from tribodyn.geometry.sources.raw_mesh import VOLUMES, RawMesh
+from tribodyn.geometry.sources.raw_mesh import RawMesh
 from tribodyn.refusal import Refusal
 
 # named supports -> axes that they hold
@@ -31,35 +31,12 @@ NAMED_SUPPORTS = {
 # read first, as the points that they name are known by these names then, and tables of materials need temperatures
 FIRST = {"COUPLING", "KINEMATIC", "DISTRIBUTING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "RIGID BODY",
          "INITIAL CONDITIONS", "SURFACE INTERACTION", "CHANGE FRICTION", "FRICTION"}  # fmt: skip
-TABLE = CardTable(
-    read="""NODE, ELEMENT, NSET, ELSET, SURFACE, SOLID SECTION, PART, END PART, INSTANCE, END INSTANCE, ASSEMBLY,
-        END ASSEMBLY, INCLUDE, SYSTEM, ORIENTATION, DISTRIBUTION, MATERIAL, ELASTIC, DENSITY, EXPANSION, MASS, SPRING,
-        TIE, EQUATION, COUPLING, KINEMATIC, DISTRIBUTING, KINEMATIC COUPLING, DISTRIBUTING COUPLING, RIGID BODY, CLOAD,
-        BOUNDARY, DSLOAD, DLOAD, INITIAL CONDITIONS, STEP, CONTACT PAIR, SURFACE INTERACTION, CHANGE FRICTION,
-        FRICTION""",
-    silent="""HEADING, PREPRINT, RESTART, OUTPUT, NODE OUTPUT, ELEMENT OUTPUT, CONTACT OUTPUT, ENERGY OUTPUT,
-        NODE PRINT, NODE FILE, EL PRINT, EL FILE, CONTACT PRINT, CONTACT FILE, END STEP, MONITOR, PRINT, ENERGY PRINT,
-        SECTION PRINT, FILE FORMAT""",
-    harmless={
-        "the step is the scene's": """STATIC, FREQUENCY, DYNAMIC, BUCKLE, VISCO, STEADY STATE DYNAMICS, MODAL DYNAMIC,
-            RANDOM RESPONSE, RESPONSE SPECTRUM, COMPLEX FREQUENCY, HEAT TRANSFER, SUBSTRUCTURE GENERATE,
-            SUBSTRUCTURE MATRIX OUTPUT, SUBSTRUCTURE LOAD CASE, RETAINED NODAL DOFS, SELECT EIGENMODES, AMPLITUDE,
-            MATRIX GENERATE, MATRIX OUTPUT, CONTROLS, SOLUTION TECHNIQUE, TIME POINTS, SECTION CONTROLS,
-            HOURGLASS STIFFNESS, DISTRIBUTION TABLE, PHYSICAL CONSTANTS, USER OUTPUT, FILTER, NORMAL""",
-        "damping is the scene's": "DAMPING, MODAL DAMPING, GLOBAL DAMPING, DAMPING CONTROLS",
-        "bodies are elastic": "PLASTIC, CREEP, CYCLIC HARDENING, RATE DEPENDENT, CONDUCTIVITY, SPECIFIC HEAT",
-        "contact is the scene's": """SURFACE BEHAVIOR, CONTACT, CONTACT INCLUSIONS,
-            CONTACT EXCLUSIONS, CONTACT PROPERTY ASSIGNMENT, CONTACT CONTROLS, CONTACT CONTROLS ASSIGNMENT,
-            CONTACT FORMULATION, CONTACT INITIALIZATION ASSIGNMENT, CONTACT INITIALIZATION DATA, CONTACT DAMPING,
-            CLEARANCE, GAP CONDUCTANCE, SURFACE PROPERTY ASSIGNMENT""",
-    },
-)
 
 
 def read(path: Path) -> RawMesh:
     """Read a deck. Raises ValueError: one sentence that names the card and the cure."""
     assembly = abaqus.load(path)
-    raw, row, number = abaqus.raw_of(assembly)
+    raw, row, number = raw_of(assembly)
     if not raw.cells:
         return raw
     reader = _Cards(assembly, raw, row, number)
@@ -69,14 +46,9 @@ def read(path: Path) -> RawMesh:
 
 
 @dataclass
-class _Cards:
+class _Cards(MaterialCards):
     """Cards taken one after the other; what they name is turned into groups of the mesh."""
 
-    assembly: DeckAssembly
-    raw: RawMesh
-    row: dict[Node, int]
-    number: dict[Node, int]
-    materials: dict[str, deck.DeckMaterial] = field(default_factory=dict)
     ties: list[deck.DeckTie] = field(default_factory=list)
     contacts: list[deck.DeckTie] = field(default_factory=list)
     couplings: list[deck.Coupling] = field(default_factory=list)
@@ -84,28 +56,12 @@ class _Cards:
     forces: list[deck.Force] = field(default_factory=list)
     pressures: list[deck.FacePressure] = field(default_factory=list)
     supports: list[deck.Support] = field(default_factory=list)
-    nodes: dict[str, np.ndarray] = field(default_factory=dict)
-    faces: dict[str, list[np.ndarray]] = field(default_factory=dict)
-    references: dict[int, str] = field(default_factory=dict)
     unused: list[str] = field(default_factory=list)
     springs: list[deck.DeckSpring] = field(default_factory=list)
-    met: SkippedCards = field(default_factory=lambda: SkippedCards(TABLE, "*"))
     steps: int = 0
     frictions: dict[str, float] = field(default_factory=dict)  # of surface interactions
     interaction: str = ""
-    material: str = ""
     coupling: Card | None = None
-    solid: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool))
-    warm: np.ndarray = field(default_factory=lambda: np.empty(0))  # initial temperature of each point
-
-    def __post_init__(self) -> None:
-        self.solid, self.warm = np.zeros(len(self.raw.points), dtype=bool), np.full(len(self.raw.points), np.nan)
-        for block in self.raw.cells:
-            self.solid[block.nodes] = True
-        self.keys = list(self.row)
-        for name, rows in self.raw.nodes.items():  # a point has one name, whichever of its sets a card takes
-            if len(rows) == 1 and not self.solid[rows[0]]:
-                self.references.setdefault(int(rows[0]), name)
 
     def take(self, card: Card) -> None:
         """Use a card, or count it among those that are not used or refused."""
@@ -113,63 +69,6 @@ class _Cards:
             getattr(self, "_" + card.name.lower().replace(" ", "_"))(card)
         else:
             self.met.other(card.name)
-
-    def _refused(self, card: Card, what: str = "") -> None:
-        """Refuse a card, or one form of it."""
-        self.met.refuse(f"*{card.name}{what and ', '}{what}")
-
-    # materials
-
-    def _material(self, card: Card) -> None:
-        self.material = card.option("NAME").upper()
-        if self.material in self.materials:
-            raise Refusal(f"{card.where} defines the material '{card.option('NAME')}' again: give each its own name")
-        self.materials[self.material] = deck.DeckMaterial(card.option("NAME"))
-
-    def _elastic(self, card: Card) -> None:
-        kind = card.option("TYPE").upper() or "ISO"
-        if kind.startswith("ISO") and (values := self._row(card, 2, 1)):
-            self._give(card, young=values[0], poisson=values[1])
-        elif kind.startswith("ENGINEERING") and (values := self._row(card, 9, 2)):
-            self._give(card, engineering=tuple(values))
-        elif kind.startswith("ORTHO") and (values := self._row(card, 9, 2)) and _regular(values):
-            self._give(card, engineering=engineering_constants(values))
-        elif kind.startswith("ANISO") and (values := self._row(card, 21, 3)):
-            self._give(card, stiffness=anisotropic(values))
-        else:
-            self._refused(card, kind)
-
-    def _row(self, card: Card, count: int, lines: int) -> list[float]:
-        """So many constants, each row on so many lines with its temperature behind it; none where they are not there.
-
-        Several rows are taken at the initial temperature, and refused where that is not one for all
-        """
-        rows = [[card.number(text) for line in card.data[i : i + lines] for text in line]
-                for i in range(0, len(card.data), lines)]  # fmt: skip
-        if not rows or len(rows[0]) < count:
-            return []
-        warm, at = self.warm[self.solid], [row[count] for row in rows if len(row) > count]
-        if len(rows) == 1:
-            return rows[0][:count]
-        if len(at) < len(rows) or not (np.diff(at) > 0).all() or np.ptp(warm) != 0:
-            self._refused(card, "at several temperatures")
-            return rows[0][:count]
-        return [float(np.interp(warm[0], at, column)) for column in list(zip(*rows, strict=False))[:count]]
-
-    def _density(self, card: Card) -> None:
-        if values := self._row(card, 1, 1):
-            self._give(card, density=values[0])
-
-    def _expansion(self, card: Card) -> None:
-        if card.option("TYPE").upper() in ("", "ISO") and (values := self._row(card, 1, 1)):
-            self._give(card, expansion=values[0])
-        else:
-            self._refused(card, card.option("TYPE").upper())
-
-    def _give(self, card: Card, **values: object) -> None:
-        if self.material not in self.materials:
-            raise Refusal(f"{card.where} stands before any *MATERIAL: move it below its material")
-        self.materials[self.material] = replace(self.materials[self.material], **values)  # type: ignore[arg-type]
 
     # constraints
 
@@ -353,75 +252,6 @@ class _Cards:
 
     # places
 
-    def _rows(self, text: str, card: Card) -> list[int]:
-        try:
-            members = self.assembly.nodes(text)
-            return sorted(self.row[node] for node in members)
-        except KeyError:
-            raise Refusal(
-                f"{card.where} names '{text}', which is no node and no set of the deck: correct the name or add the set"
-            ) from None
-
-    def _node(self, row: int) -> str:
-        """Group of one node."""
-        if row not in self.references:
-            name = self._label(row)
-            self.nodes[name] = np.array([row])
-            return name
-        return self.references[row]
-
-    def _label(self, row: int) -> str:
-        instance, label = self.keys[row]
-        return f"node {f'{instance}.' if instance else ''}{label}"
-
-    def _place(self, text: str, card: Card, face: bool = False) -> str:
-        """Name of the group that a card means: a face, a node set, or a group of one node that is made for it."""
-        known = [*self.raw.faces, *self.raw.nodes] if face else [*self.raw.nodes, *self.raw.faces]
-        for name in known:
-            if name.upper() == text.upper():
-                rows = self.raw.nodes.get(name)
-                return self.references.get(int(rows[0]), name) if rows is not None and len(rows) == 1 else name
-        if face and not self._has(text):
-            raise Refusal(
-                f"{card.where} names the surface '{text}', which the deck has not: correct the name or add the surface"
-            )
-        rows_of = self._rows(text, card)
-        if len(rows_of) == 1:
-            return self._node(rows_of[0])
-        self.nodes[text] = np.array(rows_of)
-        return text
-
-    def _has(self, text: str) -> bool:
-        try:
-            return bool(self.assembly.nodes(text))
-        except KeyError:
-            return False
-
-    def _reference(self, text: str, card: Card) -> str:
-        rows = self._rows(text, card)
-        if len(rows) != 1:
-            raise Refusal(f"{card.where} needs one reference node, '{text}' has {len(rows)}: name one node")
-        name = self.references.get(rows[0]) or (f"node {text}" if text.replace(".", "").isdigit() else text)
-        self.references[rows[0]] = name
-        return name
-
-    def _faces_of(self, text: str, face: int, card: Card) -> list[np.ndarray]:
-        try:
-            named = self.assembly.elements(text)
-        except KeyError:
-            named = []
-        wanted = np.array([self.number[key] for key in named if key in self.number], dtype=int)
-        found, start = [], 0
-        for block in self.raw.cells:
-            inside = wanted[(wanted >= start) & (wanted < start + len(block.nodes))] - start
-            start += len(block.nodes)
-            faces = abaqus.FACES[VOLUMES[block.kind][0].corners]
-            if len(inside) and face <= len(faces):
-                found.append(block.nodes[inside][:, list(faces[face - 1])])
-        if not found:
-            self._refused(card, f"on '{text}', which is no solid element")
-        return found
-
     # the end
 
     def finished(self) -> RawMesh:
@@ -461,82 +291,6 @@ class _Cards:
             notes=[*self.raw.notes, *notes],
         )
 
-    def _with_groups(self) -> Iterator[deck.DeckMaterial]:
-        groups: dict[str, dict[str, Directions | None]] = {}
-        for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
-            for card in scope.sections:
-                elset, material = card.option("ELSET"), card.option("MATERIAL")
-                if "COMPOSITE" in card.options:
-                    self._refused(card, "COMPOSITE")
-                    continue
-                if material.upper() not in self.materials:
-                    raise Refusal(
-                        f"*SOLID SECTION of '{elset}' names the material '{material}', which the deck has not: "
-                        "correct the name or add the material"
-                    )
-                wanted = f"{instance}.{elset}" if instance else elset
-                name = next((name for name in self.raw.volumes if name.upper() == wanted.upper()), None)
-                if name:
-                    groups.setdefault(material.upper(), {})[name] = self._directions(card, scope, instance)
-        for key, one in self.materials.items():
-            mine = groups.get(key, {})
-            yield replace(one, groups=tuple(mine), directions={name: axes for name, axes in mine.items() if axes})
-
-    def _directions(self, section: Card, scope: abaqus.Scope, instance: str) -> Directions | None:
-        """Axes of the material of a section, None for x, y, z."""
-        name = section.option("ORIENTATION")
-        if not name:
-            return None
-        scope = scope if name.upper() in scope.orientations else self.assembly.top
-        card = scope.orientations.get(name.upper())
-        if card is None:
-            raise Refusal(f"{section.where} names the orientation '{name}', which the deck has not: add it")
-        if card.option("DEFINITION").upper() not in ("", "COORDINATES") or not card.data:
-            self._refused(card, card.option("DEFINITION").upper())
-            return None
-        turn, shift = self.assembly.moves.get(instance, (np.eye(3), np.zeros(3)))
-        own = np.eye(3)
-        if len(card.data) > 1 and card.data[1][0]:
-            axis, angle = card.floats(card.data[1], 2)
-            if axis not in (1.0, 2.0, 3.0):
-                raise Refusal(f"{card.where} turns about axis {axis:g}: give 1, 2 or 3")
-            own = axis_rotation(int(axis) - 1, angle)
-        table = scope.distributions.get(card.data[0][0].upper())
-        if table is not None:
-            return self._listed(table, instance, turn, own)
-        points = np.array(card.floats(card.data[0], 9)).reshape(3, 3)
-        kind = card.option("SYSTEM").upper() or "RECTANGULAR"
-        if kind in ("RECTANGULAR", "Z RECTANGULAR"):
-            rows = orthogonal(points[0] - points[2], points[1] - points[2])
-            if kind[0] == "Z":  # the first is z, the second x
-                rows = np.roll(rows, -1, axis=0)
-            system = System("rectangular", np.zeros(3), rows, own)
-        elif kind in ("CYLINDRICAL", "SPHERICAL"):
-            pole = points[1] - points[0]
-            aside = np.eye(3)[np.abs(pole).argmin()]
-            system = replace(System.of_points(kind.lower(), points[0], points[1], points[0] + aside), turn=own)
-        else:
-            self._refused(card, kind)
-            return None
-        return system.moved(turn, shift)
-
-    def _listed(self, card: Card, instance: str, turn: np.ndarray, own: np.ndarray) -> ElementAxes:
-        """Axes element by element; those that no line names have those of the first line."""
-        centres = np.vstack([self.raw.points[block.nodes].mean(axis=1) for block in self.raw.cells])
-        mine = [number for (where, _), number in self.number.items() if where == instance]  # labels are those of a part
-        axes: list[np.ndarray] = []
-        which = np.zeros(len(centres), dtype=int)
-        for line in card.data:
-            points = np.array(card.floats(line[1:], 6)).reshape(2, 3)
-            if line[0]:
-                try:
-                    named = self.assembly.elements(line[0], instance)
-                except KeyError:
-                    raise Refusal(f"{card.where} names the elements '{line[0]}', which the deck has not") from None
-                which[[self.number[key] for key in named if key in self.number]] = len(axes)
-            axes.append(own @ orthogonal(*points) @ turn.T)
-        return ElementAxes(centres[mine], np.array(axes)[which[mine]])
-
     def _springs(self) -> Iterator[deck.DeckSpring]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
             for card in scope.springs:
@@ -572,25 +326,3 @@ def _axes(card: Card, fields: list[str]) -> range:
     if not given:
         return range(0)
     return range(given[0] - 1, min(given[-1] if len(given) > 1 else given[0], 6))
-
-
-def engineering_constants(D: list[float]) -> tuple[float, ...]:
-    """(E1, E2, E3, nu12, nu13, nu23, G12, G13, G23) from D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, ..."""
-    S = np.linalg.inv(_normal_block(D))
-    E = 1 / np.diag(S)
-    return (*E.tolist(), float(-S[0, 1] * E[0]), float(-S[0, 2] * E[0]), float(-S[1, 2] * E[1]), *D[6:9])
-
-
-def anisotropic(D: list[float]) -> tuple[tuple[float, ...], ...]:
-    """The stiffness in our order of 21 values: columns of its upper triangle, stresses 11, 22, 33, 12, 13, 23."""
-    by_rows = [D[j * (j + 1) // 2 + i] for i in range(6) for j in range(i, 6)]
-    return deck.stiffness(by_rows, (0, 1, 2, 5, 4, 3))
-
-
-def _normal_block(D: list[float]) -> np.ndarray:
-    return np.array([[D[0], D[1], D[3]], [D[1], D[2], D[4]], [D[3], D[4], D[5]]])
-
-
-def _regular(D: list[float]) -> bool:
-    """Whether a stiffness can be inverted; those of fluids cannot."""
-    return bool(np.linalg.eigvalsh(_normal_block(D))[0] > 0)

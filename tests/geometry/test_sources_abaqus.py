@@ -7,7 +7,7 @@ import pytest
 
 from tribodyn.geometry.mesh import quality
 from tribodyn.geometry.sources import deck, foreign_file
-from tribodyn.geometry.sources.abaqus_cards import engineering_constants
+from tribodyn.geometry.sources.abaqus_materials import engineering_constants
 
 LAP = Path(__file__).parent / "decks" / "lap.inp"
 

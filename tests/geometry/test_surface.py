@@ -8,21 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tribodyn.geometry.height_map import (
-    HeightMap,
-    centred,
-    check,
-    facing_gap,
-    fill_holes,
-    level,
-    mirrored,
-    onto_nodes,
-    prepare,
-    remove_outliers,
-    split,
-    synthetic_pair,
-)
+from tribodyn.geometry.height_map import HeightMap, centred, facing_gap, level, mirrored, onto_nodes, synthetic_pair
 from tribodyn.geometry.height_map_files import read
+from tribodyn.geometry.map_repair import check, fill_holes, prepare, remove_outliers, split
 
 MICRO = 1e-6
 

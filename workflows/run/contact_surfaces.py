@@ -6,7 +6,8 @@ import numpy as np
 import scipy
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.geometry.height_map import centred, facing_gap, onto_nodes, prepare
+from tribodyn.geometry.height_map import centred, facing_gap, onto_nodes
+from tribodyn.geometry.map_repair import prepare
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import kept
 from tribodyn.workflows.scene.contact_numbers import faces

@@ -21,7 +21,7 @@ from tribodyn.geometry.sources.deck import Deck
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import groups as group_pictures
 from tribodyn.workflows.result.readable import named_lines
-from tribodyn.workflows.run import decks, modelling, sanity_checks
+from tribodyn.workflows.run import deck_materials, decks, modelling, sanity_checks
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
@@ -157,7 +157,7 @@ def _of_file(
     for name, body in source.bodies.items():
         mesh, node_sets = decks.with_elements(body.mesh, dict(body.node_sets), table, name)
         try:
-            made = decks.material(source.deck, name, mesh, table, named)
+            made = deck_materials.material(source.deck, name, mesh, table, named)
         except ValueError as sentence:  # no or no whole material
             made, lacking = {}, str(sentence)
         solids.append(Body(name, mesh, node_sets, made))

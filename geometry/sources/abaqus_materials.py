@@ -1,0 +1,180 @@
+"""Materials of an Abaqus or CalculiX deck: constants, and the directions of the bodies made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tribodyn.geometry.sources import abaqus, deck
+from tribodyn.geometry.sources.abaqus_places import DeckPlaces
+from tribodyn.geometry.sources.directions import Directions, ElementAxes, System, axis_rotation, orthogonal
+from tribodyn.geometry.sources.keywords import Card
+from tribodyn.refusal import Refusal
+
+
+@dataclass
+class MaterialCards(DeckPlaces):
+    """Cards of materials and sections.
+
+    materials : name in capitals -> material; material : name of the one whose cards follow
+    warm : (n_point,) initial temperature of each point, NaN where none is given
+    """
+
+    materials: dict[str, deck.DeckMaterial] = field(default_factory=dict)
+    material: str = ""
+    warm: np.ndarray = field(default_factory=lambda: np.empty(0))  # initial temperature of each point
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.warm = np.full(len(self.raw.points), np.nan)
+
+    def _material(self, card: Card) -> None:
+        self.material = card.option("NAME").upper()
+        if self.material in self.materials:
+            raise Refusal(f"{card.where} defines the material '{card.option('NAME')}' again: give each its own name")
+        self.materials[self.material] = deck.DeckMaterial(card.option("NAME"))
+
+    def _elastic(self, card: Card) -> None:
+        kind = card.option("TYPE").upper() or "ISO"
+        if kind.startswith("ISO") and (values := self._row(card, 2, 1)):
+            self._give(card, young=values[0], poisson=values[1])
+        elif kind.startswith("ENGINEERING") and (values := self._row(card, 9, 2)):
+            self._give(card, engineering=tuple(values))
+        elif kind.startswith("ORTHO") and (values := self._row(card, 9, 2)) and _regular(values):
+            self._give(card, engineering=engineering_constants(values))
+        elif kind.startswith("ANISO") and (values := self._row(card, 21, 3)):
+            self._give(card, stiffness=anisotropic(values))
+        else:
+            self._refused(card, kind)
+
+    def _row(self, card: Card, count: int, lines: int) -> list[float]:
+        """So many constants, each row on so many lines with its temperature behind it; none where they are not there.
+
+        Several rows are taken at the initial temperature, and refused where that is not one for all
+        """
+        rows = [[card.number(text) for line in card.data[i : i + lines] for text in line]
+                for i in range(0, len(card.data), lines)]  # fmt: skip
+        if not rows or len(rows[0]) < count:
+            return []
+        warm, at = self.warm[self.solid], [row[count] for row in rows if len(row) > count]
+        if len(rows) == 1:
+            return rows[0][:count]
+        if len(at) < len(rows) or not (np.diff(at) > 0).all() or np.ptp(warm) != 0:
+            self._refused(card, "at several temperatures")
+            return rows[0][:count]
+        return [float(np.interp(warm[0], at, column)) for column in list(zip(*rows, strict=False))[:count]]
+
+    def _density(self, card: Card) -> None:
+        if values := self._row(card, 1, 1):
+            self._give(card, density=values[0])
+
+    def _expansion(self, card: Card) -> None:
+        if card.option("TYPE").upper() in ("", "ISO") and (values := self._row(card, 1, 1)):
+            self._give(card, expansion=values[0])
+        else:
+            self._refused(card, card.option("TYPE").upper())
+
+    def _give(self, card: Card, **values: object) -> None:
+        if self.material not in self.materials:
+            raise Refusal(f"{card.where} stands before any *MATERIAL: move it below its material")
+        self.materials[self.material] = replace(self.materials[self.material], **values)  # type: ignore[arg-type]
+
+    def _with_groups(self) -> Iterator[deck.DeckMaterial]:
+        groups: dict[str, dict[str, Directions | None]] = {}
+        for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
+            for card in scope.sections:
+                elset, material = card.option("ELSET"), card.option("MATERIAL")
+                if "COMPOSITE" in card.options:
+                    self._refused(card, "COMPOSITE")
+                    continue
+                if material.upper() not in self.materials:
+                    raise Refusal(
+                        f"*SOLID SECTION of '{elset}' names the material '{material}', which the deck has not: "
+                        "correct the name or add the material"
+                    )
+                wanted = f"{instance}.{elset}" if instance else elset
+                name = next((name for name in self.raw.volumes if name.upper() == wanted.upper()), None)
+                if name:
+                    groups.setdefault(material.upper(), {})[name] = self._directions(card, scope, instance)
+        for key, one in self.materials.items():
+            mine = groups.get(key, {})
+            yield replace(one, groups=tuple(mine), directions={name: axes for name, axes in mine.items() if axes})
+
+    def _directions(self, section: Card, scope: abaqus.Scope, instance: str) -> Directions | None:
+        """Axes of the material of a section, None for x, y, z."""
+        name = section.option("ORIENTATION")
+        if not name:
+            return None
+        scope = scope if name.upper() in scope.orientations else self.assembly.top
+        card = scope.orientations.get(name.upper())
+        if card is None:
+            raise Refusal(f"{section.where} names the orientation '{name}', which the deck has not: add it")
+        if card.option("DEFINITION").upper() not in ("", "COORDINATES") or not card.data:
+            self._refused(card, card.option("DEFINITION").upper())
+            return None
+        turn, shift = self.assembly.moves.get(instance, (np.eye(3), np.zeros(3)))
+        own = np.eye(3)
+        if len(card.data) > 1 and card.data[1][0]:
+            axis, angle = card.floats(card.data[1], 2)
+            if axis not in (1.0, 2.0, 3.0):
+                raise Refusal(f"{card.where} turns about axis {axis:g}: give 1, 2 or 3")
+            own = axis_rotation(int(axis) - 1, angle)
+        table = scope.distributions.get(card.data[0][0].upper())
+        if table is not None:
+            return self._listed(table, instance, turn, own)
+        points = np.array(card.floats(card.data[0], 9)).reshape(3, 3)
+        kind = card.option("SYSTEM").upper() or "RECTANGULAR"
+        if kind in ("RECTANGULAR", "Z RECTANGULAR"):
+            rows = orthogonal(points[0] - points[2], points[1] - points[2])
+            if kind[0] == "Z":  # the first is z, the second x
+                rows = np.roll(rows, -1, axis=0)
+            system = System("rectangular", np.zeros(3), rows, own)
+        elif kind in ("CYLINDRICAL", "SPHERICAL"):
+            pole = points[1] - points[0]
+            aside = np.eye(3)[np.abs(pole).argmin()]
+            system = replace(System.of_points(kind.lower(), points[0], points[1], points[0] + aside), turn=own)
+        else:
+            self._refused(card, kind)
+            return None
+        return system.moved(turn, shift)
+
+    def _listed(self, card: Card, instance: str, turn: np.ndarray, own: np.ndarray) -> ElementAxes:
+        """Axes element by element; those that no line names have those of the first line."""
+        centres = np.vstack([self.raw.points[block.nodes].mean(axis=1) for block in self.raw.cells])
+        mine = [number for (where, _), number in self.number.items() if where == instance]  # labels are those of a part
+        axes: list[np.ndarray] = []
+        which = np.zeros(len(centres), dtype=int)
+        for line in card.data:
+            points = np.array(card.floats(line[1:], 6)).reshape(2, 3)
+            if line[0]:
+                try:
+                    named = self.assembly.elements(line[0], instance)
+                except KeyError:
+                    raise Refusal(f"{card.where} names the elements '{line[0]}', which the deck has not") from None
+                which[[self.number[key] for key in named if key in self.number]] = len(axes)
+            axes.append(own @ orthogonal(*points) @ turn.T)
+        return ElementAxes(centres[mine], np.array(axes)[which[mine]])
+
+
+def engineering_constants(D: list[float]) -> tuple[float, ...]:
+    """(E1, E2, E3, nu12, nu13, nu23, G12, G13, G23) from D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, ..."""
+    S = np.linalg.inv(_normal_block(D))
+    E = 1 / np.diag(S)
+    return (*E.tolist(), float(-S[0, 1] * E[0]), float(-S[0, 2] * E[0]), float(-S[1, 2] * E[1]), *D[6:9])
+
+
+def anisotropic(D: list[float]) -> tuple[tuple[float, ...], ...]:
+    """The stiffness in our order of 21 values: columns of its upper triangle, stresses 11, 22, 33, 12, 13, 23."""
+    by_rows = [D[j * (j + 1) // 2 + i] for i in range(6) for j in range(i, 6)]
+    return deck.stiffness(by_rows, (0, 1, 2, 5, 4, 3))
+
+
+def _normal_block(D: list[float]) -> np.ndarray:
+    return np.array([[D[0], D[1], D[3]], [D[1], D[2], D[4]], [D[3], D[4], D[5]]])
+
+
+def _regular(D: list[float]) -> bool:
+    """Whether a stiffness can be inverted; those of fluids cannot."""
+    return bool(np.linalg.eigvalsh(_normal_block(D))[0] > 0)
