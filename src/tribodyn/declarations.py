@@ -15,6 +15,7 @@ running its files. A part or a continuation may leave units out; see `workflows.
 from __future__ import annotations
 
 import ast
+import hashlib
 import importlib.util
 import sys
 from collections.abc import Iterable, Mapping
@@ -214,7 +215,8 @@ def run_file(path: Path, title: str, functions: tuple[str, ...]) -> ModuleType:
     """
     if not path.is_file():
         raise Refusal(f"there is no {title} file '{path}'")
-    name = f"tribodyn_own_{path.stem}_{abs(hash(path.resolve())):x}"
+    # the same name in every process: kernels that numba has cached on disk refer to their module by it
+    name = f"tribodyn_own_{path.stem}_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:16]}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None

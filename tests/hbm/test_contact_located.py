@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from tests.helpers.contact_draws import HARMONICS, LOCATED, draw, own
+from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, draw, law_id, law_numbers
 from tests.helpers.random_problems import cases
 from tribodyn.hbm.contact import aft, contact_law, located
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 EVERY_LAW = pytest.mark.parametrize(
-    ("name", "components"), LOCATED, ids=lambda v: v if isinstance(v, str) else "".join(v)
+    ("name", "components"), CLOSED_FORMS, ids=law_id
 )
 WITH_STATIC = HarmonicBasis((0, 1, 2, 3), 8, "located")
 
@@ -43,7 +43,7 @@ def fine_force(x, k, mu, load, memory, basis, n=40_000):
 def test_against_a_fine_integration(name, components, harmonics):
     law = contact_law.load(name)
     basis = HarmonicBasis(harmonics, 12, "located")
-    x, p, memory = draw(law, components, basis, 6, seed=21)
+    x, p, memory = draw(name, components, basis, 6, seed=21)
     force = aft.cycle(law, x, p, basis, memory).force
     for i in range(6):
 
@@ -83,7 +83,8 @@ def test_what_locating_buys(name, components, swing, order):
         normal = x[:, -1]
         normal *= swing / np.hypot(normal[:, 1::2], normal[:, 2::2]).sum(axis=1)[:, None]
         normal[:, 0] = 1
-    p = ContactParameters.of(components, np.ones((200, len(components))), **own(name, friction=0.5, normal_load=1.0))
+    numbers = law_numbers(name, friction=0.5, normal_load=1.0)
+    p = ContactParameters.of(components, np.ones((200, len(components))), **numbers)
     exact = aft.cycle(law, x, p, WITH_STATIC)
     samples = 8 * 2 ** np.arange(10)
     error = []
@@ -103,7 +104,7 @@ def test_jacobian_through_every_kind_of_transition(name, components):
     law = contact_law.load(name)
     for harmonics in HARMONICS:
         basis = HarmonicBasis(harmonics, 16, "located")
-        x, p, memory = draw(law, components, basis, 100, seed=22)
+        x, p, memory = draw(name, components, basis, 100, seed=22)
         direction = np.random.default_rng(1).normal(size=x.shape)
         e = 1e-6
         plus, minus = (aft.cycle(law, x + s * e * direction, p, basis, memory, jacobian=False).force for s in (1, -1))
@@ -114,9 +115,9 @@ def test_jacobian_through_every_kind_of_transition(name, components):
 
 
 def test_dissipation_is_never_negative():
-    for name, components in LOCATED:
+    for name, components in CLOSED_FORMS:
         law = contact_law.load(name)
-        x, p, memory = draw(law, components, WITH_STATIC, 500, seed=23)
+        x, p, memory = draw(name, components, WITH_STATIC, 500, seed=23)
         work = WITH_STATIC.work_per_cycle(aft.cycle(law, x, p, WITH_STATIC, memory).force, x)
         scale = np.abs(x).max()
         assert work.min() > -1e-14 * scale
@@ -289,7 +290,7 @@ def test_no_root_is_missed(coefficients, harmonics):
 def test_without_numba_the_kernels_give_the_same(monkeypatch):
     """The compiled kernels and their Python source agree (one cycle with all kinds of segment)."""
     law = contact_law.load("jenkins")
-    x, p, memory = draw(law, ("t1", "n"), WITH_STATIC, 4, seed=24)
+    x, p, memory = draw("jenkins", ("t1", "n"), WITH_STATIC, 4, seed=24)
     compiled = aft.cycle(law, x, p, WITH_STATIC, memory)
     for kernel in [n for n in vars(located) if hasattr(getattr(located, n), "py_func")]:
         monkeypatch.setattr(located, kernel, getattr(located, kernel).py_func)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.helpers.contact_draws import LAWS, LOCATED, own
+from tests.helpers.contact_draws import EVENT_BASED, LAWS, law_id, law_numbers
 from tests.helpers.continuation_models import Lifting
 from tests.helpers.verification_models import interface, modal_damping, random_structure
 from tribodyn.fem.system import SecondOrderSystem
@@ -38,7 +38,7 @@ def balance_of(name, components, transitions):
     rows = [3 * pair + ("t1", "t2", "n").index(c) for pair in range(PAIRS) for c in components]
     model = replace(model, interface=interface(np.asarray(model.interface.B)[rows], components))
     rng = np.random.default_rng(1)
-    numbers = own(name, friction=0.4, normal_load=rng.uniform(20, 60, PAIRS), cubic=1e14)
+    numbers = law_numbers(name, friction=0.4, normal_load=rng.uniform(20, 60, PAIRS), slip_force=16.0, free=1e14)
     gap = -1e-5 * rng.random(PAIRS)
     parameters = ContactParameters.of(components, rng.uniform(0.5, 2, (PAIRS, len(components))) * K, gap=gap, **numbers)
     basis = HarmonicBasis((0, 1, 2, 3), 64, transitions)
@@ -60,13 +60,13 @@ def with_number(balance, name, factor):
     return balance.contact.with_parameters(change)
 
 
-@pytest.mark.parametrize(("name", "components"), LAWS, ids=lambda v: v if isinstance(v, str) else "".join(v))
+@pytest.mark.parametrize(("name", "components"), LAWS, ids=law_id)
 def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again(name, components):
-    balance = balance_of(name, components, "located" if (name, components) in LOCATED else "sampled")
+    balance = balance_of(name, components, "located" if (name, components) in EVENT_BASED else "sampled")
     solved = newton.solve_from_rest(balance, OMEGA, EXACT)
     assert solved.converged
     springs = ["tangential stiffness", "normal stiffness"][: 1 + ("n" in components)]
-    names = [*springs, *(n.name for n in contact_law.declared(name) if not n.whole)]
+    names = [*springs, *(n.name for n in contact_law.declared(name) if not n.integer)]
     step, posed = 1e-6, BalanceInputs.of(balance)
     changes = [
         ParameterChange(p, step, *(replace(posed, contact=with_number(balance, p, 1 + s)) for s in (step, -step)))

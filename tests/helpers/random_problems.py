@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg as sla
 from hypothesis import HealthCheck, settings, strategies as st
 
-from tests.helpers.contact_draws import LAWS, LOCATED, own
+from tests.helpers.contact_draws import EVENT_BASED, LAWS, law_numbers
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
@@ -83,7 +83,7 @@ def drawn_problems(draw: st.DrawFn, laws: list[tuple[str, tuple[str, ...]]] = LA
     """Numbers of a problem."""
     law, components = draw(st.sampled_from(laws))
     harmonics = draw(st.sampled_from(HARMONICS))
-    ways = ("sampled", "located") if (law, components) in LOCATED else ("sampled",)
+    ways = ("sampled", "located") if (law, components) in EVENT_BASED else ("sampled",)
     return Drawn(
         law=law,
         components=components,
@@ -143,11 +143,12 @@ def problem_of(d: Drawn) -> HarmonicBalance:
         d.components,
         spread,
         gap=gap,
-        **own(
+        **law_numbers(
             d.law,
             friction=d.friction,
             normal_load=load * rng.uniform(0, 1, d.n_pair),
-            cubic=10**d.contact * 10 ** rng.uniform(-3, 3, d.n_pair),
+            slip_force=load * d.friction,
+            free=10**d.contact * 10 ** rng.uniform(-3, 3, d.n_pair),
         ),
     )
     basis = HarmonicBasis(d.harmonics, d.n_samples, d.transitions)
