@@ -9,27 +9,29 @@ over them.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from tribodyn import declarations
-from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation.branch import Branch, amplitude
-from tribodyn.hbm.continuation.free_vibration import Point
-from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.time.mean_motion import MeanMotion
-from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
+from tribodyn.hbm.quantity_sources import EndOfLife, MotionInTime, Slopes, SolvedCurve, SolvedCycle, WornContact
 from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
+if TYPE_CHECKING:
+    from tribodyn.hbm.continuation.free_vibration import Point
+
+__all__ = [
+    "CurveQuantity", "CycleQuantity", "EndOfLife", "ErrorKind", "ModeQuantity", "MotionInTime", "Slopes",
+    "SolvedCurve", "SolvedCycle", "StatedQuantity", "WearQuantity", "WornContact", "every", "known", "load",
+    "names_with_error", "with_error",
+]  # fmt: skip
 FILES = PluginKind("quantity", "tribodyn.hbm.quantities", ())
-Pairs = slice | np.ndarray
 
 
 class ErrorKind(StrEnum):
@@ -43,180 +45,13 @@ class ErrorKind(StrEnum):
 
 
 @dataclass(frozen=True)
-class SolvedCycle:
-    """One vibration cycle: fresh from a balance, or as a result holds it; what a result does not hold is None.
-
-    omega : [rad/s]; basis : its harmonics; output : row of the observed output in `response` (n_output, n_coeff) [m]
-    amplitude : of that output [m]; preload : mean normal force of the contact [N]
-    energy, normal_force : (n_pair,) friction work per cycle [J], mean normal force [N]
-    displacement, force : (n_pair, n_component, n_coeff) [m], [N]; components : of the contact, such as t1, t2, n
-    joints : name -> its pairs; pairs : that the cycle is asked of, those of one joint or all
-    driven : lowest harmonic that is driven; wear_coefficient : (n_pair,) [m3/J]
-    """
-
-    omega: float
-    basis: HarmonicBasis
-    response: np.ndarray
-    amplitude: float
-    output: int = 0
-    preload: float | None = None
-    energy: np.ndarray | None = None
-    normal_force: np.ndarray | None = None
-    displacement: np.ndarray | None = None
-    force: np.ndarray | None = None
-    components: tuple[str, ...] = ()
-    joints: Mapping[str, Pairs] | None = None
-    pairs: Pairs = field(default_factory=lambda: slice(None))
-    joint: str = ""
-    driven: int | None = None
-    wear_coefficient: np.ndarray | None = None
-
-    @classmethod
-    def of(
-        cls, balance: HarmonicBalance, state: State, output: str, wear: Mapping[str, float] | None = None
-    ) -> SolvedCycle:
-        """The cycle of a solved balance; wear : joint -> wear coefficient [m3/J]."""
-        contact, basis, response = balance.contact, balance.basis, balance.outputs(state)
-        row = balance.compliance.output_names.index(output)
-        loaded = [h for h, _ in balance.excitation.loads if h in basis.dynamic] or [basis.dynamic[0]]
-        rate = np.zeros(contact.n_pair) if wear else None
-        for joint in contact.joints if wear else ():
-            assert wear is not None
-            assert rate is not None
-            rate[joint.rows] = wear.get(joint.name, 0.0)
-        return cls(
-            state.omega, basis, response, float(amplitude(response[row])), row, balance.preload(state),
-            balance.energy(state), balance.normal_force(state), state.x, state.cycle.force, contact.components,
-            {joint.name: joint.rows for joint in contact.joints}, driven=min(loaded), wear_coefficient=rate,
-        )  # fmt: skip
-
-    @classmethod
-    def at_row(cls, history: WearHistory, row: int, basis: HarmonicBasis, joints: Mapping[str, slice]) -> SolvedCycle:
-        """The cycle of a row of a wear history; its displacement and force are left out."""
-        in_time = history.in_time[row]
-        height = float(amplitude(history.response[row, 0]) if in_time else history.amplitude[row])
-        return cls(
-            float(history.omega[row]), basis, history.response[row], height, 0, float(history.preload[row]),
-            history.energy[row], history.normal_force[row], joints=joints,
-        )  # fmt: skip
-
-    @classmethod
-    def at_point(cls, branch: Branch, point: int, basis: HarmonicBasis) -> SolvedCycle:
-        """The cycle of a point of a response curve, of its first output."""
-        height = float(branch.amplitude(branch.output_names[0])[point])
-        return cls(float(branch.omega[point]), basis, branch.response[point], height)
-
-    def of_joint(self, name: str) -> SolvedCycle:
-        """The same cycle, asked of one joint alone."""
-        assert self.joints is not None
-        return replace(self, pairs=self.joints[name], joint=name)
-
-    @cached_property
-    def mask(self) -> np.ndarray:
-        """(n_pair, 1, 1) 1 for the pairs that the cycle is asked of, else 0."""
-        assert self.displacement is not None
-        mask = np.zeros((len(self.displacement), 1, 1))
-        mask[self.pairs] = 1.0
-        return mask
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """How a quantity of a cycle moves with the solution.
-
-    by_x, by_force : (n_pair, n_component, n_coeff) by displacement and by contact force, the others fixed
-    by_response : (n_output, n_coeff); None where it does not depend on one of these
-    by_omega : by the frequency [rad/s]
-    """
-
-    by_x: np.ndarray | None = None
-    by_force: np.ndarray | None = None
-    by_response: np.ndarray | None = None
-    by_omega: float = 0.0
-
-
-@dataclass(frozen=True)
-class MotionInTime:
-    """The motion that integration in time came to.
-
-    means : over its periods; sectors : of the wheel that it spans, 1 for a part
-    energy : (n_pair,) friction work per period of one sector [J]; least_energy : below which work is rounding [J]
-    """
-
-    means: MeanMotion
-    sectors: int
-    energy: np.ndarray
-    least_energy: float
-
-
-@dataclass(frozen=True)
-class WornContact:
-    """A wear history with the contact that wore.
-
-    area, gap : (n_pair,) [m2], of the unworn contact [m]; components, joints, pairs : as in SolvedCycle
-    basis : harmonics, with samples enough to see a pair open
-    life_share : of the first preload, where a life ends; any_joint : whether it ends with the first joint that is lost
-    share_of_body_1 : of the depth, that is worn off body 1
-    """
-
-    history: WearHistory
-    area: np.ndarray
-    gap: np.ndarray
-    components: tuple[str, ...]
-    basis: HarmonicBasis
-    joints: Mapping[str, slice]
-    life_share: float = LIFE_SHARE
-    any_joint: bool = False
-    share_of_body_1: float = 0.5
-    pairs: slice = field(default_factory=lambda: slice(None))
-    joint: str = ""
-
-    def of_joint(self, name: str) -> WornContact:
-        """The same wear, asked of one joint alone."""
-        return replace(self, pairs=self.joints[name], joint=name)
-
-    @cached_property
-    def depth(self) -> np.ndarray:
-        """(n_pair,) total depth at the end, of the pairs that are asked for [m]."""
-        history = self.history
-        return np.asarray(history.depth[-1] + history.worn[-1])[self.pairs]
-
-    @property
-    def cycles(self) -> float:
-        """Vibration cycles at the end."""
-        return float(self.history.cycles[-1] + self.history.cycles_in_step[-1])
-
-
-@dataclass(frozen=True)
-class EndOfLife:
-    """Where a life ends and how that moves with n parameters; the slopes have them on their last axis.
-
-    life : [cycles]; by_life : (n,); depth, area : (n_pair,) [m], [m2]; by_depth, by_area : (n_pair, n)
-    """
-
-    life: float
-    by_life: np.ndarray
-    depth: np.ndarray
-    by_depth: np.ndarray
-    area: np.ndarray
-    by_area: np.ndarray
-
-
-@dataclass(frozen=True)
-class SolvedCurve:
-    """A response curve; spread : (n_point,) range of amplitudes by the load path over its middle, None if unknown."""
-
-    branch: Branch
-    spread: np.ndarray | None = None
-
-
-@dataclass(frozen=True)
 class StatedQuantity:
     """What every quantity declares; `name` is that of its file.
 
     title : for axes and headings; unit : SI, "cycles", or empty
     by_joint : whether each named contact has its own; relative : whether its changes count over its value
     error : how its error is found; rank : place in tables, ascending
+    headline : whether the short summary gives it; digits : significant ones of a value whose error is not known
     """
 
     title: str
@@ -226,6 +61,8 @@ class StatedQuantity:
     relative: bool = True
     error: ErrorKind = ErrorKind.NONE
     rank: int = 99
+    headline: bool = True
+    digits: int = 3
     name: str = ""
 
     @property
@@ -253,10 +90,14 @@ class WearQuantity(StatedQuantity):
     """A number of a whole wear run.
 
     value : WornContact -> number, None where there is none
+    grows : whether it has a value at every row of the history, so that it is drawn against the cycles
+    remark : WornContact -> what a reader should know of the value, such as where a life ends
     at_end_of_life : EndOfLife -> its value there; tangent : EndOfLife -> (n,) derivatives of that
     """
 
     value: Callable[[WornContact], float | None]
+    grows: bool = False
+    remark: Callable[[WornContact], str] | None = None
     at_end_of_life: Callable[[EndOfLife], float] | None = None
     tangent: Callable[[EndOfLife], np.ndarray] | None = None
 
@@ -337,3 +178,13 @@ def every(kind: type[Kinds]) -> tuple[Kinds, ...]:
 def with_error(kind: type[Kinds]) -> tuple[Kinds, ...]:
     """The quantities of a kind whose errors are stated."""
     return tuple(q for q in every(kind) if q.error is not ErrorKind.NONE)
+
+
+def names_with_error() -> tuple[str, ...]:
+    """Names of all quantities whose errors are stated, those of a cycle first."""
+    return tuple(q.name for kind in (CycleQuantity, WearQuantity) for q in with_error(kind))
+
+
+def known(name: str) -> StatedQuantity:
+    """The quantity of this name; one of a result whose file is not there any more has its name and no unit."""
+    return next((q for q in _every() if q.name == name), StatedQuantity(name, "", lambda _: None, name=name))

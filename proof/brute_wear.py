@@ -17,7 +17,7 @@ from proof import scoreboard
 from proof.time_limit import TimeUp, processor_seconds
 from tests.helpers.verification_models import random_structure
 from tribodyn.hbm.wear.history import LIFE_SHARE
-from tribodyn.workflows.errors import verdict
+from tribodyn.workflows.errors import judgement
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import parse
 
@@ -247,7 +247,7 @@ def run(scenes: int, say: Callable[[str], None], first: int = 0, seconds: float 
             try:
                 with processor_seconds(seconds):
                     result, model = scoreboard.solved(file)
-                    statement = verdict.judge(file, model, result, Progress()).statements["life"]
+                    statement = judgement.judge(file, model, result, Progress()).statements["life"]
                 row = replace(
                     row, value=statement.value, error=statement.error, stated=statement.stated, reason=statement.reason
                 )

@@ -17,8 +17,8 @@ from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.workflows.errors.measure import sampling_error
-from tribodyn.workflows.errors.options import DEFAULT
+from tribodyn.workflows.errors.refinement_limits import DEFAULT
+from tribodyn.workflows.errors.sampling_error import sampling_error
 
 CONVERGED, REFUSED, WRONG = "converged", "refused", "wrong"  # what is said of a cell
 LARGEST_DENSE = 1600  # unknowns up to which the dense reference is solved

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.errors.options import DEFAULT
+from tribodyn.workflows.errors.refinement_limits import DEFAULT
 from tribodyn.workflows.result import store, summary
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import Verdict
@@ -58,8 +58,8 @@ def _within(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 def _of_verdict(verdict: Verdict, summed: dict[str, Any]) -> str:
     """What a verdict says that cannot be, or that the summary of its result contradicts."""
-    frequency = summed["peak_hz"][0] if summed["wear_steps"] else None
-    summarised = {"life": None if summed["joints"] else summed["life_cycles"], "peak_frequency": frequency}
+    frequency = summed["peak_frequency"]["first"] if summed["wear_steps"] else None
+    summarised = {"life": None if summed["joints"] else summed["life"], "peak_frequency": frequency}
     for name, statement in verdict.statements.items():
         value, error = statement.value, statement.error
         other = summarised.get(name)

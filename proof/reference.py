@@ -10,17 +10,15 @@ from dataclasses import dataclass
 
 from proof.time_limit import TimeUp, processor_seconds
 from tribodyn.hbm import threads
-from tribodyn.hbm.continuation.operating_point import NoPeak
-from tribodyn.workflows.errors import refine, states
-from tribodyn.workflows.errors.measure import life_of
-from tribodyn.workflows.result.verdict import QUANTITIES
-from tribodyn.workflows.run import modelling, wear_run
+from tribodyn.hbm.quantity import WearQuantity, names_with_error, with_error
+from tribodyn.refusal import Refusal, SolverFailure
+from tribodyn.workflows.errors import operating_states, refine, wear_values
+from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 Values = dict[str, float | None]
 MEASURED = "measured"
-OF_WEAR = ("depth", "life")
 
 
 @dataclass(frozen=True)
@@ -49,24 +47,22 @@ def solved(file: SceneFile, seconds: float, elements: float = FINER.elements) ->
     then with wear, in as many seconds again
     """
     fine = finer(file, elements)
-    values: Values = dict.fromkeys(QUANTITIES)
+    values: Values = dict.fromkeys(names_with_error())
     what = "its reference"
     try:
         with processor_seconds(seconds), threads.limited(1):
             model = modelling.build(fine, Progress())
-            values |= states.unworn(fine, model).answers
-        wear = fine.scene.wear
-        if fine.scene.wears and wear is not None:
+            values |= operating_states.unworn_state(fine, model).values
+        if fine.scene.wears:
             what = "measured, the reference of its wear"
             with processor_seconds(seconds), threads.limited(1):
-                worn = wear_run.worn_out(fine, model, wear.lost_below)
-            if worn.ended.failed:
-                raise RuntimeError(str(worn.end))
-            values["depth"] = float((worn.depth[-1] + worn.worn[-1]).max())
-            values["life"] = life_of(worn, model, wear)
+                worn = wear_values.worn_by(fine, model)
+            if worn.history.ended.failed:
+                raise SolverFailure(str(worn.history.end))
+            values |= {quantity.name: quantity.value(worn) for quantity in with_error(WearQuantity)}
     except TimeUp:
         return values, f"{what} is too expensive"
-    except (NoPeak, ValueError, RuntimeError) as refusal:
+    except (Refusal, SolverFailure) as refusal:
         return values, f"{what} is refused: {refusal}"
     return values, MEASURED
 

@@ -31,8 +31,8 @@ from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.linear_damping import modal_damping
-from tribodyn.workflows.errors.limit import limit_of
-from tribodyn.workflows.errors.verdict import with_verdict
+from tribodyn.workflows.errors.extrapolation import limit_of
+from tribodyn.workflows.errors.judgement import with_verdict
 from tribodyn.workflows.run import modelling, pipeline, references
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file

@@ -19,10 +19,11 @@ import numpy as np
 from proof import reference
 from proof.scoreboard_scenes import draw
 from proof.time_limit import TimeUp, processor_seconds
-from tribodyn.workflows.errors import accuracy, verdict
-from tribodyn.workflows.errors.states import relative
+from tribodyn.hbm.quantity import names_with_error
+from tribodyn.workflows.errors import accuracy, judgement
+from tribodyn.workflows.errors.operating_states import relative_change
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import QUANTITIES, Verdict
+from tribodyn.workflows.result.verdict import Verdict
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -151,7 +152,7 @@ def measured(number: int, seed: int, seconds: float, wearing: bool = False) -> R
         except (ValueError, RuntimeError) as refusal:
             return replace(row, outcome=f"refused: {refusal}", seconds=(process_time() - clock, 0.0, 0.0))
         ran = process_time() - clock
-        stated = verdict.judge(file, model, result, Progress())
+        stated = judgement.judge(file, model, result, Progress())
         clock = process_time()
         truth, outcome = reference.solved(file, seconds)
         referred = process_time() - clock
@@ -160,7 +161,7 @@ def measured(number: int, seed: int, seconds: float, wearing: bool = False) -> R
             outcome=outcome,
             n_pair=model.balance.contact.n_pair,
             harmonics=max(result.harmonics),
-            judged=tuple(_judged(name, stated, truth) for name in QUANTITIES),
+            judged=tuple(_judged(name, stated, truth) for name in names_with_error()),
             bound=_bound(file, seconds) if number % BOUNDED == 1 and not wearing else (),
             changes=tuple(asdict(change) for change in stated.changes),
             ratio=stated.ratio,
@@ -176,7 +177,7 @@ def solved(file: SceneFile) -> tuple[Result, modelling.Model]:
 
 def _judged(name: str, judgement: Verdict, truth: reference.Values) -> Judged:
     statement, right = judgement.statements[name], truth[name]
-    true = None if statement.value is None or right is None else relative(statement.value, right)
+    true = None if statement.value is None or right is None else relative_change(statement.value, right)
     return Judged(
         name, statement.value, statement.error, statement.dominated_by, statement.stated, right, true, statement.reason
     )
@@ -190,7 +191,7 @@ def _bound(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
         if process_time() - start > seconds:
             raise RuntimeError(f"the bound takes above {seconds:g} s")
         result, model = solved(scene_file)
-        return verdict.with_verdict(scene_file, model, result, Progress())
+        return judgement.with_verdict(scene_file, model, result, Progress())
 
     try:
         result, bound = accuracy.to_accuracy(file, ACCURACY, round_of, lambda sentence: None)

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from proof.scoreboard import ROUNDING, Judged, Row
+from tribodyn.hbm.quantity import known, names_with_error
 from tribodyn.workflows.pictures.theme import BLUE, RED, STYLE
-from tribodyn.workflows.result.verdict import NAMES, QUANTITIES
 
 COLUMNS = ("scene", "family", "pairs", "harmonics", "quantity", "value", "stated error", "true error", "dominated by")
 SMALLEST, LARGEST = 1e-1, 1e3  # of the ratios that the histogram shows
@@ -42,7 +42,7 @@ def summary(rows: Sequence[Row]) -> str:
     lines.append(
         f"{'quantity':15} {'errors':>8} {'violated':>8} {'median overestimate':>19} {'not stated':>10} {'not known':>9}"
     )
-    for quantity in (*QUANTITIES, None):
+    for quantity in (*names_with_error(), None):
         of = [
             statement
             for row in rows
@@ -56,12 +56,12 @@ def summary(rows: Sequence[Row]) -> str:
             sum(not statement.stated for statement in of),
             sum(statement.stated and statement.error is None for statement in of),
         ]
-        name = "all" if quantity is None else NAMES.get(quantity, quantity)
+        name = "all" if quantity is None else known(quantity).label
         lines.append(f"{name:15} {counts[0]:8d} {counts[1]:8d} {median:>19} {unsaid[0]:10d} {unsaid[1]:9d}")
     bounds = [statement for row in rows for statement in row.bound if statement.counted]
     lines.append(f"--accuracy: {len(bounds)} bounds, {sum(statement.violated for statement in bounds)} violated")
     for row, statement in _violated(rows):
-        name = NAMES.get(statement.quantity, statement.quantity)
+        name = known(statement.quantity).label
         lines.append(
             f"violated: {row.family} {row.number}, {name}: stated {statement.error:.2g}, true {statement.true:.2g}"
         )

@@ -32,5 +32,5 @@ scene = {
     "verdict": {"enabled": False},
 }
 result = td.run(scene)
-print(f"peak at {result.summary()['peak_hz'][0]:.0f} Hz")
+print(f"peak at {result.summary()['peak_frequency']['first']:.0f} Hz")
 td.plot.response(result).savefig("response.png")

@@ -15,5 +15,5 @@ COARSE = {
 }
 
 result = td.run("beam", overrides=COARSE | {"wear": None})
-print(f"{result.summary()['peak_hz'][0]:.0f} Hz, {1e3 * result.summary()['peak_m'][0]:.2f} mm")
+print(f"{result.summary()['peak_frequency']['first']:.0f} Hz, {1e3 * result.summary()['amplitude']['first']:.2f} mm")
 td.plot.response(result).savefig("response.png")

@@ -15,5 +15,5 @@ COARSE = {
 }
 
 result = td.run("beam", overrides=COARSE | {"wear.tolerance": "10 %"})
-print(f"life {result.summary()['life_cycles'] / 1e6:.1f} million cycles")
+print(f"life {result.summary()['life'] / 1e6:.1f} million cycles")
 td.plot.wear(result, "preload").savefig("preload.png")

@@ -18,7 +18,7 @@ COARSE = {
 frictions, peaks = (0.4, 0.45, 0.5, 0.55), []
 for friction in frictions:
     result = td.run("beam", overrides=COARSE | {"wear": None, "contact.friction": friction})
-    peaks.append(1e3 * result.summary()["peak_m"][0])
+    peaks.append(1e3 * result.summary()["amplitude"]["first"])
 with td.plot.axes() as (figure, axes):
     axes.plot(frictions, peaks, "o-")
     axes.set(xlabel="coefficient of friction", ylabel="largest amplitude / mm", title="amplitude by friction")

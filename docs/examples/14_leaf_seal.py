@@ -7,5 +7,5 @@ import tribodyn as td
 
 coarse = {"geometry.n_column": 7, "geometry.pin_column": 2, "response.points": 24, "verdict.enabled": False}
 result = td.run("leaf_seal", overrides=coarse)
-print(f"peak at {result.summary()['peak_hz'][0]:.1f} Hz")
+print(f"peak at {result.summary()['peak_frequency']['first']:.1f} Hz")
 td.plot.response(result).savefig("leaf_seal.png")

@@ -6,5 +6,5 @@ One sector of a wheel whose blades rub at their shrouds; engine order 1 drives i
 import tribodyn as td
 
 result = td.run("blade", overrides={"wear": None, "response.points": 30, "verdict.enabled": False})
-print(f"peak at {result.summary()['peak_hz'][0]:.1f} Hz")
+print(f"peak at {result.summary()['peak_frequency']['first']:.1f} Hz")
 td.plot.response(result).savefig("blade.png")

@@ -7,6 +7,6 @@ import tribodyn as td
 
 coarse = {"geometry.n_contact_length": 3, "reduction.modes": 6, "harmonics.kept": [0, 1], "response.points": 16}
 result = td.run("rig", overrides=coarse | {"verdict.enabled": False, "wear": None})
-print(f"peak at {result.summary()['peak_hz'][0]:.0f} Hz")
+print(f"peak at {result.summary()['peak_frequency']['first']:.0f} Hz")
 td.plot.response(result).savefig("rig.png")
 td.plot.patch(result).savefig("rig_patch.png")

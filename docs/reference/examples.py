@@ -43,7 +43,7 @@ print(model.balance.contact.gap.shape)  # a gap for each pair
 
 # td.run
 result = td.run("beam", "results/small", overrides=WORN)
-print(result.summary()["peak_hz"], result.wear.cycles[-1])
+print(result.summary()["peak_frequency"], result.wear.cycles[-1])
 
 # td.plot.Live
 live = td.plot.Live(every=1.0)  # in a notebook

@@ -10,4 +10,9 @@ def value(worn: WornContact) -> float:
     return worn.cycles
 
 
-QUANTITY = WearQuantity("cycles of the run", "cycles", value, rank=22)
+def remark(worn: WornContact) -> str:
+    """Why the run ended."""
+    return str(worn.history.end).split(";")[0]
+
+
+QUANTITY = WearQuantity("cycles of the run", "cycles", value, rank=20, remark=remark)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from tribodyn.hbm.continuation.free_vibration import Point
 from tribodyn.hbm.quantity import ModeQuantity
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.continuation.free_vibration import Point
 
 
 def value(point: Point) -> float:

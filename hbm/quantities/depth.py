@@ -23,6 +23,6 @@ def tangent(end: EndOfLife) -> np.ndarray:
 
 
 QUANTITY = WearQuantity(
-    "largest wear depth", "m", value, by_joint=True, error=ErrorKind.DEPTH, rank=11,
+    "largest wear depth", "m", value, by_joint=True, error=ErrorKind.DEPTH, rank=11, grows=True,
     at_end_of_life=at_end_of_life, tangent=tangent,
 )  # fmt: skip

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from tribodyn.hbm.quantity import WearQuantity, WornContact
-from tribodyn.hbm.wear.history import events, first
+from tribodyn.hbm.wear.history import first
 
 
 def value(worn: WornContact) -> float | None:
     """Cycles; None where none opens."""
-    return first(events(worn.history, worn.components, worn.gap, worn.basis)[0])
+    return first(worn.events[0])
 
 
-QUANTITY = WearQuantity("cycles until a pair first lifts", "cycles", value, rank=24)
+QUANTITY = WearQuantity("cycles until a pair first lifts", "cycles", value, rank=24, digits=2)

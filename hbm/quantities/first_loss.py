@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from tribodyn.hbm.quantity import WearQuantity, WornContact
-from tribodyn.hbm.wear.history import events, first
+from tribodyn.hbm.wear.history import first
 
 
 def value(worn: WornContact) -> float | None:
     """Cycles; None where every pair still touches."""
-    return first(events(worn.history, worn.components, worn.gap, worn.basis)[1])
+    return first(worn.events[1])
 
 
-QUANTITY = WearQuantity("cycles until a pair first loses contact", "cycles", value, rank=25)
+QUANTITY = WearQuantity("cycles until a pair first loses contact", "cycles", value, rank=25, digits=2, headline=False)

@@ -11,4 +11,4 @@ def value(curve: SolvedCurve) -> float | None:
     return float(branch.load_factor[branch.converged].max()) if branch.controlled else None
 
 
-QUANTITY = CurveQuantity("largest load factor", "", value, rank=42)
+QUANTITY = CurveQuantity("largest load factor", "", value, rank=42, headline=False)

@@ -11,4 +11,4 @@ def value(curve: SolvedCurve) -> float | None:
     return float(branch.load_factor[branch.converged].min()) if branch.controlled else None
 
 
-QUANTITY = CurveQuantity("least load factor", "", value, rank=41)
+QUANTITY = CurveQuantity("least load factor", "", value, rank=41, headline=False)

@@ -19,6 +19,16 @@ def value(worn: WornContact) -> float | None:
     return min((life for life in lives if life is not None), default=None)
 
 
+def remark(worn: WornContact) -> str:
+    """Where it ends."""
+    if worn.any_joint and not worn.joint:
+        life = value(worn)
+        joint = next((name for name in worn.joints if value(worn.of_joint(name)) == life), "")
+        return f"until contact {joint} is lost"
+    at_rest = worn.history.preload_at_rest is not None and not worn.joint
+    return f"until {100 * worn.life_share:g} % of the preload{' at rest' if at_rest else ''} is left"
+
+
 def at_end_of_life(end: EndOfLife) -> float:
     """The life itself."""
     return end.life
@@ -30,6 +40,6 @@ def tangent(end: EndOfLife) -> np.ndarray:
 
 
 QUANTITY = WearQuantity(
-    "life", "cycles", value, by_joint=True, error=ErrorKind.DURATION, rank=21,
+    "life", "cycles", value, by_joint=True, error=ErrorKind.DURATION, rank=21, remark=remark,
     at_end_of_life=at_end_of_life, tangent=tangent,
 )  # fmt: skip

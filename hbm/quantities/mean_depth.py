@@ -11,4 +11,4 @@ def value(worn: WornContact) -> float:
     return float(worn.depth @ area / area.sum())
 
 
-QUANTITY = WearQuantity("mean wear depth", "m", value, by_joint=True, rank=12)
+QUANTITY = WearQuantity("mean wear depth", "m", value, by_joint=True, rank=12, grows=True)

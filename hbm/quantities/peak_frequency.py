@@ -17,4 +17,6 @@ def slopes(cycle: SolvedCycle) -> Slopes:
     return Slopes(by_omega=1 / (2 * np.pi))
 
 
-QUANTITY = CycleQuantity("frequency of the peak", "Hz", value, error=ErrorKind.UNSAMPLED_CYCLE, rank=1, slopes=slopes)
+QUANTITY = CycleQuantity(
+    "frequency of the peak", "Hz", value, error=ErrorKind.UNSAMPLED_CYCLE, rank=1, digits=4, slopes=slopes
+)

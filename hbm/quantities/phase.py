@@ -28,4 +28,4 @@ def _terms(cycle: SolvedCycle) -> tuple[float, float]:
     return cycle.response[cycle.output, cosine], cycle.response[cycle.output, sine]
 
 
-QUANTITY = CycleQuantity("phase of the response", "rad", value, relative=False, rank=3, slopes=slopes)
+QUANTITY = CycleQuantity("phase of the response", "rad", value, relative=False, rank=3, headline=False, slopes=slopes)

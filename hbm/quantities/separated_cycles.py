@@ -10,4 +10,4 @@ def value(worn: WornContact) -> float | None:
     return worn.cycles if worn.history.ended.lost else None
 
 
-QUANTITY = WearQuantity("cycles until every pair is separated", "cycles", value, rank=23)
+QUANTITY = WearQuantity("cycles until every pair is separated", "cycles", value, rank=23, headline=False)

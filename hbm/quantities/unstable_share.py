@@ -10,4 +10,4 @@ def value(worn: WornContact) -> float | None:
     return worn.history.unstable_share
 
 
-QUANTITY = WearQuantity("unstable share of the cycles", "", value, rank=32)
+QUANTITY = WearQuantity("unstable share of the cycles", "", value, rank=32, headline=False)

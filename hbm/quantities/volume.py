@@ -23,5 +23,6 @@ def tangent(end: EndOfLife) -> np.ndarray:
 
 
 QUANTITY = WearQuantity(
-    "worn volume", "m3", value, by_joint=True, rank=13, at_end_of_life=at_end_of_life, tangent=tangent
-)
+    "worn volume", "m3", value, by_joint=True, rank=13, grows=True, at_end_of_life=at_end_of_life,
+    tangent=tangent,
+)  # fmt: skip

@@ -11,4 +11,4 @@ def value(worn: WornContact) -> float:
     return worn.share_of_body_1 * volume.value(worn)
 
 
-QUANTITY = WearQuantity("volume worn off body 1", "m3", value, rank=14)
+QUANTITY = WearQuantity("volume worn off body 1", "m3", value, rank=14, headline=False)

@@ -11,4 +11,4 @@ def value(worn: WornContact) -> float:
     return (1 - worn.share_of_body_1) * volume.value(worn)
 
 
-QUANTITY = WearQuantity("volume worn off body 2", "m3", value, rank=15)
+QUANTITY = WearQuantity("volume worn off body 2", "m3", value, rank=15, headline=False)

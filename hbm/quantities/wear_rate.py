@@ -19,4 +19,4 @@ def slopes(cycle: SolvedCycle) -> Slopes:
     return of_work(cycle, cycle.wear_coefficient)
 
 
-QUANTITY = CycleQuantity("worn volume per cycle", "m3", value, rank=6, slopes=slopes)
+QUANTITY = CycleQuantity("worn volume per cycle", "m3", value, rank=6, headline=False, slopes=slopes)

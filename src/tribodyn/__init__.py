@@ -3,7 +3,7 @@
     import tribodyn as td
 
     result = td.run("beam")                 # or a path, or a dict; td.scene_names() lists those that come along
-    print(result.summary()["peak_hz"])
+    print(result.summary()["peak_frequency"])
     td.plot.response(result).savefig("response.png")
 
     life = td.studies.lives("scatter.toml")

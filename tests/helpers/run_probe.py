@@ -59,7 +59,7 @@ def tell(scene: str, overrides: list[str]) -> None:
         "coordinates": balance.model.system.n_dof,
         "masters": len(balance.model.origin.masters),
         "modes": balance.model.origin.n_modes,
-        "delta_max": result.facts.delta_max_m,
+        "delta_max": result.facts.delta_max,
     }
     print(json.dumps(told), flush=True)
 

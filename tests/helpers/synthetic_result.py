@@ -113,7 +113,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     return Result(
         provenance={"scene_name": "beam", "scene_text": file.text},
         scene=file.scene,
-        facts=Facts(seconds=12.5, delta_max_m=5e-3, unknowns=9 * n_pair, model_dofs=3 * n_pair + 17, harmonics=(0, 1)),
+        facts=Facts(seconds=12.5, delta_max=5e-3, unknowns=9 * n_pair, model_dofs=3 * n_pair + 17, harmonics=(0, 1)),
         stage=Stage.COMPLETE,
         patch=where,
         part=part,

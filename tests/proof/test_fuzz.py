@@ -103,7 +103,7 @@ def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.
     assert end() == verdict() == ""
     assert verdict(error=None) == "verdict: depth is stated without an error"
     assert end(wear=replace(wear, depth=np.full_like(wear.depth, np.inf))) == "not finite: wear.depth"
-    assert end(facts=replace(result.facts, delta_max_m=float("nan"))) == "not finite: facts.delta_max_m"
+    assert end(facts=replace(result.facts, delta_max=float("nan"))) == "not finite: facts.delta_max"
     assert verdict(value=None) == "verdict: depth is stated without a value"
     assert verdict(value=float("nan")) == "verdict: depth is no number"
     assert verdict(value=-1.0) == "verdict: depth is negative"

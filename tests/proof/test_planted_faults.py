@@ -15,10 +15,10 @@ from proof import planted_faults, planting, reference_runs
 from proof.planted_faults import Detection, Fault, Room
 from proof.rewriting import Rule, rewritten
 from tribodyn.hbm.wear.history import cycles_to_share
-from tribodyn.workflows.errors.limit import limit_of
+from tribodyn.workflows.errors.extrapolation import limit_of
 
 TREE = Path(__file__).parents[2]
-LIMIT = "workflows/errors/limit.py"
+LIMIT = "workflows/errors/extrapolation.py"
 
 
 def fault_in(file: str) -> Fault:
@@ -121,7 +121,7 @@ def test_a_fault_is_seen_by_its_test_and_a_test_that_always_fails_is_not_counted
     (tmp_path / "workflows").symlink_to(TREE / "workflows")
     test = tmp_path / "test_of_limit.py"
     test.write_text(
-        "from tribodyn.workflows.errors.limit import limit_of\n\n\n"
+        "from tribodyn.workflows.errors.extrapolation import limit_of\n\n\n"
         "def test_always_wrong():\n    assert False\n\n\n"
         "def test_limit():\n    assert abs(limit_of([1, 2, 4], [2.0, 1.25, 1.0625]).value - 1.0) < 1e-9\n"
     )

@@ -36,7 +36,7 @@ def test_the_amplitude_is_held_and_the_force_is_stored_point_by_point(tmp_path: 
     np.testing.assert_allclose(table["force_N"], 20.0 * table["load_factor"])
     np.testing.assert_allclose(table["response_phase_rad"], np.arctan2(-b, a), atol=1e-12)
     i = int(np.argmin(table["force_N"]))
-    assert result.summary()["peak_hz"][0] == pytest.approx(table["frequency_Hz"][i])
+    assert result.summary()["peak_frequency"]["first"] == pytest.approx(table["frequency_Hz"][i])
     at = f"['{table['frequency_Hz'][i]:.12g} Hz', '121 Hz']"  # constant force of this size has the same amplitude there
     value = f"loads.harmonic.shaker.value={table['force_N'][i]:.12g} N"
     given = td.run(scene, None, overrides=(*PLAIN, value, f"response.frequency={at}"))

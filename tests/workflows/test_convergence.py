@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tribodyn.hbm.quantity import names_with_error
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.errors import ladders
+from tribodyn.workflows.errors.extrapolation import limit_of
+from tribodyn.workflows.errors.ladder_table import LadderRow, LadderTable, LadderTables, SolvedSetting, table_of
 from tribodyn.workflows.errors.ladders import Ladder, Setting
-from tribodyn.workflows.errors.limit import limit_of
-from tribodyn.workflows.errors.settling import Measured, Row, Settling, Settlings, judged
-from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import convergence
 from tribodyn.workflows.studies.convergence import Convergence
@@ -36,14 +36,14 @@ def found() -> Convergence:
 
 def test_each_setting_is_held_against_where_it_tends_to(found: Convergence) -> None:
     for one in found.table.ladders:
-        assert all(row.measured.outcome == "converged" and row.measured.memory > 1e7 for row in one.rows)
+        assert all(row.solved.outcome == "converged" and row.solved.memory > 1e7 for row in one.rows)
         bounds = [one.bound(row, "amplitude") for row in one.rows]
         assert bounds[-1] == min(bounds) < 5e-3
     exact = found.table.ladders[-1].rows[-1]
     assert np.isnan(exact.setting.size)
     assert found.table.ladders[-1].bound(exact, "energy") == 0
     rows = found.record()
-    assert [row["setting"] for row in rows if row["own"]] == ["modes=4", "tolerance=1e-08", "interface_modes="]
+    assert [row["setting"] for row in rows if row["of_the_scene"]] == ["modes=4", "tolerance=1e-08", "interface_modes="]
     assert json.loads(json.dumps(rows)) == rows
 
 
@@ -74,11 +74,11 @@ def test_the_life_is_that_of_the_run_and_falls_within_its_doubt() -> None:
     overrides = (*SMALL, *worn, "response.points=10", "geometry.n_length=3", "reduction.modes=2")
     (one,) = convergence.converge("beam", settings=["wear"], most=3, overrides=overrides).table.ladders
     coarse, _, fine = one.rows
-    life = fine.measured.values["life"]
+    life = fine.solved.values["life"]
     assert life is not None
-    assert coarse.measured.values["life"] == pytest.approx(life, rel=0.5)
+    assert coarse.solved.values["life"] == pytest.approx(life, rel=0.5)
     assert one.bound(fine, "life") < one.bound(coarse, "life")
-    assert fine.measured.seconds > fine.measured.wearing > 0
+    assert fine.solved.seconds > fine.solved.wear_seconds > 0
 
 
 def test_a_setting_that_the_scene_has_not_is_refused() -> None:
@@ -108,19 +108,19 @@ def test_every_setting_of_every_ladder_is_a_scene() -> None:
                 assert file.name == scene
 
 
-def made_up(name: str, costs: list[float], errors: list[float]) -> Settling:
+def made_up(name: str, costs: list[float], errors: list[float]) -> LadderTable:
     """A ladder that ends with an exact setting, of known costs and errors in amplitude; four seconds are the base."""
-    none = dict.fromkeys(QUANTITIES)
+    none = dict.fromkeys(names_with_error())
     sizes = [*range(1, len(costs)), np.nan]
     rows = [
-        Row(
+        LadderRow(
             Setting(size, (f"x.{name}={cost:g}",)),
-            Measured({**none, "amplitude": 1 + error}, *np.zeros((3, 1)), cost, 0.0, 0.0, "converged"),
+            SolvedSetting({**none, "amplitude": 1 + error}, *np.zeros((3, 1)), cost, 0.0, 0.0, "converged"),
             cost / 4,
         )
         for size, cost, error in zip(sizes, costs, errors, strict=True)
     ]
-    return judged(Ladder(name, tuple(row.setting for row in rows)), rows, rows[0].setting.label)
+    return table_of(Ladder(name, tuple(row.setting for row in rows)), rows, rows[0].setting.label)
 
 
 def test_the_cheapest_combination_is_found() -> None:
@@ -128,7 +128,7 @@ def test_the_cheapest_combination_is_found() -> None:
     costs = draw.uniform(1, 9, (3, 4))
     errors = np.concatenate([draw.uniform(0.001, 0.02, (3, 3)), np.zeros((3, 1))], axis=1)
     found = [made_up(name, list(c), list(e)) for name, c, e in zip("abc", costs, errors, strict=True)]
-    table = Settlings("made up", (), 4.0, tuple(found))
+    table = LadderTables("made up", (), 4.0, tuple(found))
     for wanted in (0.002, 0.01, 0.03):
         places = itertools.product(range(4), repeat=3)
         allowed = [p for p in places if sum(errors[i, k] for i, k in enumerate(p)) <= wanted]
@@ -143,11 +143,11 @@ def test_the_cheapest_combination_is_found() -> None:
 
 def test_the_setting_that_is_needed_is_the_first_from_which_all_are_good() -> None:
     one = made_up("n", [1, 2, 3, 4], [0.004, 0.02, 0.008, 0.0])
-    needed = one.needed("amplitude", 0.01)
+    needed = one.coarsest("amplitude", 0.01)
     assert needed is not None
     assert needed.setting.label == "n=3"
-    assert made_up("n", [1, 2], [0.004, 0.0]).needed("amplitude", 0.001).setting.label == "n=2"
-    text = str(Convergence(Settlings("made up", (), 4.0, (one,))))
+    assert made_up("n", [1, 2], [0.004, 0.0]).coarsest("amplitude", 0.001).setting.label == "n=2"
+    text = str(Convergence(LadderTables("made up", (), 4.0, (one,))))
     assert "1% on amplitude needs n=3 or finer" in text
     assert "the setting of the scene, n=1, is good for 1% on all: amplitude 0.004" in text
     assert "for 1% on amplitude use n=1: 0.4%, 1 s" in text

@@ -93,7 +93,7 @@ def test_rows_of_studies_go_by_lengths_whose_mesh_stays_the_same(monkeypatch):
     found = of_summary(Varying(file, Progress()), td.run("beam", overrides=without), wanted)
     assert {key for _, key in found} == {"geometry.length", "contact.friction"}
     along = td.studies.derivatives(file, only=("geometry.length",)).found
-    assert found["peak_hz_first", "geometry.length"] == pytest.approx(along.slopes[0, 0], rel=1e-6)
+    assert found["peak_frequency_first", "geometry.length"] == pytest.approx(along.slopes[0, 0], rel=1e-6)
 
 
 @pytest.mark.slow

@@ -14,13 +14,20 @@ import pytest
 import tribodyn as td
 from proof import reference
 from tribodyn.hbm.continuation.operating_point import AtPeak
-from tribodyn.workflows.errors import accuracy, in_time, measure, refine, states, verdict
+from tribodyn.hbm.quantity import names_with_error
+from tribodyn.workflows.errors import accuracy, change_table, judgement, operating_states, refine
 from tribodyn.workflows.errors.accuracy import Bound
-from tribodyn.workflows.errors.in_time import Left
-from tribodyn.workflows.errors.options import DEFAULT
-from tribodyn.workflows.errors.states import relative
+from tribodyn.workflows.errors.operating_states import relative_change, with_more_harmonics
+from tribodyn.workflows.errors.refinement_limits import DEFAULT
+from tribodyn.workflows.errors.time_comparison import (
+    TimeComparison,
+    changes_along_wear,
+    compare,
+    is_checked,
+    wear_differences,
+)
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.verdict import QUANTITIES, Change, Refinement, Statement, Status, Verdict
+from tribodyn.workflows.result.verdict import MeasuredChange, Refinement, Statement, Status, Verdict
 from tribodyn.workflows.run import wear_run
 from tribodyn.workflows.scene import scene_file
 
@@ -47,13 +54,13 @@ def verdict_of(result: td.Result) -> Verdict:
     return result.verdict
 
 
-def rows(result: td.Result, refinement: Refinement) -> dict[str, Change]:
+def rows(result: td.Result, refinement: Refinement) -> dict[str, MeasuredChange]:
     return {row.quantity: row for row in verdict_of(result).changes if row.refinement == refinement}
 
 
 def test_every_quantity_has_a_statement(small: td.Result) -> None:
     said = small.summary()["verdict"]
-    assert tuple(said) == QUANTITIES
+    assert tuple(said) == names_with_error()
     for name, one in said.items():
         assert one["stated"] == (one["status"] == Status.REPORTED), name
         assert not one["stated"] or 0 < one["error"] <= DEFAULT.largest  # no value is stated without an error
@@ -71,7 +78,7 @@ def test_single_refinements_lead_step_by_step_to_the_combined_one(small: td.Resu
         assert modes[name].refined == mesh[name].value
         assert mesh[name].refined == harmonics[name].value
         assert harmonics[name].refined == combined[name].refined
-        assert combined[name].relative == relative(combined[name].value or 0.0, combined[name].refined or 0.0)
+        assert combined[name].relative == relative_change(combined[name].value or 0.0, combined[name].refined or 0.0)
 
 
 def test_the_combined_refinement_is_that_of_a_finer_run(small: td.Result) -> None:
@@ -88,15 +95,15 @@ def test_the_combined_refinement_is_that_of_a_finer_run(small: td.Result) -> Non
 
 
 def test_the_scatter_of_a_motion_in_time_and_of_its_steps_is_the_least_change_that_counts() -> None:
-    def row(refinement: Refinement, relative: float) -> Change:
-        return Change(refinement, "life", None, None, relative, "")
+    def row(refinement: Refinement, relative: float) -> MeasuredChange:
+        return MeasuredChange(refinement, "life", None, None, relative, "")
 
     own = [row(Refinement.COMBINED, 0.002), row(Refinement.WEAR_STEPS, 0.01)]
-    assert verdict.error_of(own, 0.7)[0] == 0.01 > DEFAULT.total(0.002, 0.7)
-    assert verdict.error_of([own[0], row(Refinement.WEAR_STEPS, 0.005)], 0.7)[0] == DEFAULT.total(0.002, 0.7)
-    assert verdict.error_of([*own, row(Refinement.MOTION, 0.005)], 0.7)[0] == DEFAULT.total(0.01, 0.7)
-    assert verdict.error_of([*own, row(Refinement.MOTION, 0.03)], 0.7)[0] == DEFAULT.total(0.03, 0.7)
-    assert verdict.error_of([*own, row(Refinement.OTHER_MOTION, 0.06)], 0.7)[0] == pytest.approx(0.01 + 0.06)
+    assert judgement.total_error(own, 0.7)[0] == 0.01 > DEFAULT.total(0.002, 0.7)
+    assert judgement.total_error([own[0], row(Refinement.WEAR_STEPS, 0.005)], 0.7)[0] == DEFAULT.total(0.002, 0.7)
+    assert judgement.total_error([*own, row(Refinement.MOTION, 0.005)], 0.7)[0] == DEFAULT.total(0.01, 0.7)
+    assert judgement.total_error([*own, row(Refinement.MOTION, 0.03)], 0.7)[0] == DEFAULT.total(0.03, 0.7)
+    assert judgement.total_error([*own, row(Refinement.OTHER_MOTION, 0.06)], 0.7)[0] == pytest.approx(0.01 + 0.06)
 
 
 def test_the_error_holds_against_a_finer_reference(small: td.Result) -> None:
@@ -107,7 +114,8 @@ def test_the_error_holds_against_a_finer_reference(small: td.Result) -> None:
         right = truth[name]
         if one.stated and right is not None:
             assert one.value is not None
-            assert relative(one.value, right) < (one.error or 0.0) < 12 * max(relative(one.value, right), DEFAULT.floor)
+            change = relative_change(one.value, right)
+            assert change < (one.error or 0.0) < 12 * max(change, DEFAULT.floor)
 
 
 def test_the_same_scene_has_the_same_errors_in_every_digit(small: td.Result) -> None:
@@ -117,18 +125,18 @@ def test_the_same_scene_has_the_same_errors_in_every_digit(small: td.Result) -> 
 
 
 def test_an_error_that_nobody_measured_is_not_known() -> None:
-    row = Change(Refinement.COMBINED, "energy", None, None, None, "above the limit")
-    assert verdict.error_of([row], None) == (None, "above the limit")
-    assert verdict.error_of([], None)[0] is None
+    row = MeasuredChange(Refinement.COMBINED, "energy", None, None, None, "above the limit")
+    assert judgement.total_error([row], None) == (None, "above the limit")
+    assert judgement.total_error([], None)[0] is None
 
 
 def test_a_life_is_dominated_by_what_changed_it_most() -> None:
-    def row(refinement: Refinement, quantity: str, change: float) -> Change:
-        return Change(refinement, quantity, None, None, change, "")
+    def row(refinement: Refinement, quantity: str, change: float) -> MeasuredChange:
+        return MeasuredChange(refinement, quantity, None, None, change, "")
 
     for quantity, expected in (("life", Refinement.COMBINED), ("energy", Refinement.WEAR_STEPS)):
         both = [row(Refinement.COMBINED, quantity, 0.12), row(Refinement.WEAR_STEPS, quantity, 0.02)]
-        assert verdict.dominating(both) == expected
+        assert judgement.dominating(both) == expected
 
 
 def test_what_is_above_a_limit_of_work_is_not_measured() -> None:
@@ -136,24 +144,24 @@ def test_what_is_above_a_limit_of_work_is_not_measured() -> None:
     limits = replace(DEFAULT, max_unknowns=10)
     file = scene_file.read("beam", (*TINY, "wear="))
     result = td.run(file, overrides=["verdict.enabled=false"])
-    found = verdict.judge(file, td.build(file), result, td_progress(), limits)
+    found = judgement.judge(file, td.build(file), result, td_progress(), limits)
     assert {found.statements[name].status for name in OF_STATE} == {Status.NOT_KNOWN}
     assert {row.refinement for row in found.changes if row.relative} >= {Refinement.MODES, Refinement.HARMONICS}
 
 
-def td_progress() -> measure.Progress:
-    return measure.Progress()
+def td_progress() -> change_table.Progress:
+    return change_table.Progress()
 
 
 def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
     overrides = (*TINY, "wear.at=700 Hz", "wear.tolerance=60 %")
     result = td.run("beam", overrides=overrides)
     combined = rows(result, Refinement.COMBINED)
-    assert result.summary()["life_cycles"] == combined["life"].value
+    assert result.summary()["life"] == combined["life"].value
     file = scene_file.read("beam", overrides)
     finer = refine.wear(refine.harmonics(refine.modes(refine.mesh(file, 2.0)[0], 2) or file, 5), 2.0)
     there = td.run(finer, overrides=["verdict.enabled=false"])
-    assert there.summary()["life_cycles"] == pytest.approx(combined["life"].refined, rel=1e-6)
+    assert there.summary()["life"] == pytest.approx(combined["life"].refined, rel=1e-6)
     assert result.wear is not None
     stated(result, result.wear.unstable_share or 0.0)
 
@@ -166,14 +174,14 @@ def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
     assert result.wear is not None
     preload = result.wear.preload / result.wear.preload[0]
     assert preload[-2] > 0.05 > preload[-1] > 1e-3
-    assert result.wear.cycles[-2] < result.summary()["life_cycles"] < result.wear.cycles[-1]
+    assert result.wear.cycles[-2] < result.summary()["life"] < result.wear.cycles[-1]
     limits = replace(DEFAULT, max_wear=0.0, harmonics=3)
-    judgement = verdict.judge(file, td.build(file), result, td_progress(), limits)
-    assert judgement.worn_ratio == pytest.approx(refine.mesh(file, 1 / 1.5)[1])
-    judged = replace(result, verdict=judgement)
+    verdict = judgement.judge(file, td.build(file), result, td_progress(), limits)
+    assert verdict.worn_ratio == pytest.approx(refine.mesh(file, 1 / 1.5)[1])
+    judged = replace(result, verdict=verdict)
     coarser = refine.harmonics(refine.modes(refine.mesh(file, 1 / 1.5)[0], 2) or file, 3)
     there = td.run(coarser, overrides=["verdict.enabled=false"])
-    assert rows(judged, Refinement.COMBINED)["life"].refined == pytest.approx(there.summary()["life_cycles"], rel=1e-6)
+    assert rows(judged, Refinement.COMBINED)["life"].refined == pytest.approx(there.summary()["life"], rel=1e-6)
     assert result.wear.growth is not None
     stated(judged, result.wear.unstable_share or 0.0)
     left = replace(result.wear, growth=np.where(np.arange(len(result.wear.growth)) < 2, 1e-3, -1e-3))
@@ -183,9 +191,9 @@ def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
 def test_a_refined_run_begins_at_the_peak_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     file = scene_file.read("beam", (*TINY, "wear.rule=thesis", "wear.step=1 um", "wear.max_steps=1"))
     model = td.build(file)
-    first, wanted = states.unworn(file, model), wear_run.worn_out(file, model)
+    first, wanted = operating_states.unworn_state(file, model), wear_run.worn_out(file, model)
     monkeypatch.delattr(AtPeak, "first")
-    begun = wear_run.worn_out(file, model, start=(first.here.state.omega, first.here.state.x))
+    begun = wear_run.worn_out(file, model, start=(first.point.state.omega, first.point.state.x))
     assert begun.amplitude == pytest.approx(wanted.amplitude, rel=1e-5)
 
 
@@ -201,8 +209,8 @@ def stated(result: td.Result, unstable: float) -> None:
     ("changes", "status"),
     [
         ({}, None),
-        ({"apart": {"energy": 0.2}}, Status.CONTRADICTED),
-        ({"apart": {"energy": 0.2}, "spread": 0.1}, Status.UNSTABLE),
+        ({"differences": {"energy": 0.2}}, Status.CONTRADICTED),
+        ({"differences": {"energy": 0.2}, "spread": 0.1}, Status.UNSTABLE),
         ({"error": 0.02, "spread": 0.1}, Status.UNSTABLE),  # how far it is off is not known well enough
         ({"spread": 0.1}, None),  # it leaves, for a motion that answers the same
     ],
@@ -210,8 +218,8 @@ def stated(result: td.Result, unstable: float) -> None:
 def test_what_time_integration_finds_decides_what_is_reported(
     changes: dict[str, object], status: Status | None
 ) -> None:
-    one = Left(0.0, np.ones(2), np.ones(2), {"energy": 0.001}, 0.0, 0.0)
-    assert replace(one, **changes).judged("energy", 0.01)[0] == status  # type: ignore[arg-type]
+    one = TimeComparison(0.0, np.ones(2), np.ones(2), {"energy": 0.001}, 0.0, 0.0)
+    assert replace(one, **changes).judge("energy", 0.01)[0] == status  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("steepness", [0.0, 3.0])
@@ -225,22 +233,22 @@ def test_a_life_is_off_by_the_mean_of_its_states(steepness: float) -> None:
     wear = SimpleNamespace(cycles=cycles, cycles_in_step=taken, preload=left, in_time=np.zeros(400, bool), worn=worn)
     wear.depth = np.cumsum(worn, axis=0) - worn
     result = cast(td.Result, SimpleNamespace(wear=wear))
-    share, here = np.array([0.6, 0.4]), (0, *states.later_rows(result))
-    found = [Left(cycles[i], (1 + off[i]) * share, share, {}, 0.0, 0.0) for i in here]
+    share, here = np.array([0.6, 0.4]), (0, *operating_states.later_rows(result))
+    found = [TimeComparison(cycles[i], (1 + off[i]) * share, share, {}, 0.0, 0.0) for i in here]
     life_in_time = np.sum(np.diff(done) * (1 + off) / rate)
-    assert in_time.missed(found, result) == (pytest.approx(1 - taken.sum() / life_in_time, rel=0.06), 0.0)
+    assert wear_differences(found, result) == (pytest.approx(1 - taken.sum() / life_in_time, rel=0.06), 0.0)
     scattered = [replace(one, error=0.02) for one in found]
-    assert in_time.missed(scattered, result)[0] == pytest.approx(in_time.missed(found, result)[0] + 0.02)
+    assert wear_differences(scattered, result)[0] == pytest.approx(wear_differences(found, result)[0] + 0.02)
     elsewhere = [
-        replace(one, machine=one.balance * [1.1, 0.85]) for one in found
+        replace(one, in_time=one.balance * [1.1, 0.85]) for one in found
     ]  # as much work, 10 % more of it there
-    assert in_time.missed(elsewhere, result) == pytest.approx((0.0, 1 - 1 / 1.1))
-    at_rest = [replace(one, machine=0.0 * share) for one in found]
-    assert in_time.missed(at_rest, result)[0] == pytest.approx(1.0)  # no life ends
+    assert wear_differences(elsewhere, result) == pytest.approx((0.0, 1 - 1 / 1.1))
+    at_rest = [replace(one, in_time=0.0 * share) for one in found]
+    assert wear_differences(at_rest, result)[0] == pytest.approx(1.0)  # no life ends
     nothing = [replace(one, balance=0.0 * share) for one in at_rest]
-    assert in_time.missed(nothing, result) == (0.0, 0.0)  # both motions rest
+    assert wear_differences(nothing, result) == (0.0, 0.0)  # both motions rest
     wear.in_time = cycles > 0  # what was worn in time needs no balance
-    assert in_time.missed(found, result)[0] < 0.001
+    assert wear_differences(found, result)[0] < 0.001
 
 
 def test_small_contacts_are_integrated_in_time() -> None:
@@ -248,11 +256,11 @@ def test_small_contacts_are_integrated_in_time() -> None:
     less = ("loads.harmonic.shake.value=2 kN", "response.frequency=['600 Hz', '2600 Hz']")
     file = scene_file.read("beam", (*TINY[:-1], "wear=", *less))
     result = td.run(file, overrides=["verdict.enabled=false"])
-    first = states.first_state(file, td.build(file).balance, result)
+    first = operating_states.first_state(file, td.build(file).balance, result)
     few, many = DEFAULT, replace(DEFAULT, max_time_components=1)
-    asked = [in_time.is_checked(first, *given) for given in ((None, few), (None, many), (True, many), (False, few))]
+    asked = [is_checked(first, *given) for given in ((None, few), (None, many), (True, many), (False, few))]
     assert asked == [True, False, True, False]
-    one, more = (in_time.left(state).apart for state in (first, states.widened(first, 9)))
+    one, more = (compare(state).differences for state in (first, with_more_harmonics(first, 9)))
     assert 0.01 < one["energy"] < 1  # one harmonic beside the motion in time
     assert more["energy"] < 0.1 * one["energy"]  # what the others change is in the combined row, and counts once
 
@@ -268,10 +276,12 @@ def test_a_machine_that_leaves_the_balance_makes_the_error_of_a_life() -> None:
     own = DEFAULT.total(rows(result, Refinement.COMBINED)["life"].relative or 0.0, found.worn_ratio)
     least = rows(result, Refinement.WEAR_STEPS)["life"].relative or 0.0
     assert found.statements["life"].error == pytest.approx(max(own, least) + life)
-    more = in_time.rows(file, td.build(file).balance, result, replace(DEFAULT, harmonics=9))[0].relative
+    more_harmonics = replace(DEFAULT, harmonics=9)
+    changes = changes_along_wear(file, td.build(file).balance, result, more_harmonics)
+    more = next(row.relative for row in changes if row.quantity == "life")
     assert more != life  # beside the balance with the harmonics of the combined refinement
-    there = td.run(file, overrides=["wear.motion=time", "verdict.enabled=false"]).summary()["life_cycles"]
-    balance = result.summary()["life_cycles"]
+    there = td.run(file, overrides=["wear.motion=time", "verdict.enabled=false"]).summary()["life"]
+    balance = result.summary()["life"]
     assert abs(balance / there - 1) < max(own, least) + life
 
 
@@ -316,9 +326,9 @@ def test_a_resumed_search_repeats_no_round(reached: tuple[td.Result, Bound, Path
 
 def made(changes: dict[str, dict[str, float | None]]) -> Verdict:
     """A verdict from changes by refinement and quantity."""
-    table = [Change(r, q, 1.0, 1.0, e, "made") for r, of in changes.items() for q, e in of.items()]
+    table = [MeasuredChange(r, q, 1.0, 1.0, e, "made") for r, of in changes.items() for q, e in of.items()]
     said = {}
-    for name in QUANTITIES:
+    for name in names_with_error():
         own = [row for row in table if row.quantity == name]
         known = [row.relative for row in own if row.relative is not None]
         error = DEFAULT.total(sum(known), 2.0) if own and len(known) == len(own) else None

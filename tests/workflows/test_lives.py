@@ -145,7 +145,7 @@ def test_the_claimed_confidence_is_kept_on_fifty_planted_problems() -> None:
 
 
 def test_quantiles_and_indices_are_those_of_the_closed_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life_cycles": lasts(values)}))
+    monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life": lasts(values)}))
     found = td.studies.lives(study(lives={"model_error": 0.1}), tmp_path)
     for q, name in zip(found.quantiles, ("P10", "P50", "P90"), strict=True):
         assert q.name == name
@@ -169,7 +169,7 @@ def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypa
     def life(values: dict[str, float], task: StudyRun) -> dict[str, float]:
         asked.append(task.number)
         whole = lasts(values)
-        return {"life_cycles": whole * math.exp(0.2 * math.sin(6 * math.log(whole / MEDIAN)))}
+        return {"life": whole * math.exp(0.2 * math.sin(6 * math.log(whole / MEDIAN)))}
 
     monkeypatch.setattr(pool, "finished", engine(life))
     tables = study(runs=16, lives={"model_error": 0, "within": "4 %", "most": 48})
@@ -208,7 +208,7 @@ def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
         def finished(tasks: Sequence[StudyRun], workers: int, solve: Any) -> Iterator[RunRow]:
             for task in tasks:
                 said = dict(text.split("=", 1) for text in task.overrides)
-                numbers = {"life_cycles": life({key: float(said[key]) for key in vary}, powers)}
+                numbers = {"life": life({key: float(said[key]) for key in vary}, powers)}
                 yield RunRow(task.number, task.key, "complete", "told", numbers)
 
         return finished
@@ -228,7 +228,7 @@ def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
 
 def test_missing_runs_widen_what_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def life(values: dict[str, float], task: StudyRun) -> dict[str, float] | None:
-        return None if task.number % 16 == 0 else {"life_cycles": lasts(values)}
+        return None if task.number % 16 == 0 else {"life": lasts(values)}
 
     monkeypatch.setattr(pool, "finished", engine(life))
     found = td.studies.lives(study(lives={"model_error": 0}), tmp_path)
@@ -244,7 +244,7 @@ def test_lives_that_did_not_end_are_lower_bounds(tmp_path: Path, monkeypatch: py
 
     def life(values: dict[str, float], task: StudyRun) -> dict[str, float]:
         own = lasts(values)
-        return {"cycles": limit} if own > limit else {"cycles": own, "life_cycles": own}
+        return {"cycles": limit} if own > limit else {"cycles": own, "life": own}
 
     monkeypatch.setattr(pool, "finished", engine(life))
     found = td.studies.lives(study(runs=64, lives={"model_error": 0}), tmp_path)
@@ -323,7 +323,7 @@ def test_runs_with_derivatives_say_as_much_as_three_times_as_many() -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"lives": {"number": "lifes"}}, 'has no number "lifes": there are life_cycles'),
+        ({"lives": {"number": "lifes"}}, 'has no number "lifes": there are life'),
         ({"lives": {"shares": [1.5]}}, "lives.shares"),
         ({"vary": VARY | {"damping.modal": [0.01, 0.02]}}, "vary.damping.modal: expected a distribution"),
         ({"study": {"scene": "beam", "design": "list"}, "vary": {FRICTION: [0.5]}}, "lives are drawn"),
@@ -332,7 +332,7 @@ def test_runs_with_derivatives_say_as_much_as_three_times_as_many() -> None:
 def test_what_cannot_be_is_refused(
     change: dict[str, Any], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life_cycles": 1e6}))
+    monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life": 1e6}))
     with pytest.raises(ValueError, match=sentence):
         td.studies.lives(study() | change, tmp_path)
 
@@ -374,9 +374,9 @@ def test_a_life_by_controlled_errors_is_smooth_and_its_row_has_its_derivatives()
     for friction in (0.495, 0.5, 0.505):
         file = scene_file.read("blade", (*cheap, f"contact.friction={friction}"))
         row = solve(StudyRun(1, "blade", file.text, file.overrides, file.folder, keys if friction == 0.5 else ()))
-        lives.append(row.numbers["life_cycles"])
+        lives.append(row.numbers["life"])
         if friction == 0.5:
-            by_friction, by_coefficient = (row.numbers[slope_column("life_cycles", key)] for key in keys)
+            by_friction, by_coefficient = (row.numbers[slope_column("life", key)] for key in keys)
     assert abs(np.diff(np.log(lives), 2)[0]) < 2e-3
     assert by_coefficient == pytest.approx(-lives[1] / file.scene.wear.numbers["coefficient"], rel=1e-9)
     assert by_friction == pytest.approx((lives[2] - lives[0]) / 0.01, rel=0.05)  # whose steps are not the same

@@ -44,7 +44,7 @@ SHARES, CONFIDENCE, RUNS, SETS = (0.1, 0.5, 0.9), 0.9, 64, 20
 def population(tmp_path_factory: pytest.TempPathFactory) -> tuple[np.ndarray, np.ndarray]:
     """Coordinates and logarithms of the lives of five hundred runs."""
     found = td.studies.grid(LIVES, tmp_path_factory.mktemp("population")).columns
-    values = np.asarray(found["life_cycles"], float)
+    values = np.asarray(found["life"], float)
     has = np.isfinite(values)
     space = ParameterSpace.of(study_file.parse(LIVES, "population.toml", Path()))
     return space.coordinates(space.points_of(found))[has], np.log(values[has])

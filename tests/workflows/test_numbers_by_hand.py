@@ -23,10 +23,10 @@ from tribodyn.hbm.wear.history import cycles_to_share
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import energy
 from tribodyn.reduction.linear_damping import rayleigh, rayleigh_of_ratios
-from tribodyn.workflows.errors.limit import limit_of
-from tribodyn.workflows.errors.states import relative
-from tribodyn.workflows.errors.verdict import error_of
-from tribodyn.workflows.result.verdict import Change, Refinement
+from tribodyn.workflows.errors.extrapolation import limit_of
+from tribodyn.workflows.errors.judgement import total_error
+from tribodyn.workflows.errors.operating_states import relative_change
+from tribodyn.workflows.result.verdict import MeasuredChange, Refinement
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.references import delta_max
 from tribodyn.workflows.scene import scene_file
@@ -164,14 +164,14 @@ def test_a_sequence_of_known_order_is_extrapolated_to_its_limit() -> None:
     [(0.01, 2.0, 0.025), (0.01, 1.5, 0.0375), (0.0, 2.0, 2.5e-3), (0.3, 2.0, 0.75)],
 )
 def test_the_total_error_extrapolates_the_change(change: float, ratio: float, total: float) -> None:
-    row = Change(Refinement.COMBINED, "energy", 1.0, 1.0, change, "")
-    assert error_of([row], ratio)[0] == pytest.approx(total)
+    row = MeasuredChange(Refinement.COMBINED, "energy", 1.0, 1.0, change, "")
+    assert total_error([row], ratio)[0] == pytest.approx(total)
 
 
 def test_a_change_is_relative_to_the_better_value() -> None:
-    assert relative(1.1, 1.0) == pytest.approx(0.1)
-    assert relative(-0.5, 1.0) == pytest.approx(1.5)
-    assert (relative(0.0, 0.0), relative(1e-9, 0.0)) == (0.0, 1.0)
+    assert relative_change(1.1, 1.0) == pytest.approx(0.1)
+    assert relative_change(-0.5, 1.0) == pytest.approx(1.5)
+    assert (relative_change(0.0, 0.0), relative_change(1e-9, 0.0)) == (0.0, 1.0)
 
 
 def test_the_energy_law_takes_off_its_coefficient_times_the_work(solved: tuple[HarmonicBalance, State]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from proof import bracket
-from tribodyn.workflows.errors import states
+from tribodyn.workflows.errors import operating_states
 from tribodyn.workflows.result.summary import numbers
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
@@ -94,15 +94,15 @@ def test_head_verdict_and_arc_length_have_one_peak(name: str) -> None:
     file = parse(SCENES[name], "part.toml", ("verdict.enabled=false",), Path(bracket.__file__).parent)
     result = pipeline.run(file, None, Progress())
     assert result.response is not None
-    assert states.turns_back(result.response)
+    assert operating_states.turns_back(result.response)
     head = numbers(result)
-    said = states.first_state(file, modelling.build(file, Progress()).balance, result).answers
+    said = operating_states.first_state(file, modelling.build(file, Progress()).balance, result).values
     assert (said["peak_frequency"], said["amplitude"]) == pytest.approx(
-        (head["peak_hz"][0], head["peak_m"][0]), rel=1e-9
+        (head["peak_frequency"]["first"], head["amplitude"]["first"]), rel=1e-9
     )
     down = pipeline.run(file.changed("response.method=arc_length", "response.sweep=down"), None, Progress())
     assert down.response is not None
     assert down.response.omega[0] > down.response.omega[-1]  # it comes to the peak from the other side
     other = numbers(down)
-    assert other["peak_hz"] == pytest.approx(head["peak_hz"], rel=1e-5)
-    assert other["peak_m"] == pytest.approx(head["peak_m"], rel=1e-4)
+    assert other["peak_frequency"] == pytest.approx(head["peak_frequency"], rel=1e-5)
+    assert other["amplitude"] == pytest.approx(head["amplitude"], rel=1e-4)

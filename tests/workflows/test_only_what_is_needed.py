@@ -180,7 +180,7 @@ def test_the_static_part_is_there_where_a_static_load_is_and_nowhere_else(tmp_pa
     assert result.facts.unknowns == 6 * 4
     # without x_0 every coefficient vibrates
     everything = np.linalg.norm(result.response.response[:, 0], axis=1).max()
-    assert summary.summary(result)["peak_m"] == [everything, everything]
+    assert summary.summary(result)["amplitude"] == {"first": everything}
 
 
 def test_contact_without_friction_state_or_derivative_allocates_neither() -> None:

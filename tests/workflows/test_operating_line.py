@@ -138,4 +138,4 @@ def test_a_study_follows_each_engine_order_at_its_own_frequencies(tmp_path: Path
         assert one.scene().scene.response.frequency == pytest.approx((100 * order, 125 * order))
     row = run_task.solve(tasks[1])
     assert row.status == "complete"
-    assert 230 < row.numbers["peak_hz_first"] < 240
+    assert 230 < row.numbers["peak_frequency_first"] < 240

@@ -159,17 +159,17 @@ def test_a_response_that_is_highest_at_its_end_has_no_peak_to_win_with() -> None
     below = ["response.frequency=['300 Hz', '350 Hz']"]
     numbers = numbers_of(td.run("beam", overrides=[*LINEAR["set"], "verdict.enabled=false", *below]))
     assert numbers["peak_at_end"] == 1.0
-    assert not {"peak_hz_first", "peak_m_first", "peak_m_last"} & set(numbers)
+    assert not {"peak_frequency_first", "amplitude_first", "amplitude_last"} & set(numbers)
 
 
 def test_a_contact_that_survives_lives_longest() -> None:
     """So does one that never slips, of which no cycle is known; a run that was stopped counts by its cycles."""
     columns = {
         "run": np.arange(1, 5), "status": np.array(["complete"] * 4, dtype=object),
-        "life_cycles": np.array([5e6, np.nan, np.nan, np.nan]), "cycles": np.array([6e6, 2e6, 3e6, 0.0]),
+        "life": np.array([5e6, np.nan, np.nan, np.nan]), "cycles": np.array([6e6, 2e6, 3e6, 0.0]),
         "survives": np.array([np.nan, 1.0, np.nan, 1.0]),
     }  # fmt: skip
-    values, least = StudyTable("made up", columns, ()).values_of("life_cycles")
+    values, least = StudyTable("made up", columns, ()).values_of("life")
     assert values.tolist() == [5e6, 5e6, 3e6, 5e6]
     assert least.tolist() == [False, True, True, True]
 
@@ -181,7 +181,7 @@ def test_what_cannot_be_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"optimise\.aims"):
         parsed(optimise={"aims": []})
     with pytest.raises(SceneError, match="needs low or high"):
-        parsed(optimise={"limits": [{"number": "peak_hz_first"}]})
+        parsed(optimise={"limits": [{"number": "peak_frequency_first"}]})
     with pytest.raises(SceneError, match="give a key that does not vary"):
         parsed(study={**LINEAR, "same": {"contact.friction": "nothing"}})
     normal = {"distribution": "normal", "mean": "15 N", "cov": "10 %"}

@@ -75,7 +75,7 @@ def test_the_run_ends_with_contact_lost(finished: Result) -> None:
     assert finished.wear is not None
     assert finished.wear.preload[0] > 1e3
     assert finished.wear.preload[-1] == 0.0
-    assert finished.wear.depth[-1].max() > finished.facts.delta_max_m
+    assert finished.wear.depth[-1].max() > finished.facts.delta_max
 
 
 def test_worn_volume_is_coefficient_times_energy(finished: Result) -> None:
@@ -118,9 +118,10 @@ def test_references_peak_where_the_modes_are(finished: Result) -> None:
     assert references is not None
     hertz = references.omega / (2 * np.pi)
     spacing = hertz[1] - hertz[0]
-    free = finished.facts.free_hz[0]
+    free = finished.facts.open_frequencies[0]
     assert hertz[np.argmax(references.free)] == pytest.approx(free, abs=2 * spacing)
-    there = finished.facts.stuck_hz[(finished.facts.stuck_hz > hertz[0]) & (finished.facts.stuck_hz < hertz[-1])]
+    stuck = finished.facts.stuck_frequencies
+    there = stuck[(stuck > hertz[0]) & (stuck < hertz[-1])]
     assert np.abs(hertz[np.argmax(references.stuck)] - there).min(initial=np.inf) <= 2 * spacing
     assert finished.wear is not None
     # without contact the peak is the free one, 1 % damping: amplitudes agree where the grid of 5 Hz allows
@@ -307,9 +308,11 @@ def test_curves_of_the_worn_contact_walk_to_the_free_one(finished: Result, tmp_p
     assert len(worn.row) == 3
     assert worn.row[-1] == len(finished.wear.cycles) - 1
     peaks = worn.omega[np.arange(3), np.nanargmax(worn.amplitude, axis=1)] / (2 * np.pi)
-    assert peaks[-1] == pytest.approx(finished.facts.free_hz[0], rel=0.05)
+    assert peaks[-1] == pytest.approx(finished.facts.open_frequencies[0], rel=0.05)
     assert np.all(np.diff(peaks) <= 0)
-    assert summary(result)["surface_volumes_m3"] == pytest.approx([0.5 * summary(result)["volume_m3"]] * 2)
+    assert [summary(result)[f"volume_of_body_{n}"] for n in (1, 2)] == pytest.approx(
+        [0.5 * summary(result)["volume"]] * 2
+    )
     drawn = {path.name for path in plots.draw(result, tmp_path, dpi=60)}
     assert {"frf.png", "depth.png"} <= drawn
 

@@ -116,7 +116,7 @@ def test_stage_and_ends_of_a_run_come_back(tmp_path: Path, stage: Stage, end: Ou
 def test_facts_of_a_wheel_come_back(tmp_path: Path) -> None:
     from dataclasses import replace
 
-    facts = replace(result().facts, around=Around(40, 3, np.array([1.0, 0.0, 0.0])), free_hz=np.array([12.5]))
+    facts = replace(result().facts, around=Around(40, 3, np.array([1.0, 0.0, 0.0])), open_frequencies=np.array([12.5]))
     written = replace(result(), facts=facts)
     store.save(tmp_path / "result.h5", written)
     assert same(written, store.load(tmp_path / "result.h5"))

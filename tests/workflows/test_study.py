@@ -143,8 +143,8 @@ def test_a_row_is_what_the_run_itself_gives(done: Path) -> None:
     assert "friction" in frame["sentence"][3]
     assert list(frame[PRESS]) == [10e3, 20e3] * 2  # in SI units
     own = td.run("beam", overrides=[*TINY, f"{FRICTION}=0.3", f"{PRESS}=20 kN", "verdict.enabled=false"]).summary()
-    assert frame["peak_m_first"][2] == pytest.approx(own["peak_m"][0], rel=1e-9)
-    assert frame["peak_hz_first"][2] == own["peak_hz"][0]
+    assert frame["amplitude_first"][2] == pytest.approx(own["amplitude"]["first"], rel=1e-9)
+    assert frame["peak_frequency_first"][2] == own["peak_frequency"]["first"]
     assert (done / "study.png").stat().st_size > 5000
 
 
@@ -278,6 +278,6 @@ def test_what_runs_share_is_made_once(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_runs_without_a_peak_have_nothing_to_draw() -> None:
     """Complete runs, none of which has a number that is drawn."""
     runs = {"run": np.arange(2.0), FRICTION: np.array([0.2, 0.3]), "status": np.array(["complete"] * 2)}
-    bare = {**runs, "peak_hz_first": np.full(2, np.nan)}
+    bare = {**runs, "peak_frequency_first": np.full(2, np.nan)}
     assert not study_pictures.shown(SimpleNamespace(columns=bare))  # type: ignore[arg-type]
-    assert study_pictures.shown(SimpleNamespace(columns={**runs, "peak_hz_first": np.array([np.nan, 900.0])}))  # type: ignore[arg-type]
+    assert study_pictures.shown(SimpleNamespace(columns={**runs, "peak_frequency_first": np.array([np.nan, 900.0])}))  # type: ignore[arg-type]

@@ -7,15 +7,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from tribodyn.hbm.quantity import WearQuantity, known, load, names_with_error, with_error
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import refine
-from tribodyn.workflows.errors.options import DEFAULT
+from tribodyn.workflows.errors.refinement_limits import DEFAULT
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import NAMES, Refinement, Verdict
+from tribodyn.workflows.result.verdict import Refinement, Verdict
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.units import to_si
 
-OF_WEAR = ("depth", "life")
 PER_CENT = re.compile(r" ?\bper ?cent\b")
 
 Runner = Callable[[SceneFile, int], Result]
@@ -65,8 +65,8 @@ class Bound:
     @property
     def sentence(self) -> str:
         """Errors, the settings that gave them, and what is missed."""
-        good = [f"{NAMES[q]} {self.errors[q]:.2g}" for q, why in self.reasons.items() if not why]
-        bad = [f"{NAMES[q]} ({why})" for q, why in self.reasons.items() if why]
+        good = [f"{known(q).label} {self.errors[q]:.2g}" for q, why in self.reasons.items() if not why]
+        bad = [f"{known(q).label} ({why})" for q, why in self.reasons.items() if why]
         settings = f"with {', '.join(self.overrides)}" if self.overrides else "with the scene as it is"
         said = f"error bound {self.wanted.error:g} {settings}, after {self.rounds} runs"
         said += f"; met: {', '.join(good)}" if good else ""
@@ -86,12 +86,12 @@ def parsed(text: str) -> Wanted:
         raise Refusal(f'--accuracy "{text}": {wrong}') from None
     if not 0 < error < 1:
         raise Refusal(f'--accuracy "{text}": give an error above 0 and below 100 %, such as "1 %"')
-    known = {name: q for q, name in NAMES.items()}
+    labels = {load(name).label: name for name in names_with_error()}
     asked = tuple(re.split(r", and |, | and ", names)) if names else ()
     for name in asked:
-        if name not in known:
-            raise Refusal(f'--accuracy "{text}": after "of" expected one of {", ".join(known)}, got "{name}"')
-    return Wanted(error, tuple(known[name] for name in dict.fromkeys(asked)))
+        if name not in labels:
+            raise Refusal(f'--accuracy "{text}": after "of" expected one of {", ".join(labels)}, got "{name}"')
+    return Wanted(error, tuple(labels[name] for name in dict.fromkeys(asked)))
 
 
 def to_accuracy(
@@ -106,7 +106,7 @@ def to_accuracy(
     """
     wanted, rounds = parsed(accuracy), rounds or Rounds()
     always = {"verdict.enabled": "true"}
-    if wanted.quantities and not set(wanted.quantities) & set(OF_WEAR):
+    if wanted.quantities and not set(wanted.quantities) & {q.name for q in with_error(WearQuantity)}:
         always["wear"] = ""
     added: dict[str, str] = {}
     for number in range(1, rounds.most + 1):
@@ -116,7 +116,7 @@ def to_accuracy(
         assert found is not None
         of = wanted.quantities or tuple(name for name, one in found.statements.items() if one.value is not None)
         if not of:
-            raise SolverFailure(f"{file.name} has no error: {found.statements['peak_frequency'].reason}")
+            raise SolverFailure(f"{file.name} has no error: {next(iter(found.statements.values())).reason}")
         finer = {name: _finer(current, name, rounds.finer) for name in _large(found, wanted, of, rounds.share)}
         left = tuple(name for name, texts in finer.items() if not texts)
         bound = _bound(found, wanted, of, added, left, number)

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from tribodyn.extras import package
+from tribodyn.hbm.quantity import StatedQuantity
+from tribodyn.workflows.result.answers import histories_of
 from tribodyn.workflows.result.readable import write_columns
 from tribodyn.workflows.result.result import Result
 
@@ -107,15 +109,10 @@ def _histories(result: Result) -> list[dict[str, Any]]:
     table = tables(result).get("wear")
     if table is None:
         return []
-    wanted = {name: unit for name, unit in (
-        ("frequency_Hz", "Hz"), ("amplitude_m", "m"), ("preload_N", "N"), ("energy_per_cycle_J", "J"),
-        ("depth_largest_m", "m"), ("depth_mean_m", "m"), ("volume_m3", "m3"),
-    )}  # fmt: skip
+    cycles, plain = table["cycles"], DataKind.PLAIN
     return [
-        function(
-            Function.GENERAL, name, "cycles", DataKind.PLAIN, "", table["cycles"], DataKind.PLAIN, unit, table[name]
-        )
-        for name, unit in wanted.items()
+        function(Function.GENERAL, header(quantity), "cycles", plain, "", cycles, plain, quantity.unit, values)
+        for quantity, values in histories_of(result).items()
     ]
 
 
@@ -219,6 +216,11 @@ def response(result: Result) -> Table:
     return columns
 
 
+def header(quantity: StatedQuantity) -> str:
+    """The column of a quantity: its name and unit."""
+    return f"{quantity.name}_{quantity.unit}" if quantity.unit else quantity.name
+
+
 def terms(harmonics: tuple[int, ...]) -> list[str]:
     """Names of the Fourier coefficients in the order of the last axis: a0, a1, b1, a2, ..."""
     return [name for h in harmonics for name in ((f"a{h}",) if h == 0 else (f"a{h}", f"b{h}"))]
@@ -237,21 +239,15 @@ def pairs(result: Result) -> Table:
 
 def wear(result: Result) -> Table:
     """The wear history row by row, each row the state that a wear step starts from."""
-    history, patch = result.wear, result.patch
+    history = result.wear
     assert history is not None
     columns = {
         "row": np.arange(len(history.cycles)),
         "cycles": history.cycles,
         "cycles_in_step": history.cycles_in_step,
-        "frequency_Hz": history.omega / (2 * np.pi),
-        "amplitude_m": history.amplitude,
-        "preload_N": history.preload,
-        "energy_per_cycle_J": history.energy.sum(axis=1),
+        **{header(quantity): values for quantity, values in histories_of(result).items()},
         "friction_work_in_step_J": history.work.sum(axis=1),
-        "depth_largest_m": history.depth.max(axis=1),
-        "depth_mean_m": history.depth @ patch.area / patch.area.sum(),
-        "depth_smallest_m": history.depth.min(axis=1),
-        "volume_m3": history.depth @ patch.area,
+        "smallest_depth_m": history.depth.min(axis=1),
         "solves": history.solves,
         "step_error": history.step_error,
     }

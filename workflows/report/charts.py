@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tribodyn.hbm.quantity import StatedQuantity
 from tribodyn.workflows.pictures.exploded import explosion_offsets
 from tribodyn.workflows.pictures.figures import status_name
 from tribodyn.workflows.pictures.loop_plots import loop_size, pair_name
 from tribodyn.workflows.pictures.theme import CYCLE, GREY, INK, STATUS
 from tribodyn.workflows.pictures.view import grid_of, looking, wear_scale
 from tribodyn.workflows.pictures.wear_plots import with_gaps
+from tribodyn.workflows.result.answers import histories_of
 from tribodyn.workflows.result.faces import bodies, meetings_of, worn_off
+from tribodyn.workflows.result.readable import axis_unit
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, shown_states, state_of
 
@@ -29,11 +32,7 @@ def charts(results: Sequence[tuple[str, Result]]) -> dict[str, Chart]:
     """Charts by title, each with the curves of all results that have them."""
     found = {
         "Response": _response(results),
-        "Peak frequency under wear": _wear(results, "omega", "frequency / Hz", 1 / (2 * np.pi)),
-        "Amplitude under wear": _wear(results, "amplitude", "amplitude / mm", 1e3),
-        "Preload": _wear(results, "preload", "preload / N", 1.0),
-        "Largest wear depth": _wear(results, "depth", "largest total depth / mm", 1e3),
-        "Friction work per cycle": _wear(results, "energy", "energy per cycle / J", 1.0),
+        **_wear(results),
         "Hysteresis": _loops(results),
     }
     return {title: chart for title, chart in found.items() if chart["data"]}
@@ -98,17 +97,22 @@ def _response(results: Sequence[tuple[str, Result]]) -> Chart:
     return _chart(data, "frequency / Hz", "amplitude / mm", log=True)
 
 
-def _wear(results: Sequence[tuple[str, Result]], what: str, label: str, scale: float) -> Chart:
-    data = []
+def _wear(results: Sequence[tuple[str, Result]]) -> dict[str, Chart]:
+    """A chart over the vibration cycles for each quantity that has a value at every row of the wear."""
+    lines: dict[StatedQuantity, list[Chart]] = {}
     for name, result in results:
         if result.wear is None or not result.wear_steps:
             continue
-        values = np.asarray(getattr(result.wear, what))
-        if values.ndim == 2:
-            values = values.max(axis=1) if what == "depth" else values.sum(axis=1)
-        cycles, shown = with_gaps(result.wear, result.wear.cycles, scale * values)
-        data.append(_line(name, cycles, shown, mode="lines+markers", marker={"size": 4}))
-    return _chart(data, "vibration cycles", label)
+        for quantity, values in histories_of(result).items():
+            cycles, shown = with_gaps(result.wear, result.wear.cycles, axis_unit(quantity.unit)[1] * values)
+            line = _line(name, cycles, shown, mode="lines+markers", marker={"size": 4})
+            lines.setdefault(quantity, []).append(line)
+    return {
+        f"{quantity.title[:1].upper()}{quantity.title[1:]}": _chart(
+            data, "vibration cycles", f"{quantity.label} / {axis_unit(quantity.unit)[0]}"
+        )
+        for quantity, data in lines.items()
+    }
 
 
 def _loops(results: Sequence[tuple[str, Result]]) -> Chart:

@@ -24,18 +24,13 @@ from tribodyn.workflows.pictures import offscreen, plots, render
 from tribodyn.workflows.pictures.theme import STYLE
 from tribodyn.workflows.report import text
 from tribodyn.workflows.report.charts import charts, solid
+from tribodyn.workflows.result.answers import answers_of
 from tribodyn.workflows.result.result import Result
 
 HEADING = "part"  # the picture that heads the page
 DPI = 110  # of the figures on the page
 LARGEST = 15e6  # bytes of a page
 HERE = Path(__file__).parent
-COMPARED = (
-    ("peak frequency / Hz", "peak_hz"), ("amplitude / m", "peak_m"), ("preload / N", "preload_N"), ("cycles", "cycles"),
-    ("life / cycles", "life_cycles"), ("largest depth / m", "depth_max_m"), ("worn volume / m³", "volume_m3"),
-    ("friction work / J", "energy_J"), ("contact pairs", "contact_pairs"), ("DOFs of the model", "model_dofs"),
-    ("seconds", "seconds"),
-)  # fmt: skip
 
 
 def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
@@ -167,23 +162,30 @@ def _number(value: Any) -> str:
 
 def _comparison(named: Sequence[tuple[str, Result]]) -> str:
     """Numbers of all results, with the relative difference from the first."""
-    every = [result.summary() for _, result in named]
+    tables = [_headlines(result) for _, result in named]
     rows = []
-    for label, key in COMPARED:
-        values = [numbers.get(key) for numbers in every]
-        for position, word in (
-            ((0, "first"), (1, "last")) if any(isinstance(v, list) for v in values) else ((None, ""),)
-        ):
-            picked = [v if position is None or not isinstance(v, list) else v[position] for v in values]
-            if all(v is None for v in picked):
-                continue
-            cells = [_number(picked[0])]
-            for value in picked[1:]:
-                first: Any = picked[0]
-                both = value is not None and first not in (None, 0)
-                cells.append(_number(value) + (f" ({value / first - 1:+.2%})" if both else ""))
-            rows.append((f"{label}{', ' + word if word else ''}", *cells))
+    for label in dict.fromkeys(label for table in tables for label in table):
+        first: Any
+        first, *others = (table.get(label) for table in tables)
+        cells = [_number(first)]
+        for value in others:
+            comparable = value is not None and first not in (None, 0)
+            cells.append(_number(value) + (f" ({value / first - 1:+.2%})" if comparable else ""))
+        rows.append((label, *cells))
     return _table(rows, ("", *(name for name, _ in named)))
+
+
+def _headlines(result: Result) -> dict[str, Any]:
+    """Label with unit -> number, of what results are compared by."""
+    answers = [answer for answer in answers_of(result) if answer.quantity.headline and not answer.joint]
+    table: dict[str, Any] = {}
+    for answer in answers:
+        unit, when = answer.quantity.unit, answer.when
+        if answer.value is not None:
+            table[f"{answer.quantity.title}{unit and f' / {unit}'}{when and f', {when}'}"] = answer.value
+    facts = result.facts
+    sizes = {"contact pairs": facts.contact_pairs, "DOFs of the model": facts.model_dofs, "seconds": facts.seconds}
+    return table | sizes
 
 
 def _inspection(result: Result) -> str:
@@ -191,8 +193,8 @@ def _inspection(result: Result) -> str:
         "elements": "elements", "nodes": "nodes", "scaled_jacobian": "smallest scaled Jacobian (1 is best)",
         "full_dofs": "DOFs of the full model", "model_dofs": "DOFs of the reduced model",
         "retained_modes": "retained modes",
-        "first_omitted_hz": "first omitted mode / Hz", "free_hz": "modes, contact open / Hz",
-        "stuck_hz": "modes, contact stuck / Hz", "contact_pairs": "contact pairs",
+        "first_omitted_frequency": "first omitted mode / Hz", "open_frequencies": "modes, contact open / Hz",
+        "stuck_frequencies": "modes, contact stuck / Hz", "contact_pairs": "contact pairs",
         "unknowns": "unknowns of the balance", "harmonics": "harmonics", "compliance_error": "error of the compliance",
         "factorisation": "factorisation", "prestress_residual": "residual of the prestress",
         "prestress_rotation": "largest static rotation / rad", "sectors": "sectors", "engine_order": "engine order",

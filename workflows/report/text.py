@@ -2,201 +2,221 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from tribodyn.hbm.quantity import CurveQuantity, StatedQuantity, WearQuantity, known
+from tribodyn.workflows.result.answers import (
+    FIRST,
+    LAST,
+    PEAK,
+    STABLE,
+    Answer,
+    answers_of,
+    cycles_of,
+    wears_at_peak,
+)
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.readable import UNKNOWN, digits, measured, rounded
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, life_ends, order_of_line, size_of, worn_at_peak
-from tribodyn.workflows.result.verdict import NAMES, UNITS, Refinement, Statement, Status
+from tribodyn.workflows.result.summary import LARGEST_BEND, order_of_line, size_of
+from tribodyn.workflows.result.verdict import Refinement, Statement, Status
 
 Lines = list[tuple[str, str]]
 TOGETHER = "mesh, modes and harmonics together"
 MOST_JOINTS = 4  # named contacts that a summary has a line each for
+WIDTH = 16  # of the names in a summary
 
 
 def brief(result: Result) -> list[str]:
     """The summary of a result: model, response, wear, errors, warnings, each number with the digits it has."""
-    found, judged = result.summary(), result.verdict.statements if result.verdict else {}
+    answers = [answer for answer in answers_of(result) if answer.value is not None and answer.quantity.headline]
     groups = {
-        "model": _model_in_brief(result, found),
-        "response": _response_in_brief(result, found, judged),
-        "wear": _wear_in_brief(result, found, judged) if found["depth_max_m"] is not None else [],
-        "errors": _errors_in_brief(judged),
+        "model": _model_lines(result),
+        "response": [*_cycle_lines(result, answers), *_curve_lines(result, answers)],
+        "wear": _wear_lines(answers),
+        "errors": _error_lines({} if result.verdict is None else result.verdict.statements),
     }
     state = result.state.split(":")[0]
-    shown = [f"{result.provenance['scene_name']}: {state}, {found['seconds']:.0f} s"]
-    for name, lines in groups.items():
-        shown += [f"{name if at == 0 else '':9} {line}".rstrip() for at, line in enumerate(lines)]
-    return shown + [f"warning   {warning}" for warning in warnings(result)]
+    lines = [f"{result.provenance['scene_name']}: {state}, {result.facts.seconds:.0f} s"]
+    for name, group in groups.items():
+        lines += [f"{name if at == 0 else '':9} {line}".rstrip() for at, line in enumerate(group)]
+    return lines + [f"warning   {warning}" for warning in warnings(result)]
 
 
-def _model_in_brief(result: Result, found: dict[str, Any]) -> list[str]:
-    full, model, around = found["full_dofs"], found["model_dofs"], result.facts.around
+def _model_lines(result: Result) -> list[str]:
+    facts = result.facts
+    full, model, around = facts.full_dofs, facts.model_dofs, facts.around
     pieces = [f"{full} DOFs" if full == model else f"{full} DOFs reduced to {model}"]
-    pieces.append(f"{found['contact_pairs']} node pairs in contact")
+    pieces.append(f"{facts.contact_pairs} node pairs in contact")
     if around is not None:
         pieces.append(f"{around.sectors} sectors, engine order {around.engine_order}")
-    if found["harmonics"]:
-        pieces.append(f"harmonics {', '.join(map(str, found['harmonics']))}")
-    modes = {"open": found["free_hz"][:3], "stuck": found["stuck_hz"][:3]}
-    known = [f"{how} {_hertz(lowest)}" for how, lowest in modes.items() if lowest]
-    return ["; ".join(pieces), *([f"modes with the contact {', '.join(known)}"] if known else [])]
+    if result.harmonics:
+        pieces.append(f"harmonics {', '.join(map(str, result.harmonics))}")
+    modes = {"open": facts.open_frequencies[:3].tolist(), "stuck": facts.stuck_frequencies[:3].tolist()}
+    spectra = [f"{how} {_hertz(lowest)}" for how, lowest in modes.items() if lowest]
+    return ["; ".join(pieces), *([f"modes with the contact {', '.join(spectra)}"] if spectra else [])]
 
 
 def _hertz(modes: list[float]) -> str:
     return ", ".join(rounded(hertz, 4) if hertz > 1e-4 * max(modes) else "0" for hertz in modes) + " Hz"
 
 
-def _of(judged: dict[str, Statement], name: str, default: int = 3) -> int:
-    """Digits of a quantity by its error."""
-    one = judged.get(name)
-    sought = one is not None and one.status == Status.NOT_KNOWN and name in ("depth", "life")
-    return default if one is None else digits(one.error, UNKNOWN if sought else default)
+def _value(answer: Answer) -> str:
+    """The value of an answer with its unit and the digits that its error allows."""
+    assert answer.value is not None
+    return _number(answer.quantity, answer.value, answer.error)
 
 
-def _response_in_brief(result: Result, found: dict[str, Any], judged: dict[str, Statement]) -> list[str]:
-    if found["peak_hz"] is None:
-        return []
-    count = _of(judged, "peak_frequency", 4), _of(judged, "amplitude")
-    given = found["wear_steps"] and not worn_at_peak(result)
-    peaks = [
-        f"{f'{hertz:g} Hz' if given else measured(hertz, 'Hz', count[0])}, {measured(height, 'm', count[1])}"
-        for hertz, height in zip(found["peak_hz"], found["peak_m"], strict=True)
+def _number(quantity: StatedQuantity, value: float, statement: Statement | None) -> str:
+    if not quantity.unit:
+        return percent(value)
+    if statement is None:
+        return measured(value, quantity.unit, quantity.digits)
+    sought = statement.status == Status.NOT_KNOWN and isinstance(quantity, WearQuantity)
+    return measured(value, quantity.unit, digits(statement.error, UNKNOWN if sought else quantity.digits))
+
+
+def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
+    """A line for each cycle that the result states numbers of: where it is, and its numbers."""
+    place = "peak" if wears_at_peak(result) else "operating point"
+    words = {PEAK: "peak", FIRST: place, LAST: place, STABLE: "stable point"}
+    suffix = {FIRST: ", before wear" if result.wear_steps else "", LAST: ", at the end of wear"}
+    lines = []
+    for when, word in words.items():
+        own = [answer for answer in answers if answer.when == when and not answer.joint]
+        if not own or (when == LAST and not result.wear_steps) or (when == STABLE and not _is_unstable(result)):
+            continue
+        frequency, *others = own
+        values = [_value(frequency), *(f"{answer.quantity.label} {_value(answer)}" for answer in others)]
+        if (order := order_of_line(result)) is not None and frequency.value is not None:
+            values.insert(1, f"{60 * frequency.value / order:.{frequency.quantity.digits}g} rpm")
+        lines.append(f"{word:{WIDTH}}{', '.join(values)}{suffix.get(when, '')}")
+    return lines
+
+
+def _is_unstable(result: Result) -> bool:
+    return result.summary()["peak_is_stable"] is False
+
+
+def _curve_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
+    lines, table, curve = [], result.summary(), result.response
+    if curve is not None and curve.controlled:
+        factors = curve.load_factor[curve.converged]
+        force = result.driving_force
+        ends = [abs(force or 1.0) * float(factor) for factor in (factors.min(), factors.max())]
+        texts = [f"{end:.3g} times the loads" if force is None else measured(end, "N") for end in ends]
+        lines.append(f"{'force':{WIDTH}}{texts[0]} to {texts[1]}, found")
+    if table["harmonics_error"] is not None:
+        lines.append(f"{'harmonics':{WIDTH}}chosen, estimated truncation error {percent(table['harmonics_error'])}")
+    numbers = [answer for answer in answers if isinstance(answer.quantity, CurveQuantity)]
+    lines += [f"{answer.quantity.title}: {_value(answer)}" for answer in numbers]
+    if table["bifurcations"]:
+        places = ", ".join(f"{b['kind']} at {measured(b['frequency'], 'Hz', 4)}" for b in table["bifurcations"])
+        lines.append(f"{'stability':{WIDTH}}{table['unstable_points']} unstable points; {places}")
+    return lines
+
+
+def _wear_lines(answers: Sequence[Answer]) -> list[str]:
+    """A line for each number of the wear, and for each of the first named contacts."""
+    wear = [answer for answer in answers if isinstance(answer.quantity, WearQuantity)]
+    lines = [
+        f"{answer.quantity.label:{WIDTH}}{_value(answer)}{f', {answer.why}' if answer.why else ''}"
+        for answer in sorted(wear, key=lambda answer: answer.quantity.rank)
+        if not answer.joint
     ]
-    shown = [f"peak      {peaks[0]}{', unworn' if found['wear_steps'] else ''}"]
-    if found["wear_steps"] and not given:
-        shown.append(f"          {peaks[1]}, at the end of wear")
-    elif given:
-        shown = [f"worn at   {peaks[0]}, unworn", f"          {peaks[1]}, at the end of wear"]
-        if (frf := result.response) is not None and (top := frf.peak(frf.output_names[0])) is not None:
-            highest = measured(frf.frequency[top], "Hz", 4), measured(frf.amplitude(frf.output_names[0])[top], "m")
-            shown.insert(0, f"peak      {', '.join(highest)}, unworn")
-    if (order := order_of_line(result)) is not None:
-        speeds = [f"{60 * hertz / order:.{count[0]}g} rpm" for hertz in found["peak_hz"]]
-        shown.append(f"speed     {speeds[0]}" + (f", {speeds[1]} at the end of wear" if found["wear_steps"] else ""))
-    if found["load_factor"] is not None:
-        ends = [abs(result.driving_force or 1.0) * factor for factor in found["load_factor"]]
-        force = [f"{end:.3g} times the loads" if result.driving_force is None else measured(end, "N") for end in ends]
-        shown.append(f"force     {force[0]} to {force[1]}, found")
-    if found["harmonics_error"] is not None:
-        shown.append(f"harmonics chosen, estimated truncation error {percent(found['harmonics_error'])}")
-    if found["shear_spread"] is not None:
-        spread, there = percent(found["shear_spread"]), percent(found["shear_spread_at_peak"])
-        shown.append(f"load path changes the amplitude by up to {spread}, {there} at the peak")
-    if found["bifurcations"]:
-        places = ", ".join(f"{one['kind']} at {measured(one['hz'], 'Hz', 4)}" for one in found["bifurcations"])
-        shown.append(f"stability {found['unstable_points']} unstable points; {places}")
-    return shown
+    joints = dict.fromkeys(answer.joint for answer in wear if answer.joint)
+    for name in list(joints)[:MOST_JOINTS]:
+        values = (f"{answer.quantity.label} {_value(answer)}" for answer in wear if answer.joint == name)
+        lines.append(f"  {name}: {', '.join(values)}")
+    return lines
 
 
-def _wear_in_brief(result: Result, found: dict[str, Any], judged: dict[str, Statement]) -> list[str]:
-    count, life = _of(judged, "depth"), _of(judged, "life")
-    shown = [f"cycles    {measured(found['cycles'], 'cycles', life)}: {found['wear_end'].split(';')[0]}"]
-    lost = found["life_cycles"] and measured(found["life_cycles"], "cycles", life)
-    if lost and not shown[0].startswith(f"cycles    {lost}:"):
-        joint, (share, whose) = first_lost(result), life_ends(result)
-        until = f"{100 * share:g} % of the {whose} is left" if joint is None else f"contact {joint} is lost"
-        shown.append(f"life      {lost}, until {until}")
-    if found["first_lift_cycles"] is not None:
-        shown.append(f"opens     first after {measured(found['first_lift_cycles'], 'cycles', 2)}")
-    deepest, mean = (measured(found[key], "m", count) for key in ("depth_max_m", "depth_mean_m"))
-    first, last = (measured(force, "N", _of(judged, "preload")) for force in found["preload_N"])
-    work = measured(found["energy_J"], "J", UNKNOWN)
-    shown.append(f"depth     {deepest} at most, {mean} on average")
-    shown.append(f"preload   {first} at first, {last} in the end, means of a cycle")
-    shown.append(f"worn      {measured(found['volume_m3'], 'm3', count)} by {work} of friction work")
-    for name, joint in list(found["joints"].items())[:MOST_JOINTS]:
-        if "depth_max_m" in joint:
-            until = joint["life_cycles"]
-            end = "" if until is None else f", lost after {measured(until, 'cycles', life)}"
-            shown.append(f"  {name}: depth {measured(joint['depth_max_m'], 'm', count)}{end}")
-    return shown
-
-
-def _errors_in_brief(judged: dict[str, Statement]) -> list[str]:
+def _error_lines(statements: Mapping[str, Statement]) -> list[str]:
     """A table of values, errors and what dominates these; the reasons of what is not known once, below it."""
-    shown, reasons = [], dict[str, list[str]]()
-    for name, one in judged.items():
-        label = NAMES[name]
-        if one.value is None or (name == "peak_frequency" and one.error == 0.0):  # given by the scene
+    lines, reasons = [], dict[str, list[str]]()
+    for name, statement in statements.items():
+        quantity = known(name)
+        if statement.value is None or statement.error == 0.0:  # given by the scene
             continue
-        if one.stated:
-            value, error = measured(one.value, UNITS[name], digits(one.error)), percent(one.error or 0.0)
-            by = TOGETHER if one.dominated_by == Refinement.COMBINED else one.dominated_by or one.reason
-            shown.append(f"{label:15} {value:19} {error:8} {by}")
+        if statement.stated:
+            value = _number(quantity, statement.value, statement)
+            by = TOGETHER if statement.dominated_by == Refinement.COMBINED else statement.dominated_by
+            lines.append(f"{quantity.label:15} {value:19} {percent(statement.error or 0.0):8} {by or statement.reason}")
             continue
-        known = one.status == Status.NOT_KNOWN
-        value = measured(one.value, UNITS[name], _of(judged, name)) if known else "not reported"
-        error = "unknown" if known else ""
-        shown.append(f"{label:15} {value:19} {error}".rstrip())
-        why = one.reason if known else f"{one.status.removeprefix('not reported ').strip('()')}; {one.reason}"
-        reasons.setdefault(why.strip("; "), []).append(label)
-    head = [f"{'':15} {'value':19} {'error':8} dominated by"] if shown else []
-    return head + shown + [f"{', '.join(names)}: {why}" for why, names in reasons.items() if why]
+        unknown = statement.status == Status.NOT_KNOWN
+        value = _number(quantity, statement.value, statement) if unknown else "not reported"
+        lines.append(f"{quantity.label:15} {value:19} {'unknown' if unknown else ''}".rstrip())
+        why = "" if unknown else f"{statement.status.removeprefix('not reported ').strip('()')}; "
+        reasons.setdefault(f"{why}{statement.reason}".strip("; "), []).append(quantity.label)
+    head = [f"{'':15} {'value':19} {'error':8} dominated by"] if lines else []
+    return head + lines + [f"{', '.join(labels)}: {why}" for why, labels in reasons.items() if why]
 
 
 def warnings(result: Result) -> Iterator[str]:
     """What of a result is to be doubted, in sentences."""
-    found = result.summary()
+    table, curve = result.summary(), result.response
     if result.stage not in (Stage.COMPLETE, Stage.RESPONSE):
         yield f"this run is not complete: {result.state}"
-    if found["peak_at_end"] and (frf := result.response) is not None:
-        yield f"no peak: {frf.no_peak(frf.output_names[0])}"
-    if found["jumped"]:
+    if table["peak_at_end"] and curve is not None:
+        yield f"no peak: {curve.no_peak(curve.output_names[0])}"
+    if table["jumped"]:
         yield 'the sweep jumped: behind the fold its peak may be higher; see response.method "arc_length"'
-    if found["peak_is_stable"] is False and not found["wear_steps"]:
-        yield f"this peak is unstable, no vibration remains there; {_stable(found)}"
-    if (wear := result.wear) is not None:
-        if wear.in_time[:1].any():
-            height, work = measured(wear.amplitude[0], "m", 2), measured(wear.energy[0].sum(), "J", 2)
-            what = "peak" if worn_at_peak(result) else "motion"
-            yield f"the unworn {what} is unstable: a machine leaves it for {height} and {work} a cycle on average"
-        if found["unstable_cycles"]:
-            share = percent(found["unstable_cycles"])
-            yield f'the motion is unstable for {share} of the cycles; wear.motion = "machine" follows a machine there'
-        elif found["unstable_cycles"] is None and result.facts.around is not None and found["wear_steps"]:
-            yield "whether the wheel stays at the motion that it wears along is not known"
-        for row in wear.without_balance[:1]:
-            yield f"from {measured(wear.cycles[row], 'cycles')} on maps, loops and films are of the last balance solved"
-        for row in wear.jumps:
-            before, after = (measured(hertz, "Hz", 4) for hertz in wear.frequency[row : row + 2])
-            when = measured(wear.cycles[row + 1], "cycles")
-            yield f"at {when} the response jumped from {before} to {after}, where another resonance dominates"
-    heights, size = found["peak_m"] or [0.0], size_of(result)
-    if (most := max(heights)) > LARGEST_BEND * size:
-        where = "at the end of wear" if most > heights[0] else "at the peak"
+    if table["peak_is_stable"] is False and not result.wear_steps:
+        stable = any(answer.when == STABLE for answer in answers_of(result))
+        yield f"this peak is unstable, no vibration remains there{'' if stable else '; no point is stable'}"
+    if result.wear is not None:
+        yield from _wear_warnings(result)
+    cycles = cycles_of(result)
+    highest = max((cycles[when][0].amplitude for when in (FIRST, LAST) if when in cycles), default=0.0)
+    if highest > LARGEST_BEND * size_of(result):
         yield (
-            f"{measured(most, 'm')} {where} on a part of {measured(size, 'm')} is beyond the linear model: it says "
-            "that the amplitude is large, not how large"
+            f"{measured(highest, 'm')} on a part of {measured(size_of(result), 'm')} is beyond the linear model: it "
+            "says that the amplitude is large, not how large"
         )
 
 
-def _stable(found: dict[str, Any]) -> str:
-    if found["stable_peak_hz"] is None:
-        return "no point is stable"
-    return f"highest stable point: {found['stable_peak_hz']:.5g} Hz, {1e3 * found['stable_peak_m']:.5g} mm"
+def _wear_warnings(result: Result) -> Iterator[str]:
+    wear = result.wear
+    assert wear is not None
+    if wear.in_time[:1].any():
+        height, work = measured(wear.amplitude[0], "m", 2), measured(wear.energy[0].sum(), "J", 2)
+        yield f"the steady state before wear is unstable: the response goes to {height} and {work} a cycle on average"
+    if wear.unstable_share:
+        share = percent(wear.unstable_share)
+        yield f'the steady state is unstable for {share} of the cycles; wear.motion = "machine" follows the response'
+    elif wear.unstable_share is None and result.facts.around is not None and result.wear_steps:
+        yield "whether the steady state of the wheel is stable along its wear is not known"
+    for row in wear.without_balance[:1]:
+        yield f"from {measured(wear.cycles[row], 'cycles')} on maps, loops and films are of the last balance solved"
+    for row in wear.jumps:
+        previous, following = (measured(hertz, "Hz", 4) for hertz in wear.frequency[row : row + 2])
+        when = measured(wear.cycles[row + 1], "cycles")
+        yield f"at {when} the response jumped from {previous} to {following}, where another resonance dominates"
 
 
 def lines(result: Result) -> Lines:
     """Every number under the name that `show --json` has for it, and what each refinement changed."""
-    found = result.summary()
-    changes = found.pop("changes")
-    found |= {f"verdict.{name}": one for name, one in (found.pop("verdict") or {}).items()}
-    found |= {f"joints.{name}": one for name, one in found.pop("joints").items()}
-    shown = [(name, _shown(value)) for name, value in found.items() if value not in (None, [], {})]
-    for one in changes or ():
-        relative = one["how"] if one["relative"] is None else percent(one["relative"])
-        shown.append((f"{one['refinement']}: {one['quantity']}", relative))
-    return shown
+    table = result.summary()
+    changes, units = table.pop("changes"), table.pop("units")
+    table |= {f"verdict.{name}": statement for name, statement in (table.pop("verdict") or {}).items()}
+    table |= {f"joints.{name}": joint for name, joint in table.pop("joints").items()}
+    rows = [
+        (f"{name} / {units[name]}" if units.get(name) else name, _text(value))
+        for name, value in table.items()
+        if value not in (None, [], {})
+    ]
+    for change in changes:
+        relative = change["how"] if change["relative"] is None else percent(change["relative"])
+        rows.append((f"{change['refinement']}: {change['quantity']}", relative))
+    return rows
 
 
-def _shown(value: Any) -> str:
+def _text(value: Any) -> str:
     if isinstance(value, dict):
-        return "; ".join(f"{name} {_shown(one)}" for name, one in value.items() if one not in (None, ""))
+        return "; ".join(f"{name} {_text(item)}" for name, item in value.items() if item not in (None, ""))
     if isinstance(value, list):
-        return ", ".join(map(_shown, value))
+        return ", ".join(map(_text, value))
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 

@@ -47,15 +47,16 @@ class Facts:
     """What was modelled and how long it took; None is what does not apply to a model.
 
     full_dofs, model_dofs : before and after the reduction; contact_pairs; unknowns : of a balance solve
-    harmonics : kept ones; free_hz, stuck_hz : (n,) natural frequencies with the contact absent, and stuck [Hz]
+    harmonics : of the balance
+    open_frequencies, stuck_frequencies : (n,) natural frequencies with the contact absent, and stuck [Hz]
     seconds, processor_seconds : of computing, interrupted runs included: on the wall, and of the processor
     compliance_error : relative, of the dynamic compliance of the contact
     elements, nodes, scaled_jacobian : of the mesh, the last is the smallest one, 1 is best
-    retained_modes, first_omitted_hz, factorisation : of a reduction by Craig and Bampton
+    retained_modes, first_omitted_frequency, factorisation : of a reduction by Craig and Bampton
     prestress_residual : of a wheel that turns, relative change of its static displacement by its own stress once more
     prestress_rotation : largest of any element in that displacement [rad]
     interface_modes : characteristic constraint modes that stand for the masters
-    delta_max_m : depth at which the static loads can close the contact no longer; wear_split : share of body 1
+    delta_max : depth at which the static loads can close the contact no longer; wear_split : share of body 1
     around : the wheel of a part that is a sector
     joints : named contact -> its pairs; empty where the scene names none
     harmonics_error, harmonics_choice : estimated truncation error of chosen harmonics, and how they were chosen
@@ -66,8 +67,8 @@ class Facts:
     contact_pairs: int = 0
     unknowns: int = 0
     harmonics: tuple[int, ...] = ()
-    free_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    stuck_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    open_frequencies: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    stuck_frequencies: np.ndarray = field(default_factory=lambda: np.zeros(0))
     seconds: float = 0.0
     processor_seconds: float = 0.0
     compliance_error: float | None = None
@@ -75,12 +76,12 @@ class Facts:
     nodes: int | None = None
     scaled_jacobian: float | None = None
     retained_modes: int | None = None
-    first_omitted_hz: float | None = None
+    first_omitted_frequency: float | None = None
     factorisation: str | None = None
     prestress_residual: float | None = None
     prestress_rotation: float | None = None
     interface_modes: int | None = None
-    delta_max_m: float | None = None
+    delta_max: float | None = None
     wear_split: float | None = None
     around: Around | None = None
     harmonics_error: float | None = None
@@ -109,7 +110,7 @@ class Facts:
         known = {item.name: plain[item.name] for item in fields(cls) if item.name in plain}
         if "harmonics" in known:
             known["harmonics"] = tuple(int(h) for h in np.atleast_1d(known["harmonics"]))
-        for name in {"free_hz", "stuck_hz"} & known.keys():
+        for name in {"open_frequencies", "stuck_frequencies"} & known.keys():
             known[name] = np.atleast_1d(known[name])
         if "sectors" in plain:
             known["around"] = Around(plain["sectors"], plain["engine_order"], np.asarray(plain["axis"], float))

@@ -61,6 +61,11 @@ def measured(value: float, unit: str, count: int = USUAL) -> str:
     return f"{rounded(value / 10.0**power, count)} {PREFIXES[power]}{unit}"
 
 
+def axis_unit(unit: str) -> tuple[str, float]:
+    """The unit that an axis has for one in SI, and the factor on its values: lengths in mm."""
+    return {"m": ("mm", 1e3), "m3": ("mm³", 1e9)}.get(unit, (unit or "1", 1.0))
+
+
 def sparkline(x: np.ndarray, y: np.ndarray, width: int = 20) -> str:
     """A curve in one line of blocks: the largest y in each of `width` parts of x, from the left, on a log scale."""
     part = np.minimum((width * (x - x.min()) / max(np.ptp(x), 1e-300)).astype(int), width - 1)

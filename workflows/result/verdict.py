@@ -9,10 +9,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-QUANTITIES = ("peak_frequency", "amplitude", "energy", "preload", "depth", "life")
-NAMES = {name: name.replace("_", " ") for name in QUANTITIES}
-UNITS = {"peak_frequency": "Hz", "amplitude": "m", "energy": "J", "preload": "N", "depth": "m", "life": "cycles"}
-
 
 class Refinement(StrEnum):
     """What is refined in a scene to see what it changes."""
@@ -33,17 +29,17 @@ class Status(StrEnum):
     REPORTED = "reported"
     NOT_KNOWN = "error not known"
     TOO_LARGE = "not reported (error above 50 %)"
-    UNSTABLE = "not reported (the motion is unstable)"
+    UNSTABLE = "not reported (the steady state is unstable)"
     CONTRADICTED = "not reported (time integration contradicts it)"
-    UNSETTLED = "not reported (the motion in time does not settle)"
+    UNSETTLED = "not reported (the motion in time is not stationary)"
     ABSENT = "none"
 
 
 @dataclass(frozen=True)
-class Change:
+class MeasuredChange:
     """One row of the table of measured changes.
 
-    value, refined : of the quantity before and after the refinement, in UNITS; None where there is none
+    value, refined : of the quantity, in its unit, before and after the refinement; None where there is none
     relative : change over the refined value, or an estimate of it; None where it was not measured
     how : what was refined, or why it was not measured
     """
@@ -60,7 +56,8 @@ class Change:
 class Statement:
     """One quantity of a verdict.
 
-    value : in UNITS, None where there is none; error : total and relative, None where it is not known
+    value : in the unit of the quantity, None where there is none
+    error : total and relative, None where it is not known
     dominated_by : the refinement that changed most; status : a Status; reason : in words
     """
 
@@ -80,13 +77,14 @@ class Statement:
 class Verdict:
     """The table of changes and what follows for every quantity.
 
-    statements : by QUANTITIES; changes : rows of the table; ratio : elements along every edge of the refined mesh over
-    those of the scene, None where that was not solved; worn_ratio : the same of the mesh that was worn beside it
+    statements : by name of the quantity; changes : rows of the table
+    ratio : elements along every edge of the refined mesh over those of the scene, None where that was not solved
+    worn_ratio : the same of the mesh that was worn beside it
     seconds : of one processor, for information alone
     """
 
     statements: dict[str, Statement]
-    changes: tuple[Change, ...]
+    changes: tuple[MeasuredChange, ...]
     ratio: float | None
     seconds: float
     worn_ratio: float | None = None
@@ -95,5 +93,5 @@ class Verdict:
     def of(cls, table: dict[str, Any]) -> Verdict:
         """A verdict from its fields as plain data, as `dataclasses.asdict` gives them."""
         statements = {name: Statement(**item) for name, item in table["statements"].items()}
-        changes = tuple(Change(**item) for item in table["changes"])
+        changes = tuple(MeasuredChange(**item) for item in table["changes"])
         return cls(**table | {"statements": statements, "changes": changes})

@@ -51,8 +51,8 @@ def described(
         contact_pairs=i.n_pair,
         unknowns=balance.n_unknown,
         harmonics=tuple(balance.basis.harmonics),
-        free_hz=reduced.free_frequency,
-        stuck_hz=balance.compliance.stuck_frequencies(next(filter(None, balance.basis.harmonics)))[:SHOWN],
+        open_frequencies=reduced.free_frequency,
+        stuck_frequencies=balance.compliance.stuck_frequencies(next(filter(None, balance.basis.harmonics)))[:SHOWN],
         compliance_error=balance.compliance.error,
         prestress_residual=reduced.accuracy().get("prestress_residual"),
         prestress_rotation=reduced.accuracy().get("prestress_rotation"),
@@ -65,7 +65,7 @@ def described(
         facts = replace(
             facts,
             retained_modes=origin.n_modes,
-            first_omitted_hz=origin.first_omitted_frequency,
+            first_omitted_frequency=origin.first_omitted_frequency,
             factorisation=origin.factorisation,
             interface_modes=origin.n_interface_modes or None,
         )
@@ -76,7 +76,7 @@ def described(
         facts = replace(facts, joints=pairs)
     if file.scene.wear is not None:
         depth = delta_max(file.scene, free, i.area)  # none where nothing holds the part without its contact
-        facts = replace(facts, delta_max_m=depth if np.isfinite(depth) else None, wear_split=file.scene.wear.split)
+        facts = replace(facts, delta_max=depth if np.isfinite(depth) else None, wear_split=file.scene.wear.split)
     if isinstance(file.scene, MeshScene) and (wheel := file.scene.wheel) is not None:
         facts = replace(facts, around=Around(wheel.sectors, wheel.engine_order, np.array(wheel.axis)))
     if choice is not None:

@@ -50,7 +50,7 @@ class Pictures(Table, stage=DRAW):
 
 
 class VerdictOptions(Table, stage=STUDY):
-    """What is measured to judge a finished result, see `tribodyn.workflows.errors.verdict`."""
+    """What is measured to judge a finished result, see `tribodyn.workflows.errors.judgement`."""
 
     enabled: StrictBool = True
     """Judge the result when the run is done."""

@@ -21,11 +21,18 @@ from matplotlib.ticker import NullFormatter, NullLocator
 from matplotlib.tri import Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
+from tribodyn.hbm.quantity import known, names_with_error
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.errors.settling import ANSWERED, Measured, Row, Settling, Settlings, settle
+from tribodyn.workflows.errors.ladder_table import (
+    SOLVED,
+    LadderRow,
+    LadderTable,
+    LadderTables,
+    SolvedSetting,
+    measure_ladders,
+)
 from tribodyn.workflows.pictures.theme import BLUE, GREEN, GREY, INK, ORANGE, STYLE
 from tribodyn.workflows.result.summary import plain
-from tribodyn.workflows.result.verdict import NAMES, QUANTITIES
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
 from tribodyn.workflows.studies.files import write_files
@@ -42,7 +49,7 @@ MARKERS = "osD^v<>PX*hp"
 class Convergence(StudyResult):
     """The settings of a scene, measured."""
 
-    table: Settlings
+    table: LadderTables
 
     def record(self) -> list[dict[str, Any]]:
         """For machines: one row for each setting, with its errors and what is doubtful about their limits."""
@@ -59,7 +66,7 @@ class Convergence(StudyResult):
 
     def write(self, folder: Path) -> list[Path]:
         """Write a picture of what the settings cost, and of each ladder of grids or meshes one."""
-        grids = [one for one in self.table.ladders if len({len(row.measured.area) for row in one.rows}) > 1]
+        grids = [one for one in self.table.ladders if len({len(row.solved.area) for row in one.rows}) > 1]
         drawn = {f"converge_{self.table.scene}_{one.ladder.name}": picture(self.table.scene, one) for one in grids}
         return write_files(folder, {}, {f"converge_{self.table.scene}": self.plot(), **drawn})
 
@@ -76,7 +83,7 @@ def converge(
     if most < 1:
         raise Refusal(f"--most {most}: a ladder needs one setting at least")
     texts, say = override_texts(overrides), reporter(progress).say
-    return Convergence(settle(fspath(scene), settings, texts, say, most))
+    return Convergence(measure_ladders(fspath(scene), settings, texts, say, most))
 
 
 def on_grid(fine: np.ndarray, field: np.ndarray, coarse: np.ndarray) -> np.ndarray:
@@ -87,58 +94,59 @@ def on_grid(fine: np.ndarray, field: np.ndarray, coarse: np.ndarray) -> np.ndarr
     return np.where(np.isnan(inside), NearestNDInterpolator(fine, field)(coarse), inside)
 
 
-def map_difference(coarse: Measured, fine: Measured) -> float:
+def map_difference(coarse: SolvedSetting, fine: SolvedSetting) -> float:
     """R.m.s. difference of friction work per area over its r.m.s. on the finer grid, by area of the coarser one."""
     reference = on_grid(fine.patch, fine.work, coarse.patch)
     size = float(coarse.area @ reference**2)
     return float(np.sqrt(coarse.area @ (coarse.work - reference) ** 2 / size)) if size > 0 else 0.0
 
 
-def _record(scene: str, one: Settling, row: Row) -> dict[str, Any]:
-    found = row.measured
+def _record(scene: str, one: LadderTable, row: LadderRow) -> dict[str, Any]:
+    found = row.solved
     return plain(
         {
             "scene": scene, "ladder": one.ladder.name, "setting": row.setting.label, "size": row.setting.size,
-            "own": row.setting.label == one.own, "overrides": list(row.setting.overrides), "pairs": len(found.area),
-            "values": found.values, "errors": {q: one.error(row, q) for q in QUANTITIES},
-            "bounds": {q: one.bound(row, q) for q in QUANTITIES},
+            "of_the_scene": row.setting.label == one.scene_setting, "overrides": list(row.setting.overrides),
+            "pairs": len(found.area),
+            "values": found.values, "errors": {q: one.error(row, q) for q in names_with_error()},
+            "bounds": {q: one.bound(row, q) for q in names_with_error()},
             "orders": {q: limit.order for q, limit in one.limits.items()}, "map_difference": _difference(one, row),
             "seconds": found.seconds, "share": row.share, "memory": found.memory, "outcome": found.outcome,
         }
     )  # fmt: skip
 
 
-def _difference(one: Settling, row: Row) -> float | None:
+def _difference(one: LadderTable, row: LadderRow) -> float | None:
     """Of the map of a row from that of the finest grid; None of the grids that are as fine."""
-    shown = [m for m in (other.measured for other in one.rows) if m.values["energy"]]
-    if not shown or not row.measured.values["energy"] or len(row.measured.area) == len(shown[-1].area):
+    shown = [m for m in (other.solved for other in one.rows) if m.values["energy"]]
+    if not shown or not row.solved.values["energy"] or len(row.solved.area) == len(shown[-1].area):
         return None
-    return map_difference(row.measured, shown[-1])
+    return map_difference(row.solved, shown[-1])
 
 
-def _lines(one: Settling) -> Iterator[str]:
-    shown = [q for q in QUANTITIES if q in one.limits]
+def _lines(one: LadderTable) -> Iterator[str]:
+    shown = [q for q in names_with_error() if q in one.limits]
     width = max(len(one.ladder.name), *(len(row.setting.label) for row in one.rows))
     yield _line(one.ladder.name.ljust(width), "pairs", "seconds", "MB", [_name(q) for q in shown], "map")
     for row in one.rows:
-        found, off = row.measured, _difference(one, row)
-        failed = "" if found.outcome == ANSWERED else f"  {found.outcome}"
+        found, off = row.solved, _difference(one, row)
+        failed = "" if found.outcome == SOLVED else f"  {found.outcome}"
         cells = [_cell(one, row, q) for q in shown]
         numbers = str(len(found.area)), f"{found.seconds:.2f}", f"{found.memory / 1e6:.0f}"
         yield _line(row.setting.label.ljust(width), *numbers, cells, ("" if off is None else f"{off:.1%}") + failed)
     limits = [f"{one.limits[q].value:.5g} ({_order(one.limits[q].order)})" for q in shown]
     yield _line("limit".ljust(width), "", "", "", limits, "")
     for q in shown:
-        enough = one.needed(q, WANTED)
+        enough = one.coarsest(q, WANTED)
         needed = "a finer setting than these" if enough is None else f"{enough.setting.label} or finer"
         yield f"{WANTED:.0%} on {_name(q)} needs {needed}; the limit is known to {one.limits[q].doubt:.2g}"
     for row in one.rows:
-        if row.setting.label == one.own and shown:
+        if row.setting.label == one.scene_setting and shown:
             known = {q: b for q in shown if (b := one.bound(row, q)) is not None}
             missed = [_name(q) for q, b in known.items() if b > WANTED]
             verdict = f"misses {WANTED:.0%} on {', '.join(missed)}" if missed else f"is good for {WANTED:.0%} on all"
             errors = ", ".join(f"{_name(q)} {b:.2g}" for q, b in known.items())
-            yield f"the setting of the scene, {one.own}, {verdict}: {errors}"
+            yield f"the setting of the scene, {one.scene_setting}, {verdict}: {errors}"
 
 
 def _line(setting: str, pairs: str, seconds: str, memory: str, cells: Sequence[str], maps: str) -> str:
@@ -146,11 +154,11 @@ def _line(setting: str, pairs: str, seconds: str, memory: str, cells: Sequence[s
 
 
 def _name(quantity: str) -> str:
-    return NAMES.get(quantity, quantity)
+    return known(quantity).label
 
 
-def _cell(one: Settling, row: Row, quantity: str) -> str:
-    value, error = row.measured.values[quantity], one.error(row, quantity)
+def _cell(one: LadderTable, row: LadderRow, quantity: str) -> str:
+    value, error = row.solved.values[quantity], one.error(row, quantity)
     if value is None or error is None:
         return ""
     doubt = one.limits[quantity].doubt
@@ -161,11 +169,11 @@ def _order(order: float) -> str:
     return "scattered" if np.isnan(order) else f"order {order:.1f}"
 
 
-def _advice(table: Settlings) -> Iterator[str]:
+def _advice(table: LadderTables) -> Iterator[str]:
     """What the numbers are, and for each quantity what to use for the wanted error."""
     yield "in brackets: error from where the setting tends to, behind ~ the doubt in that"
     yield f"each setting alone, the others as {table.scene} has them with {'; '.join(table.base) or 'nothing changed'}"
-    for quantity in QUANTITIES:
+    for quantity in names_with_error():
         if any(quantity in one.limits and one.ladder.base is None for one in table.ladders):
             try:
                 rows, error, seconds = table.choose(WANTED, quantity)
@@ -176,7 +184,7 @@ def _advice(table: Settlings) -> Iterator[str]:
             yield f"for {WANTED:.0%} on {_name(quantity)} use {used}: {error:.1%}, {seconds:.2g} s"
 
 
-def costs(table: Settlings) -> Figure:
+def costs(table: LadderTables) -> Figure:
     """Error in amplitude, energy and life, as far as there are any, against seconds; the Pareto front as a line.
 
     The front is of settings of all ladders together, as they are chosen for smaller and smaller errors.
@@ -189,7 +197,7 @@ def costs(table: Settlings) -> Figure:
         colours = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
         for pane, quantity in zip(panes, shown, strict=True):
             for i, one in enumerate(table.ladders):
-                points = [(row.measured.seconds, b) for row in one.rows if (b := one.bound(row, quantity)) is not None]
+                points = [(row.solved.seconds, b) for row in one.rows if (b := one.bound(row, quantity)) is not None]
                 seconds, errors = zip(*points, strict=True) if points else ((), ())
                 style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
                 label = one.ladder.name.replace("_", " ")
@@ -206,7 +214,7 @@ def costs(table: Settlings) -> Figure:
     return figure
 
 
-def _front(table: Settlings, quantity: str) -> tuple[list[float], list[float]]:
+def _front(table: LadderTables, quantity: str) -> tuple[list[float], list[float]]:
     """Seconds and errors of the cheapest settings for smaller and smaller errors, as far as they are known."""
     seconds, errors = [], []
     for wanted in np.logspace(-0.5, -5, 37):
@@ -219,10 +227,10 @@ def _front(table: Settlings, quantity: str) -> tuple[list[float], list[float]]:
     return seconds, errors
 
 
-def picture(scene: str, one: Settling) -> Figure:
+def picture(scene: str, one: LadderTable) -> Figure:
     """Errors against the number of pairs, the work on the finest grid, and where coarser grids differ from it."""
-    by_pairs = {len(m.area): m for m in reversed([row.measured for row in one.rows]) if m.values["energy"]}
-    *some, finest = [by_pairs[n] for n in sorted(by_pairs)][-4:] or [one.rows[-1].measured]
+    by_pairs = {len(m.area): m for m in reversed([row.solved for row in one.rows]) if m.values["energy"]}
+    *some, finest = [by_pairs[n] for n in sorted(by_pairs)][-4:] or [one.rows[-1].solved]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.1 + 2.5 * len(some), 3.6), layout="constrained")
         panes = figure.subplots(1, 2 + len(some), width_ratios=[1.7] + [1] * (1 + len(some)), squeeze=False)[0]
@@ -241,15 +249,15 @@ def picture(scene: str, one: Settling) -> Figure:
     return figure
 
 
-def _draw_errors(pane: Any, one: Settling) -> None:
+def _draw_errors(pane: Any, one: LadderTable) -> None:
     drawn = (("peak_frequency", GREY, "^"), ("amplitude", BLUE, "o"), ("energy", ORANGE, "s"), ("life", GREEN, "D"))
     for quantity, colour, mark in drawn:
-        points = [(len(row.measured.area), b) for row in one.rows if (b := one.bound(row, quantity))]
+        points = [(len(row.solved.area), b) for row in one.rows if (b := one.bound(row, quantity))]
         if points:
             style = {"marker": mark, "markersize": 4, "color": colour, "label": _name(quantity)}
             pane.loglog(*zip(*points, strict=True), linestyle="none", **style)
     pane.axhline(WANTED, color=GREY, linestyle=":", linewidth=1)
-    ticks = sorted({len(row.measured.area) for row in one.rows})
+    ticks = sorted({len(row.solved.area) for row in one.rows})
     pane.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=8)
     pane.xaxis.set_minor_locator(NullLocator())
     pane.set(xlabel="node pairs", ylabel="relative error, with the doubt in it")
@@ -257,7 +265,7 @@ def _draw_errors(pane: Any, one: Settling) -> None:
         pane.legend(fontsize=8, loc="upper right")
 
 
-def _map(pane: Any, one: Measured, field: np.ndarray, colours: dict[str, Any]) -> Any:
+def _map(pane: Any, one: SolvedSetting, field: np.ndarray, colours: dict[str, Any]) -> Any:
     mesh = Triangulation(*(1e3 * one.patch.T))
     a, b, c = np.moveaxis(np.stack([mesh.x, mesh.y], axis=1)[mesh.triangles], 1, 0)
     area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])

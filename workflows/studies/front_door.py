@@ -10,7 +10,7 @@ from typing import Literal
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors import accuracy as errors
 from tribodyn.workflows.errors.accuracy import Bound
-from tribodyn.workflows.errors.verdict import with_verdict
+from tribodyn.workflows.errors.judgement import with_verdict
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.store import Held

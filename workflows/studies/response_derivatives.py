@@ -46,7 +46,7 @@ from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
 SHOWN = 12  # parameters in the picture
-OF_ROWS = {"peak_hz_first": "peak_frequency", "peak_m_first": "amplitude", "preload_N_first": "preload"}
+OF_ROWS = {"peak_frequency_first": "peak_frequency", "amplitude_first": "amplitude", "preload_first": "preload"}
 # step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
 OF_MODE = 1e-4
 DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
@@ -360,5 +360,5 @@ def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[
     if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
         add(lambda: of_branch(scene, varying.model.balance, response, changes(), places[0].frequency), OF_ROWS)
     if worn is not None:
-        add(lambda: _of_life(varying, worn, changes(), more), {"life_cycles": "life"})
+        add(lambda: _of_life(varying, worn, changes(), more), {"life": "life"})
     return slopes

@@ -24,7 +24,7 @@ from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options
-from tribodyn.workflows.errors.verdict import with_verdict
+from tribodyn.workflows.errors.judgement import with_verdict
 from tribodyn.workflows.run import modelling, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references

@@ -13,7 +13,6 @@ from proof.problems import result_of, wear
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.workflows.cases.turbine import bladed_sector
-from tribodyn.workflows.result import summary
 from tribodyn.workflows.studies.forces import BodyForces
 
 COARSE = (
@@ -75,23 +74,23 @@ def test_the_report_is_clicked_zoomed_and_turned(
 
 def test_every_contact_is_told_by_itself(worn: td.Result) -> None:
     result = worn
-    joints = summary.by_joint(result)
+    joints = result.summary()["joints"]
     assert set(joints) == JOINTS
-    worn = {name: joint for name, joint in joints.items() if joint["energy_J"] > 0}
+    worn = {name: joint for name, joint in joints.items() if joint["friction_work"] > 0}
     assert {"shroud", "damper_left"} <= set(worn)
     for name, joint in worn.items():
         coefficient = 1e-14 if name == "damper_left" else 2e-14
-        assert joint["volume_m3"] == pytest.approx(coefficient * joint["energy_J"], rel=1e-9)
+        assert joint["volume"] == pytest.approx(coefficient * joint["friction_work"], rel=1e-9)
     assert all(joint["pairs"] > 0 for joint in joints.values())
     assert result.wear is not None
     lives = []
     for name, pairs in result.facts.joints.items():
-        preload, life = result.wear.normal_force[:, pairs].sum(axis=1), joints[name]["life_cycles"]
+        preload, life = result.wear.normal_force[:, pairs].sum(axis=1), joints[name]["life"]
         assert (life is None) == (preload.min() >= 0.9995 * preload[0])
         if life is not None:
             assert np.interp(life, result.wear.cycles, preload) == pytest.approx(0.9995 * preload[0], rel=1e-5)
             lives.append(life)
-    assert result.summary()["life_cycles"] == min(lives)  # the first joint that is lost ends the run
+    assert result.summary()["life"] == min(lives)  # the first joint that is lost ends the run
 
 
 STOP = 'springs.stop={group="damper.wedge_right", direction="x", stiffness="1 N/um"}'

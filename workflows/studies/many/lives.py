@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
+from tribodyn.hbm.quantity import names_with_error
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
@@ -37,10 +37,6 @@ COEFFICIENT = "wear.coefficient"
 RATIOS = 64  # equally likely values of a key that scales a life
 PROBED, SAME = 1.1, 1e-3  # factor on keys that may scale it, and how far its logarithm may be off from that
 BATCH = 8  # runs that are added at a time
-COLUMNS = {  # of the table -> quantity of a verdict
-    "peak_hz_first": "peak_frequency", "peak_m_first": "amplitude", "preload_N_first": "preload",
-    "depth_max_m": "depth", LIFE: "life",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -319,10 +315,10 @@ def _model_error(
     study: ParameterStudy, middle: Mapping[str, float], table: StudyTable, folder: Path, progress: Progress
 ) -> tuple[float | None, str]:
     """Relative error of the model itself, and where it is from."""
-    given, quantity = study.lives.model_error, COLUMNS.get(study.lives.number, "")
+    given, quantity = study.lives.model_error, study.lives.number.removesuffix("_first")
     if given is not None:
         return given, "given"
-    if quantity not in QUANTITIES:
+    if quantity not in names_with_error():
         return None, f"a verdict says nothing about {study.lives.number}"
     errors = np.asarray(table.columns.get(f"{quantity}_error", np.empty(0)), float)
     if np.isfinite(errors).any():

@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 
 from tribodyn.version import __version__
-from tribodyn.workflows.errors.verdict import with_verdict
+from tribodyn.workflows.errors.judgement import with_verdict
+from tribodyn.workflows.result.answers import answers_of
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.varying import Varying
@@ -26,9 +26,7 @@ from tribodyn.workflows.studies import response_derivatives
 
 Status = Literal["complete", "failed", "refused", "lost"]
 RUN = "run"  # the column of their numbers
-ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
 UNDRAWN = ("pictures.plots=false", "pictures.renders=false")
-SINGLE = ("energy_J", "depth_max_m", "volume_m3", "cycles", "life_cycles")
 
 
 @dataclass(frozen=True)
@@ -119,16 +117,13 @@ def numbers_of(result: Result) -> dict[str, float]:
 
     A response that is highest at an end of its range, or whose peak was not found, has no peak.
     """
-    summary = result.summary()
-    numbers: dict[str, float | None] = {}
-    for name in ENDS:
-        first, last = (None, None) if summary["peak_at_end"] else summary[name] or (None, None)
-        numbers |= {f"{name}_first": first, f"{name}_last": last}
-    numbers |= {name: summary[name] for name in SINGLE}
-    numbers["peak_at_end"] = summary["peak_at_end"]
+    numbers: dict[str, float | None] = {
+        answer.column: answer.value for answer in answers_of(result) if answer.is_peak and answer.value is not None
+    }
+    numbers["peak_at_end"] = result.summary()["peak_at_end"]
     if result.wear is not None and result.wear.ended.survived:
         numbers["survives"] = 1.0
-    for name in QUANTITIES if summary["verdict"] else ():
-        said = summary["verdict"][name]
-        numbers |= {f"{name}_error": said["error"], f"{name}_stated": said["stated"]}
+    statements = {} if result.verdict is None else result.verdict.statements
+    for name, statement in statements.items():
+        numbers |= {f"{name}_error": statement.error, f"{name}_stated": statement.stated}
     return {name: float(value) for name, value in numbers.items() if value is not None}

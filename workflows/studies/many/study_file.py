@@ -64,7 +64,7 @@ Share = Annotated[Number, Field(gt=0, lt=1)]
 class LifeSettings(Table):
     """The table [lives]: what `tribodyn study lives` asks of the runs."""
 
-    number: str = "life_cycles"
+    number: str = "life"
     """Column of the study's table whose distribution is wanted."""
     shares: Annotated[tuple[Share, ...], Field(min_length=1)] = (0.1, 0.5, 0.9)
     """Shares of the parts that fall below the wanted values: 0.1 gives P10, which 90 % of the parts outlive."""
@@ -107,7 +107,7 @@ class Constraint(Table):
         return self
 
 
-AIMS = (Aim(number="peak_m_first", want="low"), Aim(number="life_cycles", want="high"))
+AIMS = (Aim(number="amplitude_first", want="low"), Aim(number="life", want="high"))
 
 
 class OptimiseSettings(Table):

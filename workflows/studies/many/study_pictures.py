@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 WIDE_SCALE = 30.0  # largest over least value, from which on a scale is logarithmic
 SHOWN = {
-    "peak_hz_first": "peak / Hz",
-    "peak_m_first": "amplitude / m",
-    "depth_max_m": "depth / m",
-    "life_cycles": "life / cycles",
+    "peak_frequency_first": "peak / Hz",
+    "amplitude_first": "amplitude / m",
+    "depth": "depth / m",
+    "life": "life / cycles",
 }
 TICKS = (1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 

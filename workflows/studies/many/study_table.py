@@ -14,18 +14,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
+from tribodyn.hbm.quantity import StatedQuantity, every
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.store import replacing, set_aside
 from tribodyn.workflows.studies.many import study_pictures
 from tribodyn.workflows.studies.many.distributions import si
-from tribodyn.workflows.studies.many.run_task import ENDS, RUN, SINGLE, RunRow
+from tribodyn.workflows.studies.many.run_task import RUN, RunRow
 from tribodyn.workflows.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
     import pandas as pd
 
 STATUS, SENTENCE = "status", "sentence"
-LIFE = "life_cycles"
+LIFE = "life"
 FEWEST = 5  # complete runs that a correlation needs
 JOURNAL = "rows.jsonl"
 
@@ -114,7 +115,7 @@ class StudyTable(StudyResult):
         counts = self.record()["runs"].items()
         lines = ["runs: " + ", ".join(f"{count} {status}" for status, count in counts if count), *self.troubles()]
         for number, by_key in self.influence().items():
-            if number.endswith("_first") or number in (LIFE, "depth_max_m"):
+            if number.endswith("_first") or number in (LIFE, "depth"):
                 ranks = sorted(by_key.items(), key=lambda item: -abs(item[1]))
                 lines.append(f"{number:14} rank correlation with {', '.join(f'{k} {rank:+.2f}' for k, rank in ranks)}")
         return lines
@@ -159,7 +160,8 @@ def table(
 
 def _ordered(names: Mapping[str, None]) -> list[str]:
     """Names of numbers in an order that does not depend on which run came first."""
-    first = [f"{name}_{end}" for name in ENDS for end in ("first", "last")] + [*SINGLE, "peak_at_end"]
+    first = [column for q in every(StatedQuantity) for column in (f"{q.name}_first", f"{q.name}_last", q.name)]
+    first.append("peak_at_end")
     return [name for name in first if name in names] + sorted(name for name in names if name not in first)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Options:
+class RefinementLimits:
     """Limits count DOFs, unknowns and solves, never seconds: the same scene has the same errors on every machine.
 
     ratios : elements along every edge over those of the scene; the first that the limits allow is taken, else `coarser`
@@ -19,7 +19,7 @@ class Options:
     coarser : elements along every edge of the scene over those of the coarser mesh
     wear_steps : on the refined mesh over those of the scene
     max_time_components : of a contact whose motions are integrated in time
-    looks : wear states at which a periodic motion is looked for that an irregular one passed by
+    searched_rows : wear states at which a periodic motion is searched that an irregular one did not take
     order : of convergence that is relied on: errors at contact kinks and corners fall with the element size
     safety : on the extrapolated error (Roache 1994: 1.25)
     floor : least change that a refinement counts with: two models agree by chance on small errors
@@ -35,7 +35,7 @@ class Options:
     coarser: float = 1.5
     wear_steps: float = 2.0
     max_time_components: int = 30
-    looks: int = 12
+    searched_rows: int = 12
     order: float = 1.0
     safety: float = 1.25
     floor: float = 1e-3
@@ -54,4 +54,4 @@ class Options:
         return self.factor(ratio) * max(change, self.floor)
 
 
-DEFAULT = Options()
+DEFAULT = RefinementLimits()

@@ -1,0 +1,201 @@
+"""What a number of a run is computed from: a solved cycle, a motion in time, a worn contact, a response curve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tribodyn.hbm.continuation.branch import Branch, amplitude
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, events
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.balance import HarmonicBalance, State
+    from tribodyn.hbm.time.mean_motion import MeanMotion
+
+Pairs = slice | np.ndarray
+
+
+@dataclass(frozen=True)
+class SolvedCycle:
+    """One vibration cycle: fresh from a balance, or as a result holds it; what a result does not hold is None.
+
+    omega : [rad/s]; basis : its harmonics; output : row of the observed output in `response` (n_output, n_coeff) [m]
+    amplitude : of that output [m]; preload : mean normal force of the contact [N]
+    energy, normal_force : (n_pair,) friction work per cycle [J], mean normal force [N]
+    displacement, force : (n_pair, n_component, n_coeff) [m], [N]; components : of the contact, such as t1, t2, n
+    joints : name -> its pairs; pairs : that the cycle is asked of, those of one joint or all
+    driven : lowest harmonic that is driven; wear_coefficient : (n_pair,) [m3/J]
+    """
+
+    omega: float
+    basis: HarmonicBasis
+    response: np.ndarray
+    amplitude: float
+    output: int = 0
+    preload: float | None = None
+    energy: np.ndarray | None = None
+    normal_force: np.ndarray | None = None
+    displacement: np.ndarray | None = None
+    force: np.ndarray | None = None
+    components: tuple[str, ...] = ()
+    joints: Mapping[str, Pairs] | None = None
+    pairs: Pairs = field(default_factory=lambda: slice(None))
+    joint: str = ""
+    driven: int | None = None
+    wear_coefficient: np.ndarray | None = None
+
+    @classmethod
+    def of(
+        cls, balance: HarmonicBalance, state: State, output: str, wear: Mapping[str, float] | None = None
+    ) -> SolvedCycle:
+        """The cycle of a solved balance; wear : joint -> wear coefficient [m3/J]."""
+        contact, basis, response = balance.contact, balance.basis, balance.outputs(state)
+        row = balance.compliance.output_names.index(output)
+        loaded = [h for h, _ in balance.excitation.loads if h in basis.dynamic] or [basis.dynamic[0]]
+        rate = np.zeros(contact.n_pair) if wear else None
+        for joint in contact.joints if wear else ():
+            assert wear is not None
+            assert rate is not None
+            rate[joint.rows] = wear.get(joint.name, 0.0)
+        return cls(
+            state.omega, basis, response, float(amplitude(response[row])), row, balance.preload(state),
+            balance.energy(state), balance.normal_force(state), state.x, state.cycle.force, contact.components,
+            {joint.name: joint.rows for joint in contact.joints}, driven=min(loaded), wear_coefficient=rate,
+        )  # fmt: skip
+
+    @classmethod
+    def at_row(cls, history: WearHistory, row: int, basis: HarmonicBasis, joints: Mapping[str, slice]) -> SolvedCycle:
+        """The cycle of a row of a wear history; its displacement and force are left out."""
+        in_time = history.in_time[row]
+        height = float(amplitude(history.response[row, 0]) if in_time else history.amplitude[row])
+        return cls(
+            float(history.omega[row]), basis, history.response[row], height, 0, float(history.preload[row]),
+            history.energy[row], history.normal_force[row], joints=joints,
+        )  # fmt: skip
+
+    @classmethod
+    def at_point(cls, branch: Branch, point: int, basis: HarmonicBasis) -> SolvedCycle:
+        """The cycle of a point of a response curve, of its first output."""
+        height = float(branch.amplitude(branch.output_names[0])[point])
+        return cls(float(branch.omega[point]), basis, branch.response[point], height)
+
+    def of_joint(self, name: str) -> SolvedCycle:
+        """The same cycle, asked of one joint alone."""
+        assert self.joints is not None
+        return replace(self, pairs=self.joints[name], joint=name)
+
+    @cached_property
+    def mask(self) -> np.ndarray:
+        """(n_pair, 1, 1) 1 for the pairs that the cycle is asked of, else 0."""
+        assert self.displacement is not None
+        mask = np.zeros((len(self.displacement), 1, 1))
+        mask[self.pairs] = 1.0
+        return mask
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """How a quantity of a cycle moves with the solution.
+
+    by_x, by_force : (n_pair, n_component, n_coeff) by displacement and by contact force, the others fixed
+    by_response : (n_output, n_coeff); None where it does not depend on one of these
+    by_omega : by the frequency [rad/s]
+    """
+
+    by_x: np.ndarray | None = None
+    by_force: np.ndarray | None = None
+    by_response: np.ndarray | None = None
+    by_omega: float = 0.0
+
+
+@dataclass(frozen=True)
+class MotionInTime:
+    """The motion that integration in time came to.
+
+    means : over its periods; sectors : of the wheel that it spans, 1 for a part
+    energy : (n_pair,) friction work per period of one sector [J]; least_energy : below which work is rounding [J]
+    """
+
+    means: MeanMotion
+    sectors: int
+    energy: np.ndarray
+    least_energy: float
+
+
+@dataclass(frozen=True)
+class WornContact:
+    """A wear history with the contact that wore.
+
+    area, gap : (n_pair,) [m2], of the unworn contact [m]; components, joints, pairs : as in SolvedCycle
+    basis : harmonics, with samples enough to see a pair open
+    life_share : of the first preload, where a life ends; any_joint : whether it ends with the first joint that is lost
+    share_of_body_1 : of the depth, that is worn off body 1
+    row : of the history, whose state is asked for; None for the end of the run
+    """
+
+    history: WearHistory
+    area: np.ndarray
+    gap: np.ndarray
+    components: tuple[str, ...]
+    basis: HarmonicBasis
+    joints: Mapping[str, slice]
+    life_share: float = LIFE_SHARE
+    any_joint: bool = False
+    share_of_body_1: float = 0.5
+    pairs: slice = field(default_factory=lambda: slice(None))
+    joint: str = ""
+    row: int | None = None
+
+    def of_joint(self, name: str) -> WornContact:
+        """The same wear, asked of one joint alone."""
+        return replace(self, pairs=self.joints[name], joint=name)
+
+    @cached_property
+    def depth(self) -> np.ndarray:
+        """(n_pair,) total depth of the pairs that are asked for [m]."""
+        history = self.history
+        depth = history.depth[-1] + history.worn[-1] if self.row is None else history.depth[self.row]
+        return np.asarray(depth)[self.pairs]
+
+    @property
+    def work(self) -> np.ndarray:
+        """(n_step, n_pair) friction work of the steps, of the pairs that are asked for [J]."""
+        return np.asarray(self.history.work[: self.row, self.pairs])
+
+    @property
+    def cycles(self) -> float:
+        """Vibration cycles at the end."""
+        return float(self.history.cycles[-1] + self.history.cycles_in_step[-1])
+
+    @cached_property
+    def events(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cycles (n_pair,) from which on a pair opens, and touches no more; see `hbm.wear.history.events`."""
+        return events(self.history, self.components, self.gap, self.basis)
+
+
+@dataclass(frozen=True)
+class EndOfLife:
+    """Where a life ends and how that moves with n parameters; the slopes have them on their last axis.
+
+    life : [cycles]; by_life : (n,); depth, area : (n_pair,) [m], [m2]; by_depth, by_area : (n_pair, n)
+    """
+
+    life: float
+    by_life: np.ndarray
+    depth: np.ndarray
+    by_depth: np.ndarray
+    area: np.ndarray
+    by_area: np.ndarray
+
+
+@dataclass(frozen=True)
+class SolvedCurve:
+    """A response curve; spread : (n_point,) range of amplitudes by the load path over its middle, None if unknown."""
+
+    branch: Branch
+    spread: np.ndarray | None = None
