@@ -141,7 +141,7 @@ def from_dense(
     The dense wheel has the damping of sectors alike, which the wheel on its sector has by definition.
     """
     n = blades.wheel.n_sectors
-    alike, own = wheel.whole([1.0] * n), wheel.whole([float(1 + one) for one in pattern.stiffness])
+    alike, own = wheel.whole_wheel([1.0] * n), wheel.whole_wheel([float(1 + one) for one in pattern.stiffness])
     system = replace(own.model.system, damping=alike.model.system.damping)
     model, load = replace(own.model, system=system), own.excitation
     dense = HarmonicBalance.of(model, own.contact.joints, own.basis, load, blades.wheel.wave.omega_max)

@@ -84,7 +84,7 @@ print(td.studies.derivatives("slider.toml"))
 with td.plot.axes(12, 4, columns=3) as (figure, (peaks, curves, stop)):
     for friction in np.arange(0.1, 0.75, 0.08):
         new = {"contact.friction": friction}
-        found = td.studies.derivatives("slider.toml", only=("contact.friction",), overrides=new).found
+        found = td.studies.derivatives("slider.toml", only=("contact.friction",), overrides=new).derivatives
         near, amplitude = friction + np.array([-0.03, 0.03]), found.names.index("amplitude")
         peaks.plot(near, 1e6 * (found.values[amplitude] + found.slopes[amplitude, 0] * (near - friction)), "k")
         peaks.plot(friction, 1e6 * found.values[amplitude], "C3o", ms=4)

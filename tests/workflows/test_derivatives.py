@@ -47,7 +47,7 @@ def test_the_laws_of_scaling_hold(beam):
 
     All mass times c, damping as a ratio, is all time times sqrt(c); all stiffness times c, loads too, time over sqrt(c)
     """
-    rows, names = beam.elasticities, beam.found.names
+    rows, names = beam.elasticities, beam.derivatives.names
     wanted = {"peak_frequency": 0.0, "amplitude": 1.0, "phase": 0.0, "energy": 2.0, "preload": 1.0, "wear_rate": 2.0}
     loads = sum(row for key, row in rows.items() if key.startswith("loads."))
     np.testing.assert_allclose(loads, [wanted[name] for name in names], atol=2e-6)
@@ -74,7 +74,7 @@ def test_the_law_of_similarity_holds_of_lengths():
     found = td.studies.derivatives(file, only=(*keys(file.scene), *LENGTHS))
     wanted = {"peak_frequency": -1.0, "amplitude": 1.0, "phase": 0.0, "energy": 3.0, "preload": 2.0, "wear_rate": 3.0}
     total = similar(found.elasticities, LENGTHS, {})
-    np.testing.assert_allclose(total, [wanted[name] for name in found.found.names], atol=2e-6)
+    np.testing.assert_allclose(total, [wanted[name] for name in found.derivatives.names], atol=2e-6)
 
 
 @pytest.mark.slow
@@ -92,7 +92,7 @@ def test_rows_of_studies_go_by_lengths_whose_mesh_stays_the_same(monkeypatch):
     wanted = ["geometry.length", "geometry.height", "contact.friction"]
     found = of_summary(Varying(file, Progress()), td.run("beam", overrides=without), wanted)
     assert {key for _, key in found} == {"geometry.length", "contact.friction"}
-    along = td.studies.derivatives(file, only=("geometry.length",)).found
+    along = td.studies.derivatives(file, only=("geometry.length",)).derivatives
     assert found["peak_frequency_first", "geometry.length"] == pytest.approx(along.slopes[0, 0], rel=1e-6)
 
 
@@ -140,7 +140,7 @@ def test_the_law_of_scaling_holds_of_springs_that_the_reduction_follows(modes):
     rows = found.elasticities
     total = sum(row for key, row in rows.items() if key.endswith((".stiffness", ".young", "shaker.value")))
     wanted = {"peak_frequency": 0.5, "energy": 1.0, "preload": 1.0, "wear_rate": 1.0}
-    np.testing.assert_allclose(total, [wanted.get(name, 0.0) for name in found.found.names], atol=1e-5)
+    np.testing.assert_allclose(total, [wanted.get(name, 0.0) for name in found.derivatives.names], atol=1e-5)
 
 
 def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
@@ -152,9 +152,9 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
     ratio = friction * 0.5 / record["quantities"]["amplitude"]
     assert record["elasticities"]["contact.friction"]["amplitude"] == pytest.approx(ratio)
     assert all(path.stat().st_size > 0 for path in beam.write(tmp_path))
-    names = ("mode_frequency", "life", *beam.found.names[2:])
-    marked = replace(beam.found, names=names, corner=np.ones_like(beam.found.corner))
-    assert sum("the table is that of one side" in line for line in replace(beam, found=marked).lines()) == 1
+    names = ("mode_frequency", "life", *beam.derivatives.names[2:])
+    marked = replace(beam.derivatives, names=names, corner=np.ones_like(beam.derivatives.corner))
+    assert sum("the table is that of one side" in line for line in replace(beam, derivatives=marked).lines()) == 1
 
 
 @pytest.mark.parametrize(
@@ -172,9 +172,9 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
 def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, step, order):
     """At a fixed frequency, and along the peak."""
     file = scene_file.read(name.split()[-1], COARSE[name])
-    along = td.studies.derivatives(file, only=only).found
+    along = td.studies.derivatives(file, only=only).derivatives
     value, omega = keys(file.scene) | geometry_keys(file.scene), along.state.omega
-    fixed = td.studies.derivatives(file, at=omega / (2 * np.pi), only=along.parameters).found
+    fixed = td.studies.derivatives(file, at=omega / (2 * np.pi), only=along.parameters).derivatives
 
     def solved(key, factor):
         with limited(1):
@@ -206,7 +206,7 @@ def test_a_temperature_acts_through_the_numbers_of_its_table():
 def test_at_a_row_of_its_table_a_temperature_has_two_derivatives():
     """By the slopes of the table above the row and below it; all other keys keep theirs."""
     at_row = td.studies.derivatives("beam", overrides=(*HOT_BEAM, "contact.temperature=200 K"))
-    found = at_row.found
+    found = at_row.derivatives
     i, amplitude = found.parameters.index("contact.temperature"), found.names.index("amplitude")
     assert at_row.corners == ("contact.temperature",)
     for side, friction, stiffness in ((found.above, -0.15, -90e6), (found.below, -0.05, -30e6)):
@@ -234,7 +234,7 @@ def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
     file = scene_file.read("leaf_seal", LEAF)
     found = td.studies.derivatives(file, of="fold")
     rows = {key: row[0] for key, row in found.elasticities.items()}
-    assert found.found.names == ("fold_frequency",)
+    assert found.derivatives.names == ("fold_frequency",)
     stiffness, loads = (
         sum(row for key, row in rows.items() if key.endswith(end)) for end in (("stiffness", "young"), "pressure")
     )
@@ -245,9 +245,9 @@ def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
         changed = file.changed(f"damping.modal={value['damping.modal'] * factor!r}")
         with limited(1):
             balance = Varying(changed, Progress()).model.balance
-            return fold_derivatives.at_fold(balance, found.found.state, ()).values[0]
+            return fold_derivatives.at_fold(balance, found.derivatives.state, ()).values[0]
 
-    difference = (again(1 + h) - again(1 - h)) / (2 * h) / found.found.values[0]
+    difference = (again(1 + h) - again(1 - h)) / (2 * h) / found.derivatives.values[0]
     assert rows["damping.modal"] == pytest.approx(difference, rel=1e-5)
 
 
@@ -259,8 +259,8 @@ def test_a_mode_follows_the_laws_of_scaling():
     all mass is.
     """
     found = td.studies.derivatives("beam", **MODE)
-    assert found.found.names == ("mode_frequency", "damping")
-    assert found.lines()[0].endswith(f"damping {found.found.values[1]:.6g}")
+    assert found.derivatives.names == ("mode_frequency", "damping")
+    assert found.lines()[0].endswith(f"damping {found.derivatives.values[1]:.6g}")
     stiffer = sum(
         row for key, row in found.elasticities.items() if key.endswith(("_stiffness", "young", "press.value"))
     )
@@ -274,8 +274,8 @@ def test_derivatives_of_a_mode_are_those_of_modes_found_anew():
     values, h = [], 1e-4
     for friction in (0.5 * (1 + h), 0.5 * (1 - h)):
         changed = MODE | {"overrides": (*COARSE["beam"], f"contact.friction={friction!r}")}
-        values.append(td.studies.derivatives("beam", **changed, only=("damping.modal",)).found.values)
-    difference = (values[0] - values[1]) / (2 * h) / found.found.values
+        values.append(td.studies.derivatives("beam", **changed, only=("damping.modal",)).derivatives.values)
+    difference = (values[0] - values[1]) / (2 * h) / found.derivatives.values
     np.testing.assert_allclose(found.elasticities["contact.friction"], difference, rtol=1e-5)
 
 

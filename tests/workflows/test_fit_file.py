@@ -50,7 +50,7 @@ def found_again(scene, overrides, true, looked, measured):
         }
     )
     fit = fit_file.best(scene_file.read(scene, overrides), task, Progress())
-    return fit.found, fit.changes
+    return fit.identification, fit.changes
 
 
 def test_contact_springs_and_friction_are_found_again():
@@ -134,7 +134,7 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
         }
     )
     fit = fit_file.best(scene_file.read("rig", RIG), task, Progress())
-    found, changes = fit.found, fit.changes
+    found, changes = fit.identification, fit.changes
     assert len(made) == 1
     assert 1e-6 < found.values[0] < 4e-6
     assert changes[0].endswith(" m")
@@ -251,7 +251,7 @@ def test_friction_is_found_again_from_a_measured_curve(tmp_path):
     write_columns(columns, tmp_path / "sweep.csv")
     friction = {"keys": ["contact.friction"], "low": 0.2, "high": 0.8}
     task = {"parameters": {"mu": friction}, "curves": {"sweep": {"file": str(tmp_path / "sweep.csv"), "error": "5 %"}}}
-    found = td.studies.identify(base[0], task, overrides=base[1]).found
+    found = td.studies.identify(base[0], task, overrides=base[1]).identification
     assert found.values == pytest.approx([0.38], rel=1e-3)
     assert found.rms < 1e-3
     assert len(found.measured) == len(w)
@@ -291,7 +291,7 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
         "parameters": {"kt": {"keys": ["contacts.lap.tangential_stiffness"], "low": "60 N/um", "high": "200 N/um"}},
         "curves": {"sweep": {"file": str(tmp_path / "sweep.csv")}},
     }
-    found = td.studies.identify(scene, task, overrides=own).found
+    found = td.studies.identify(scene, task, overrides=own).identification
     assert found.values == pytest.approx([130e6], rel=1e-3)
     assert found.rms < 1e-3
     file = scene_file.read(scene, own)

@@ -39,7 +39,7 @@ def test_factors_that_move_on_by_a_sector_move_the_amplitudes_on(scene: Path) ->
     wheel = wheels.build(scene_file.read(str(scene)))
     factors, heights = np.array([1.04, 0.97, 1.0, 1.01, 0.99, 1.02]), []
     for turn in (0, 2):
-        balance = wheel.whole([float(factor) for factor in np.roll(factors, turn)])
+        balance = wheel.whole_wheel([float(factor) for factor in np.roll(factors, turn)])
         solution = newton.solve_from_rest(balance, 2 * np.pi * 402)
         assert solution.converged
         rows = [balance.compliance.output_names.index(f"response@{n}") for n in range(6)]
@@ -68,11 +68,11 @@ def test_derivatives_by_the_factors_are_those_of_other_wheels(scene: Path, dampi
         wheels.build(scene_file.read(str(scene), overrides)),
         unequal_sectors.mistuned(scene, overrides=overrides),
     )
-    found, output = solved.peak.found, f"response@{solved.record()['worst_sector']}"
+    found, output = solved.peak.derivatives, f"response@{solved.record()['worst_sector']}"
     assert found.names[3] == "energy"
     assert found.values[3] > 0
     step = 3e-5
-    ends = (wheel.whole([float(one) for one in factors + side * way]) for side in (step, -step))
+    ends = (wheel.whole_wheel([float(one) for one in factors + side * way]) for side in (step, -step))
     up, down = (cycle_derivatives.at_peak(one, found.state, output, ()).values[:2] for one in ends)
     off, size = found.slopes[:2] @ way - (up - down) / (2 * step), np.linalg.norm(found.slopes[:2], axis=1)
     assert (abs(off) < 1e-5 * size).all(), off / size

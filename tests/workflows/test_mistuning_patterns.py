@@ -79,8 +79,8 @@ def test_blades_alike_amplify_nothing(scene: Path) -> None:
     blades = patterns.MistunedBlades.of(scene_file.read(str(scene), ("mistuning.frequency=0", "mistuning.friction=0")))
     none = np.zeros(6)
     found, _ = blades.peak(patterns.Pattern(0, none, none, none))
-    assert found.amplitude == pytest.approx(blades.alike.amplitude, rel=1e-4)
-    assert found.state.omega == pytest.approx(blades.alike.state.omega, rel=1e-4)
+    assert found.amplitude == pytest.approx(blades.tuned.amplitude, rel=1e-4)
+    assert found.state.omega == pytest.approx(blades.tuned.state.omega, rel=1e-4)
 
 
 def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) -> None:

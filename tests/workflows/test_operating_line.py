@@ -58,7 +58,7 @@ def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz, law)
     one = line(sectors, order, *span)
     for f in (0.5 * (low + high), high - 1.0):
         own = (*LINE[1:], f"wheel.engine_order={order}", f'wheel.speed="{f / abs(order)} Hz"', *span)
-        whole = wheel_model.build(scene(sectors, *own)).whole()
+        whole = wheel_model.build(scene(sectors, *own)).whole_wheel()
         mine, theirs = (arc_length.solve_along_load(b, 2 * np.pi * f, EXACT) for b in (one, whole))
         assert mine.converged
         assert theirs.converged

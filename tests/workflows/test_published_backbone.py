@@ -33,7 +33,7 @@ def test_ours_stands_at_the_published_amplitudes_that_it_has_reached(tmp_path: P
     assert published is not None
     a = np.geomspace(1e-7, 5e-5, 60)
     found = SimpleNamespace(converged=a > 0, modal_amplitude=a, frequency=200 - np.log10(a), damping=1e-3 + 0 * a)
-    said = backbones.beside(found, published)
+    said = backbones.differences_from(found, published)
     assert said["source"] == "others"
     assert [row["modal_amplitude"] for row in said["rows"]] == [1e-6, 1e-5]
     last = said["rows"][-1]

@@ -31,7 +31,7 @@ def scene(tmp_path: Path) -> Path:
 def test_the_scan_gives_radius_and_table(scene: Path):
     read = scene_file.read(str(scene), [NO_TABLE, "contacts.lap.radius=", *FACES]).scene.joints["lap"]
     scales = {"cutoff": CUTOFF, "shortest": SHORTEST, "spacing": (SPACING, SPACING)}
-    found = td.studies.asperities(scene.parent / "scan.txt", **scales).found
+    found = td.studies.asperities(scene.parent / "scan.txt", **scales).asperities
     assert read.numbers["radius"] == pytest.approx(found.radius, rel=1e-12)
     np.testing.assert_allclose(np.array(read.table), found.table(), rtol=1e-12)
     given = scene_file.read(str(scene), [NO_TABLE, *FACES]).scene.joints["lap"]

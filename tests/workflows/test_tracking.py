@@ -75,7 +75,7 @@ def test_a_fold_against_the_load_is_that_of_a_branch_traced_anew(
     code, out, err = leave(["curve", "track", lifting, *arguments], capsys)
     assert code == 0, err
     found = json.loads(out)
-    assert (found["what"], found["against"], found["end"]) == ("fold", "load factor", "reached load factor 1.4")
+    assert (found["kind"], found["against"], found["end"]) == ("fold", "load factor", "reached load factor 1.4")
     balance = modelling.build(read(lifting), Progress()).balance
     for at in (0, -1):
         loaded = balance.with_load(found["value"][at])

@@ -84,7 +84,7 @@ def with_harmonics(folder: Path, highest: int, hertz: float) -> verification.Tim
 @pytest.mark.slow
 def test_more_harmonics_come_closer(folder: Path) -> None:
     """The differences fall with the harmonics kept: this beam lifts and slides, its third harmonic is near a mode."""
-    found = [with_harmonics(folder, highest, 680.0).found for highest in (3, 9, 15)]
+    found = [with_harmonics(folder, highest, 680.0).integration for highest in (3, 9, 15)]
     assert all(one.motion.periodic for one in found)
     waveform = [one.waveform["response"] for one in found]
     energy = [abs(one.energy) for one in found]
@@ -114,7 +114,7 @@ def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest
     result = store.load(folder / "result.h5")
     assert result.wear is not None
     comparison = verify(result, row=1, steps=128)
-    assert comparison.found.omega == result.wear.omega[1]
+    assert comparison.integration.omega == result.wear.omega[1]
     assert comparison.solution.steps == 0  # it starts at the solution of the row
     assert comparison.record()["preload"]["balance_N"] == pytest.approx(result.wear.preload[1], rel=1e-6)
     code, out, _ = leave(["verify", str(folder), "--row", "1", "--steps", "128", "--out", str(folder / "own")], capsys)

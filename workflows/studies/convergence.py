@@ -38,7 +38,7 @@ from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
-WANTED = 0.01
+TARGET_ERROR = 0.01
 FLAT = 1e-6  # area over the mean one of a triangle that is no part of a map
 MOST_SHOWN = 0.98  # share of the nodes whose difference is within the colours of a map
 FLOOR = 1e-8  # errors below this are drawn here
@@ -53,12 +53,12 @@ class Convergence(StudyResult):
 
     def record(self) -> list[dict[str, Any]]:
         """For machines: one row for each setting, with its errors and what is doubtful about their limits."""
-        return [_record(self.table.scene, one, row) for one in self.table.ladders for row in one.rows]
+        return [_record(self.table.scene, ladder, row) for ladder in self.table.ladders for row in ladder.rows]
 
     def lines(self) -> list[str]:
         """For people: tables, limits with their orders, the setting that a wanted accuracy needs, what to use."""
-        found = [line for one in self.table.ladders for line in _lines(one)]
-        return [*found, *_advice(self.table)]
+        texts = [line for ladder in self.table.ladders for line in _lines(ladder)]
+        return [*texts, *_advice(self.table)]
 
     def plot(self) -> Figure:
         """Draw errors against seconds, with the cheapest settings of all ladders together."""
@@ -66,8 +66,13 @@ class Convergence(StudyResult):
 
     def write(self, folder: Path) -> list[Path]:
         """Write a picture of what the settings cost, and of each ladder of grids or meshes one."""
-        grids = [one for one in self.table.ladders if len({len(row.solved.area) for row in one.rows}) > 1]
-        drawn = {f"converge_{self.table.scene}_{one.ladder.name}": picture(self.table.scene, one) for one in grids}
+        grids = [
+            settling for settling in self.table.ladders if len({len(row.solved.area) for row in settling.rows}) > 1
+        ]
+        drawn = {
+            f"converge_{self.table.scene}_{settling.ladder.name}": picture(self.table.scene, settling)
+            for settling in grids
+        }
         return write_files(folder, {}, {f"converge_{self.table.scene}": self.plot(), **drawn})
 
 
@@ -101,52 +106,57 @@ def map_difference(coarse: SolvedSetting, fine: SolvedSetting) -> float:
     return float(np.sqrt(coarse.area @ (coarse.work - reference) ** 2 / size)) if size > 0 else 0.0
 
 
-def _record(scene: str, one: LadderTable, row: LadderRow) -> dict[str, Any]:
-    found = row.solved
+def _record(scene: str, settling: LadderTable, row: LadderRow) -> dict[str, Any]:
+    measured = row.solved
     return plain(
         {
-            "scene": scene, "ladder": one.ladder.name, "setting": row.setting.label, "size": row.setting.size,
-            "of_the_scene": row.setting.label == one.scene_setting, "overrides": list(row.setting.overrides),
-            "pairs": len(found.area),
-            "values": found.values, "errors": {q: one.error(row, q) for q in names_with_error()},
-            "bounds": {q: one.bound(row, q) for q in names_with_error()},
-            "orders": {q: limit.order for q, limit in one.limits.items()}, "map_difference": _difference(one, row),
-            "seconds": found.seconds, "share": row.share, "memory": found.memory, "outcome": found.outcome,
+            "scene": scene, "ladder": settling.ladder.name, "setting": row.setting.label, "size": row.setting.size,
+            "of_the_scene": row.setting.label == settling.scene_setting, "overrides": list(row.setting.overrides),
+            "pairs": len(measured.area),
+            "values": measured.values, "errors": {q: settling.error(row, q) for q in names_with_error()},
+            "bounds": {q: settling.bound(row, q) for q in names_with_error()},
+            "orders": {q: limit.order for q, limit in settling.limits.items()},
+            "map_difference": _difference(settling, row),
+            "seconds": measured.seconds, "share": row.share, "memory": measured.memory, "outcome": measured.outcome,
         }
     )  # fmt: skip
 
 
-def _difference(one: LadderTable, row: LadderRow) -> float | None:
+def _difference(ladder: LadderTable, row: LadderRow) -> float | None:
     """Of the map of a row from that of the finest grid; None of the grids that are as fine."""
-    shown = [m for m in (other.solved for other in one.rows) if m.values["energy"]]
+    shown = [m for m in (other.solved for other in ladder.rows) if m.values["energy"]]
     if not shown or not row.solved.values["energy"] or len(row.solved.area) == len(shown[-1].area):
         return None
     return map_difference(row.solved, shown[-1])
 
 
-def _lines(one: LadderTable) -> Iterator[str]:
-    shown = [q for q in names_with_error() if q in one.limits]
-    width = max(len(one.ladder.name), *(len(row.setting.label) for row in one.rows))
-    yield _line(one.ladder.name.ljust(width), "pairs", "seconds", "MB", [_name(q) for q in shown], "map")
-    for row in one.rows:
-        found, off = row.solved, _difference(one, row)
-        failed = "" if found.outcome == SOLVED else f"  {found.outcome}"
-        cells = [_cell(one, row, q) for q in shown]
-        numbers = str(len(found.area)), f"{found.seconds:.2f}", f"{found.memory / 1e6:.0f}"
+def _lines(settling: LadderTable) -> Iterator[str]:
+    shown = [q for q in names_with_error() if q in settling.limits]
+    width = max(len(settling.ladder.name), *(len(row.setting.label) for row in settling.rows))
+    yield _line(settling.ladder.name.ljust(width), "pairs", "seconds", "MB", [_name(q) for q in shown], "map")
+    for row in settling.rows:
+        measured, off = row.solved, _difference(settling, row)
+        failed = "" if measured.outcome == SOLVED else f"  {measured.outcome}"
+        cells = [_cell(settling, row, q) for q in shown]
+        numbers = str(len(measured.area)), f"{measured.seconds:.2f}", f"{measured.memory / 1e6:.0f}"
         yield _line(row.setting.label.ljust(width), *numbers, cells, ("" if off is None else f"{off:.1%}") + failed)
-    limits = [f"{one.limits[q].value:.5g} ({_order(one.limits[q].order)})" for q in shown]
+    limits = [f"{settling.limits[q].value:.5g} ({_order(settling.limits[q].order)})" for q in shown]
     yield _line("limit".ljust(width), "", "", "", limits, "")
     for q in shown:
-        enough = one.coarsest(q, WANTED)
+        enough = settling.coarsest(q, TARGET_ERROR)
         needed = "a finer setting than these" if enough is None else f"{enough.setting.label} or finer"
-        yield f"{WANTED:.0%} on {_name(q)} needs {needed}; the limit is known to {one.limits[q].doubt:.2g}"
-    for row in one.rows:
-        if row.setting.label == one.scene_setting and shown:
-            known = {q: b for q in shown if (b := one.bound(row, q)) is not None}
-            missed = [_name(q) for q, b in known.items() if b > WANTED]
-            verdict = f"misses {WANTED:.0%} on {', '.join(missed)}" if missed else f"is good for {WANTED:.0%} on all"
-            errors = ", ".join(f"{_name(q)} {b:.2g}" for q, b in known.items())
-            yield f"the setting of the scene, {one.scene_setting}, {verdict}: {errors}"
+        yield f"{TARGET_ERROR:.0%} on {_name(q)} needs {needed}; the limit is known to {settling.limits[q].doubt:.2g}"
+    for row in settling.rows:
+        if row.setting.label == settling.scene_setting and shown:
+            bounds = {q: b for q in shown if (b := settling.bound(row, q)) is not None}
+            missed = [_name(q) for q, b in bounds.items() if b > TARGET_ERROR]
+            verdict = (
+                f"misses {TARGET_ERROR:.0%} on {', '.join(missed)}"
+                if missed
+                else f"is good for {TARGET_ERROR:.0%} on all"
+            )
+            errors = ", ".join(f"{_name(q)} {b:.2g}" for q, b in bounds.items())
+            yield f"the setting of the scene, {settling.scene_setting}, {verdict}: {errors}"
 
 
 def _line(setting: str, pairs: str, seconds: str, memory: str, cells: Sequence[str], maps: str) -> str:
@@ -157,11 +167,11 @@ def _name(quantity: str) -> str:
     return known(quantity).label
 
 
-def _cell(one: LadderTable, row: LadderRow, quantity: str) -> str:
-    value, error = row.solved.values[quantity], one.error(row, quantity)
+def _cell(ladder: LadderTable, row: LadderRow, quantity: str) -> str:
+    value, error = row.solved.values[quantity], ladder.error(row, quantity)
     if value is None or error is None:
         return ""
-    doubt = one.limits[quantity].doubt
+    doubt = ladder.limits[quantity].doubt
     return f"{value:.5g} ({100 * error:+.2g}{f' ~{100 * doubt:.2g}' if doubt else ''} %)"
 
 
@@ -174,14 +184,14 @@ def _advice(table: LadderTables) -> Iterator[str]:
     yield "in brackets: error from where the setting tends to, behind ~ the doubt in that"
     yield f"each setting alone, the others as {table.scene} has them with {'; '.join(table.base) or 'nothing changed'}"
     for quantity in names_with_error():
-        if any(quantity in one.limits and one.ladder.base is None for one in table.ladders):
+        if any(quantity in settling.limits and settling.ladder.base is None for settling in table.ladders):
             try:
-                rows, error, seconds = table.choose(WANTED, quantity)
+                rows, error, seconds = table.choose(TARGET_ERROR, quantity)
             except ValueError as refusal:
                 yield str(refusal)
                 continue
             used = ", ".join(row.setting.label for row in rows)
-            yield f"for {WANTED:.0%} on {_name(quantity)} use {used}: {error:.1%}, {seconds:.2g} s"
+            yield f"for {TARGET_ERROR:.0%} on {_name(quantity)} use {used}: {error:.1%}, {seconds:.2g} s"
 
 
 def costs(table: LadderTables) -> Figure:
@@ -189,37 +199,39 @@ def costs(table: LadderTables) -> Figure:
 
     The front is of settings of all ladders together, as they are chosen for smaller and smaller errors.
     """
-    found = [q for q in ("amplitude", "energy", "life") if any(q in one.limits for one in table.ladders)]
-    shown = found or ["amplitude"]
+    quantities = [q for q in ("amplitude", "energy", "life") if any(q in settling.limits for settling in table.ladders)]
+    shown = quantities or ["amplitude"]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(4.2 * len(shown) + 1.6, 4.0), layout="constrained")
         panes = figure.subplots(1, len(shown), squeeze=False)[0]
         colours = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
         for pane, quantity in zip(panes, shown, strict=True):
-            for i, one in enumerate(table.ladders):
-                points = [(row.solved.seconds, b) for row in one.rows if (b := one.bound(row, quantity)) is not None]
+            for i, settling in enumerate(table.ladders):
+                points = [
+                    (row.solved.seconds, b) for row in settling.rows if (b := settling.bound(row, quantity)) is not None
+                ]
                 seconds, errors = zip(*points, strict=True) if points else ((), ())
                 style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
-                label = one.ladder.name.replace("_", " ")
+                label = settling.ladder.name.replace("_", " ")
                 pane.plot(seconds, np.maximum(errors, FLOOR), label=label, markersize=5, **style)
             front = _front(table, quantity)
             pane.plot(*front, color=INK, linewidth=0.8, marker=".", zorder=0, label="all together, as chosen")
             pane.set_xscale("log")  # before its formatter
-            pane.axhline(WANTED, color=GREY, linestyle=":", linewidth=1)
+            pane.axhline(TARGET_ERROR, color=GREY, linestyle=":", linewidth=1)
             pane.xaxis.set_minor_formatter(NullFormatter())
             pane.set(yscale="log", xlabel="seconds of one processor", title=f"{table.scene}: {_name(quantity)}")
         panes[0].set_ylabel("relative error, with the doubt in it")
-        known = panes[0].get_legend_handles_labels()
-        panes[-1].legend(*known, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+        handles = panes[0].get_legend_handles_labels()
+        panes[-1].legend(*handles, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     return figure
 
 
 def _front(table: LadderTables, quantity: str) -> tuple[list[float], list[float]]:
     """Seconds and errors of the cheapest settings for smaller and smaller errors, as far as they are known."""
     seconds, errors = [], []
-    for wanted in np.logspace(-0.5, -5, 37):
+    for target in np.logspace(-0.5, -5, 37):
         try:
-            _, error, needed = table.choose(float(wanted), quantity)
+            _, error, needed = table.choose(float(target), quantity)
         except ValueError:
             break
         seconds.append(needed)
@@ -227,37 +239,37 @@ def _front(table: LadderTables, quantity: str) -> tuple[list[float], list[float]
     return seconds, errors
 
 
-def picture(scene: str, one: LadderTable) -> Figure:
+def picture(scene: str, settling: LadderTable) -> Figure:
     """Errors against the number of pairs, the work on the finest grid, and where coarser grids differ from it."""
-    by_pairs = {len(m.area): m for m in reversed([row.solved for row in one.rows]) if m.values["energy"]}
-    *some, finest = [by_pairs[n] for n in sorted(by_pairs)][-4:] or [one.rows[-1].solved]
+    by_pairs = {len(m.area): m for m in reversed([row.solved for row in settling.rows]) if m.values["energy"]}
+    *coarser, finest = [by_pairs[n] for n in sorted(by_pairs)][-4:] or [settling.rows[-1].solved]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.1 + 2.5 * len(some), 3.6), layout="constrained")
-        panes = figure.subplots(1, 2 + len(some), width_ratios=[1.7] + [1] * (1 + len(some)), squeeze=False)[0]
-        _draw_errors(panes[0], one)
-        panes[0].set_title(f"{scene}: {one.ladder.name.replace('_', ' ')}")
+        figure = Figure(figsize=(7.1 + 2.5 * len(coarser), 3.6), layout="constrained")
+        panes = figure.subplots(1, 2 + len(coarser), width_ratios=[1.7] + [1] * (1 + len(coarser)), squeeze=False)[0]
+        _draw_errors(panes[0], settling)
+        panes[0].set_title(f"{scene}: {settling.ladder.name.replace('_', ' ')}")
         drawn = _map(panes[1], finest, 1e-3 * finest.work, {"cmap": "viridis"})
         figure.colorbar(drawn, ax=panes[1], label="work per cycle and area, kJ/m²", location="bottom")
         reach = max(float(finest.work.max()), 1e-300)
-        offs = [(coarse.work - on_grid(finest.patch, finest.work, coarse.patch)) / reach for coarse in some]
-        most = max((float(np.quantile(np.abs(off), MOST_SHOWN)) for off in offs), default=0.0) or 1.0
-        for pane, coarse, off in zip(panes[2:], some, offs, strict=True):
-            drawn = _map(pane, coarse, off, {"cmap": "RdBu_r", "vmin": -most, "vmax": most})
-        if some:
+        offs = [(coarse.work - on_grid(finest.patch, finest.work, coarse.patch)) / reach for coarse in coarser]
+        limit = max((float(np.quantile(np.abs(off), MOST_SHOWN)) for off in offs), default=0.0) or 1.0
+        for pane, coarse, off in zip(panes[2:], coarser, offs, strict=True):
+            drawn = _map(pane, coarse, off, {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit})
+        if coarser:
             label = "work − that of the finest grid, over its largest"
             figure.colorbar(drawn, ax=list(panes[2:]), label=label, location="bottom", extend="both", aspect=40)
     return figure
 
 
-def _draw_errors(pane: Any, one: LadderTable) -> None:
+def _draw_errors(pane: Any, ladder: LadderTable) -> None:
     drawn = (("peak_frequency", GREY, "^"), ("amplitude", BLUE, "o"), ("energy", ORANGE, "s"), ("life", GREEN, "D"))
     for quantity, colour, mark in drawn:
-        points = [(len(row.solved.area), b) for row in one.rows if (b := one.bound(row, quantity))]
+        points = [(len(row.solved.area), b) for row in ladder.rows if (b := ladder.bound(row, quantity))]
         if points:
             style = {"marker": mark, "markersize": 4, "color": colour, "label": _name(quantity)}
             pane.loglog(*zip(*points, strict=True), linestyle="none", **style)
-    pane.axhline(WANTED, color=GREY, linestyle=":", linewidth=1)
-    ticks = sorted({len(row.solved.area) for row in one.rows})
+    pane.axhline(TARGET_ERROR, color=GREY, linestyle=":", linewidth=1)
+    ticks = sorted({len(row.solved.area) for row in ladder.rows})
     pane.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=8)
     pane.xaxis.set_minor_locator(NullLocator())
     pane.set(xlabel="node pairs", ylabel="relative error, with the doubt in it")
@@ -265,12 +277,12 @@ def _draw_errors(pane: Any, one: LadderTable) -> None:
         pane.legend(fontsize=8, loc="upper right")
 
 
-def _map(pane: Any, one: SolvedSetting, field: np.ndarray, colours: dict[str, Any]) -> Any:
-    mesh = Triangulation(*(1e3 * one.patch.T))
+def _map(pane: Any, measured: SolvedSetting, field: np.ndarray, colours: dict[str, Any]) -> Any:
+    mesh = Triangulation(*(1e3 * measured.patch.T))
     a, b, c = np.moveaxis(np.stack([mesh.x, mesh.y], axis=1)[mesh.triangles], 1, 0)
     area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     mesh.set_mask(area < FLAT * area.mean())  # rounding makes slivers along the rim
     drawn = pane.tripcolor(mesh, field, shading="gouraud", **colours)
-    pane.set(aspect="equal", title=f"{len(one.area)} pairs", xlabel="mm")
+    pane.set(aspect="equal", title=f"{len(measured.area)} pairs", xlabel="mm")
     pane.grid(visible=False)
     return drawn

@@ -29,11 +29,11 @@ SCHEMA = "scene.schema.json"
 class Limits:
     """What is taken for a contact, and for a file in metres.
 
-    near : distance over the size of the whole; opposed : cosine of the normals; share : of the facets of a face
+    distance : distance over the size of the whole; opposed : cosine of the normals; share : of the facets of a face
     longest : of a part in metres [m], beyond which a file is taken to be in millimetres
     """
 
-    near: float = 0.01
+    distance: float = 0.01
     opposed: float = -0.7
     share: float = 0.1
     longest: float = 3.0
@@ -62,28 +62,29 @@ class Candidate:
 class Draft(StudyResult):
     """A scene and what it is made of.
 
-    text : of the scene beside the file; name : of it; unit : of length in the file, and why; candidates : best first
+    text, name : of the scene; unit : of length in the file, unit_reason : where it comes from
+    candidates : pairs of faces that may touch, best first
     """
 
     file: Path
     text: str
     name: str
     unit: str
-    why: str
+    unit_reason: str
     bodies: Mapping[str, Sequence[str]]
     candidates: tuple[Candidate, ...]
 
     def record(self) -> dict[str, Any]:
         """For machines."""
-        pairs = [vars(one) for one in self.candidates]
+        pairs = [vars(candidate) for candidate in self.candidates]
         return {"unit": self.unit, "bodies": dict(self.bodies), "candidates": pairs, "scene": self.text}
 
     def lines(self) -> list[str]:
         """For people."""
-        found = [f"unit      {self.unit}: {self.why}"]
-        found += [f"body      {name}: groups {', '.join(groups) or 'none'}" for name, groups in self.bodies.items()]
-        found += [f"contact   {_said(one)}" for one in self.candidates]
-        return found if self.candidates else [*found, "contact   no two faces of different bodies are near each other"]
+        texts = [f"unit      {self.unit}: {self.unit_reason}"]
+        texts += [f"body      {name}: groups {', '.join(groups) or 'none'}" for name, groups in self.bodies.items()]
+        texts += [f"contact   {_describe(candidate)}" for candidate in self.candidates]
+        return texts if self.candidates else [*texts, "contact   no two faces of different bodies are near each other"]
 
     def write(self, folder: Path) -> list[Path]:
         """Write the scene and, beside it, the schema by which editors complete and check its keys."""
@@ -97,32 +98,32 @@ class Draft(StudyResult):
         return [scene, schema]
 
 
-def draft(what: AnyPath, *, unit: str | None = None) -> Draft:
+def draft(file: AnyPath, *, unit: str | None = None) -> Draft:
     """Write a commented scene that begins from a mesh, a deck or a CAD file, and the schema of scenes for editors.
 
     what : a file of a mesh, a deck or a CAD program
     unit : unit of length of the file: m, mm, cm, um, in, ft; guessed and said by default
     Raises  ValueError: the file cannot be read, one sentence
     """
-    path = Path(what)
+    path = Path(file)
     if path.suffix.lower() not in sources.ENDINGS:
-        raise Refusal(f'"{what}" is no mesh, deck or CAD file: its ending is none of {", ".join(sources.ENDINGS)}')
+        raise Refusal(f'"{file}" is no mesh, deck or CAD file: its ending is none of {", ".join(sources.ENDINGS)}')
     raw = sources.read(path, "m" if unit is None else unit)
-    why = "as given"
+    reason = "as given"
     if unit is None:
-        unit, why = _guessed(raw, path)
+        unit, reason = _guessed(raw, path)
     source = raw if unit == "m" else sources.read(path, unit)
     candidates = tuple(_candidates(source))
     groups = {name: sorted(body.node_sets) for name, body in source.bodies.items()}
     is_deck = bool(source.deck.materials or source.deck.supports)
-    text = "\n".join(_text(path, source, unit, why, candidates, is_deck)) + "\n"
-    return Draft(path, text, path.stem.replace(".", "_"), unit, why, groups, candidates)
+    text = "\n".join(_text(path, source, unit, reason, candidates, is_deck)) + "\n"
+    return Draft(path, text, path.stem.replace(".", "_"), unit, reason, groups, candidates)
 
 
 def _guessed(source: Any, path: Path) -> tuple[str, str]:
     """The unit of length of a file and why, from its kind and its size."""
-    every = np.concatenate([body.mesh.doflocs for body in source.bodies.values()], axis=1)
-    longest = float(np.ptp(every, axis=1).max())
+    points = np.concatenate([body.mesh.doflocs for body in source.bodies.values()], axis=1)
+    longest = float(np.ptp(points, axis=1).max())
     if path.suffix.lower() in cad.ENDINGS:
         return "mm", f"guessed, as CAD files are in mm; the whole is then {longest:.4g} mm long"
     if longest > LIMITS.longest:
@@ -132,41 +133,49 @@ def _guessed(source: Any, path: Path) -> tuple[str, str]:
 
 def _candidates(source: Any) -> Iterator[Candidate]:
     """Pairs of named faces of different bodies that are near each other and look at each other, nearest first."""
-    every = np.concatenate([body.mesh.doflocs for body in source.bodies.values()], axis=1)
-    near = LIMITS.near * float(np.linalg.norm(np.ptp(every, axis=1)))
+    points = np.concatenate([body.mesh.doflocs for body in source.bodies.values()], axis=1)
+    reach = LIMITS.distance * float(np.linalg.norm(np.ptp(points, axis=1)))
     faces = []
     for body, solid in source.bodies.items():
         facets, centre, normal = outline(solid.mesh)
         corners = solid.mesh.p[:, solid.mesh.facets[:, facets]]
         wide = np.linalg.norm(np.ptp(corners, axis=1), axis=0)
-        for name, own in (solid.mesh.boundaries or {}).items():
-            of = np.isin(facets, own)
+        for name, facets_of_group in (solid.mesh.boundaries or {}).items():
+            of = np.isin(facets, facets_of_group)
             if of.sum() < len(facets):  # a group of the whole skin says nothing
                 faces.append((body, name, {*facets[of].tolist()}, centre[of], normal[of], wide[of]))
-    declared = {frozenset((one.slave, one.master)): one.friction for one in source.deck.contacts}
-    found = []
-    for one, two in combinations(faces, 2):
-        if one[0] != two[0] and (met := _near(one[3:], two[3:], near)) is not None:
-            names = [group_name(body, face, source.bodies[body].node_sets) for body, face, *_ in (one, two)]
-            faced = frozenset((one[1], two[1]))
-            found.append((Candidate(names[0], names[1], *met, faced in declared, declared.get(faced)), one, two))
-    taken: dict[tuple[str, str], set[int]] = defaultdict(set)  # bodies that touch -> facets of the first one
-    for pair, one, two in sorted(found, key=lambda at: (not at[0].declared, -round(at[0].share, 2), at[0].distance)):
-        ends = ((taken[one[0], two[0]], one[2]), (taken[two[0], one[0]], two[2]))
-        if all(known.isdisjoint(own) for known, own in ends):  # of groups that overlap the best one
-            for known, own in ends:
-                known |= own
+    declared = {frozenset((first.slave, first.master)): first.friction for first in source.deck.contacts}
+    pairs = []
+    for first, second in combinations(faces, 2):
+        if first[0] != second[0] and (match := _meet(first[3:], second[3:], reach)) is not None:
+            names = [group_name(body, face, source.bodies[body].node_sets) for body, face, *_ in (first, second)]
+            faced = frozenset((first[1], second[1]))
+            pairs.append((Candidate(names[0], names[1], *match, faced in declared, declared.get(faced)), first, second))
+    used_facets: dict[tuple[str, str], set[int]] = defaultdict(set)  # bodies that touch -> facets of the first one
+    for pair, first, second in sorted(
+        pairs, key=lambda at: (not at[0].declared, -round(at[0].share, 2), at[0].distance)
+    ):
+        ends = ((used_facets[first[0], second[0]], first[2]), (used_facets[second[0], first[0]], second[2]))
+        if all(
+            used.isdisjoint(facets_of_group) for used, facets_of_group in ends
+        ):  # of groups that overlap the best one
+            for used, facets_of_group in ends:
+                used |= facets_of_group
             yield pair
 
 
-def _near(one: Any, two: Any, near: float) -> tuple[float, float, Any] | None:
+def _meet(first: Any, second: Any, distance: float) -> tuple[float, float, Any] | None:
     """Least distance of two faces [m], share of the smaller one near, normal there; None where they are apart."""
-    (centre, normal, wide), (places, normals, widths) = one, two
+    (centre, normal, wide), (places, normals, widths) = first, second
     _, at = scipy.spatial.cKDTree(places).query(centre)
-    apart = places[at] - centre
-    gap = np.abs((apart * normal).sum(axis=1))
-    aside = np.linalg.norm(apart - (apart * normal).sum(axis=1)[:, None] * normal, axis=1)
-    good = ((normal * normals[at]).sum(axis=1) < LIMITS.opposed) & (gap < near) & (aside < np.maximum(wide, widths[at]))
+    offset = places[at] - centre
+    gap = np.abs((offset * normal).sum(axis=1))
+    sideways = np.linalg.norm(offset - (offset * normal).sum(axis=1)[:, None] * normal, axis=1)
+    good = (
+        ((normal * normals[at]).sum(axis=1) < LIMITS.opposed)
+        & (gap < distance)
+        & (sideways < np.maximum(wide, widths[at]))
+    )
     share = good.sum() / min(len(centre), len(places))
     if share < LIMITS.share:
         return None
@@ -174,21 +183,21 @@ def _near(one: Any, two: Any, near: float) -> tuple[float, float, Any] | None:
     return float(gap[good].min()), float(min(share, 1.0)), tuple((mean / np.linalg.norm(mean)).round(3).tolist())
 
 
-def _said(pair: Candidate) -> str:
+def _describe(pair: Candidate) -> str:
     return f"{pair.first} and {pair.second}: {1e3 * pair.distance:.3g} mm apart, {pair.share:.0%} of it near" + (
         ", a contact pair of the deck" if pair.declared else ""
     )
 
 
 def _text(
-    path: Path, source: Any, unit: str, why: str, candidates: Sequence[Candidate], is_deck: bool
+    path: Path, source: Any, unit: str, reason: str, candidates: Sequence[Candidate], is_deck: bool
 ) -> Iterator[str]:
     yield f"#:schema ./{SCHEMA}"
     yield f"# Begun from {path.name} by tribodyn new. What is marked GUESS is a place holder: replace it by your own."
     yield from ("", "[scene]", f"title = {json.dumps(path.stem)}", "")
     if is_deck:
         yield from (f"[decks.{_key(path.stem)}]", f"file = {json.dumps(path.name)}")
-        yield f'unit = "{unit}"  # {why}'
+        yield f'unit = "{unit}"  # {reason}'
         yield "# its bodies, materials, ties, supports and loads come along; groups are named as follows"
     else:
         yield from ("[materials.steel]  # GUESS", 'young = "210 GPa"', 'density = "7850 kg/m3"')
@@ -203,23 +212,27 @@ def _text(
         yield from ("", f"[bodies.{_key(name)}]", f"mesh = {json.dumps(path.name)}")
         if len(source.bodies) > 1:
             yield f"volume = {json.dumps(name)}"
-        yield from (f'unit = "{unit}"  # {why}', 'material = "steel"')
+        yield from (f'unit = "{unit}"  # {reason}', 'material = "steel"')
         if at == 0 and faces:
             yield f"fixed = [{json.dumps(first_face[name])}]  # GUESS; its groups: {', '.join(body.node_sets)}"
         else:
             yield f"# its groups: {', '.join(body.node_sets) or 'none'}"
     for number, pair in enumerate(candidates, 1):
-        yield from ("", f"[contacts.joint_{number}]  # {_said(pair)}")
+        yield from ("", f"[contacts.joint_{number}]  # {_describe(pair)}")
         yield from (f"first = {json.dumps(pair.first)}", f"second = {json.dumps(pair.second)}")
         yield from ('tangential_stiffness = "100 N/um"  # GUESS', 'normal_stiffness = "100 N/um"  # GUESS')
         yield "friction = 0.5  # GUESS" if pair.friction is None else f"friction = {pair.friction}  # of the deck"
-    held = {name for name, body in source.bodies.items() for s in source.deck.supports if s.group in body.node_sets}
-    moved = [*held, *(name for name in source.bodies if name not in held)][-1]
-    face = json.dumps(group_name(moved, first_face[moved], source.bodies[moved].node_sets))
-    own = [(pair, end) for pair in candidates for end in (pair.first, pair.second) if end.startswith(f"{moved}.")]
-    if own and not (source.deck.forces or source.deck.pressures):
-        pair, end = own[0]
-        towards = [(1 if end == pair.first else -1) * one + 0.0 for one in pair.normal]
+    fixed_bodies = {
+        name for name, body in source.bodies.items() for s in source.deck.supports if s.group in body.node_sets
+    }
+    loaded_body = [*fixed_bodies, *(name for name in source.bodies if name not in fixed_bodies)][-1]
+    face = json.dumps(group_name(loaded_body, first_face[loaded_body], source.bodies[loaded_body].node_sets))
+    loaded_ends = [
+        (pair, end) for pair in candidates for end in (pair.first, pair.second) if end.startswith(f"{loaded_body}.")
+    ]
+    if loaded_ends and not (source.deck.forces or source.deck.pressures):
+        pair, end = loaded_ends[0]
+        towards = [(1 if end == pair.first else -1) * component + 0.0 for component in pair.normal]
         yield from ("", "[loads.static.press]  # GUESS: presses the faces together, the drive shall not lift them")
         yield from (f"group = {json.dumps(end)}", f"direction = {towards}", 'value = "1 kN"')
     yield from ("", "[loads.harmonic.drive]  # GUESS", f"group = {face}", 'direction = "x"', 'value = "10 N"')
@@ -235,16 +248,16 @@ def _key(name: str) -> str:
 def _far(source: Any, candidates: Sequence[Candidate]) -> dict[str, str]:
     """Of each body the face that is farthest from what touches, to hold or to shake it."""
     touching = {name for pair in candidates for name in (pair.first, pair.second)}
-    found = {}
+    farthest = {}
     for body, solid in source.bodies.items():
         mesh, groups = solid.mesh, solid.node_sets
         names = {name: group_name(body, name, groups) for name in groups}
-        near = [mesh.doflocs[:, nodes] for name, nodes in groups.items() if names[name] in touching]
-        centre = np.concatenate(near, axis=1).mean(axis=1) if near else mesh.doflocs.mean(axis=1)
+        touching_points = [mesh.doflocs[:, nodes] for name, nodes in groups.items() if names[name] in touching]
+        centre = np.concatenate(touching_points, axis=1).mean(axis=1) if touching_points else mesh.doflocs.mean(axis=1)
         far = {
             name: np.linalg.norm(mesh.doflocs[:, groups[name]].mean(axis=1) - centre)
             for name in mesh.boundaries or groups
             if name in groups and names[name] not in touching
         }
-        found[body] = max(far, key=lambda name: far[name], default=next(iter(groups), "NAME"))
-    return found
+        farthest[body] = max(far, key=lambda name: far[name], default=next(iter(groups), "NAME"))
+    return farthest

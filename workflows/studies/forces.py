@@ -32,13 +32,13 @@ class BodyForces:
     """Static forces on a body, their sums (3,) along x, y, z [N].
 
     load : of the static loads, of centrifugal force where it has moved to; joints : joint -> force of that contact
-    held : whether a support, a spring or a prescribed displacement carries some of it too
+    is_supported : whether a support, a spring or a prescribed displacement carries some of it too
     """
 
     body: str
     load: np.ndarray
     joints: dict[str, np.ndarray]
-    held: bool
+    is_supported: bool
 
     @property
     def imbalance(self) -> float:
@@ -57,26 +57,27 @@ class Forces(StudyResult):
     def record(self) -> dict[str, Any]:
         """For machines."""
         return {
-            one.body: {
-                "load_N": one.load.tolist(),
-                "joints_N": {name: force.tolist() for name, force in one.joints.items()},
-                "imbalance": one.imbalance,
-                "held": one.held,
+            forces_on_body.body: {
+                "load_N": forces_on_body.load.tolist(),
+                "joints_N": {name: force.tolist() for name, force in forces_on_body.joints.items()},
+                "imbalance": forces_on_body.imbalance,
+                "supported": forces_on_body.is_supported,
             }
-            for one in self.bodies
+            for forces_on_body in self.bodies
         }
 
     def lines(self) -> list[str]:
         """For people."""
-        said = []
-        for one in self.bodies:
-            said.append(f"{one.body}: static load {_vector(one.load)} N")
-            said += [f"  {name}: {_vector(force)} N" for name, force in one.joints.items()]
-            if one.held:
-                said.append(f"  supports and neighbours: {_vector(-one.load - sum(one.joints.values()))} N")
+        texts = []
+        for forces_on_body in self.bodies:
+            texts.append(f"{forces_on_body.body}: static load {_vector(forces_on_body.load)} N")
+            texts += [f"  {name}: {_vector(force)} N" for name, force in forces_on_body.joints.items()]
+            if forces_on_body.is_supported:
+                remainder = -forces_on_body.load - sum(forces_on_body.joints.values())
+                texts.append(f"  supports and neighbours: {_vector(remainder)} N")
             else:
-                said.append(f"  out of balance by {one.imbalance:.1e} of the largest")
-        return said
+                texts.append(f"  out of balance by {forces_on_body.imbalance:.1e} of the largest")
+        return texts
 
 
 def forces(scene: Source, *, overrides: Overrides = ()) -> Forces:
@@ -109,14 +110,14 @@ def of_scene(file: SceneFile, scene: MeshScene) -> Forces:
     sets = {name: find_group(part.node_sets, name) for name in bodies} or {"part": np.arange(len(part.points))}
     free = np.zeros(3 * len(part.points), bool)
     free[part.free] = True
-    for given in scene.prescribed.values():
-        free[part.free[part.dofs(given.group, given.axis)]] = False
-    found = []
+    for motion in scene.prescribed.values():
+        free[part.free[part.dofs(motion.group, motion.axis)]] = False
+    bodies_found = []
     for name, nodes in sets.items():
         joints = {joint: on[nodes].sum(axis=0) for joint, on in contact.items() if on[nodes].any()}
-        held = not free.reshape(-1, 3)[nodes].all() or part.follow is not None or bool(scene.springs)
-        found.append(BodyForces(name, load[nodes].sum(axis=0), joints, held))
-    return Forces(tuple(found))
+        is_supported = not free.reshape(-1, 3)[nodes].all() or part.follow is not None or bool(scene.springs)
+        bodies_found.append(BodyForces(name, load[nodes].sum(axis=0), joints, is_supported))
+    return Forces(tuple(bodies_found))
 
 
 def _loads(scene: MeshScene, part: Part, excitation: Excitation, q: np.ndarray) -> np.ndarray:
@@ -125,8 +126,8 @@ def _loads(scene: MeshScene, part: Part, excitation: Excitation, q: np.ndarray) 
     full[part.free] = excitation.force(0, part.system.loads, len(part.free)).real
     if scene.wheel is not None and scene.wheel.speed:
         mass, _ = assemble(part.mesh, part_reduction.material(scene, part.mesh))
-        moved = part.field(q).ravel()
-        full -= spin_softening(mass, scene.wheel.axis, 2 * np.pi * scene.wheel.speed) @ moved
+        displacement = part.field(q).ravel()
+        full -= spin_softening(mass, scene.wheel.axis, 2 * np.pi * scene.wheel.speed) @ displacement
     return full.reshape(-1, 3)
 
 
@@ -135,16 +136,16 @@ def _contact_forces(scene: MeshScene, part: Part, force: np.ndarray) -> dict[str
 
     force : (n_pair, n_component) static part of the contact forces [N]
     """
-    found: dict[str, np.ndarray] = {}
+    forces_by_joint: dict[str, np.ndarray] = {}
     for contact, pairs in zip(part_reduction.contacts(scene), part.pairs.values(), strict=True):
-        own = force[pairs].ravel()
+        joint_force = force[pairs].ravel()
         if contact.opposite is None:
-            on = -contact.build(part.mesh).B.T @ own
+            on = -contact.build(part.mesh).B.T @ joint_force
         else:
             interface, second = contact.halves(part.mesh)
-            on = second.T @ own - interface.B.T @ own
-        found[contact.joint] = found.get(contact.joint, 0.0) + on.reshape(-1, 3)
-    return found
+            on = second.T @ joint_force - interface.B.T @ joint_force
+        forces_by_joint[contact.joint] = forces_by_joint.get(contact.joint, 0.0) + on.reshape(-1, 3)
+    return forces_by_joint
 
 
 def _vector(force: np.ndarray) -> str:

@@ -103,11 +103,11 @@ def run_to_accuracy(
     """
     file, report = read_scene(source, overrides), reporter(progress)
 
-    def one(current: SceneFile, number: int) -> Result:
+    def run_round(current: SceneFile, number: int) -> Result:
         place = None if folder is None else Path(folder) / "rounds" / str(number)
         return run(current, place, progress=progress, resume=resume and place is not None)
 
-    result, bound = errors.to_accuracy(file, accuracy, one, report.say)
+    result, bound = errors.to_accuracy(file, accuracy, run_round, report.say)
     if folder is not None:
         store.set_aside(Path(folder) / "result.h5")
         store.save(Path(folder) / "result.h5", result)
@@ -125,14 +125,14 @@ def draw(
     """
     from tribodyn.workflows.pictures import plots
 
-    wanted, missing = result.scene.pictures, ""
+    settings, missing = result.scene.pictures, ""
     folder.mkdir(parents=True, exist_ok=True)
-    written = plots.draw(result, folder, formats, dpi) if wanted.plots else []
-    if wanted.renders:
+    written = plots.draw(result, folder, formats, dpi) if settings.plots else []
+    if settings.renders:
         from tribodyn.workflows.pictures import offscreen, render
 
         try:
-            written += render.draw(result, folder, wanted.deformation_scale, wanted.wear_scale, formats, dpi)
+            written += render.draw(result, folder, settings.deformation_scale, settings.wear_scale, formats, dpi)
         except offscreen.RenderingUnavailable as reason:
             missing = f"no renders: {reason}"
     return written, missing
@@ -154,8 +154,8 @@ def animate(
     """
     from tribodyn.workflows.pictures.film import film
 
-    wanted = result.scene.pictures
-    factors = wanted.deformation_scale, wanted.wear_scale
+    settings = result.scene.pictures
+    factors = settings.deformation_scale, settings.wear_scale
     return film(result, folder, over, row, formats, images, dpi, *factors)
 
 
@@ -178,11 +178,11 @@ def report(results: Sequence[AnyPath], path: AnyPath) -> Path:
 
     if not results:
         raise Refusal("report: give the folder or file of a result")
-    given = [Path(one) for one in results]
-    files, loaded = [store.result_file(one) for one in given], [store.load(one) for one in given]
-    names = [str(one.provenance["scene_name"]) for one in loaded]
+    paths = [Path(item) for item in results]
+    files, loaded = [store.result_file(item) for item in paths], [store.load(item) for item in paths]
+    names = [str(item.provenance["scene_name"]) for item in loaded]
     if len(set(names)) < len(names):
-        names = [file.parent.name or str(one) for file, one in zip(files, given, strict=True)]
+        names = [file.parent.name or str(item) for file, item in zip(files, paths, strict=True)]
     if len(set(names)) < len(names):
         names = [str(file) for file in files]
     return page.write(list(zip(names, loaded, files, strict=True)), Path(path))

@@ -44,7 +44,7 @@ class Inspection(StudyResult):
     worst: Mapping[str, Any]
     unused: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     pairs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gaps: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     frequencies: tuple[float, ...] = ()
@@ -65,7 +65,7 @@ class Inspection(StudyResult):
             "pairs": dict(self.pairs),
             "gaps": dict(self.gaps),
             "frequencies_hz": list(self.frequencies),
-            "said": list(self.said),
+            "notes": list(self.notes),
             "remarks": list(self.remarks),
         }
 
@@ -96,7 +96,7 @@ class Inspection(StudyResult):
             lines.append(("gap", f"{name}: {1e6 * between['least_m']:.4g} to {1e6 * between['largest_m']:.4g} um"))
         if self.frequencies:
             lines.append(("modes", ", ".join(f"{f:.5g}" for f in self.frequencies) + " Hz"))
-        lines += [("done", sentence) for sentence in self.said]
+        lines += [("done", sentence) for sentence in self.notes]
         lines += [("not used", clause) for clause in self.unused]
         lines += [("refused", clause) for clause in self.refused]
         return named_lines(lines + [("warning", sentence) for sentence in self.remarks])
@@ -109,7 +109,7 @@ class Inspection(StudyResult):
 
 
 def inspect(
-    what: AnyPath,
+    source: AnyPath,
     *,
     unit: str = "m",
     young: Pressure | None = None,
@@ -138,11 +138,11 @@ def inspect(
     if (young is None) != (density is None):
         raise Refusal("--young and --density go together: give both or none")
     material = None if young is None or density is None else Material(young, poisson, density)
-    if Path(what).suffix.lower() in sources.ENDINGS:
-        return _of_file(Path(what), unit, elements, material, modes, free, progress or Progress())
+    if Path(source).suffix.lower() in sources.ENDINGS:
+        return _of_file(Path(source), unit, elements, material, modes, free, progress or Progress())
     if unit != "m" or material is not None or elements != "quadratic":
         raise Refusal("--unit, --young, --poisson, --density and --elements are for files: a scene has its own")
-    return _of_scene(read_scene(what, overrides), modes, progress or Progress())
+    return _of_scene(read_scene(source, overrides), modes, progress or Progress())
 
 
 def _of_file(
@@ -157,29 +157,31 @@ def _of_file(
     for name, body in source.bodies.items():
         mesh, node_sets = decks.with_elements(body.mesh, dict(body.node_sets), table, name)
         try:
-            made = deck_materials.material(source.deck, name, mesh, table, named)
+            material_of_body = deck_materials.material(source.deck, name, mesh, table, named)
         except ValueError as sentence:  # no or no whole material
-            made, lacking = {}, str(sentence)
-        solids.append(Body(name, mesh, node_sets, made))
-    found = measured(solids, decks.notes_of(source, table), source.unused)
-    pairs, apart, remarks = _pairs_of(source.deck, solids)
+            material_of_body, lacking = {}, str(sentence)
+        solids.append(Body(name, mesh, node_sets, material_of_body))
+    inspection = measured(solids, decks.notes_of(source, table), source.unused)
+    pairs, separate, remarks = _pairs_of(source.deck, solids)
     ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
-    found = replace(found, pairs=pairs, refused=(*ignored, *apart))
+    inspection = replace(inspection, pairs=pairs, refused=(*ignored, *separate))
     if n_modes:
-        if material is None and not any(one.groups for one in source.deck.materials):
+        if material is None and not any(entry.groups for entry in source.deck.materials):
             raise Refusal(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
         if lacking:
             raise Refusal(f"{path}: {lacking}")
         if free or replace(source.deck, contacts=()) == Deck(materials=source.deck.materials):
-            found = replace(found, frequencies=_free_frequencies(solids, n_modes, progress))
+            inspection = replace(inspection, frequencies=_free_frequencies(solids, n_modes, progress))
         else:
             with progress.stage("mass and stiffness"):
                 part = decks.part(path.stem, table, named, path.parent)
             with progress.stage("modes"):
-                found = replace(found, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes))
+                inspection = replace(
+                    inspection, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes)
+                )
     hint = 'give --unit mm (in a scene: unit = "mm")'
-    remarks += sanity_checks.check_size(found.size, hint) + _check_materials(solids)
-    return replace(found, remarks=tuple(remarks))
+    remarks += sanity_checks.check_size(inspection.size, hint) + _check_materials(solids)
+    return replace(inspection, remarks=tuple(remarks))
 
 
 def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, float]], list[str], list[str]]:
@@ -189,43 +191,43 @@ def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, flo
         negative where they overlap, the angle between them [degrees]; sentences on pairs that share nothing; remarks
         on those that are an opening apart
     """
-    whole = Assembly(solids)
-    found: dict[str, dict[str, float]] = {}
+    assembly = Assembly(solids)
+    meetings: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     remarks: list[str] = []
-    for kind, one in [*(("tie", tie) for tie in of.ties), *(("contact", c) for c in of.contacts)]:
-        name = f"{kind} '{one.name}'"
+    for kind, pair in [*(("tie", tie) for tie in of.ties), *(("contact", c) for c in of.contacts)]:
+        name = f"{kind} '{pair.name}'"
         first, second = (
             [
                 face
                 for solid in solids
-                if (face := group_name(solid.name, group, solid.node_sets)) in whole.boundaries
+                if (face := group_name(solid.name, group, solid.node_sets)) in assembly.boundaries
                 and group in solid.node_sets
             ]
-            for group in (one.slave, one.master)
+            for group in (pair.slave, pair.master)
         )
-        slaves = [solid.mesh for solid in solids if one.slave in (solid.mesh.boundaries or {})]
-        met, trouble = [], f"{name}: its sets are no faces of elements: give surfaces"
+        slaves = [solid.mesh for solid in solids if pair.slave in (solid.mesh.boundaries or {})]
+        matches, trouble = [], f"{name}: its sets are no faces of elements: give surfaces"
         for ends in product(first, second):
             try:
-                met.append(Tie(name, *ends, one.tolerance).meeting(whole))
+                matches.append(Tie(name, *ends, pair.tolerance).meeting(assembly))
             except ValueError as sentence:
                 trouble = str(sentence)
-        if not met:
+        if not matches:
             (refused if kind == "tie" else remarks).append(trouble)
             continue
-        gaps = np.concatenate([shared.gap for *_, shared in met])
-        facing = [(a.normal[s.first] * b.normal[s.second]).sum(axis=1) @ s.weight for a, b, s in met]
-        shared = sum(float(own.weight.sum()) for *_, own in met)
-        found[name] = {
+        gaps = np.concatenate([shared.gap for *_, shared in matches])
+        facing = [(a.normal[s.first] * b.normal[s.second]).sum(axis=1) @ s.weight for a, b, s in matches]
+        shared = sum(float(match.weight.sum()) for *_, match in matches)
+        meetings[name] = {
             "shared_m2": shared,
-            "area_m2": sum(area(mesh, mesh.boundaries[one.slave]) for mesh in slaves),
+            "area_m2": sum(area(mesh, mesh.boundaries[pair.slave]) for mesh in slaves),
             "least_m": float(gaps.min()),
             "largest_m": float(gaps.max()),
             "angle_deg": float(np.degrees(np.arccos(np.clip(-sum(facing) / shared, -1.0, 1.0)))),
         }
-        remarks += sanity_checks.check_opening(name, gaps, met[0][0].length)
-    return found, refused, remarks
+        remarks += sanity_checks.check_opening(name, gaps, matches[0][0].length)
+    return meetings, refused, remarks
 
 
 def _frequencies(M: Any, K: Any, count: int) -> tuple[float, ...]:
@@ -238,27 +240,27 @@ def _frequencies(M: Any, K: Any, count: int) -> tuple[float, ...]:
 
 def _free_frequencies(solids: Sequence[Body], count: int, progress: Progress) -> tuple[float, ...]:
     """The lowest natural frequencies of bodies that nothing holds [Hz]."""
-    found: list[float] = []
+    frequencies: list[float] = []
     for solid in solids:
         with progress.stage(f"modes of {solid.name}"):
-            found += _frequencies(*assemble(solid.mesh, solid.material), count)
-    return tuple(sorted(found)[:count])
+            frequencies += _frequencies(*assemble(solid.mesh, solid.material), count)
+    return tuple(sorted(frequencies)[:count])
 
 
 def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> Inspection:
     part = modelling.part_of(file, progress)
-    found = of_part(file, part)
+    inspection = of_part(file, part)
     if n_modes:
         with progress.stage("modes"):
-            found = replace(found, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes))
-    return found
+            inspection = replace(inspection, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes))
+    return inspection
 
 
 def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
     """The facts of a part of a scene that is assembled already."""
     scene = file.mesh_scene
     solids = _solids(file, part)
-    found = measured(solids, sanity_checks.notes(file, part))
+    inspection = measured(solids, sanity_checks.notes(file, part))
     gap = np.asarray(part.interface.gap)
     gaps = {
         name: {"least_m": float(gap[pairs].min()), "largest_m": float(gap[pairs].max())}
@@ -266,11 +268,11 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
         if gap[pairs].size
     }
     remarks = [
-        *sanity_checks.check_size(found.size, "scale the mesh to metres"),
+        *sanity_checks.check_size(inspection.size, "scale the mesh to metres"),
         *_check_materials(solids),
-        *sanity_checks.check_deflection(scene, part.system, part.largest, float(np.linalg.norm(found.size))),
+        *sanity_checks.check_deflection(scene, part.system, part.largest, float(np.linalg.norm(inspection.size))),
     ]
-    return replace(found, gaps=gaps, remarks=tuple(remarks))
+    return replace(inspection, gaps=gaps, remarks=tuple(remarks))
 
 
 def _check_materials(solids: Sequence[Body]) -> list[str]:
@@ -282,29 +284,29 @@ def _solids(file: scene_file.SceneFile, part: Any) -> list[Body]:
     return [replace(body, name=body.name or file.name) for body in part.mesh.bodies]
 
 
-def measured(solids: Sequence[Body], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
+def measured(solids: Sequence[Body], sentences: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
     """Sizes, volumes, masses, groups and the worst element of bodies."""
     all_facts = {
         solid.name: facts(solid.mesh, densities(solid.mesh, solid.material) if solid.material else None)
         for solid in solids
     }
-    volume = sum(one.volume for one in all_facts.values())
-    masses = [one.mass for one in all_facts.values() if one.mass is not None]
+    volume = sum(facts_of_body.volume for facts_of_body in all_facts.values())
+    masses = [facts_of_body.mass for facts_of_body in all_facts.values() if facts_of_body.mass is not None]
     mass = sum(masses) if len(masses) == len(solids) else None
     weights = masses if mass else [all_facts[s.name].volume for s in solids]
     centre = np.average([all_facts[s.name].centre for s in solids], axis=0, weights=weights)
-    low = np.min([one.low for one in all_facts.values()], axis=0)
-    high = np.max([one.high for one in all_facts.values()], axis=0)
+    low = np.min([facts_of_body.low for facts_of_body in all_facts.values()], axis=0)
+    high = np.max([facts_of_body.high for facts_of_body in all_facts.values()], axis=0)
     bodies, groups = {}, {}
     for solid in solids:
-        one = all_facts[solid.name]
+        facts_of_body = all_facts[solid.name]
         bodies[solid.name] = {
             "elements": solid.mesh.nelements,
             "kind": "hexahedra" if solid.mesh.t.shape[0] == 8 else "tetrahedra",
             "nodes": solid.mesh.doflocs.shape[1],
-            "volume_m3": one.volume,
-            "mass_kg": one.mass,
-            "centre_m": one.centre.tolist(),
+            "volume_m3": facts_of_body.volume,
+            "mass_kg": facts_of_body.mass,
+            "centre_m": facts_of_body.centre.tolist(),
         }
         faces = solid.mesh.boundaries or {}
         for name, nodes in solid.node_sets.items():
@@ -318,5 +320,5 @@ def measured(solids: Sequence[Body], said: Iterable[str] = (), unused: Iterable[
         "centre_m": all_facts[name].worst_centre.tolist(),
     }
     return Inspection(
-        tuple(solids), high - low, volume, mass, centre, bodies, groups, worst, tuple(unused), said=tuple(said)
+        tuple(solids), high - low, volume, mass, centre, bodies, groups, worst, tuple(unused), notes=tuple(sentences)
     )

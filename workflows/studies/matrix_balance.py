@@ -64,8 +64,11 @@ class MatrixContact:
     def stiffness(self) -> np.ndarray:
         """(n_pair, n_component) contact springs [N/m]."""
         share = self.interface.area / self.interface.area.sum()
-        given = {"t1": self.tangential_stiffness, "t2": self.tangential_stiffness, "n": self.normal_stiffness}
-        columns = [given[c] * share if np.ndim(given[c]) == 0 else given[c] for c in self.interface.components]
+        by_component = {"t1": self.tangential_stiffness, "t2": self.tangential_stiffness, "n": self.normal_stiffness}
+        columns = [
+            by_component[c] * share if np.ndim(by_component[c]) == 0 else by_component[c]
+            for c in self.interface.components
+        ]
         return np.column_stack([np.broadcast_to(np.asarray(column, float), share.shape) for column in columns])
 
     def joint(self, pairs: np.ndarray) -> Joint:
@@ -96,8 +99,10 @@ class Structure:
         """The lowest natural frequencies (n,) [Hz], contacts absent, or closed and stuck."""
         springs = None
         if stuck:
-            own = self.model.interface.components
-            springs = np.concatenate([_wide(c.stiffness, c.interface.components, own) for c in self.contacts])
+            all_components = self.model.interface.components
+            springs = np.concatenate(
+                [_wide(c.stiffness, c.interface.components, all_components) for c in self.contacts]
+            )
         return linear_modes(self.model, springs, min(n, self.model.system.n_dof))[0]
 
     def balance(
@@ -122,8 +127,8 @@ class Structure:
         chosen = joint_transitions(self.joints) if transitions == "auto" else transitions
         basis = HarmonicBasis(tuple(harmonics), samples, chosen)
         loads = Excitation.of(static, harmonic)
-        made = HarmonicBalance.of(self.model, self.joints, basis, loads, HZ * up_to)
-        return HertzBalance(made, NewtonOptions(tolerance=tolerance))
+        problem = HarmonicBalance.of(self.model, self.joints, basis, loads, HZ * up_to)
+        return HertzBalance(problem, NewtonOptions(tolerance=tolerance))
 
 
 @dataclass(frozen=True)
@@ -207,13 +212,13 @@ class HertzBalance:
 
     def solve(self, frequency: float) -> Cycle:
         """The vibration at one frequency [Hz], looked for from rest."""
-        found = solve_along_load(self.problem, HZ * frequency, self.newton)
-        return Cycle(self.problem, found.state, found.outcome)
+        solution = solve_along_load(self.problem, HZ * frequency, self.newton)
+        return Cycle(self.problem, solution.state, solution.outcome)
 
     def peak(self, start: float, stop: float, output: str | None = None) -> Cycle:
         """The highest resonance of an output, the first by default, between two frequencies [Hz]."""
-        found = AtPeak(self._output(output), HZ * start, HZ * stop, newton=self.newton).first(self.problem)
-        return Cycle(self.problem, found.state, found.solution.outcome)
+        point = AtPeak(self._output(output), HZ * start, HZ * stop, newton=self.newton).first(self.problem)
+        return Cycle(self.problem, point.state, point.solution.outcome)
 
     def response(
         self,
@@ -249,10 +254,10 @@ class HertzBalance:
         module = continuation.load(method)
         chosen = {**({} if points is None else {"n_points": points}), **options, "newton": self.newton}
         try:
-            made = module.Options(**chosen)
+            method_options = module.Options(**chosen)
         except TypeError as wrong:
             raise Refusal(f"continuation {method}: {wrong}") from None
-        branch: Branch = module.follow(problem, HZ * start, HZ * stop, made)
+        branch: Branch = module.follow(problem, HZ * start, HZ * stop, method_options)
         return driven(problem, branch) if control == "amplitude" else branch
 
     def stability(self, branch: Branch) -> floquet.BranchStability:
@@ -369,16 +374,19 @@ def joined(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     wide = []
     for interface in interfaces:
         place = [components.index(name) for name in interface.components]
-        own = sp.coo_matrix(interface.B)
-        pair, component = np.divmod(own.row, len(place))
+        rows_of_interface = sp.coo_matrix(interface.B)
+        pair, component = np.divmod(rows_of_interface.row, len(place))
         to = pair * len(components) + np.array(place)[component]
-        rows = sp.csr_matrix((own.data, (to, own.col)), (interface.n_pair * len(components), own.shape[1]))
+        rows = sp.csr_matrix(
+            (rows_of_interface.data, (to, rows_of_interface.col)),
+            (interface.n_pair * len(components), rows_of_interface.shape[1]),
+        )
         wide.append(replace(interface, components=components, B=rows))
     return join(wide)
 
 
-def _wide(stiffness: np.ndarray, own: tuple[str, ...], components: tuple[str, ...]) -> np.ndarray:
+def _wide(stiffness: np.ndarray, used: tuple[str, ...], components: tuple[str, ...]) -> np.ndarray:
     """Springs (n_pair, n_own) in the columns of all components, zero in the others."""
     wide = np.zeros((len(stiffness), len(components)))
-    wide[:, [components.index(name) for name in own]] = stiffness
+    wide[:, [components.index(name) for name in used]] = stiffness
     return wide

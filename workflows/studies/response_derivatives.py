@@ -57,18 +57,19 @@ MICROMETRE = 1e-6
 class ResponseDerivatives(StudyResult):
     """Derivatives of a scene's response at one point of it.
 
-    found : by key of the scene; at : the values of the keys, SI units; joints : joint -> its pairs
-    response_seconds, seconds : of one processor, of the response and of the derivatives; anew : keys with which the
-        model is reduced anew, which takes most of the time; without : keys that have no derivative, and why
+    derivatives : by key of the scene; at : the values of the keys, SI units; joints : joint -> its pairs
+    response_seconds, seconds : of one processor, of the response and of the derivatives
+    reduced_keys : keys that need a new reduction of the model, which takes most of the time
+    without : keys without a derivative, each with the reason
     """
 
     name: str
-    found: Derivatives
+    derivatives: Derivatives
     at: Mapping[str, float]
     joints: Mapping[str, np.ndarray]
     response_seconds: float
     seconds: float
-    anew: tuple[str, ...]
+    reduced_keys: tuple[str, ...]
     without: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -77,7 +78,7 @@ class ResponseDerivatives(StudyResult):
 
         The gap of a joint, which is zero for most, counts by the micrometre: d ln q / d gap [%/um]
         """
-        f, size = self.found, self._size
+        f, size = self.derivatives, self._size
         rows = {key: f.slopes[:, i] * value / size for i, (key, value) in enumerate(self.at.items())}
         for joint, pairs in self.joints.items():
             if f.by_gap[:, pairs].any():
@@ -87,25 +88,27 @@ class ResponseDerivatives(StudyResult):
 
     @property
     def _quantities(self) -> list[StatedQuantity]:
-        return [quantity.load(name.partition(" of ")[0]) for name in self.found.names]
+        return [quantity.load(name.partition(" of ")[0]) for name in self.derivatives.names]
 
     @property
     def _first(self) -> int:
         """The first number that moves at a fixed frequency: amplitude, life, or frequency of a fold or mode."""
-        return int(np.argmax(self.found.above.any(axis=1)))
+        return int(np.argmax(self.derivatives.above.any(axis=1)))
 
     @property
     def _size(self) -> np.ndarray:
-        return np.where([q.relative for q in self._quantities], self.found.values, 1.0)
+        return np.where([q.relative for q in self._quantities], self.derivatives.values, 1.0)
 
     @property
     def corners(self) -> tuple[str, ...]:
         """Keys at a corner of the contact forces."""
-        return tuple(key for key, corner in zip(self.found.parameters, self.found.corner, strict=True) if corner)
+        return tuple(
+            key for key, corner in zip(self.derivatives.parameters, self.derivatives.corner, strict=True) if corner
+        )
 
     def record(self) -> dict[str, Any]:
         """For machines, SI units."""
-        f = self.found
+        f = self.derivatives
         return {
             "quantities": dict(zip(f.names, f.values.tolist(), strict=True)),
             "parameters": dict(self.at),
@@ -122,7 +125,7 @@ class ResponseDerivatives(StudyResult):
 
     def lines(self) -> list[str]:
         """Elasticities, the strongest on the amplitude or the life first."""
-        f = self.found
+        f = self.derivatives
         quantities, first = self._quantities, self._first
         names = [n if q.relative else f"{n} [{q.unit}]" for n, q in zip(f.names, quantities, strict=True)]
         width = [max(12, len(name) + 2) for name in names]
@@ -141,37 +144,37 @@ class ResponseDerivatives(StudyResult):
             )
         for key in self.corners if not is_of_wear else ():
             i = f.parameters.index(key)
-            above, below = (side[first, i] * self.at[key] / f.values[first] for side in (f.above, f.below))
+            upper, lower = (side[first, i] * self.at[key] / f.values[first] for side in (f.above, f.below))
             where = " at a fixed frequency" if is_of_cycle else ""
             lines.append(
                 f"warning: {key} is at a corner of the contact forces, such as grazing or first slip: the "
                 f"{quantities[first].label} has "
-                f"{above:+.4g} above it and {below:+.4g} below{where}, and the table their mean"
+                f"{upper:+.4g} above it and {lower:+.4g} below{where}, and the table their mean"
             )
         share = 100 * self.seconds / self.response_seconds
-        what = "life" if is_of_wear else "response"
-        lines.append(f"{self.seconds:.3g} s, {share:.2g} % of the {self.response_seconds:.3g} s of the {what}")
-        lines += [f"without {key}: {why}" for key, why in self.without.items()]
-        if self.anew:
-            lines.append(f"most of them for {len(self.anew)} keys with which the model is reduced anew")
+        subject = "life" if is_of_wear else "response"
+        lines.append(f"{self.seconds:.3g} s, {share:.2g} % of the {self.response_seconds:.3g} s of the {subject}")
+        lines += [f"without {key}: {reason}" for key, reason in self.without.items()]
+        if self.reduced_keys:
+            lines.append(f"most of them for {len(self.reduced_keys)} keys with which the model is reduced anew")
         return lines
 
     def write(self, folder: Path) -> list[Path]:
         """Write derivatives.csv, derivatives.png."""
         rows = self.elasticities
         table = {"parameter": list(rows)}
-        columns = {name: [float(row[i]) for row in rows.values()] for i, name in enumerate(self.found.names)}
+        columns = {name: [float(row[i]) for row in rows.values()] for i, name in enumerate(self.derivatives.names)}
         return write_files(folder, {"derivatives": {**table, **columns}}, {"derivatives": self.plot()})
 
     def plot(self) -> Figure:
         """Bars of the elasticities of every number of the whole contact."""
         rows = dict(list(self.elasticities.items())[:SHOWN])
-        whole_contact = zip(self._quantities, self.found.names, strict=True)
+        whole_contact = zip(self._quantities, self.derivatives.names, strict=True)
         shown = [q.name for q, name in whole_contact if q.relative and q.name == name]
         columns = len(shown)
         with axes_of(2.6 + 2.2 * columns, 1.4 + 0.28 * len(rows), columns=columns) as (figure, panes):
             for i, (axes, name) in enumerate(zip(np.atleast_1d(panes), shown, strict=True)):
-                values = [row[self.found.names.index(name)] for row in rows.values()]
+                values = [row[self.derivatives.names.index(name)] for row in rows.values()]
                 axes.barh(range(len(rows)), values, color=CYCLE[i])
                 axes.axvline(0.0, color=GREY, lw=0.8)
                 axes.set(title=name, yticks=range(len(rows)), yticklabels=list(rows) if i == 0 else [])
@@ -207,25 +210,27 @@ def derivatives(
     """
     file, at = read_scene(scene, overrides), None if at is None else to_si(at, "Hz")
     amplitude = None if amplitude is None else to_si(amplitude, "m")
-    known, moving = keys(file.scene), geometry_keys(file.scene)
+    numbers, moving = keys(file.scene), geometry_keys(file.scene)
     if of == "life":
         if file.scene.wear is None:
             raise SceneError("a life needs [wear] in the scene")
-        known |= {key: value for key, (value, *_) in wear_run.law_numbers(file.scene).items()}
-    unknown = [key for key in only if key not in known | moving]
+        numbers |= {key: value for key, (value, *_) in wear_run.law_numbers(file.scene).items()}
+    unknown = [key for key in only if key not in numbers | moving]
     if unknown:
-        raise SceneError(f"{unknown[0]} is no number that a response depends on: these are {', '.join(known | moving)}")
+        raise SceneError(
+            f"{unknown[0]} is no number that a response depends on: these are {', '.join(numbers | moving)}"
+        )
     if (amplitude is not None and of != "mode") or (at is not None and of in ("mode", "life")):
         raise SceneError("--amplitude is that of --of mode, and --at a frequency of --of response or fold")
     if of == "mode" and amplitude is None and file.scene.backbone is None:
         raise SceneError("give --amplitude of the mode, or backbone.modal_amplitude in the scene")
-    wanted = {key: value for key, value in (known | moving).items() if key in (only or known)}
+    values = {key: value for key, value in (numbers | moving).items() if key in (only or numbers)}
     with limited(file.scene.solver.threads):
-        return _of_scene(file, of, amplitude if of == "mode" else at, wanted, None if only else {}, reporter(progress))
+        return _of_scene(file, of, amplitude if of == "mode" else at, values, None if only else {}, reporter(progress))
 
 
 def _of_scene(
-    file: SceneFile, of: str, at: float | None, wanted: Mapping[str, float], without: dict[str, str] | None, report: Any
+    file: SceneFile, of: str, at: float | None, values: Mapping[str, float], without: dict[str, str] | None, report: Any
 ) -> ResponseDerivatives:
     """Of a scene that was read; at : frequency [Hz], or the amplitude of a mode [m]; wanted : key -> value; without :
     see `_changes`."""
@@ -233,12 +238,12 @@ def _of_scene(
     balance, clock = varying.model.balance, process_time()
     find: Callable[[Iterator[ParameterChange]], Derivatives]
     if of == "mode":
-        asked = AmplitudeRange.of(file, None if at is None else at / DECADES, at, None, None)
-        find = partial(_of_mode, varying, backbones.along(file, balance, asked, report), modal=at is None)
+        range_ = AmplitudeRange.of(file, None if at is None else at / DECADES, at, None, None)
+        find = partial(_of_mode, varying, backbones.follow_mode(file, balance, range_, report), modal=at is None)
     elif of == "life":
         with report.track("wear") as advance:
             worn = wear_run.worn_out(file, varying.model, _share(file.scene))
-        find = partial(_of_life, varying, worn, wanted=wanted)
+        find = partial(_of_life, varying, worn, values=values)
     else:
         with report.track("frequency response") as advance:
             branch = curve.follow_response(file.scene, balance, advance)
@@ -247,17 +252,17 @@ def _of_scene(
     solved = process_time()
     with report.track("derivatives") as advance:
         try:
-            found = find(_changes(varying, wanted, advance, without))
+            derivatives_found = find(_changes(varying, values, advance, without))
         except NoDerivative as reason:
             raise SolveFailed(f"{file.name} has no derivatives here: {reason}") from None
     return ResponseDerivatives(
         file.name,
-        found,
-        {key: wanted[key] for key in found.parameters},
+        derivatives_found,
+        {key: values[key] for key in derivatives_found.parameters},
         {joint.name: joint.rows for joint in balance.contact.joints},
         solved - clock,
         process_time() - solved,
-        tuple(key for key in found.parameters if varying.anew(key)),
+        tuple(key for key in derivatives_found.parameters if varying.anew(key)),
         without or {},
     )
 
@@ -266,11 +271,11 @@ Advance = Callable[[float, str], None]
 
 
 def _changes(
-    varying: Varying, wanted: Mapping[str, float], advance: Advance, without: dict[str, str] | None
+    varying: Varying, values: Mapping[str, float], advance: Advance, without: dict[str, str] | None
 ) -> Iterator[ParameterChange]:
     """Of every key but those of wear laws; one without a derivative goes into `without`, where that is given."""
-    for i, (key, value) in enumerate(wanted.items()):
-        advance(i / len(wanted), key)
+    for i, (key, value) in enumerate(values.items()):
+        advance(i / len(values), key)
         try:
             if key in varying.numbers:
                 yield varying.change(key, value)
@@ -297,11 +302,11 @@ def _share(scene: Scene) -> float:
 
 
 def _of_life(
-    varying: Varying, worn: WearHistory, changes: Iterator[ParameterChange], wanted: Mapping[str, float]
+    varying: Varying, worn: WearHistory, changes: Iterator[ParameterChange], values: Mapping[str, float]
 ) -> Derivatives:
     scene, by_key = varying.scene, wear_run.law_numbers(varying.scene)
     problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
-    numbers = {key: by_key[key][1:3] for key in wanted if key in by_key}
+    numbers = {key: by_key[key][1:3] for key in values if key in by_key}
     return tangent.of_life(problem, worn, changes, numbers, _share(scene))
 
 
@@ -320,45 +325,49 @@ def of_branch(
     if not points.any():
         raise NoDerivative("the response has no fold")
     fits = branch.amplitude(output) if at is None else -np.abs(branch.frequency - at)
-    near = int(np.argmax(np.where(points, fits, -np.inf)))
-    if at is None and not fold and near in (0, len(branch.omega) - 1):
+    nearest = int(np.argmax(np.where(points, fits, -np.inf)))
+    if at is None and not fold and nearest in (0, len(branch.omega) - 1):
         raise NoDerivative(branch.no_peak(output))
-    x = balance.shaped(branch.contact[near])
-    state = balance.evaluate(branch.omega[near] if at is None or fold else 2 * np.pi * at, x)
+    x = balance.shaped(branch.contact[nearest])
+    state = balance.evaluate(branch.omega[nearest] if at is None or fold else 2 * np.pi * at, x)
     if fold:
         return fold_derivatives.at_fold(balance, state, changes, options)
     take = cycle_derivatives.at_peak if at is None else cycle_derivatives.at_frequency
     return take(balance, state, output, changes, wear_run.coefficients(scene), options)
 
 
-def of_summary(varying: Varying, result: Result, wanted: Sequence[str]) -> dict[tuple[str, str], float]:
+def of_summary(varying: Varying, result: Result, names_of_keys: Sequence[str]) -> dict[tuple[str, str], float]:
     """Derivatives of numbers of a finished run, of its first state and its life, by some keys of its scene.
 
     Returns (number, key) -> d number / d key, SI units, as far as these are exact
     """
     scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
-    known = {key: number.value for key, number in varying.numbers.items()}
+    scene_numbers = {key: number.value for key, number in varying.numbers.items()}
     in_wear = {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
-    own, more = ({key: of[key] for key in wanted if key in of} for of in (known, in_wear))
-    own = {key: v for key, v in own.items() if not moves_nodes(varying.numbers[key]) or varying.follows(key)}
+    values, wear_values = ({key: of[key] for key in names_of_keys if key in of} for of in (scene_numbers, in_wear))
+    values = {key: v for key, v in values.items() if not moves_nodes(varying.numbers[key]) or varying.follows(key)}
     joints = varying.model.balance.contact.joints
-    gaps = {"contact.gap" if one.name == "contact" else f"contacts.{one.name}.gap": one.rows for one in joints}
-    gaps = {key: rows for key, rows in gaps.items() if key in wanted}
-    if not (own or more or gaps):
+    gaps = {"contact.gap" if joint.name == "contact" else f"contacts.{joint.name}.gap": joint.rows for joint in joints}
+    gaps = {key: rows for key, rows in gaps.items() if key in names_of_keys}
+    if not (values or wear_values or gaps):
         return slopes
 
     def add(find: Callable[[], Derivatives], names: Mapping[str, str]) -> None:
         with suppress(ValueError, RuntimeError):  # nothing is found, or a model beside this one is none
-            found = find()
-            by = {key: found.slopes[:, i] for i, key in enumerate(found.parameters)}
-            by |= {key: found.by_gap[:, rows].sum(axis=1) for key, rows in gaps.items()}
-            for number, at in ((number, found.names.index(n)) for number, n in names.items() if n in found.names):
+            derivatives_found = find()
+            by = {key: derivatives_found.slopes[:, i] for i, key in enumerate(derivatives_found.parameters)}
+            by |= {key: derivatives_found.by_gap[:, rows].sum(axis=1) for key, rows in gaps.items()}
+            for number, at in (
+                (number, derivatives_found.names.index(n))
+                for number, n in names.items()
+                if n in derivatives_found.names
+            ):
                 slopes.update({(number, key): float(column[at]) for key, column in by.items()})
 
     places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
-    changes = partial(_changes, varying, own, lambda *_: None, {})
+    changes = partial(_changes, varying, values, lambda *_: None, {})
     if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
         add(lambda: of_branch(scene, varying.model.balance, response, changes(), places[0].frequency), OF_ROWS)
     if worn is not None:
-        add(lambda: _of_life(varying, worn, changes(), more), {"life": "life"})
+        add(lambda: _of_life(varying, worn, changes(), wear_values), {"life": "life"})
     return slopes

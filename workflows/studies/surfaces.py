@@ -25,19 +25,19 @@ Face = HeightMap | str | PathLike[str]
 class FaceAsperities(StudyResult):
     """Asperities with the table of the contact law `rough`. rows : of the table"""
 
-    found: Asperities
+    asperities: Asperities
     rows: int
 
     def record(self) -> dict[str, Any]:
         """For machines."""
-        found, m = self.found, self.found.moments
+        asperities, m = self.asperities, self.asperities.moments
         return {
-            "summits": len(found.height),
-            "radius_m": found.radius,
-            "density_per_m2": found.density,
-            "deviation_m": float(found.height.std()),
-            "mean_height_m": float(found.height.mean()),
-            "largest_gap_m": float(found.gap.max()),
+            "summits": len(asperities.height),
+            "radius_m": asperities.radius,
+            "density_per_m2": asperities.density,
+            "deviation_m": float(asperities.height.std()),
+            "mean_height_m": float(asperities.height.mean()),
+            "largest_gap_m": float(asperities.gap.max()),
             "moments": {"m0_m2": m.m0, "m2": m.m2, "m4_per_m2": m.m4, "alpha": m.alpha},
             "gaussian": {
                 "radius_m": m.radius,
@@ -45,23 +45,23 @@ class FaceAsperities(StudyResult):
                 "deviation_m": m.deviation,
                 "mean_height_m": m.mean,
             },
-            "repairs": list(found.repairs),
+            "repairs": list(asperities.repairs),
         }
 
     def lines(self) -> list[str]:
         """For people; the last one is for the table of a contact."""
-        found, m = self.found, self.found.moments
+        asperities, m = self.asperities, self.asperities.moments
         return named_lines(
             [
-                ("summits", f"{len(found.height)} on {found.area:.3g} m2"),
+                ("summits", f"{len(asperities.height)} on {asperities.area:.3g} m2"),
                 ("", f"{'found':>12} {'if Gaussian':>12}"),
-                ("radius", f"{found.radius:12.4g} {m.radius:12.4g} m"),
-                ("density", f"{found.density:12.4g} {m.density:12.4g} 1/m2"),
-                ("deviation", f"{found.height.std():12.4g} {m.deviation:12.4g} m, of their heights"),
-                ("mean height", f"{found.height.mean():12.4g} {m.mean:12.4g} m, above the mean plane"),
+                ("radius", f"{asperities.radius:12.4g} {m.radius:12.4g} m"),
+                ("density", f"{asperities.density:12.4g} {m.density:12.4g} 1/m2"),
+                ("deviation", f"{asperities.height.std():12.4g} {m.deviation:12.4g} m, of their heights"),
+                ("mean height", f"{asperities.height.mean():12.4g} {m.mean:12.4g} m, above the mean plane"),
                 ("moments", f"m0 {m.m0:.4g} m2, m2 {m.m2:.4g}, m4 {m.m4:.4g} 1/m2, alpha {m.alpha:.3g}"),
-                *(("repaired", sentence) for sentence in found.repairs),
-                ("for a contact", f'law = "rough", table = "asperities.csv", radius = "{found.radius:.6g} m"'),
+                *(("repaired", sentence) for sentence in asperities.repairs),
+                ("for a contact", f'law = "rough", table = "asperities.csv", radius = "{asperities.radius:.6g} m"'),
             ]
         )
 
@@ -69,7 +69,7 @@ class FaceAsperities(StudyResult):
         """Write asperities.csv for the key `table` of a contact."""
         folder.mkdir(parents=True, exist_ok=True)
         path, header = folder / "asperities.csv", "gap m, asperities per m2 and m of gap"
-        np.savetxt(path, self.found.table(self.rows), delimiter=",", header=header, fmt="%.9g")
+        np.savetxt(path, self.asperities.table(self.rows), delimiter=",", header=header, fmt="%.9g")
         return [path]
 
 

@@ -46,16 +46,16 @@ class TimeComparison(StudyResult):
     """The balance at one frequency and what time integration says.
 
     balance, solution : the problem, with the wear of `row` (None: unworn), and its solution
-    found : the comparison; stable : whether a machine stays at the motion, by the method that `how` names
+    integration : the comparison; stable : whether the motion is stable, by `stability_method`
     steps : per period; seconds : spent
     left_alone : what a plain march does where that solution is unstable or nothing periodic was found, else None
     """
 
     balance: HarmonicBalance
     solution: Solution
-    found: Verification
+    integration: Verification
     stable: bool
-    how: str
+    stability_method: str
     row: int | None
     steps: int
     seconds: float
@@ -64,11 +64,11 @@ class TimeComparison(StudyResult):
     @property
     def hertz(self) -> float:
         """Frequency [Hz]."""
-        return self.found.omega / (2 * np.pi)
+        return self.integration.omega / (2 * np.pi)
 
     def record(self) -> dict[str, Any]:
         """Numbers for machines: balance, time integration and the difference over the latter; nan is None."""
-        state, found, motion = self.solution.state, self.found, self.found.motion
+        state, integration, motion = self.solution.state, self.integration, self.integration.motion
         ours = amplitude(self.balance.outputs(state))
         swing = motion.outputs - motion.outputs.mean(axis=1, keepdims=True)
         theirs = np.sqrt(2 * np.mean(swing**2, axis=1))
@@ -76,11 +76,11 @@ class TimeComparison(StudyResult):
             name: {
                 "balance_m": float(ours[i]),
                 "time_m": float(theirs[i]),
-                "difference": found.amplitude[name],
-                "waveform_difference": found.waveform[name],
-                "mean_difference": found.mean[name],
+                "difference": integration.amplitude[name],
+                "waveform_difference": integration.waveform[name],
+                "mean_difference": integration.mean[name],
             }
-            for i, name in enumerate(found.amplitude)
+            for i, name in enumerate(integration.amplitude)
         }
         energy, preload = float(self.balance.energy(state).sum()), self.balance.preload(state)
         return {
@@ -91,33 +91,33 @@ class TimeComparison(StudyResult):
             "energy": {
                 "balance_J": energy,
                 "time_J": float(motion.energy.sum()),
-                "difference": found.energy,
-                "largest_pair_difference": found.energy_pairs,
+                "difference": integration.energy,
+                "largest_pair_difference": integration.energy_pairs,
             },
-            "preload": {"balance_N": preload, "time_N": motion.preload, "difference": found.preload},
+            "preload": {"balance_N": preload, "time_N": motion.preload, "difference": integration.preload},
             "mean_off_m": float(np.abs(motion.off).max()) if motion.off.size else None,
-            "contact_difference": found.contact,
-            "largest_difference": found.largest,
+            "contact_difference": integration.contact,
+            "largest_difference": integration.largest,
             "stable": self.stable,
-            "stable_by": self.how,
+            "stable_by": self.stability_method,
             "steps_per_period": self.steps,
-            "step_error": found.step_error if np.isfinite(found.step_error) else None,
-            "periods": found.periods,
-            "drift": found.drift,
-            "outcome": str(found.outcome),
+            "step_error": integration.step_error if np.isfinite(integration.step_error) else None,
+            "periods": integration.periods,
+            "drift": integration.drift,
+            "outcome": str(integration.outcome),
             "seconds": self.seconds,
             "left_alone": None if self.left_alone is None else self._left_alone(self.left_alone),
         }
 
-    def _left_alone(self, seen: LeftAlone) -> dict[str, Any]:
+    def _left_alone(self, motion: LeftAlone) -> dict[str, Any]:
         names = self.balance.compliance.output_names
         return {
-            "energy_J": seen.energy,
-            "energy_spread_J": seen.energy_spread,
-            "amplitude_m": dict(zip(names, seen.amplitude.tolist(), strict=True)),
-            "amplitude_spread_m": dict(zip(names, seen.amplitude_spread.tolist(), strict=True)),
-            "drift": seen.drift,
-            "periods": seen.periods,
+            "energy_J": motion.energy,
+            "energy_spread_J": motion.energy_spread,
+            "amplitude_m": dict(zip(names, motion.amplitude.tolist(), strict=True)),
+            "amplitude_spread_m": dict(zip(names, motion.amplitude_spread.tolist(), strict=True)),
+            "drift": motion.drift,
+            "periods": motion.periods,
         }
 
     def lines(self) -> list[str]:
@@ -138,23 +138,34 @@ class TimeComparison(StudyResult):
         row("preload", preload["balance_N"], preload["time_N"], preload["difference"], "N")
         for name, output in record["outputs"].items():
             shown.append((f"waveform {name}", f"{output['waveform_difference']:.2%} at the worst instant"))
-        shown.append(("contact", f"{self.found.contact:.2%} at the worst pair and instant"))
+        shown.append(("contact", f"{self.integration.contact:.2%} at the worst pair and instant"))
         if (off := record["mean_off_m"]) is not None:
             shown.append(("mean held", f"to {off:.1g} m of what is prescribed"))
         error = "unknown" if record["step_error"] is None else f"{record['step_error']:.1e}"
         shown.append(("time steps", f"{self.steps} per period, their own error {error}"))
-        shown.append(("periodic", f"{self.found.outcome}, {self.found.periods} periods, drift {self.found.drift:.1e}"))
-        shown.append(("stable", f"{'yes' if self.stable else 'no: a machine leaves this motion'}, by {self.how}"))
-        if (seen := self.left_alone) is not None:
-            spread = f"{seen.energy:.6g} J per cycle on average, spread {seen.energy_spread:.2g} J"
-            shown.append(("left alone", f"{spread}, drift {seen.drift:.1e} after {seen.periods} periods"))
+        shown.append(
+            (
+                "periodic",
+                f"{self.integration.outcome}, {self.integration.periods} periods, drift {self.integration.drift:.1e}",
+            )
+        )
+        shown.append(
+            ("stable", f"{'yes' if self.stable else 'no: a machine leaves this motion'}, by {self.stability_method}")
+        )
+        if (motion := self.left_alone) is not None:
+            spread = f"{motion.energy:.6g} J per cycle on average, spread {motion.energy_spread:.2g} J"
+            shown.append(("left alone", f"{spread}, drift {motion.drift:.1e} after {motion.periods} periods"))
         return named_lines(shown)
 
     @property
     def failure(self) -> str:
         """Why there is no comparison, empty where there is one."""
-        found = self.found
-        return "" if found.motion.periodic else f"the time integration found no periodic motion: {found.outcome}"
+        integration = self.integration
+        return (
+            ""
+            if integration.motion.periodic
+            else f"the time integration found no periodic motion: {integration.outcome}"
+        )
 
     def write(self, folder: Path) -> list[Path]:
         """Write verify_FREQUENCY.png."""
@@ -163,19 +174,19 @@ class TimeComparison(StudyResult):
 
     def plot(self) -> Figure:
         """Waveform of the first output over a period, and the loop of the pair that dissipates most, both ways."""
-        balance, state, motion = self.balance, self.solution.state, self.found.motion
-        angle = self.found.omega * motion.time
+        balance, state, motion = self.balance, self.solution.state, self.integration.motion
+        angle = self.integration.omega * motion.time
         ours = balance.outputs(state)[0] @ balance.basis.functions(angle).T
         theirs = motion.outputs[0]
         mean = theirs.mean()
-        with axes_of(9.0, 3.8, columns=2) as (figure, (left, right)):
+        with axes_of(9.0, 3.8, columns=2) as (figure, (waveform, loop)):
             unit, scale = length_unit(np.abs(theirs - mean).max())
             phase = angle / (2 * np.pi)
-            left.plot(phase, scale * (theirs - mean), color=ORANGE, lw=3.0, alpha=0.6, label="time integration")
-            left.plot(phase, scale * (ours - mean), color=BLUE, label="harmonic balance")
+            waveform.plot(phase, scale * (theirs - mean), color=ORANGE, lw=3.0, alpha=0.6, label="time integration")
+            waveform.plot(phase, scale * (ours - mean), color=BLUE, label="harmonic balance")
             name = balance.compliance.output_names[0]
-            left.set(xlabel="period", ylabel=f"{name} about its mean / {unit}", title=f"{self.hertz:.6g} Hz")
-            left.legend(loc="best")
+            waveform.set(xlabel="period", ylabel=f"{name} about its mean / {unit}", title=f"{self.hertz:.6g} Hz")
+            waveform.legend(loc="best")
             pair = int(np.argmax(np.abs(motion.energy)))
             step = np.roll(motion.x[pair], -1, axis=1) - np.roll(motion.x[pair], 1, axis=1)
             component = int(np.argmax(np.abs(np.sum(motion.force[pair] * step, axis=1))))  # of the largest work
@@ -188,9 +199,9 @@ class TimeComparison(StudyResult):
                 (x, force, {"color": BLUE, "lw": 1.2}),
             ):
                 closed = [np.append(v[pair, component], v[pair, component, 0]) for v in (a, b)]
-                right.plot(scale * (closed[0] - middle), scale_f * closed[1], **style)
+                loop.plot(scale * (closed[0] - middle), scale_f * closed[1], **style)
             direction = balance.contact.components[component]
-            right.set(xlabel=f"{direction} / {unit}", ylabel=f"force / {unit_f}", title=f"Pair {pair}")
+            loop.set(xlabel=f"{direction} / {unit}", ylabel=f"force / {unit_f}", title=f"Pair {pair}")
         return figure
 
 
@@ -220,15 +231,17 @@ def held_against(
         steps = steps or steps_of(balance)
         with progress.stage("time integration"):
             options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS)
-            found = march.verify(balance, solution.state, options)
-            stable, how = stays(balance, solution.state, found, options)
+            integration = march.verify(balance, solution.state, options)
+            stable, reason = stays(balance, solution.state, integration, options)
             left_alone = None
-            if not stable or not found.motion.periodic:
+            if not stable or not integration.motion.periodic:
                 left_alone = leave_alone(balance, target, solution.state, LEFT_ALONE, options)
-    return TimeComparison(balance, solution, found, stable, how, row, steps, time.perf_counter() - start, left_alone)
+    return TimeComparison(
+        balance, solution, integration, stable, reason, row, steps, time.perf_counter() - start, left_alone
+    )
 
 
-def alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> LeftAlone:
+def march_alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> LeftAlone:
     """What a plain march does from the motion that a wear run had in a row, also where that is no solution.
 
     Raises  ValueError: the result has no such row, or its motion cannot be marched; IntegrationFailed
@@ -250,9 +263,9 @@ def _start(
     """The problem, and the known solution to begin at: its frequency and x on the harmonics of the problem."""
     basis = HarmonicBasis(result.harmonics, scene.harmonics.samples)
     if row is not None:
-        held = 0 if result.wear is None else len(result.wear.cycles)
-        if not 0 <= row < held:
-            raise Refusal(f"the result has no wear row {row}: it has {f'0 to {held - 1}' if held else 'none'}")
+        n_rows = 0 if result.wear is None else len(result.wear.cycles)
+        if not 0 <= row < n_rows:
+            raise Refusal(f"the result has no wear row {row}: it has {f'0 to {n_rows - 1}' if n_rows else 'none'}")
         assert result.wear is not None
         worn: WearRow = result.wear.rows()[row]
         load = settings.mission(scene)[0].load if scene.wear is not None else 1.0

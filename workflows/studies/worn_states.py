@@ -46,26 +46,26 @@ def spread(wear: WearHistory, count: int) -> list[int]:
 class WornStates(StudyResult):
     """States of a wear run beside time integration, by row of the run.
 
-    found : the comparison, or why there is none; alone : what a plain march does, where the motion is unstable or there
+    comparisons : by row, or why there is none; marches : what a plain march does, where the motion is unstable or there
         is no comparison, if it could be marched
     """
 
     wear: WearHistory
-    found: Mapping[int, TimeComparison | str]
-    alone: Mapping[int, LeftAlone]
+    comparisons: Mapping[int, TimeComparison | str]
+    marches: Mapping[int, LeftAlone]
 
     def record(self) -> dict[str, Any]:
         """For machines; `comparison` as that of one state, `left_alone_J` mean and spread."""
         rows = []
-        for row, found in self.found.items():
-            seen, compared = self.alone.get(row), isinstance(found, TimeComparison)
+        for row, comparison in self.comparisons.items():
+            motion, compared = self.marches.get(row), isinstance(comparison, TimeComparison)
             rows.append(
                 {
                     "row": row, "cycles": float(self.wear.cycles[row]), "frequency_hz": float(self.wear.frequency[row]),
                     "energy_of_run_J": float(self.wear.energy[row].sum()),
-                    "comparison": found.record() if isinstance(found, TimeComparison) else None,
-                    "left_alone_J": None if seen is None else [seen.energy, seen.energy_spread],
-                    "no_comparison": None if compared else found,
+                    "comparison": comparison.record() if isinstance(comparison, TimeComparison) else None,
+                    "left_alone_J": None if motion is None else [motion.energy, motion.energy_spread],
+                    "no_comparison": None if compared else comparison,
                 }
             )  # fmt: skip
         return {"states": rows}
@@ -74,21 +74,25 @@ class WornStates(StudyResult):
         """For people."""
         return [HEADER, *map(self._line, self.record()["states"])]
 
-    def _line(self, said: dict[str, Any]) -> str:
-        head = f"{said['row']:4d} {said['cycles']:11.4g} {said['frequency_hz']:9.5g} {said['energy_of_run_J']:11.5g}"
-        alone = "" if said["left_alone_J"] is None else "   {:.5g} +- {:.2g}".format(*said["left_alone_J"])
-        told = said["comparison"]
-        if told is None:
-            return f"{head} {'none':>11} {'-':>11} {'-':>11} {'-':>9} {'-':>7}{alone}   {said['no_comparison']}"
-        energy, own = told["energy"], "-" if told["step_error"] is None else f"{told['step_error']:.2%}"
+    def _line(self, row: dict[str, Any]) -> str:
+        head = f"{row['row']:4d} {row['cycles']:11.4g} {row['frequency_hz']:9.5g} {row['energy_of_run_J']:11.5g}"
+        motion_alone = "" if row["left_alone_J"] is None else "   {:.5g} +- {:.2g}".format(*row["left_alone_J"])
+        comparison = row["comparison"]
+        if comparison is None:
+            return f"{head} {'none':>11} {'-':>11} {'-':>11} {'-':>9} {'-':>7}{motion_alone}   {row['no_comparison']}"
+        energy, step_error = (
+            comparison["energy"],
+            "-" if comparison["step_error"] is None else f"{comparison['step_error']:.2%}",
+        )
         integrated = f"{energy['time_J']:11.5g} {energy['difference']:11.2%}"
-        if not self._periodic(said["row"]):
+        if not self._periodic(row["row"]):
             integrated = f"{'none':>11} {'-':>11}"
-        return f"{head} {energy['balance_J']:11.5g} {integrated} {own:>9} {'yes' if told['stable'] else 'no':>7}{alone}"
+        stable = "yes" if comparison["stable"] else "no"
+        return f"{head} {energy['balance_J']:11.5g} {integrated} {step_error:>9} {stable:>7}{motion_alone}"
 
     def _periodic(self, row: int) -> bool:
-        found = self.found[row]
-        return isinstance(found, TimeComparison) and found.found.motion.periodic
+        comparison = self.comparisons[row]
+        return isinstance(comparison, TimeComparison) and comparison.integration.motion.periodic
 
     def write(self, folder: Path) -> list[Path]:
         """Write verify_states.png."""
@@ -100,12 +104,12 @@ class WornStates(StudyResult):
         with axes_of() as (figure, ax):
             ax.plot(millions, self.wear.energy.sum(axis=1), color=BLUE, label="run")
             periodic = {s["row"]: s["comparison"] for s in self.record()["states"] if self._periodic(s["row"])}
-            energy = [told["energy"]["time_J"] for told in periodic.values()]
+            energy = [comparison["energy"]["time_J"] for comparison in periodic.values()]
             ax.plot(millions[list(periodic)], energy, "o", color=ORANGE, label="time integration")
-            if self.alone:
-                heights, spreads = zip(*((s.energy, s.energy_spread) for s in self.alone.values()), strict=True)
+            if self.marches:
+                heights, spreads = zip(*((s.energy, s.energy_spread) for s in self.marches.values()), strict=True)
                 look = {"fmt": "s", "color": GREEN, "capsize": 3, "label": "left alone, mean and spread"}
-                ax.errorbar(millions[list(self.alone)], heights, spreads, **look)
+                ax.errorbar(millions[list(self.marches)], heights, spreads, **look)
             ax.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
             ax.legend(loc="best")
         return figure
@@ -144,16 +148,16 @@ def verify(
     if states is None or result.wear is None:
         omega = None if at is None else 2 * np.pi * at
         return verification.held_against(result, file.scene, unworn, omega, row, steps, report)
-    found: dict[int, TimeComparison | str] = {}
-    alone: dict[int, LeftAlone] = {}
+    comparisons: dict[int, TimeComparison | str] = {}
+    motions: dict[int, LeftAlone] = {}
     for row in spread(result.wear, states):
         try:
-            one = verification.held_against(result, file.scene, unworn, None, row, steps, report)
-            found[row], seen = one, one.left_alone
+            comparison = verification.held_against(result, file.scene, unworn, None, row, steps, report)
+            comparisons[row], motion = comparison, comparison.left_alone
         except (SolveFailed, IntegrationFailed) as error:
-            found[row], seen = str(error), None
+            comparisons[row], motion = str(error), None
             with suppress(IntegrationFailed):
-                seen = verification.alone(result, file.scene, unworn, row, steps)
-        if seen is not None:
-            alone[row] = seen
-    return WornStates(result.wear, found, alone)
+                motion = verification.march_alone(result, file.scene, unworn, row, steps)
+        if motion is not None:
+            motions[row] = motion
+    return WornStates(result.wear, comparisons, motions)

@@ -96,7 +96,7 @@ def test_references_carry_the_load_of_their_curve(blade):
 def test_blades_alike_are_a_travelling_wave():
     """The wheel that the mistuned example solves, with no deviation, is the sector: same parts, same answer."""
     blade = build(scene_file.read("blade_thesis", FEWER))
-    one, wheel = blade.wave(), blade.whole()
+    one, wheel = blade.wave(), blade.whole_wheel()
     exact = newton.NewtonOptions(tolerance=1e-11)
     mine, theirs = (newton.solve_from_rest(balance, 2 * np.pi * 1000, exact) for balance in (one, wheel))
     assert mine.outcome == theirs.outcome == CONVERGED

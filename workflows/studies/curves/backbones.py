@@ -50,17 +50,17 @@ class AmplitudeRange:
         cls, file: SceneFile, start: float | None, stop: float | None, mode: int | None, points: int | None
     ) -> AmplitudeRange:
         """What is asked for, else what the scene has in [backbone]; raises ValueError where neither has it."""
-        own = file.scene.backbone
-        mode = mode if mode is not None else own.mode if own else 0
-        points = points if points is not None else own.points if own else 40
+        table = file.scene.backbone
+        mode = mode if mode is not None else table.mode if table else 0
+        points = points if points is not None else table.points if table else 40
         if start is not None and stop is not None:
             return cls(start, stop, mode, points)
-        if start is not None or stop is not None or own is None:
+        if start is not None or stop is not None or table is None:
             raise Refusal(
                 f"--{'to' if start is not None else 'from'} is missing: give both ends of the backbone, "
                 "or backbone.modal_amplitude in the scene"
             )
-        return cls(*own.modal_amplitude, mode, points, modal=True)
+        return cls(*table.modal_amplitude, mode, points, modal=True)
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,15 +91,15 @@ class SceneBackbone(StudyResult):
 
     def record(self) -> dict[str, Any]:
         """For machines: the converged points, and what is published."""
-        found = {
+        rows = {
             "reference_hz": self.mode.reference_omega / (2 * np.pi),
             **{name: values.tolist() for name, values in self.columns.items()},
             "rows": _rows(self.columns),
             "end": str(self.mode.end),
         }
         if self.published is not None:
-            found["published"] = beside(self.mode, self.published)
-        return found
+            rows["published"] = differences_from(self.mode, self.published)
+        return rows
 
     def lines(self) -> list[str]:
         """For people."""
@@ -116,7 +116,7 @@ class SceneBackbone(StudyResult):
 
     def _published_lines(self) -> Iterator[tuple[str, str]]:
         """What is published, at three of its amplitudes, ours after it."""
-        rows = [] if self.published is None else beside(self.mode, self.published)["rows"]
+        rows = [] if self.published is None else differences_from(self.mode, self.published)["rows"]
         for row in (rows[0], rows[len(rows) // 2], rows[-1]) if rows else ():
             yield (
                 self.published.source if self.published is not None and row is rows[0] else "",
@@ -145,10 +145,10 @@ class SceneBackbone(StudyResult):
             if published is not None:
                 reached = published.modal_amplitude <= mode.modal_amplitude[good].max()
                 of_mode = mode.amplitude[good][0] / mode.modal_amplitude[good][0]
-                there = scale * of_mode * published.modal_amplitude[reached]
+                is_defined = scale * of_mode * published.modal_amplitude[reached]
                 kind = {"color": GREY, "marker": "o", "ms": 4, "lw": 1, "mfc": "none", "label": published.source}
-                upper.plot(there, published.frequency[reached], **kind)
-                lower.plot(there, 100 * published.damping[reached], **kind)
+                upper.plot(is_defined, published.frequency[reached], **kind)
+                lower.plot(is_defined, 100 * published.damping[reached], **kind)
             upper.set(ylabel="frequency / Hz", title=named(self.name, "backbone"))
             upper.legend(loc="best")
             lower.plot(amplitude, 100 * mode.damping[good], ".-", color=ORANGE, ms=4)
@@ -179,34 +179,34 @@ def backbone(
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
     file, report = read_scene(scene, overrides), reporter(progress)
-    asked = AmplitudeRange.of(file, start, stop, mode, points)
+    range_ = AmplitudeRange.of(file, start, stop, mode, points)
     published = published_backbone(file)
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, report).balance
-        found = along(file, balance, asked, report)
-    if not found.converged.any():
-        raise SolveFailed(f"the backbone {found.end}")
-    return SceneBackbone(file.name, balance, found, published)
+        nonlinear_mode = follow_mode(file, balance, range_, report)
+    if not nonlinear_mode.converged.any():
+        raise SolveFailed(f"the backbone {nonlinear_mode.end}")
+    return SceneBackbone(file.name, balance, nonlinear_mode, published)
 
 
-def along(
-    file: SceneFile, balance: HarmonicBalance, asked: AmplitudeRange, progress: Progress, output: str = settings.OUTPUT
+def follow_mode(
+    file: SceneFile, balance: HarmonicBalance, range_: AmplitudeRange, progress: Progress, output: str = settings.OUTPUT
 ) -> Backbone:
     """The backbone of a scene whose balance is made already; output : whose motion is the amplitude."""
     with progress.stage("backbone"):
-        options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
-        return nonlinear_modes.backbone(balance, asked.start, asked.stop, asked.mode, output, options, asked.modal)
+        options = BackboneOptions(range_.points, newton=settings.newton_options(file.scene))
+        return nonlinear_modes.backbone(balance, range_.start, range_.stop, range_.mode, output, options, range_.modal)
 
 
-def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:
+def differences_from(mode: Backbone, published: PublishedBackbone) -> dict[str, Any]:
     """A published backbone for machines, and ours at those of its amplitudes that ours has reached.
 
     shift : change of the frequency from the first of these amplitudes on, of that frequency
     """
-    reached = found.modal_amplitude[found.converged]
+    reached = mode.modal_amplitude[mode.converged]
     inside = (published.modal_amplitude >= reached.min()) & (published.modal_amplitude <= reached.max())
     a = published.modal_amplitude[inside]
-    ours, theirs = _at(found, a), (published.frequency[inside], published.damping[inside])
+    ours, theirs = _at(mode, a), (published.frequency[inside], published.damping[inside])
     columns = {
         "modal_amplitude": a,
         "frequency_hz": theirs[0],
@@ -219,11 +219,11 @@ def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:
     return {"source": published.source, "rows": _rows(columns)}
 
 
-def _at(found: Backbone, modal_amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _at(interpolated: Backbone, modal_amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Frequency [Hz] and damping ratio between the points of a backbone."""
-    good = found.converged
-    a, order = np.unique(found.modal_amplitude[good], return_index=True)
-    values = (found.frequency[good][order], found.damping[good][order])
+    good = interpolated.converged
+    a, order = np.unique(interpolated.modal_amplitude[good], return_index=True)
+    values = (interpolated.frequency[good][order], interpolated.damping[good][order])
     return tuple(PchipInterpolator(np.log(a), v)(np.log(modal_amplitude)) for v in values)
 
 

@@ -28,7 +28,7 @@ from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene.fields import Length, quantity
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
-from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, along
+from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, follow_mode
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
@@ -39,26 +39,26 @@ class Decay(StudyResult):
 
     mode : the backbone, converged to its last point; decay : from there
     expected : (n_point,) logarithmic decrement over 2 pi that the backbone says, see `hbm.time.decrement`
-    asked : amplitude at which the decay was to end [m]
+    target : amplitude at which the decay shall end [m]
     """
 
     mode: Backbone
     decay: RingDown
     expected: np.ndarray
-    asked: float
+    target: float
 
     def at(self, values: np.ndarray) -> np.ndarray:
         """Values (n_point,) along the backbone at the amplitudes of the decay, nan beyond its ends."""
-        along = PchipInterpolator(np.log(self.mode.first_harmonic), values, extrapolate=False)
-        return np.asarray(along(np.log(self.decay.amplitude)))
+        backbone_mode = PchipInterpolator(np.log(self.mode.first_harmonic), values, extrapolate=False)
+        return np.asarray(backbone_mode(np.log(self.decay.amplitude)))
 
     @property
     def end(self) -> str:
         """Why the decay ends, as a sentence."""
-        last, asked = (f"{x:.4g} m" for x in (self.decay.last, self.asked))
-        if self.decay.last <= self.asked:
-            return f"fell to the {asked} asked for"
-        return f"ended at {last} after all its periods, above the {asked} asked for: give more with --periods"
+        last, target = (f"{x:.4g} m" for x in (self.decay.last, self.target))
+        if self.decay.last <= self.target:
+            return f"fell to the {target} asked for"
+        return f"ended at {last} after all its periods, above the {target} asked for: give more with --periods"
 
     def record(self) -> dict[str, Any]:
         """The decay for machines, with the backbone at its amplitudes (None beyond its ends)."""
@@ -85,9 +85,9 @@ class Decay(StudyResult):
 
     def lines(self) -> list[str]:
         """For people."""
-        said = self.record()
-        first, last = said["rows"][0], said["rows"][-1]
-        off = {name: said[f"largest_{name}_difference"] for name in ("frequency", "decrement", "damping")}
+        texts = self.record()
+        first, last = texts["rows"][0], texts["rows"][-1]
+        off = {name: texts[f"largest_{name}_difference"] for name in ("frequency", "decrement", "damping")}
         frequency, of_decrement, damping = (
             "(no common amplitude)" if share is None else f"{100 * share:.3g} %" for share in off.values()
         )
@@ -100,7 +100,7 @@ class Decay(StudyResult):
                 ("from the backbone", f"frequency at most {frequency} off"),
                 ("", f"damping at most {of_decrement} off its decrement"),
                 ("", f"and {damping} off its damping ratio, which counts otherwise"),
-                ("end", said["end"]),
+                ("end", texts["end"]),
             ]
         )
 
@@ -121,8 +121,8 @@ class Decay(StudyResult):
             upper.set(ylabel="frequency / Hz")
             upper.legend()
             lower.plot(scale * self.mode.first_harmonic, 100 * self.expected, color=BLUE, label="its decrement")
-            given = 100 * self.mode.damping
-            lower.plot(scale * self.mode.first_harmonic, given, color=BLUE, ls="--", label="its damping ratio")
+            curve = 100 * self.mode.damping
+            lower.plot(scale * self.mode.first_harmonic, curve, color=BLUE, ls="--", label="its damping ratio")
             lower.plot(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
             lower.set(xlabel=f"amplitude / {unit}", ylabel="damping ratio / %")
             lower.set_ylim(bottom=0)
@@ -164,16 +164,16 @@ def ring_down(
     file, report = read_scene(scene, overrides), reporter(progress)
     if impulse is not None:
         return _struck(file, start, mode or 0, points or 40, periods, steps, impulse, report)
-    asked = AmplitudeRange.of(file, start, stop, mode, points)
-    if not asked.stop > asked.start:
+    range_ = AmplitudeRange.of(file, start, stop, mode, points)
+    if not range_.stop > range_.start:
         raise Refusal("a free decay ends at a smaller amplitude than it begins at: give --from below --to")
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, report).balance
-        swung = _reached(along(file, balance, asked, report))
+        swung = _reached(follow_mode(file, balance, range_, report))
         marked = _marked(balance, swung)
         if marked is not None:
             balance = marked
-            swung = _reached(along(file, balance, asked, report))
+            swung = _reached(follow_mode(file, balance, range_, report))
         with report.stage("free decay"):
             least = float(swung.first_harmonic[0])
             swing = time_ring_down.ring_down(balance, swung, periods, steps, least)
@@ -199,7 +199,7 @@ def _struck(
             omega = FreeVibration(balance, mode, settings.OUTPUT).reference_omega
             swing = time_ring_down.hammer(balance, impulse, omega, settings.OUTPUT, periods, steps, least)
         ends = float(swing.amplitude.min()), float(swing.amplitude.max())
-        swung = _reached(along(file, balance, AmplitudeRange(*ends, mode, points), report))
+        swung = _reached(follow_mode(file, balance, AmplitudeRange(*ends, mode, points), report))
         return Decay(swung, swing, decrement(balance, swung), least)
 
 
@@ -222,6 +222,6 @@ def _marked(balance: HarmonicBalance, mode: Backbone) -> HarmonicBalance | None:
 
 def _largest(ours: np.ndarray, reference: np.ndarray) -> float | None:
     """Largest relative difference where both are known."""
-    apart = np.abs(ours / reference - 1)
-    apart = apart[np.isfinite(apart)]
-    return float(apart.max()) if len(apart) else None
+    difference = np.abs(ours / reference - 1)
+    difference = difference[np.isfinite(difference)]
+    return float(difference.max()) if len(difference) else None

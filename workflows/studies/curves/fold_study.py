@@ -45,15 +45,15 @@ class FoldStudy(StudyResult):
 
     def lines(self) -> list[str]:
         """For people."""
-        said = [] if self.folds else [f"no folds: the response {self.branch.end}"]
+        texts = [] if self.folds else [f"no folds: the response {self.branch.end}"]
         for fold in self.folds:
             hertz, in_time = fold.omega / (2 * np.pi), fold.in_time / (2 * np.pi)
-            found = f": {fold.outcome}"
+            fold_in_time = f": {fold.outcome}"
             if fold.found:
-                found = f", in time {in_time:.6g} Hz (known to {100 * fold.resolution:.2g} %): the balance is "
-                found += f"{100 * (hertz / in_time - 1):+.3g} % off"
-            said.append(f"balance {hertz:.6g} Hz{found}")
-        return said
+                fold_in_time = f", in time {in_time:.6g} Hz (known to {100 * fold.resolution:.2g} %): the balance is "
+                fold_in_time += f"{100 * (hertz / in_time - 1):+.3g} % off"
+            texts.append(f"balance {hertz:.6g} Hz{fold_in_time}")
+        return texts
 
 
 def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), progress: Report = None) -> FoldStudy:
@@ -77,13 +77,13 @@ def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), pr
             branch = arc_length.follow(balance, low, high, options)
         if not branch.converged[0]:
             raise SolveFailed(f"the frequency response {branch.end}")
-        found = []
+        folds_in_time = []
         for fold in branch.folds:
             with report.stage(f"fold at {branch.frequency[fold]:.6g} Hz in time"):
                 try:
-                    found.append(fold_in_time(balance, branch, fold, settings.OUTPUT, bracket=within))
+                    folds_in_time.append(fold_in_time(balance, branch, fold, settings.OUTPUT, bracket=within))
                 except IntegrationFailed as failure:
                     omega = float(branch.omega[fold])
-                    why = SolveEnd.INTEGRATION_FAILED.say(f" {failure}")
-                    found.append(FoldInTime(fold, omega, omega, float("nan"), within, why))
-    return FoldStudy(branch, tuple(found))
+                    reason = SolveEnd.INTEGRATION_FAILED.say(f" {failure}")
+                    folds_in_time.append(FoldInTime(fold, omega, omega, float("nan"), within, reason))
+    return FoldStudy(branch, tuple(folds_in_time))

@@ -42,12 +42,12 @@ LIMIT = 1e-6  # distance, relative, from an end of the response range that is no
 class Track(StudyResult):
     """A line of peaks or folds.
 
-    what : "peak" or "fold"; name, unit : of the number that changes; value : (n,) of it
+    kind : "peak" or "fold"; name, unit : of the number that changes; value : (n,) of it
     frequency : (n,) [Hz]; amplitude : (n,) of the response [m]; cusps : indices of points where a line of folds turns
     end : why and where it ends; its text is a sentence
     """
 
-    what: str
+    kind: str
     name: str
     unit: str
     value: np.ndarray
@@ -59,7 +59,7 @@ class Track(StudyResult):
     def record(self) -> dict[str, Any]:
         """For machines."""
         return {
-            "what": self.what,
+            "kind": self.kind,
             "against": self.name,
             "value": self.value.tolist(),
             "frequency_hz": self.frequency.tolist(),
@@ -71,10 +71,10 @@ class Track(StudyResult):
     def lines(self) -> list[str]:
         """For people."""
         rows = zip(self.value, self.frequency, self.amplitude, strict=True)
-        said = [
+        texts = [
             f"{self.name} {f'{v:.6g} {self.unit}':14} {hertz:12.6g} Hz {height:12.6g} m" for v, hertz, height in rows
         ]
-        return [*said, f"{self.what}: {self.end}"]
+        return [*texts, f"{self.kind}: {self.end}"]
 
     def write(self, folder: Path) -> list[Path]:
         """Write track.csv and track.png."""
@@ -86,8 +86,8 @@ class Track(StudyResult):
         unit, scale = length_unit(self.amplitude.max())
         with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
             upper.plot(self.value, self.frequency, ".-", color=BLUE, ms=4)
-            title = f"{self.what.capitalize()} against {self.name}"
-            upper.set(ylabel=f"frequency of the {self.what} / Hz", title=title)
+            title = f"{self.kind.capitalize()} against {self.name}"
+            upper.set(ylabel=f"frequency of the {self.kind} / Hz", title=title)
             lower.plot(self.value, scale * self.amplitude, ".-", color=ORANGE, ms=4)
             lower.set(xlabel=f"{self.name} / {self.unit}" if self.unit else self.name, ylabel=f"amplitude / {unit}")
         return figure
@@ -147,8 +147,8 @@ def _path(balance: HarmonicBalance, against: str, depth: np.ndarray | None) -> P
     omega = balance.omega_max
     if depth is not None:
         return parameter.wear(balance, omega, depth)
-    made: Parameter = getattr(parameter, against)(balance, omega)
-    return made
+    problem: Parameter = getattr(parameter, against)(balance, omega)
+    return problem
 
 
 def _depth(worn: AnyPath, balance: HarmonicBalance) -> np.ndarray:
@@ -163,29 +163,29 @@ def _peaks(
     file: SceneFile, path: Parameter, start: float, stop: float, points: int, on_point: Callable[[int], None]
 ) -> Track:
     site = settings.peak_of(file.scene)
-    found: list[tuple[float, OperatingPoint]] = []
+    peaks: list[tuple[float, OperatingPoint]] = []
     end = BranchEnd.REACHED.say(f" {path.say(stop)}")
     for done, value in enumerate(np.linspace(start, stop, points), start=1):
         balance = path.make(value)
-        if found:
-            last = found[-1][1]
+        if peaks:
+            last = peaks[-1][1]
             point = site.next(balance, last.state.omega, last.state.x)
-        if not found or not point.solution.converged:  # the peak has left its branch: looked for afresh
+        if not peaks or not point.solution.converged:  # the peak has left its branch: looked for afresh
             point = site.first(balance)
         if not point.solution.converged:
             end = BranchEnd.ENDED.say(f" {path.say(value)}: {point.solution.outcome}")
             break
-        found.append((value, point))
+        peaks.append((value, point))
         on_point(done)
-    if not found:
+    if not peaks:
         raise SolveFailed(f"the peak {end}")
-    rows = [(value, point.state.omega / (2 * np.pi), point.amplitude) for value, point in found]
+    rows = [(value, point.state.omega / (2 * np.pi), point.amplitude) for value, point in peaks]
     values, frequency, amplitude = np.array(rows).T
     at_limit = np.flatnonzero(np.min(np.abs(frequency[:, None] / file.scene.response.range - 1), axis=1) < LIMIT)
     if len(at_limit):
         where = path.say(values[at_limit[0]])
-        beyond = f"; from {where} on some are no peaks but ends of response.frequency: widen it"
-        end = end.kind.say(end.detail + beyond)
+        is_outside = f"; from {where} on some are no peaks but ends of response.frequency: widen it"
+        end = end.kind.say(end.detail + is_outside)
     return Track("peak", path.name, path.unit, values, frequency, amplitude, (), end)
 
 

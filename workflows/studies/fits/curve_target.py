@@ -62,25 +62,27 @@ class CurveTarget:
     def of(cls, name: str, table: Curve, file: SceneFile) -> CurveTarget:
         """Read a curve; raises SceneError where it does not fit the scene or has no such runs."""
         try:
-            found = read(table._folder / table.file, table.facts)
-            kept = tuple(run for run in found.runs if table.control in (None, run.control))
-            if not kept:
+            measurement = read(table._folder / table.file, table.facts)
+            chosen_runs = tuple(run for run in measurement.runs if table.control in (None, run.control))
+            if not chosen_runs:
                 raise Refusal(f"no run has control = {table.control}")
-            return cls(name, table, prepared(replace(found, runs=kept), file.scene, table.resonance))
+            return cls(name, table, prepared(replace(measurement, runs=chosen_runs), file.scene, table.resonance))
         except ValueError as trouble:
             raise SceneError(f"curves.{name}: {trouble}") from None
 
     def numbers(self) -> list[MeasuredNumber]:
         """Every point as a measured number, see `values`."""
-        found = []
+        points = []
         for run in self.measured.runs:
-            own = np.isfinite(run.errors) & [k not in self.table.model_fields_set for k in ("frequency_error", "error")]
-            errors = np.where(own, run.errors, [self.table.frequency_error, self.table.error])
+            measured_errors = np.isfinite(run.errors) & [
+                k not in self.table.model_fields_set for k in ("frequency_error", "error")
+            ]
+            errors = np.where(measured_errors, run.errors, [self.table.frequency_error, self.table.error])
             for kind, (values, column, unit) in self._columns(run).items():
                 for x, value, error in zip(self._places(run), values, errors[:, column], strict=True):
                     weight = self.table.weight * FULL / float(error)
-                    found.append(MeasuredNumber(f"{self.name} {x} {kind}", float(value), unit, weight, float(error)))
-        return found
+                    points.append(MeasuredNumber(f"{self.name} {x} {kind}", float(value), unit, weight, float(error)))
+        return points
 
     def _places(self, run: Run) -> list[str]:
         if self.measured.kind == "backbone":
@@ -95,7 +97,7 @@ class CurveTarget:
     def values(self, file: SceneFile, model: modelling.Model) -> np.ndarray:
         """(n,) what a scene says to the numbers; raises SolveFailed where it does not reach a point."""
         pairs = compare_runs(file, model, self.measured, Progress())
-        found = np.concatenate([v for one in pairs for v, *_ in self._columns(one.computed).values()])
-        if away := np.sum(~np.isfinite(found)):
-            raise SolveFailed(f"curves.{self.name}: the scene does not reach {away} of its points")
-        return found
+        numbers = np.concatenate([v for run in pairs for v, *_ in self._columns(run.computed).values()])
+        if missing := np.sum(~np.isfinite(numbers)):
+            raise SolveFailed(f"curves.{self.name}: the scene does not reach {missing} of its points")
+        return numbers

@@ -97,8 +97,8 @@ class Target(Table):
             ("load", cycle or self.of == "peak frequency", False),
             ("left", self.of in ("life", "work"), False),
         ):
-            given = name in self.model_fields_set
-            if (given and not may) or (must and not given):
+            is_given = name in self.model_fields_set
+            if (is_given and not may) or (must and not is_given):
                 raise Refusal(f'expected {"" if may else "no "}{name} for of = "{self.of}"')
         return self
 
@@ -148,19 +148,24 @@ def read(task: AnyPath | Mapping[str, Any]) -> FitTables:
 class Fit(StudyResult):
     """The numbers of a scene that fit the measured ones best.
 
-    found : with their errors; changes : overrides "section.key=value" that put them into the scene
+    identification : with their errors; changes : overrides "section.key=value" that put them into the scene
     """
 
-    found: Identification
+    identification: Identification
     changes: tuple[str, ...]
 
     def record(self) -> dict[str, Any]:
         """For machines."""
-        return {**self.found.record(), "set": list(self.changes)}
+        return {**self.identification.record(), "set": list(self.changes)}
 
     def lines(self) -> list[str]:
         """For people."""
-        return [self.found.report(), "", "to continue with what was found:", *(f'  --set "{c}"' for c in self.changes)]
+        return [
+            self.identification.report(),
+            "",
+            "to continue with what was found:",
+            *(f'  --set "{c}"' for c in self.changes),
+        ]
 
 
 def identify(
@@ -177,19 +182,19 @@ def identify(
 
 def best(file: SceneFile, task: FitTables, progress: Progress) -> Fit:
     """The fit of a scene that was read."""
-    looked = SceneFit(file, task, progress)
-    own = {name: value_of(file.mesh_scene, one.keys[0]) for name, one in task.parameters.items()}
-    before = {name: value for name, value in own.items() if value is not None}
-    known = before if len(before) == len(looked.parameters) else None
+    scene_fit = SceneFit(file, task, progress)
+    scene_values = {name: value_of(file.mesh_scene, table.keys[0]) for name, table in task.parameters.items()}
+    defined = {name: value for name, value in scene_values.items() if value is not None}
+    initial = defined if len(defined) == len(scene_fit.parameters) else None
     with threadpool_limits(1), kept.at_hand():
-        found = fit(
-            looked.parameters,
-            looked.measured,
-            lambda values: looked.trial(values, looked.targets, nearby=True),
-            lambda values: looked.slopes(values, looked.targets),
-            known,
+        identification = fit(
+            scene_fit.parameters,
+            scene_fit.measured,
+            lambda values: scene_fit.trial(values, scene_fit.targets, nearby=True),
+            lambda values: scene_fit.slopes(values, scene_fit.targets),
+            initial,
         )
-    return Fit(found, tuple(looked.changes(found.named(), digits=6)))
+    return Fit(identification, tuple(scene_fit.changes(identification.named(), digits=6)))
 
 
 def posterior(
@@ -209,14 +214,24 @@ def posterior(
     seed : seed of the samples
     Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: most trials fail
     """
-    wanted = read(task)
-    looked = SceneFit(read_scene(scene, overrides), wanted, reporter(progress))
-    asked = {**looked.targets, **wanted.predict}
-    units = {name: MEASURED_IN[one.of] for name, one in wanted.predict.items()}
-    priors = {name: looked.prior(name, one.prior) for name, one in wanted.parameters.items() if one.prior is not None}
+    tables = read(task)
+    scene_fit = SceneFit(read_scene(scene, overrides), tables, reporter(progress))
+    all_targets = {**scene_fit.targets, **tables.predict}
+    units = {name: MEASURED_IN[target.of] for name, target in tables.predict.items()}
+    priors = {
+        name: scene_fit.prior(name, target.prior)
+        for name, target in tables.parameters.items()
+        if target.prior is not None
+    }
     with threadpool_limits(1), kept.at_hand():
         return posteriors.sample(
-            looked.parameters, looked.measured, lambda values: looked.trial(values, asked), units, priors, trials, seed
+            scene_fit.parameters,
+            scene_fit.measured,
+            lambda values: scene_fit.trial(values, all_targets),
+            units,
+            priors,
+            trials,
+            seed,
         )
 
 
@@ -224,61 +239,63 @@ class SceneFit:
     """A scene whose numbers are looked for."""
 
     def __init__(self, file: SceneFile, task: FitTables, progress: Progress):
-        both = set(task.measured) & set(task.predict)
-        if both:
-            raise SceneError(f"predict.{min(both)}: a measured number has this name, give another one")
+        doubled = set(task.measured) & set(task.predict)
+        if doubled:
+            raise SceneError(f"predict.{min(doubled)}: a measured number has this name, give another one")
         self.file, self._task, self._progress = file, task, progress
-        self.parameters = [parameter(name, one, self.file.mesh_scene) for name, one in task.parameters.items()]
+        self.parameters = [parameter(name, table, self.file.mesh_scene) for name, table in task.parameters.items()]
         self.measured = [
-            MeasuredNumber(name, _si(f"measured.{name}.value", known.value, (MEASURED_IN[known.of],))[0],
-                     MEASURED_IN[known.of], known.weight, known.error)
-            for name, known in task.measured.items()
+            MeasuredNumber(name, _si(f"measured.{name}.value", table.value, (MEASURED_IN[table.of],))[0],
+                     MEASURED_IN[table.of], table.weight, table.error)
+            for name, table in task.measured.items()
         ]  # fmt: skip
-        curves = {f"curves.{name}": CurveTarget.of(name, one, file) for name, one in task.curves.items()}
-        self.measured += [number for one in curves.values() for number in one.numbers()]
+        curves = {f"curves.{name}": CurveTarget.of(name, table, file) for name, table in task.curves.items()}
+        self.measured += [number for table in curves.values() for number in table.numbers()]
         self.targets: Mapping[str, Target | CurveTarget] = {**task.measured, **curves}
         self._count = 0
         self._last: SceneAnswers | None = None
 
     def changes(self, values: Mapping[str, float], digits: int = 17) -> list[str]:
         """Overrides that put values into the scene."""
-        said = {p.name: f"{values[p.name]:.{digits}g} {p.unit}".rstrip() for p in self.parameters}
-        return [f"{key}={text}" for name, text in said.items() for key in self._task.parameters[name].keys]
+        texts = {p.name: f"{values[p.name]:.{digits}g} {p.unit}".rstrip() for p in self.parameters}
+        return [f"{key}={text}" for name, text in texts.items() for key in self._task.parameters[name].keys]
 
     def trial(
-        self, values: Mapping[str, float], asked: Mapping[str, Target | CurveTarget], nearby: bool = False
+        self, values: Mapping[str, float], targets: Mapping[str, Target | CurveTarget], nearby: bool = False
     ) -> np.ndarray:
         """What the scene says with values; nearby : its cycles are found from those of the trial before."""
         self._count += 1
         trial = self.file.changed(*self.changes(values))
         self._last = SceneAnswers(trial, modelling.build(trial, Progress()), self._last if nearby else None)
-        found = self._last.all_to(asked)
+        numbers = self._last.all_to(targets)
         self._progress.say(
             f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         )
-        return found
+        return numbers
 
-    def slopes(self, values: Mapping[str, float], asked: Mapping[str, Target | CurveTarget]) -> np.ndarray:
+    def slopes(self, values: Mapping[str, float], targets: Mapping[str, Target | CurveTarget]) -> np.ndarray:
         """(n_measured, n_parameter) derivatives of what the last trial said; values : its own."""
-        here = self._last
-        assert here is not None
+        base = self._last
+        assert base is not None
         sides: list[Side] = []
         for p in self.parameters:
             step = DIFFERENCE * (values[p.name] if p.ratio else p.high - p.low)
             middle = float(np.clip(values[p.name], p.low + step, p.high - step))
-            above, below = (self._beside({**values, p.name: middle + s}) for s in (step, -step))
-            sides.append((p.name, step, above, below))
+            upper, lower = (self._neighbour({**values, p.name: middle + s}) for s in (step, -step))
+            sides.append((p.name, step, upper, lower))
         rows: list[Sequence[float]] = []
-        for name, known in asked.items():
+        for name, target in targets.items():
             with suppress(NoDerivative):
-                if not isinstance(known, CurveTarget):
-                    rows.append(here.slopes(known, sides))
+                if not isinstance(target, CurveTarget):
+                    rows.append(base.slopes(target, sides))
                     continue
-            beside = [[there.all_to({name: known}) for there in both] for _, _, *both in sides]
-            rows += list(np.transpose([(up - down) / (2 * s[1]) for (up, down), s in zip(beside, sides, strict=True)]))
+            neighbours = [[scene.all_to({name: target}) for scene in scenes] for _, _, *scenes in sides]
+            rows += list(
+                np.transpose([(up - down) / (2 * s[1]) for (up, down), s in zip(neighbours, sides, strict=True)])
+            )
         return np.array(rows)
 
-    def _beside(self, values: Mapping[str, float]) -> SceneAnswers:
+    def _neighbour(self, values: Mapping[str, float]) -> SceneAnswers:
         """The scene with values near those of the last trial, of which nothing is solved yet."""
         file = self.file.changed(*self.changes(values))
         return SceneAnswers(file, modelling.build(file, Progress()), self._last)
@@ -292,21 +309,23 @@ class SceneFit:
             raise SceneError(f"parameters.{name}.prior: {error}") from None
 
 
-def parameter(name: str, looked: ParameterTable, scene: MeshScene) -> FitParameter:
+def parameter(name: str, table: ParameterTable, scene: MeshScene) -> FitParameter:
     """A number that is looked for, in SI units."""
-    low, unit = _si(f"parameters.{name}.low", looked.low, UNITS)
-    same = (unit,) if isinstance(looked.low, str) else UNITS
-    high, unit = _si(f"parameters.{name}.high", looked.high, same)
-    starts = tuple(_si(f"parameters.{name}.start", start, (unit,))[0] for start in looked.start)
-    ratio = min(low, high) > 0 if looked.ratio is None else looked.ratio
-    own = value_of(scene, looked.keys[0])
+    low, unit = _si(f"parameters.{name}.low", table.low, UNITS)
+    units = (unit,) if isinstance(table.low, str) else UNITS
+    high, unit = _si(f"parameters.{name}.high", table.high, units)
+    starts = tuple(_si(f"parameters.{name}.start", start, (unit,))[0] for start in table.start)
+    ratio = min(low, high) > 0 if table.ratio is None else table.ratio
+    scene_value = value_of(scene, table.keys[0])
     if not starts:
-        what = f"parameters.{name}: the scene has no {looked.keys[0]}"
-        if own is None:
-            raise SceneError(f"{what}: give start")
-        if not low <= own <= high:
-            raise SceneError(f"{what} between {low:g} and {high:g} but {own:g}: give start, or other bounds low < high")
-        starts = (own,)
+        problem = f"parameters.{name}: the scene has no {table.keys[0]}"
+        if scene_value is None:
+            raise SceneError(f"{problem}: give start")
+        if not low <= scene_value <= high:
+            raise SceneError(
+                f"{problem} between {low:g} and {high:g} but {scene_value:g}: give start, or other bounds low < high"
+            )
+        starts = (scene_value,)
     return FitParameter(name, low, high, starts, unit, ratio)
 
 
@@ -345,72 +364,72 @@ class SceneAnswers:
     near : a scene that differs little, from whose cycles those of this one are found
     """
 
-    def __init__(self, file: SceneFile, model: modelling.Model, near: SceneAnswers | None = None):
-        self.file, self.model, self._near = file, model, {} if near is None else near._points
+    def __init__(self, file: SceneFile, model: modelling.Model, neighbour: SceneAnswers | None = None):
+        self.file, self.model, self._near_points = file, model, {} if neighbour is None else neighbour._points
         self._points: dict[tuple[Place, float], OperatingPoint] = {}
         self._derived: dict[tuple[Place | None, float], Derivatives] = {}
         self._runs: dict[float, WearHistory] = {}
 
-    def all_to(self, asked: Mapping[str, Target | CurveTarget]) -> np.ndarray:
+    def all_to(self, targets: Mapping[str, Target | CurveTarget]) -> np.ndarray:
         """(n_measured,) its numbers, of a curve one for each point."""
-        found = (
-            one.values(self.file, self.model) if isinstance(one, CurveTarget) else [self.to(name, one)]
-            for name, one in asked.items()
+        parts = (
+            target.values(self.file, self.model) if isinstance(target, CurveTarget) else [self.to(name, target)]
+            for name, target in targets.items()
         )
-        return np.concatenate([np.asarray(part, float) for part in found])
+        return np.concatenate([np.asarray(part, float) for part in parts])
 
-    def slopes(self, known: Target, sides: Sequence[Side]) -> Sequence[float]:
+    def slopes(self, target: Target, sides: Sequence[Side]) -> Sequence[float]:
         """Derivatives of a number by parameters.
 
         sides : name of each, step, and the scene a step above and a step below
         Raises  NoDerivative where a number has none, or none but by running again
         """
-        if known.mode is not None:
-            both = [[there._frequency(known.of == "stuck frequency", known.mode) for there in s[2:]] for s in sides]
-            return [(up - down) / (2 * side[1]) for (up, down), side in zip(both, sides, strict=True)]
-        if known.of in ("life", "work"):
+        if target.mode is not None:
+            pairs = [[scene._frequency(target.of == "stuck frequency", target.mode) for scene in s[2:]] for s in sides]
+            return [(up - down) / (2 * side[1]) for (up, down), side in zip(pairs, sides, strict=True)]
+        if target.of in ("life", "work"):
             raise NoDerivative("a life is followed again")
-        place = known.at or (None if known.of == "preload" else Place(peak=1.0))
-        if (place, known.load) not in self._derived:
-            self._derived[place, known.load] = self._derivatives(place, known.load, sides)
-        found = self._derived[place, known.load]
-        wanted = known.of.replace(" ", "_")
-        if wanted not in found.names:
+        place = target.at or (None if target.of == "preload" else Place(peak=1.0))
+        if (place, target.load) not in self._derived:
+            self._derived[place, target.load] = self._derivatives(place, target.load, sides)
+        derivatives_at = self._derived[place, target.load]
+        name = target.of.replace(" ", "_")
+        if name not in derivatives_at.names:
             return [0.0] * len(sides)
-        return [float(slope) for slope in found.slopes[found.names.index(wanted)]]
+        return [float(slope) for slope in derivatives_at.slopes[derivatives_at.names.index(name)]]
 
     def _derivatives(self, place: Place | None, load: float, sides: Sequence[Side]) -> Derivatives:
         """Of a cycle at a place, at rest where there is none; raises NoDerivative."""
         balance, options = self.model.balance, settings.newton_options(self.file.scene)
         changes = [
-            ParameterChange(name, step, BalanceInputs.of(above.model.balance), BalanceInputs.of(below.model.balance))
-            for name, step, above, below in sides
+            ParameterChange(name, step, BalanceInputs.of(upper.model.balance), BalanceInputs.of(lower.model.balance))
+            for name, step, upper, lower in sides
         ]
         if place is None:
             return cycle_derivatives.at_frequency(
-                balance.with_load(0.0), self._rest, settings.OUTPUT, changes, options=options
+                balance.with_load(0.0), self._state_at_rest, settings.OUTPUT, changes, options=options
             )
         balance, state = balance.with_load(load), self._point(place, load).state
         if place.peak == 1.0:
             return cycle_derivatives.at_peak(balance, state, settings.OUTPUT, changes, options=options)
-        found = cycle_derivatives.at_frequency(balance, state, settings.OUTPUT, changes, options=options)
+        derivatives_at = cycle_derivatives.at_frequency(balance, state, settings.OUTPUT, changes, options=options)
         if place.peak is not None:  # beside a peak, and moves with it
             peak = self._point(Place(peak=1.0), load).state
             moves = cycle_derivatives.at_peak(balance, peak, settings.OUTPUT, changes, options=options).slopes[0]
-            ride = np.outer(found.by_frequency, 2 * np.pi * place.peak * moves)
-            found = replace(found, slopes=found.slopes + ride)
-        return found
+            ride = np.outer(derivatives_at.by_frequency, 2 * np.pi * place.peak * moves)
+            derivatives_at = replace(derivatives_at, slopes=derivatives_at.slopes + ride)
+        return derivatives_at
 
-    def to(self, name: str, known: Target) -> float:
+    def to(self, name: str, target: Target) -> float:
         """The scene's number beside a measured one; raises SolveFailed, naming it, where there is none."""
         try:
-            if known.mode is not None:
-                return self._frequency(known.of == "stuck frequency", known.mode)
-            if known.of in ("life", "work"):
-                return self._wear(known)
-            if known.of == "preload" and known.at is None:
-                return self.model.balance.preload(self._rest)
-            point = self._point(known.at or Place(peak=1.0), known.load)
+            if target.mode is not None:
+                return self._frequency(target.of == "stuck frequency", target.mode)
+            if target.of in ("life", "work"):
+                return self._wear(target)
+            if target.of == "preload" and target.at is None:
+                return self.model.balance.preload(self._state_at_rest)
+            point = self._point(target.at or Place(peak=1.0), target.load)
         except SolveFailed as failure:
             raise SolveFailed(f"measured.{name}: {failure}") from None
         balance = self.model.balance
@@ -419,7 +438,7 @@ class SceneAnswers:
             "amplitude": point.amplitude,
             "preload": balance.preload(point.state),
             "energy": float(balance.energy(point.state).sum()),
-        }[known.of]
+        }[target.of]
 
     def _frequency(self, stuck: bool, mode: int) -> float:
         reduced = self.model.reduced
@@ -429,19 +448,19 @@ class SceneAnswers:
         return float(linear_modes(reduced, springs, mode)[0][mode - 1])
 
     @cached_property
-    def _rest(self) -> State:
+    def _state_at_rest(self) -> State:
         still = self.model.balance.with_load(0.0)
-        found = newton.solve_from_rest(still, still.omega_max, settings.newton_options(self.file.scene))
-        if not found.converged:
-            raise SolveFailed(f"the contact at rest: {found.outcome}")
-        return found.state
+        solution = newton.solve_from_rest(still, still.omega_max, settings.newton_options(self.file.scene))
+        if not solution.converged:
+            raise SolveFailed(f"the contact at rest: {solution.outcome}")
+        return solution.state
 
     def _point(self, where: Place, load: float) -> OperatingPoint:
         if (where, load) not in self._points:
             site = settings.site_of(self.file.scene, where)
-            balance, known, point = self.model.balance.with_load(load), self._near.get((where, load)), None
-            if known is not None and known.state.x.shape == (balance.contact.n_pair, *known.state.x.shape[1:]):
-                point = site.next(balance, known.state.omega, known.state.x)
+            balance, previous, point = self.model.balance.with_load(load), self._near_points.get((where, load)), None
+            if previous is not None and previous.state.x.shape == (balance.contact.n_pair, *previous.state.x.shape[1:]):
+                point = site.next(balance, previous.state.omega, previous.state.x)
             if point is None or not point.solution.converged:
                 point = site.first(balance)
             if not point.solution.converged:
@@ -449,14 +468,14 @@ class SceneAnswers:
             self._points[where, load] = point
         return self._points[where, load]
 
-    def _wear(self, known: Target) -> float:
+    def _wear(self, target: Target) -> float:
         if self.file.scene.wear is None:
             raise SceneError("a life or its work is measured, but the scene has no [wear]")
-        if known.left not in self._runs:
-            self._runs[known.left] = wear_run.worn_out(self.file, self.model, known.left)
-        run = self._runs[known.left]
-        life = cycles_to_preload(run, known.left)
+        if target.left not in self._runs:
+            self._runs[target.left] = wear_run.worn_out(self.file, self.model, target.left)
+        run = self._runs[target.left]
+        life = cycles_to_preload(run, target.left)
         if life is None:
-            raise SolveFailed(f"the preload did not fall to {known.left:.3g} of its start: {run.end}")
+            raise SolveFailed(f"the preload did not fall to {target.left:.3g} of its start: {run.end}")
         spent = np.concatenate([[0.0], np.cumsum(run.work.sum(axis=1))[:-1]])
-        return life if known.of == "life" else float(np.interp(life, run.cycles, spent))
+        return life if target.of == "life" else float(np.interp(life, run.cycles, spent))

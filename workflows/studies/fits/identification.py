@@ -176,17 +176,17 @@ def fit(
     def predicted(unknowns: np.ndarray) -> np.ndarray:
         nonlocal count
         count += 1
-        found = np.asarray(predict(named(unknowns)), dtype=float)
-        if found.shape != target.shape or not (found > 0).all():
+        numbers = np.asarray(predict(named(unknowns)), dtype=float)
+        if numbers.shape != target.shape or not (numbers > 0).all():
             raise Refusal(
-                f"the model predicts {found.tolist()} instead of {len(target)} numbers above 0: narrow the bounds"
+                f"the model predicts {numbers.tolist()} instead of {len(target)} numbers above 0: narrow the bounds"
             )
-        return found
+        return numbers
 
     first_values = {p.name: p.starts[0] for p in parameters} if before is None else before
     origin = np.array([p.scaled(first_values[p.name]) for p in parameters])
-    there = predicted(origin)
-    last = origin, there  # where, and what was predicted there
+    predicted_first = predicted(origin)
+    last = origin, predicted_first  # where, and what was predicted there
 
     def residual(unknowns: np.ndarray) -> np.ndarray:
         nonlocal last
@@ -205,12 +205,12 @@ def fit(
     starts = product(*([p.scaled(value) for value in p.starts] for p in parameters))
     within = low + 1e-6 * (high - low), high - 1e-6 * (high - low)
     ends = (least_squares(residual, np.clip(x, *within), slope, (low, high), xtol=1e-6) for x in starts)
-    best = min(ends, key=lambda one: float(one.cost))
+    best = min(ends, key=lambda solution: float(solution.cost))
     return Identification(
         parameters,
         measured,
         np.array(list(named(best.x).values())),
-        there,
+        predicted_first,
         target * np.exp(best.fun / weight),
         best.jac / weight[:, None],
         _deviation(best.jac, float(np.sum(best.fun**2))),

@@ -83,37 +83,37 @@ class Posterior(StudyResult):
     @property
     def doubts(self) -> list[str]:
         """What stands against believing it, in sentences; empty where nothing does."""
-        found = []
+        sentences = []
         if self.chain < LONG:
-            found.append(f"the chains are {self.chain:.0f} autocorrelation times long, {LONG:.0f} are wanted")
+            sentences.append(f"the chains are {self.chain:.0f} autocorrelation times long, {LONG:.0f} are wanted")
         if self.surrogate > ENOUGH:
-            found.append(
+            sentences.append(
                 f"the surrogate is uncertain by {self.surrogate:.2f} of the measurements' errors: allow more trials"
             )
-        found += [
+        sentences += [
             f"{p.name}: the numbers say little, its posterior is {share:.2f} as wide as its prior"
             for p, share in zip(self.parameters, self.narrowed, strict=True)
             if share > NARROWED
         ]
-        return found
+        return sentences
 
     def lines(self) -> list[str]:
         """For people."""
         failed = f", {self.failed} of them without numbers" if self.failed else ""
-        found = [f"posterior from {self.trials} trials{failed}", f"{'':26}{'median':>12}   90 % credible"]
-        found += [
-            f"{one.name:26}{one.median:12.4g}   {one.low:.4g} .. {one.high:.4g} {one.unit}".rstrip()
-            for one in self.summaries()
+        texts = [f"posterior from {self.trials} trials{failed}", f"{'':26}{'median':>12}   90 % credible"]
+        texts += [
+            f"{summary.name:26}{summary.median:12.4g}   {summary.low:.4g} .. {summary.high:.4g} {summary.unit}".rstrip()
+            for summary in self.summaries()
         ]
         for i, j in zip(*np.triu_indices(len(self.parameters), 1), strict=True):
-            both = np.corrcoef(self.samples[:, i], self.samples[:, j])[0, 1]
-            found.append(f"correlation of {self.parameters[i].name} and {self.parameters[j].name}: {both:+.2f}")
-        return found + [f"doubtful: {doubt}" for doubt in self.doubts]
+            correlation = np.corrcoef(self.samples[:, i], self.samples[:, j])[0, 1]
+            texts.append(f"correlation of {self.parameters[i].name} and {self.parameters[j].name}: {correlation:+.2f}")
+        return texts + [f"doubtful: {doubt}" for doubt in self.doubts]
 
     def record(self) -> dict[str, Any]:
         """Plain data for machines."""
         return {
-            "summaries": [vars(one) for one in self.summaries()], "trials": self.trials, "failed": self.failed,
+            "summaries": [vars(summary) for summary in self.summaries()], "trials": self.trials, "failed": self.failed,
             "surrogate": self.surrogate, "chain": self.chain, "doubts": self.doubts,
         }  # fmt: skip
 
@@ -132,7 +132,7 @@ def sample(
     trial: Trial,
     predicted: Mapping[str, str] | None = None,
     priors: Mapping[str, Marginal] | None = None,
-    most: int = 100,
+    max_trials: int = 100,
     seed: int = 0,
 ) -> Posterior:
     """Sample the posterior of parameters within their bounds.
@@ -157,16 +157,18 @@ def sample(
     trials = _Trials(box, trial, len(target) + len(names))
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The balance properties of Sobol", UserWarning)  # as many as there may be
-        first = qmc.Sobol(len(parameters), seed=np.random.default_rng(seed)).random(min(FIRST * len(parameters), most))
+        first = qmc.Sobol(len(parameters), seed=np.random.default_rng(seed)).random(
+            min(FIRST * len(parameters), max_trials)
+        )
     trials.make(first)
     while True:
         levels = trials.levels()
         chain, length = _chains(box, levels[: len(target)], target, errors, seed)
         spread = chain[:: max(len(chain) // 400, 1)]
         sure = _uncertainty(levels[: len(target)], errors, box.coordinates(spread))
-        if sure.max() <= ENOUGH or trials.count + BATCH > most:
+        if sure.max() <= ENOUGH or trials.count + BATCH > max_trials:
             break
-        trials.make(_apart(spread, sure, np.array(trials.shares)))
+        trials.make(_spread_points(spread, sure, np.array(trials.shares)))
     thin = chain[:: max(len(chain) // 4000, 1)]
     draw = np.random.default_rng(seed)
     coordinates = box.coordinates(thin)
@@ -200,14 +202,14 @@ class _Box:
     def log_prior(self, share: np.ndarray) -> np.ndarray:
         """(n,) of shares (n, k), up to a constant; -inf outside."""
         inside = ((share > 0) & (share < 1)).all(axis=1)
-        found = np.where(inside, 0.0, -np.inf)
+        density_sum = np.where(inside, 0.0, -np.inf)
         for i, p in enumerate(self.parameters):
             if p.name in self.priors and inside.any():
                 law = self.priors[p.name]
                 values = np.array([self.values(row)[i] for row in share[inside]])
                 density = law.law.logpdf(values) + (np.log(values) if p.ratio else 0.0)  # of the unknown
-                found[inside] += np.where((values >= law.low) & (values <= law.high), density, -np.inf)
-        return found
+                density_sum[inside] += np.where((values >= law.low) & (values <= law.high), density, -np.inf)
+        return density_sum
 
     def width_of_prior(self, seed: int) -> np.ndarray:
         """(k,) standard deviations of the shares before anything was measured."""
@@ -226,7 +228,7 @@ class _Trials:
         self.shares: list[np.ndarray] = []
         self._numbers: list[np.ndarray] = []
         self.failed = 0
-        self._why = ""
+        self._last_failure = ""
 
     @property
     def count(self) -> int:
@@ -236,16 +238,18 @@ class _Trials:
         for share in shares:
             values = dict(zip((p.name for p in self.box.parameters), self.box.values(share), strict=True))
             try:
-                found = np.asarray(self._trial(values), float)
+                numbers = np.asarray(self._trial(values), float)
             except SolveFailed as failure:
-                self.failed, self._why = self.failed + 1, str(failure)
+                self.failed, self._last_failure = self.failed + 1, str(failure)
                 continue
-            if found.shape != (self._width,) or not (found > 0).all():
-                raise Refusal(f"the model predicts {found.tolist()} instead of {self._width} numbers above 0")
+            if numbers.shape != (self._width,) or not (numbers > 0).all():
+                raise Refusal(f"the model predicts {numbers.tolist()} instead of {self._width} numbers above 0")
             self.shares.append(share)
-            self._numbers.append(np.log(found))
+            self._numbers.append(np.log(numbers))
         if 2 * self.failed > self.count:
-            raise SolveFailed(f"{self.failed} of {self.count} trials fail: narrow the bounds; the last: {self._why}")
+            raise SolveFailed(
+                f"{self.failed} of {self.count} trials fail: narrow the bounds; the last: {self._last_failure}"
+            )
 
     def levels(self) -> list[Surrogate]:
         points, numbers = self.box.coordinates(np.array(self.shares)), np.array(self._numbers)
@@ -260,15 +264,15 @@ def _chains(
     k = len(box.parameters)
 
     def log_probability(share: np.ndarray) -> np.ndarray:
-        found = box.log_prior(share)
-        good = np.isfinite(found)
+        log_density = box.log_prior(share)
+        good = np.isfinite(log_density)
         if good.any():
             coordinates = box.coordinates(share[good])
             for level, value, error in zip(levels, target, errors, strict=True):
                 mean, deviation = level.mean_and_deviation(coordinates)
                 variance = error**2 + deviation**2
-                found[good] -= 0.5 * ((value - mean) ** 2 / variance + np.log(variance))
-        return found
+                log_density[good] -= 0.5 * ((value - mean) ** 2 / variance + np.log(variance))
+        return log_density
 
     draw = np.random.default_rng(seed)
     start = draw.random((4000, k))
@@ -291,21 +295,21 @@ def _uncertainty(levels: Sequence[Surrogate], errors: np.ndarray, coordinates: n
     return np.asarray(np.max(each, axis=0))
 
 
-def _apart(share: np.ndarray, uncertainty: np.ndarray, known: np.ndarray) -> np.ndarray:
+def _spread_points(share: np.ndarray, uncertainty: np.ndarray, trials: np.ndarray) -> np.ndarray:
     """(BATCH, k) of the samples: uncertain ones far from each other and from what is known."""
-    chosen, there = [], known
+    chosen, taken_points = [], trials
     for _ in range(BATCH):
-        distance = np.min(np.linalg.norm(share[:, None] - there[None], axis=2), axis=1)
+        distance = np.min(np.linalg.norm(share[:, None] - taken_points[None], axis=2), axis=1)
         best = int(np.argmax(uncertainty * distance))
         chosen.append(share[best])
-        there = np.vstack([there, share[best]])
+        taken_points = np.vstack([taken_points, share[best]])
     return np.array(chosen)
 
 
-def _picture(found: Posterior) -> Figure:
+def _picture(posterior: Posterior) -> Figure:
     """The parameters and the numbers that follow from them; red: medians and the ends of their central 90 %."""
-    shown_numbers = found.summaries()
-    columns = np.column_stack([found.samples, *found.predicted.values()])
+    shown_numbers = posterior.summaries()
+    columns = np.column_stack([posterior.samples, *posterior.predicted.values()])
     n = len(shown_numbers)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.3 * n + 0.8, 2.1 * n + 0.5), layout="constrained")
@@ -334,5 +338,5 @@ def _picture(found: Posterior) -> Figure:
     return figure
 
 
-def _label(one: Summary) -> str:
-    return f"{one.name} / {one.unit}" if one.unit else one.name
+def _label(summary: Summary) -> str:
+    return f"{summary.name} / {summary.unit}" if summary.unit else summary.name

@@ -57,13 +57,13 @@ class Marginal:
     @classmethod
     def of(cls, table: Distribution) -> Marginal:
         """The distribution of a table; raises ValueError with a sentence."""
-        given = {name for name in table.model_fields_set if name != "distribution"}
+        names = {name for name in table.model_fields_set if name != "distribution"}
         must, one_of, may = NUMBERS[table.distribution]
         wants = ", ".join([*sorted(must), *([" or ".join(sorted(one_of, reverse=True))] if one_of else [])])
-        if not must <= given or (one_of and len(given & one_of) != 1) or given - must - one_of - may:
+        if not must <= names or (one_of and len(names & one_of) != 1) or names - must - one_of - may:
             optional = f", and may have {' and '.join(sorted(may, reverse=True))}" if may else ""
-            raise Refusal(f"a {table.distribution} distribution needs {wants}{optional}; this has {_told(given)}")
-        n = _numbers({name: getattr(table, name) for name in given})
+            raise Refusal(f"a {table.distribution} distribution needs {wants}{optional}; this has {_describe(names)}")
+        n = _numbers({name: getattr(table, name) for name in names})
         if "low" in n and "high" in n and not n["low"] < n["high"]:
             raise Refusal(f"low {table.low} is not below high {table.high}")
         for name in ("std", "cov"):
@@ -85,38 +85,40 @@ class Marginal:
             deviation = n["std"] if "std" in n else n["cov"] * abs(n["mean"])
             if not deviation > 0:
                 raise Refusal("a cov of a mean of 0 is no deviation: give std")
-            found = cls(stats.norm(n["mean"], deviation), *ends)
+            numbers = cls(stats.norm(n["mean"], deviation), *ends)
         else:
             if not n["median"] > 0:
                 raise Refusal(f"median {table.median} is not above 0")
             # coefficient of variation v of a lognormal variable: v^2 = exp(s^2) - 1
-            found = cls(stats.lognorm(math.sqrt(math.log1p(n["cov"] ** 2)), scale=n["median"]), *ends, logarithmic=True)
-        if not found.law.cdf(found.high) - found.law.cdf(found.low) > 0:
+            numbers = cls(
+                stats.lognorm(math.sqrt(math.log1p(n["cov"] ** 2)), scale=n["median"]), *ends, logarithmic=True
+            )
+        if not numbers.law.cdf(numbers.high) - numbers.law.cdf(numbers.low) > 0:
             raise Refusal("nothing is left of the distribution between low and high")
-        return found
+        return numbers
 
     def at(self, share: np.ndarray) -> np.ndarray:
         """Quantiles; share : (n,) in (0, 1)."""
-        below, upto = self.law.cdf(self.low), self.law.cdf(self.high)
-        return np.clip(self.law.ppf(below + share * (upto - below)), self.low, self.high)
+        share_below, upto = self.law.cdf(self.low), self.law.cdf(self.high)
+        return np.clip(self.law.ppf(share_below + share * (upto - share_below)), self.low, self.high)
 
     def share(self, values: np.ndarray) -> np.ndarray:
         """Shares (n,) below values (n,); the inverse of `at`."""
-        below, upto = self.law.cdf(self.low), self.law.cdf(self.high)
-        return np.asarray((self.law.cdf(values) - below) / (upto - below))
+        share_below, upto = self.law.cdf(self.low), self.law.cdf(self.high)
+        return np.asarray((self.law.cdf(values) - share_below) / (upto - share_below))
 
 
-def _told(given: set[str]) -> str:
-    return ", ".join(sorted(given)) or "none of them"
+def _describe(names: set[str]) -> str:
+    return ", ".join(sorted(names)) or "none of them"
 
 
-def _numbers(given: dict[str, NumberWithUnit]) -> dict[str, float]:
+def _numbers(names: dict[str, NumberWithUnit]) -> dict[str, float]:
     """The numbers in SI units; all but the coefficient of variation in the same one."""
-    found = {"cov": units.to_si(given["cov"], "")} if "cov" in given else {}
-    unit = {name: unit_of(value) for name, value in given.items() if name != "cov"}
+    numbers = {"cov": units.to_si(names["cov"], "")} if "cov" in names else {}
+    unit = {name: unit_of(value) for name, value in names.items() if name != "cov"}
     if len(set(unit.values())) > 1:
-        raise Refusal("its numbers have different units: " + ", ".join(f"{n} {given[n]}" for n in unit))
-    return found | {name: units.to_si(given[name], of) for name, of in unit.items()}
+        raise Refusal("its numbers have different units: " + ", ".join(f"{n} {names[n]}" for n in unit))
+    return numbers | {name: units.to_si(names[name], of) for name, of in unit.items()}
 
 
 def unit_of(value: NumberWithUnit) -> str:

@@ -35,7 +35,7 @@ from tribodyn.workflows.studies.study_result import StudyResult
 
 COEFFICIENT = "wear.coefficient"
 RATIOS = 64  # equally likely values of a key that scales a life
-PROBED, SAME = 1.1, 1e-3  # factor on keys that may scale it, and how far its logarithm may be off from that
+PROBED, TOLERANCE = 1.1, 1e-3  # factor on keys that may scale it, and how far its logarithm may be off from that
 BATCH = 8  # runs that are added at a time
 
 
@@ -95,35 +95,35 @@ class LifeDistribution(StudyResult):
 
     def record(self) -> dict[str, Any]:
         """Plain data for machines."""
-        own = ("name", "number", "confidence", "runs", "open", "missing", "scaled", "explained", "scatter",
+        names = ("name", "number", "confidence", "runs", "open", "missing", "scaled", "explained", "scatter",
                "logarithmic", "model_error", "model_error_of")  # fmt: skip
         return {
-            **{name: getattr(self, name) for name in own},
+            **{name: getattr(self, name) for name in names},
             "quantiles": [{"name": q.name, **asdict(q)} for q in self.quantiles],
-            "influences": [{**asdict(i), "left": i.left} for i in self.influences],
+            "influences": [{**asdict(i), "remaining": i.remaining} for i in self.influences],
         }
 
     def lines(self) -> list[str]:
         """For people."""
         runs = f"{self.runs} runs" + (f" ({self.open} of them survived, or ended before)" if self.open else "")
-        known = "not known: " + self.model_error_of if self.model_error is None else self.model_error_of
+        source = "not known: " + self.model_error_of if self.model_error is None else self.model_error_of
         error = "" if self.model_error is None else f"{100 * self.model_error:.2g} %, "
-        found = [
+        texts = [
             f"{self.number} from {runs}" + (f", {self.missing} more have none" if self.missing else ""),
             *(f"in proportion to the reciprocal of {' and '.join(group)}, by two runs" for group in self.scaled),
             f"surrogate explains {100 * self.explained:.2f} % of the variance of runs that are left out",
-            f"error of the model itself: {error}{known}",
+            f"error of the model itself: {error}{source}",
             f"{'':8}{'value':>12}   {100 * self.confidence:g} % sure{'':17}with the model's error",
         ]
         for q in self.quantiles:
             ends = f"{q.low:.4g} .. {q.high:.4g}"
-            own = "" if self.model_error is None else f"{q.low_in_all:.4g} .. {q.high_in_all:.4g}"
+            range_in_all = "" if self.model_error is None else f"{q.low_in_all:.4g} .. {q.high_in_all:.4g}"
             least = "  at least: some parts survive, or their runs ended before" if q.at_least else ""
-            found.append(f"{q.name:8}{q.value:12.4g}   {ends:26}{own}{least}".rstrip())
+            texts.append(f"{q.name:8}{q.value:12.4g}   {ends:26}{range_in_all}{least}".rstrip())
         scatter = f"{100 * self.scatter:.3g} %" if self.logarithmic else f"{self.scatter:.3g}"
-        found.append(f"scatter {scatter}; measured exactly, a key leaves of it (first and total Sobol index):")
-        found += [f"  {i.key:32}{100 * i.left:6.1f} %   ({i.first:.3f}, {i.total:.3f})" for i in self.influences]
-        return self.table.troubles() + found
+        texts.append(f"scatter {scatter}; measured exactly, a key leaves of it (first and total Sobol index):")
+        texts += [f"  {i.key:32}{100 * i.remaining:6.1f} %   ({i.first:.3f}, {i.total:.3f})" for i in self.influences]
+        return self.table.troubles() + texts
 
     @property
     def files(self) -> list[Path]:
@@ -156,42 +156,42 @@ def lives(
     resume : take the runs that the folder holds already, and do the others
     Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler
     """
-    asked = study_file.read(study)
-    runner = Runner(studies.place(asked, folder), reporter(progress), workers, scheduler, resume)
-    return _distribution(asked, runner, rare)
+    plan = study_file.read(study)
+    runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, resume)
+    return _distribution(plan, runner, rare)
 
 
 def _distribution(study: ParameterStudy, runner: Runner, rare: float | None) -> LifeDistribution:
     """Runs until the first share is known as well as is wanted, and what they come to."""
-    wanted = study.lives
+    life_settings = study.lives
     if study.settings.design in LISTED:
         raise SceneError(f'{study.name}: lives are drawn, give design = "sobol" and distributions instead of lists')
     if rare is not None and not 0 < rare < 1:
         raise Refusal(f"rare {rare}: give a share between 0 and 1")
     space, groups = ParameterSpace.of(study), _scaling(study)
-    shares = wanted.shares if rare is None else (rare, *wanted.shares)
+    shares = life_settings.shares if rare is None else (rare, *life_settings.shares)
     middle = space.run_of(space.values(np.full((1, len(space.keys)), 0.5))[0])
     probes = [{**middle, **{key: PROBED * middle[key] for key in group}} for group in groups]
     added: list[dict[str, Any]] = [middle, *probes] if probes else []
     while True:
-        again = replace(runner, resume=runner.resume or len(added) > len(groups) + 1)
-        table = studies.run(study, again, more=added, drawn=False)
-        found = LifeFit.of(space, table, wanted.number, study.settings.runs or 0, shares[0], groups)
-        sample = Sample.of(found.space, found.surrogate, shares[0] < RARE)
-        half = _half_width(found, sample, shares[0], wanted.confidence)
+        next_runner = replace(runner, resume=runner.resume or len(added) > len(groups) + 1)
+        table = studies.run(study, next_runner, added=added, drawn=False)
+        life_fit = LifeFit.of(space, table, life_settings.number, study.settings.runs or 0, shares[0], groups)
+        sample = Sample.of(life_fit.space, life_fit.surrogate, shares[0] < RARE)
+        half = _half_width(life_fit, sample, shares[0], life_settings.confidence)
         done = len(table.columns["run"])
-        if wanted.within is None or half <= wanted.within or done >= wanted.most:
+        if life_settings.within is None or half <= life_settings.within or done >= life_settings.most:
             break
         runner.progress.say(
             f"after {done} runs P{100 * shares[0]:.6g} is known within {100 * half:.2g} %: runs are added"
         )
-        points = quantiles.next_runs(sample, found.surrogate, shares[0], min(BATCH, wanted.most - done))
+        points = quantiles.next_runs(sample, life_fit.surrogate, shares[0], min(BATCH, life_settings.most - done))
         added += [space.run_of(point) for point in points]
     folder = runner.folder
     if study_pictures.shown(table):
         table.plot().savefig(folder / "study.png")
     error, source = _model_error(study, middle, table, folder, runner.progress)
-    distribution = _result(study, table, found, sample, shares, error, source)
+    distribution = _result(study, table, life_fit, sample, shares, error, source)
     (folder / "lives.json").write_text(json.dumps(distribution.record(), indent=2) + "\n", encoding="utf-8")
     distribution.plot().savefig(folder / "lives.png")
     return distribution
@@ -235,9 +235,11 @@ class LifeFit:
         if share == self.asked:
             return float(low), float(high)
         of = self.surrogate
-        values, said = ((each - self.by_ratio)[self.drawn, None] + self.ratios for each in (of.values, of.left_out))
-        fewest, most = quantiles.counted(sample, values, said, at, confidence)
-        return float(min(low, fewest)), float(max(high, most))
+        values, predictions = (
+            (each - self.by_ratio)[self.drawn, None] + self.ratios for each in (of.values, of.left_out)
+        )
+        lowest, highest = quantiles.counted(sample, values, predictions, at, confidence)
+        return float(min(low, lowest)), float(max(high, highest))
 
     def at_least(self, share: float, high: float, confidence: float) -> bool:
         """Whether a quantile may belong to values of which only a lower bound is known.
@@ -247,8 +249,10 @@ class LifeFit:
         """
         if not self.open:
             return False
-        most = stats.beta.ppf(0.5 + confidence / 2, self.open + 1, self.runs - self.open)  # Clopper and Pearson 1934
-        return bool(high >= self.bound or share >= 1 - most)
+        share_open = stats.beta.ppf(
+            0.5 + confidence / 2, self.open + 1, self.runs - self.open
+        )  # Clopper and Pearson 1934
+        return bool(high >= self.bound or share >= 1 - share_open)
 
     @classmethod
     def of(
@@ -257,7 +261,7 @@ class LifeFit:
         table: StudyTable,
         number: str,
         drawn: int,
-        asked: float,
+        share_sought: float,
         groups: Sequence[tuple[str, ...]],
     ) -> LifeFit:
         values, bounds = table.bounded(number)
@@ -267,7 +271,7 @@ class LifeFit:
             raise SolveFailed(f"no run has a {number}; the first: {table.columns['sentence'][0]}")
         logarithmic = bool((values[good] > 0).all())
         probed = np.log(PROBED * values[drawn + 1 : drawn + 1 + len(groups)] / values[drawn]) if groups else ()
-        scaled = tuple(group for group, off in zip(groups, probed, strict=True) if abs(off) < SAME)
+        scaled = tuple(group for group, off in zip(groups, probed, strict=True) if abs(off) < TOLERANCE)
         space = replace(space, ratios=tuple(key for group in scaled for key in group))
         laws = [Law(np.isin(space.keys, group) / space.widths, -1.0) for group in scaled]
         numbers, points = values[good], space.coordinates(space.points_of(table.columns)[good])
@@ -275,13 +279,13 @@ class LifeFit:
         if logarithmic:
             numbers, slopes = np.log(numbers), slopes / numbers[:, None]
         surrogate = Surrogate.fitted(points, numbers, None if laws else slopes, tuple(laws))
-        alone = [law for group, law in zip(scaled, laws, strict=True) if len(group) == 1][:1]
+        single_law = [law for group, law in zip(scaled, laws, strict=True) if len(group) == 1][:1]
         share = np.repeat(((np.arange(RATIOS) + 0.5) / RATIOS)[:, None], len(space.keys), axis=1)
         likely, runs = space.coordinates(space.values(share)), table.columns["run"][good]
-        by_ratio = (alone[0].known(each) if alone else np.zeros(1) for each in (points, likely))
+        by_ratio = (single_law[0].values(each) if single_law else np.zeros(1) for each in (points, likely))
         return cls(
-            space, surrogate, runs <= drawn, asked if runs.max() > drawn + len(groups) + 1 else None, logarithmic,
-            float(np.min(bounds, initial=np.inf, where=open_)), int(open_.sum()), int(good.sum()),
+            space, surrogate, runs <= drawn, share_sought if runs.max() > drawn + len(groups) + 1 else None,
+            logarithmic, float(np.min(bounds, initial=np.inf, where=open_)), int(open_.sum()), int(good.sum()),
             1 - float(np.mean(good)), scaled, *by_ratio,
         )  # fmt: skip
 
@@ -296,17 +300,17 @@ def _scaling(study: ParameterStudy) -> list[tuple[str, ...]]:
         return []
     numbers = smooth_numbers(scene_file.read(study.scene, study.settings.set).scene)
     loads = [key for key, number in numbers.items() if isinstance(number.table, (StaticLoad, DofLoad))]
-    moved = {**{key: key for key in study.varied}, **study.settings.same}
+    originals = {**{key: key for key in study.varied}, **study.settings.same}
     groups: list[tuple[str, ...]] = [(COEFFICIENT,)] if COEFFICIENT in study.varied else []
-    if loads and all(key in moved for key in loads):
-        groups.append(tuple(dict.fromkeys(moved[key] for key in loads)))
+    if loads and all(key in originals for key in loads):
+        groups.append(tuple(dict.fromkeys(originals[key] for key in loads)))
     return groups
 
 
-def _half_width(found: LifeFit, sample: Sample, share: float, confidence: float) -> float:
+def _half_width(life_fit: LifeFit, sample: Sample, share: float, confidence: float) -> float:
     """Half the confidence interval of a quantile, relative."""
-    low, high = found.ends(sample, share, share, quantiles.drawn(sample, found.surrogate, share), confidence)
-    if found.logarithmic:
+    low, high = life_fit.ends(sample, share, share, quantiles.drawn(sample, life_fit.surrogate, share), confidence)
+    if life_fit.logarithmic:
         return float(np.exp(0.5 * (high - low)) - 1)
     return float(0.5 * (high - low) / max(abs(sample.quantile(share)), 1e-300))
 
@@ -315,9 +319,9 @@ def _model_error(
     study: ParameterStudy, middle: Mapping[str, float], table: StudyTable, folder: Path, progress: Progress
 ) -> tuple[float | None, str]:
     """Relative error of the model itself, and where it is from."""
-    given, quantity = study.lives.model_error, study.lives.number.removesuffix("_first")
-    if given is not None:
-        return given, "given"
+    stated, quantity = study.lives.model_error, study.lives.number.removesuffix("_first")
+    if stated is not None:
+        return stated, "given"
     if quantity not in names_with_error():
         return None, f"a verdict says nothing about {study.lives.number}"
     errors = np.asarray(table.columns.get(f"{quantity}_error", np.empty(0)), float)
@@ -337,44 +341,46 @@ def _model_error(
 
 
 def _result(
-    study: ParameterStudy, table: StudyTable, found: LifeFit, sample: Sample,
+    study: ParameterStudy, table: StudyTable, life_fit: LifeFit, sample: Sample,
     shares: Sequence[float], error: float | None, source: str,
 ) -> LifeDistribution:  # fmt: skip
-    wanted, body = study.lives, sample
+    settings, body = study.lives, sample
     if shares[0] < RARE:
-        body = Sample.of(found.space, found.surrogate)
-    back = np.exp if found.logarithmic else np.asarray
-    every = []
+        body = Sample.of(life_fit.space, life_fit.surrogate)
+    back = np.exp if life_fit.logarithmic else np.asarray
+    quantile_list = []
     for share in sorted(shares):
         of = sample if share < RARE else body
-        every.append(_quantile(found, of, share, wanted.confidence, error))
+        quantile_list.append(_quantile(life_fit, of, share, settings.confidence, error))
     middle = float(body.mean @ body.weight)
     scatter = float(np.sqrt((body.mean - middle) ** 2 @ body.weight))
     return LifeDistribution(
-        study.name, wanted.number, table, tuple(every), influences(found.space, found.surrogate.mean),
-        wanted.confidence, found.runs, found.open, len(table.columns["run"]) - found.runs, found.scaled,
-        found.surrogate.explained, scatter, found.logarithmic, error, source, back(body.mean), body.weight,
+        study.name, settings.number, table, tuple(quantile_list), influences(life_fit.space, life_fit.surrogate.mean),
+        settings.confidence, life_fit.runs, life_fit.open, len(table.columns["run"]) - life_fit.runs, life_fit.scaled,
+        life_fit.surrogate.explained, scatter, life_fit.logarithmic, error, source, back(body.mean), body.weight,
     )  # fmt: skip
 
 
-def _quantile(found: LifeFit, sample: Sample, share: float, confidence: float, error: float | None) -> Quantile:
+def _quantile(life_fit: LifeFit, sample: Sample, share: float, confidence: float, error: float | None) -> Quantile:
     """One quantile; runs that are missing may all lie below it or all above it."""
-    fewest = max((share - found.failed) / (1 - found.failed), 0.0)
-    most = min(share / (1 - found.failed), 1.0)
+    lowest_share = max((share - life_fit.failed) / (1 - life_fit.failed), 0.0)
+    highest_share = min(share / (1 - life_fit.failed), 1.0)
     ends = []
-    for at, side in ((fewest, 0), (most, 1)):
-        draws = quantiles.drawn(sample, found.surrogate, at)
-        end = found.ends(sample, share, at, draws, confidence)[side]
+    for at, side in ((lowest_share, 0), (highest_share, 1)):
+        draws = quantiles.drawn(sample, life_fit.surrogate, at)
+        end = life_fit.ends(sample, share, at, draws, confidence)[side]
         shares = 0.5 - confidence / 2, 0.5 + confidence / 2
-        moved = np.quantile(_shifted(draws, error, found.logarithmic), shares[side]) - np.quantile(draws, shares[side])
-        ends.append((end, end + float(moved)))
-    back = np.exp if found.logarithmic else float
+        shift = np.quantile(_shifted(draws, error, life_fit.logarithmic), shares[side]) - np.quantile(
+            draws, shares[side]
+        )
+        ends.append((end, end + float(shift)))
+    back = np.exp if life_fit.logarithmic else float
     (own_low, all_low), (own_high, all_high) = ([float(back(end)) for end in side] for side in ends)
-    if fewest == 0 and found.failed:
-        own_low = all_low = 0.0 if found.logarithmic else -np.inf
+    if lowest_share == 0 and life_fit.failed:
+        own_low = all_low = 0.0 if life_fit.logarithmic else -np.inf
     # the median of the draws: the expected function is smoother than what it stands for, and its own quantiles too near
-    value = float(back(np.median(quantiles.drawn(sample, found.surrogate, share))))
-    least = found.at_least(share, own_high, confidence)
+    value = float(back(np.median(quantiles.drawn(sample, life_fit.surrogate, share))))
+    least = life_fit.at_least(share, own_high, confidence)
     return Quantile(share, value, own_low, own_high, all_low, all_high, least)
 
 

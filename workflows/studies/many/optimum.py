@@ -41,7 +41,7 @@ from tribodyn.workflows.studies.study_result import StudyResult
 GAIN = 1e-3  # of an aim, of its logarithm where it is positive and of its range else, that one run more is worth
 MISSED = 1e3  # what a limit that is passed counts beside the aims
 AUGMENTED = 0.05  # share of the sum of aims beside the largest: Knowles 2006
-NEAR = 1e-3  # of the unit cube, within which a proposal is a run that is there already
+SAME_POINT = 1e-3  # of the unit cube, within which a proposal is a run that is there already
 
 
 @dataclass(frozen=True, repr=False)
@@ -50,7 +50,7 @@ class Optimum(StudyResult):
 
     table : of all runs; front : rows of the table that no other allowed one beats in all aims, by the first aim
     best : row of the one nearest to the best of every aim, each between its ends on the front; the best of one aim
-    only : by aim, rows of which only a lower bound is known, such as lives that did not end
+    bounded : by aim, rows of which only a lower bound is known, such as lives that did not end
     """
 
     name: str
@@ -58,7 +58,7 @@ class Optimum(StudyResult):
     table: StudyTable
     front: tuple[int, ...]
     best: int
-    only: dict[str, tuple[int, ...]]
+    bounded: dict[str, tuple[int, ...]]
 
     def values(self, row: int) -> dict[str, float]:
         """Values of the aims in a row of the table; lower bounds count as values."""
@@ -69,7 +69,7 @@ class Optimum(StudyResult):
         return {key: self.table.columns[key][row] for key in self.table.varied}
 
     def _record(self, row: int) -> dict[str, Any]:
-        least = [number for number, rows in self.only.items() if row in rows]
+        least = [number for number, rows in self.bounded.items() if row in rows]
         return {"run": int(self.table.columns[RUN][row]), "keys": self.keys(row), **self.values(row), "at_least": least}
 
     def record(self) -> dict[str, Any]:
@@ -85,19 +85,19 @@ class Optimum(StudyResult):
 
     def lines(self) -> list[str]:
         """For people."""
-        wanted = ", ".join(f"{aim.number} {aim.want}" for aim in self.aims)
-        said = [f"{len(self.table.columns[RUN])} runs, {self.table.count('complete')} complete; wanted: {wanted}"]
+        aims_text = ", ".join(f"{aim.number} {aim.want}" for aim in self.aims)
+        texts = [f"{len(self.table.columns[RUN])} runs, {self.table.count('complete')} complete; wanted: {aims_text}"]
         if len(self.aims) > 1:
-            said.append(f"best trades, {len(self.front)} runs that no other one beats:")
+            texts.append(f"best trades, {len(self.front)} runs that no other one beats:")
         for row in self.front:
             mark = "  <- nearest to the best of every aim" if row == self.best and len(self.front) > 1 else ""
-            said.append(f"  {self._told(row)}{mark}")
-        return self.table.troubles() + said
+            texts.append(f"  {self._describe(row)}{mark}")
+        return self.table.troubles() + texts
 
-    def _told(self, row: int) -> str:
+    def _describe(self, row: int) -> str:
         keys = ", ".join(f"{key} {_short(value)}" for key, value in self.keys(row).items())
         values = ", ".join(
-            f"{number} {'at least ' if row in self.only[number] else ''}{value:.4g}"
+            f"{number} {'at least ' if row in self.bounded[number] else ''}{value:.4g}"
             for number, value in self.values(row).items()
         )
         return f"run {self.table.columns[RUN][row]}: {values}   with {keys}"
@@ -131,44 +131,46 @@ def optimise(
     resume : take the runs that the folder holds already, and what was proposed, and do the others
     Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run keeps the limits, a lost scheduler
     """
-    asked = study_file.read(study)
-    runner = Runner(studies.place(asked, folder), reporter(progress), workers, scheduler, resume)
-    return _search(asked, runner)
+    plan = study_file.read(study)
+    runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, resume)
+    return _search(plan, runner)
 
 
 def _search(study: ParameterStudy, runner: Runner) -> Optimum:
     """Runs where they promise most, until nothing is to be gained or there are as many as may be."""
-    wanted, space = study.optimise, _space(study)
+    optimise_settings, space = study.optimise, _space(study)
     study = replace(study, settings=study.settings.model_copy(update={"derivatives": True}))
-    more: list[dict[str, float]] = []
+    proposals: list[dict[str, float]] = []
     while True:
         table = studies.run(
-            study, replace(runner, resume=runner.resume or bool(more)), more=more, drawn=False, inside=True
+            study, replace(runner, resume=runner.resume or bool(proposals)), added=proposals, drawn=False, inside=True
         )
-        known = _known(study, space, table)
-        if not known.solved.any():
+        evaluated = _evaluate(study, space, table)
+        if not evaluated.solved.any():
             raise SolveFailed(f"no run has all numbers; the first: {table.columns[SENTENCE][0]}")
-        if len(known.share) >= wanted.evaluations:
+        if len(evaluated.share) >= optimise_settings.evaluations:
             break
-        place, gain = propose(known, lambda share: space.coordinates(space.values(share)), study.settings.seed)
+        place, gain = propose(evaluated, lambda share: space.coordinates(space.values(share)), study.settings.seed)
         if gain < GAIN:
             break
-        more.append(space.run_of(space.values(place[None])[0]))
+        proposals.append(space.run_of(space.values(place[None])[0]))
         runner.progress.say(
-            f"{len(known.front)} best trades of {len(known.share)} runs, {int(known.allowed.sum())} allowed"
+            f"{len(evaluated.front)} best trades of {len(evaluated.share)} runs, {int(evaluated.allowed.sum())} allowed"
         )
-    front = known.front
+    front = evaluated.front
     if not len(front):
-        least = known.excess[known.solved].max(axis=1).min()
-        limits = ", ".join(limit.number for limit in wanted.limits)
+        least = evaluated.excess[evaluated.solved].max(axis=1).min()
+        limits = ", ".join(limit.number for limit in optimise_settings.limits)
         raise SolveFailed(f"no run keeps the limits of {limits}: the nearest passes one by {100 * least:.2g} % of it")
-    low, high = ends(known)
-    best = int(front[chebyshev(known.aims[front], np.ones(len(wanted.aims)), low, high).argmin()])
-    only = {aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in wanted.aims}
-    found = Optimum(study.name, wanted.aims, table, tuple(int(row) for row in front), best, only)
-    (runner.folder / "optimum.json").write_text(json.dumps(found.record(), indent=2) + "\n", encoding="utf-8")
-    found.plot().savefig(runner.folder / "optimum.png")
-    return found
+    low, high = ends(evaluated)
+    best = int(front[chebyshev(evaluated.aims[front], np.ones(len(optimise_settings.aims)), low, high).argmin()])
+    bounded = {
+        aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in optimise_settings.aims
+    }
+    optimum = Optimum(study.name, optimise_settings.aims, table, tuple(int(row) for row in front), best, bounded)
+    (runner.folder / "optimum.json").write_text(json.dumps(optimum.record(), indent=2) + "\n", encoding="utf-8")
+    optimum.plot().savefig(runner.folder / "optimum.png")
+    return optimum
 
 
 def _space(study: ParameterStudy) -> ParameterSpace:
@@ -185,10 +187,10 @@ def _space(study: ParameterStudy) -> ParameterSpace:
     return space
 
 
-def _known(study: ParameterStudy, space: ParameterSpace, table: StudyTable) -> EvaluatedRuns:
+def _evaluate(study: ParameterStudy, space: ParameterSpace, table: StudyTable) -> EvaluatedRuns:
     """What the runs say of aims and limits, small values better; a number that is always positive by its logarithm."""
-    wanted, columns = study.optimise, []
-    for aim in wanted.aims:
+    settings, columns = study.optimise, []
+    for aim in settings.aims:
         values, slopes = table.values_of(aim.number)[0], space.slopes_of(table.columns, aim.number)
         good = np.isfinite(values)
         if good.any() and (values[good] > 0).all():
@@ -198,7 +200,7 @@ def _known(study: ParameterStudy, space: ParameterSpace, table: StudyTable) -> E
             values, slopes = values / size, slopes / size
         sign = 1.0 if aim.want == "low" else -1.0
         columns.append((sign * values, sign * slopes))
-    for limit in wanted.limits:
+    for limit in settings.limits:
         values, slopes = table.values_of(limit.number)[0], space.slopes_of(table.columns, limit.number)
         for end, sign in ((limit.low, -1.0), (limit.high, 1.0)):
             if end is not None:
@@ -207,7 +209,7 @@ def _known(study: ParameterStudy, space: ParameterSpace, table: StudyTable) -> E
                 size = sign / (abs(at) or 1.0)
                 columns.append((size * (values - at), size * slopes))
     numbers, by = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
-    m = len(wanted.aims)
+    m = len(settings.aims)
     return EvaluatedRuns(space.shares(space.points_of(table.columns)), numbers[:, :m], numbers[:, m:], by)
 
 
@@ -251,8 +253,8 @@ def best_trades(aims: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     rows = np.flatnonzero(allowed)
     no_better = np.all(aims[rows, None] >= aims[None, rows], axis=2)  # row i against all others
     worse = np.any(aims[rows, None] > aims[None, rows], axis=2)
-    found = rows[~(no_better & worse).any(axis=1)]
-    return found[np.lexsort(aims[found].T[::-1])]
+    front = rows[~(no_better & worse).any(axis=1)]
+    return front[np.lexsort(aims[front].T[::-1])]
 
 
 def weighed(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -266,15 +268,15 @@ def chebyshev(aims: np.ndarray, weights: np.ndarray, low: np.ndarray, high: np.n
     return np.asarray(weighed(aims, weights, low, high).max(axis=-1))
 
 
-def ends(known: EvaluatedRuns) -> tuple[np.ndarray, np.ndarray]:
+def ends(evaluated: EvaluatedRuns) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest values (m,) of the aims along the best trades, of all runs where these are fewer than two."""
-    front = known.front
-    aims = known.aims[front if len(front) > 1 else known.solved]
+    front = evaluated.front
+    aims = evaluated.aims[front if len(front) > 1 else evaluated.solved]
     low, high = aims.min(axis=0), aims.max(axis=0)
     return low, np.where(high > low, high, low + 1.0)
 
 
-def propose(known: EvaluatedRuns, scale: Callable[[np.ndarray], np.ndarray], seed: int) -> tuple[np.ndarray, float]:
+def propose(evaluated: EvaluatedRuns, scale: Callable[[np.ndarray], np.ndarray], seed: int) -> tuple[np.ndarray, float]:
     """A place (k,) in the unit cube for the run that promises most; the same runs and seed propose the same.
 
     scale : places (n, k) -> coordinates (n, k) that surrogates are fitted in
@@ -282,50 +284,54 @@ def propose(known: EvaluatedRuns, scale: Callable[[np.ndarray], np.ndarray], see
         and where few runs without derivatives are solved: then it lies far from all others. A second aim is weighed
         anew for every run
     """
-    share, m = known.share, known.aims.shape[1]
+    share, m = evaluated.share, evaluated.aims.shape[1]
     draw = np.random.default_rng([seed, len(share)])
-    columns, solved = np.concatenate([known.aims, known.excess], axis=1), known.solved
+    columns, solved = np.concatenate([evaluated.aims, evaluated.excess], axis=1), evaluated.solved
     places = qmc.Sobol(share.shape[1], seed=draw).random_base2(8)
     emptiest = places[np.abs(places[:, None] - share).max(axis=2).min(axis=1).argmax()]
-    if not solved.any() or (solved.sum() < FEWEST and not np.isfinite(known.slopes[solved]).any()):
+    if not solved.any() or (solved.sum() < FEWEST and not np.isfinite(evaluated.slopes[solved]).any()):
         return emptiest, np.inf
-    surrogates = [_fitted(scale(share), column, known.slopes[:, i], solved) for i, column in enumerate(columns.T)]
-    low, high = ends(known)
+    surrogates = [_fitted(scale(share), column, evaluated.slopes[:, i], solved) for i, column in enumerate(columns.T)]
+    low, high = ends(evaluated)
     turn = len(share) % (3 * m)  # the ends of the trade in their turns
     weights = np.eye(m)[turn] if turn < m and m > 1 else draw.dirichlet(np.ones(m))
-    least = float(chebyshev(known.aims[known.allowed], weights, low, high).min()) if known.allowed.any() else np.inf
+    least = (
+        float(chebyshev(evaluated.aims[evaluated.allowed], weights, low, high).min())
+        if evaluated.allowed.any()
+        else np.inf
+    )
 
     def expected(places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Aims (n, m) at places (n, k), deviation (n,) of what is made of them, excess (n, q) a deviation higher."""
         at = scale(np.clip(places, 0.0, 1.0))
-        mean, deviation = np.stack([one.mean_and_deviation(at) for one in surrogates], axis=-1)
+        mean, deviation = np.stack([surrogate.mean_and_deviation(at) for surrogate in surrogates], axis=-1)
         return mean[:, :m], chebyshev(deviation[:, :m], weights, np.zeros(m), high - low), (mean + deviation)[:, m:]
 
     def worth(places: np.ndarray, least: float) -> np.ndarray:
         aims, deviation, excess = expected(places)
-        passed = np.maximum(excess, 0).max(axis=1, initial=0.0)
-        return promised(least, chebyshev(aims, weights, low, high), deviation) - MISSED * passed
+        excess_sum = np.maximum(excess, 0).max(axis=1, initial=0.0)
+        return promised(least, chebyshev(aims, weights, low, high), deviation) - MISSED * excess_sum
 
     def margins(z: np.ndarray) -> np.ndarray:
         aims, _, excess = (each[0] for each in expected(z[None, 1:]))
         return np.concatenate([z[0] - weighed(aims, weights, low, high), -excess])
 
     def climbed(start: np.ndarray) -> np.ndarray:
-        found = minimize(
+        solution = minimize(
             lambda z: -promised(least, z[0], expected(z[None, 1:])[1])[0],
             [chebyshev(expected(start[None])[0], weights, low, high)[0], *start], method="SLSQP",
             bounds=[(None, None), *[(0.0, 1.0)] * len(start)], constraints={"type": "ineq", "fun": margins},
         )  # fmt: skip
-        return np.clip(found.x[1:], 0.0, 1.0)
+        return np.clip(solution.x[1:], 0.0, 1.0)
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # steps beyond the bounds
-        places = np.vstack([share[known.front], places])
-        starts = [places[worth(places, beyond).argmax()] for beyond in (least, np.inf)]
+        places = np.vstack([share[evaluated.front], places])
+        starts = [places[worth(places, threshold).argmax()] for threshold in (least, np.inf)]
         places = np.vstack([*starts, *map(climbed, starts)])
         promise = worth(places, least)
     at, gain = places[promise.argmax()], float(np.exp(promise.max()) * (high - low)[0] / (1 + AUGMENTED))
-    if np.abs(share - at).max(axis=1).min() < NEAR:
+    if np.abs(share - at).max(axis=1).min() < SAME_POINT:
         return (at, 0.0) if m == 1 else (emptiest, np.inf)
     return at, gain if m == 1 and np.isfinite(least) else np.inf
 
@@ -340,8 +346,12 @@ def promised(least: float, value: np.ndarray | float, deviation: np.ndarray) -> 
         return -np.broadcast_to(value, deviation.shape)
     deviation = np.maximum(deviation, np.finfo(float).tiny)
     z = (least - value) / deviation
-    below = -np.minimum(np.abs(z), 1e6)  # beyond it all is rounding
-    tail = -(below**2) / 2 - np.log(2 * np.pi) / 2 + np.log1p(below * np.sqrt(np.pi / 2) * erfcx(-below / np.sqrt(2)))
+    distance = -np.minimum(np.abs(z), 1e6)  # beyond it all is rounding
+    tail = (
+        -(distance**2) / 2
+        - np.log(2 * np.pi) / 2
+        + np.log1p(distance * np.sqrt(np.pi / 2) * erfcx(-distance / np.sqrt(2)))
+    )
     return np.asarray(np.log(deviation) + np.where(z > 0, np.log(np.where(z > 0, z, 1.0) + np.exp(tail)), tail))
 
 
@@ -350,8 +360,8 @@ def _fitted(points: np.ndarray, column: np.ndarray, slopes: np.ndarray, solved: 
 
     Source  Forrester, Sobester and Keane 2006, doi 10.1098/rspa.2005.1608
     """
-    found = Surrogate.fitted(points[solved], column[solved], slopes[solved], few=True)
+    surrogate = Surrogate.fitted(points[solved], column[solved], slopes[solved], is_small=True)
     for point in points[~solved]:
-        mean, deviation = found.mean_and_deviation(point[None])
-        found = found.with_run(point, float(mean[0] + deviation[0]))
-    return found
+        mean, deviation = surrogate.mean_and_deviation(point[None])
+        surrogate = surrogate.with_run(point, float(mean[0] + deviation[0]))
+    return surrogate

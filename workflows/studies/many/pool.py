@@ -45,14 +45,14 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], RunRow
     processes = prepared()
     waiting, deaths = deque(tasks), Counter[int]()
     while waiting:
-        alone = deaths[waiting[0].number] > 0
-        limit = 1 if alone else min(workers, len(waiting))
+        one_at_a_time = deaths[waiting[0].number] > 0
+        limit = 1 if one_at_a_time else min(workers, len(waiting))
         pool = ProcessPoolExecutor(limit, processes, _begin)
         under_way: dict[Future[RunRow], Work] = {}
         try:
-            while under_way or (waiting and (deaths[waiting[0].number] > 0) == alone):
+            while under_way or (waiting and (deaths[waiting[0].number] > 0) == one_at_a_time):
                 # no more than there are processes: what is under way when one dies is then known
-                while waiting and len(under_way) < limit and (deaths[waiting[0].number] > 0) == alone:
+                while waiting and len(under_way) < limit and (deaths[waiting[0].number] > 0) == one_at_a_time:
                     task = waiting.popleft()
                     try:
                         under_way[pool.submit(solve, task)] = task
@@ -60,7 +60,9 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], RunRow
                         waiting.appendleft(task)
                         raise
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
-                for future in sorted(done, key=lambda one: isinstance(one.exception(), BrokenProcessPool)):
+                for future in sorted(
+                    done, key=lambda done_future: isinstance(done_future.exception(), BrokenProcessPool)
+                ):
                     row = future.result()
                     del under_way[future]
                     yield row
@@ -70,8 +72,8 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], RunRow
                 if deaths[task.number] < ATTEMPTS:
                     waiting.appendleft(task)
                 else:
-                    told = f"the process that worked on it died {ATTEMPTS} times, it was killed or short of memory"
-                    yield RunRow(task.number, task.key, "lost", told)
+                    sentence = f"the process that worked on it died {ATTEMPTS} times, it was killed or short of memory"
+                    yield RunRow(task.number, task.key, "lost", sentence)
         finally:
             _stop(pool)
 
@@ -131,9 +133,9 @@ def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callabl
     try:
         by_future = {client.submit(solve, task, pure=False, priority=-i): task for i, task in enumerate(tasks)}
         for future in distributed.as_completed(list(by_future), loop=client.loop):
-            task, why = by_future.pop(future), future.exception() if future.status == "error" else None
-            if why is not None:  # the run itself raises nothing: its workers died, or cannot run it at all
-                yield RunRow(task.number, task.key, "lost", " ".join(f"{type(why).__name__}: {why}".split()))
+            task, failure = by_future.pop(future), future.exception() if future.status == "error" else None
+            if failure is not None:  # the run itself raises nothing: its workers died, or cannot run it at all
+                yield RunRow(task.number, task.key, "lost", " ".join(f"{type(failure).__name__}: {failure}".split()))
             elif future.status == "finished":
                 yield future.result()
             else:

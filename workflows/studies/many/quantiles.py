@@ -16,7 +16,7 @@ RARE = 0.01  # shares below this are drawn from a wider distribution
 WIDE = 1.6  # how much wider
 DRAWS = 300  # functions that the surrogate may stand for
 ZONE = 4.0  # standard deviations: points further than this from a quantile lie on their side for sure
-MOST = 1000  # points whose values are drawn jointly
+MAX_DRAWS = 1000  # points whose values are drawn jointly
 GRID = 1024  # values among which ends are looked for
 POINTS = 2**12  # of the Sobol indices, a power of two
 
@@ -60,28 +60,28 @@ def drawn(sample: Sample, surrogate: Surrogate, share: float, draws: int = DRAWS
     their order, are drawn jointly.
     """
     middle = sample.quantile(share)
-    near = np.flatnonzero(np.abs(sample.mean - middle) < ZONE * sample.deviation)
-    if len(near) < 2:
+    neighbours = np.flatnonzero(np.abs(sample.mean - middle) < ZONE * sample.deviation)
+    if len(neighbours) < 2:
         return np.full(draws, middle)
-    step = -(-len(near) // MOST)
-    chosen = near[step // 2 :: step]
+    step = -(-len(neighbours) // MAX_DRAWS)
+    chosen = neighbours[step // 2 :: step]
     sure = np.ones(len(sample.mean), bool)
-    sure[near] = False
-    below = float(sample.weight[sure & (sample.mean < middle)].sum())
-    weight = sample.weight[chosen] * (sample.weight[near].sum() / sample.weight[chosen].sum())
-    own = np.clip((share - below) / weight.sum(), 0.0, 1.0)
+    sure[neighbours] = False
+    n_below = float(sample.weight[sure & (sample.mean < middle)].sum())
+    weight = sample.weight[chosen] * (sample.weight[neighbours].sum() / sample.weight[chosen].sum())
+    own_deviation = np.clip((share - n_below) / weight.sum(), 0.0, 1.0)
     values = sample.mean[chosen] + surrogate.departures(sample.coordinates[chosen], draws, seed)
     # thinned out, the chosen points have a quantile of their own: only how the draws differ from it counts
-    offset = middle - weighted_quantile(sample.mean[chosen], weight / weight.sum(), own)
-    found = np.empty(draws)
+    offset = middle - weighted_quantile(sample.mean[chosen], weight / weight.sum(), own_deviation)
+    quantile_draws = np.empty(draws)
     for i, row in enumerate(values):
         order = np.argsort(row)
-        found[i] = offset + weighted_quantile(row[order], weight[order] / weight.sum(), own)
-    return found
+        quantile_draws[i] = offset + weighted_quantile(row[order], weight[order] / weight.sum(), own_deviation)
+    return quantile_draws
 
 
 def counted(
-    sample: Sample, values: np.ndarray, said: np.ndarray, share: float, confidence: float
+    sample: Sample, values: np.ndarray, predictions: np.ndarray, share: float, confidence: float
 ) -> tuple[float, float]:
     """Ends of a quantile that hold however the runs depend on the points, also where they jump.
 
@@ -95,15 +95,17 @@ def counted(
     Source  Angelopoulos et al. 2023, doi 10.1126/science.adi6000: prediction-powered quantiles
     """
     thinned = sample.mean[:: max(len(sample.mean) // GRID, 1)]
-    at = np.unique(np.concatenate([thinned, values.ravel(), said.ravel()]))
-    own, others = (np.array([np.searchsorted(np.sort(x), at, side="right") for x in each]) for each in (values, said))
-    off = (own - others) / values.shape[1]  # runs x values
-    below = np.interp(at, sample.mean, np.cumsum(sample.weight)) + off.mean(axis=0)
+    at = np.unique(np.concatenate([thinned, values.ravel(), predictions.ravel()]))
+    run_values, remaining = (
+        np.array([np.searchsorted(np.sort(x), at, side="right") for x in each]) for each in (values, predictions)
+    )
+    off = (run_values - remaining) / values.shape[1]  # runs x values
+    n_below = np.interp(at, sample.mean, np.cumsum(sample.weight)) + off.mean(axis=0)
     width = stats.norm.ppf(0.5 + confidence / 2) * off.std(axis=0, ddof=1) / np.sqrt(len(values))
-    low = high = int(np.argmax(below >= share))
-    while low > 0 and below[low] + width[low] >= share:
+    low = high = int(np.argmax(n_below >= share))
+    while low > 0 and n_below[low] + width[low] >= share:
         low -= 1
-    while high < len(at) - 1 and below[high] - width[high] <= share:
+    while high < len(at) - 1 and n_below[high] - width[high] <= share:
         high += 1
     return float(at[low]), float(at[high])
 
@@ -115,13 +117,13 @@ def next_runs(sample: Sample, surrogate: Surrogate, share: float, count: int) ->
     10.1016/j.strusafe.2011.01.002; several at a time by taking expected values as found (kriging believer)
     """
     middle = sample.quantile(share)
-    candidates = np.argsort(-_gain(sample.weight, sample.mean, sample.deviation, middle))[:MOST]
+    candidates = np.argsort(-_gain(sample.weight, sample.mean, sample.deviation, middle))[:MAX_DRAWS]
     chosen: list[int] = []
     for _ in range(count):
         mean, deviation = surrogate.mean_and_deviation(sample.coordinates[candidates])
-        own = _gain(sample.weight[candidates], mean, deviation, middle)
-        own[chosen] = -1.0
-        best = int(np.argmax(own))
+        own_deviation = _gain(sample.weight[candidates], mean, deviation, middle)
+        own_deviation[chosen] = -1.0
+        best = int(np.argmax(own_deviation))
         chosen.append(best)
         surrogate = surrogate.with_run(sample.coordinates[candidates[best]], float(mean[best]))
     return sample.points[candidates[chosen]]
@@ -145,7 +147,7 @@ class Influence:
     total: float
 
     @property
-    def left(self) -> float:
+    def remaining(self) -> float:
         """Share of the standard deviation that stays when the key is measured."""
         return float(np.sqrt(max(1 - self.first, 0.0)))
 
@@ -165,11 +167,15 @@ def influences(space: ParameterSpace, mean: Callable[[np.ndarray], np.ndarray], 
     else:
         first, total = np.empty(k), np.empty(k)
         for i, key in enumerate(space.keys):
-            others = [other for other in space.keys if other != key]
-            first[i] = _indices(_ordered(space, [key, *others]), _as_before(space, mean, [key, *others]), seed)[0][0]
-            total[i] = _indices(_ordered(space, [*others, key]), _as_before(space, mean, [*others, key]), seed)[1][-1]
-    found = [Influence(key, float(a), float(b)) for key, a, b in zip(space.keys, first, total, strict=True)]
-    return tuple(sorted(found, key=lambda one: -one.first))
+            remaining = [other for other in space.keys if other != key]
+            first[i] = _indices(_ordered(space, [key, *remaining]), _as_before(space, mean, [key, *remaining]), seed)[
+                0
+            ][0]
+            total[i] = _indices(_ordered(space, [*remaining, key]), _as_before(space, mean, [*remaining, key]), seed)[
+                1
+            ][-1]
+    indices = [Influence(key, float(a), float(b)) for key, a, b in zip(space.keys, first, total, strict=True)]
+    return tuple(sorted(indices, key=lambda influence: -influence.first))
 
 
 def _indices(
@@ -183,8 +189,8 @@ def _indices(
         return mean(space.coordinates(space.values(share.T)))[None]
 
     shares = [stats.uniform(0, 1)] * len(space.keys)
-    found = stats.sobol_indices(func=function, n=POINTS, dists=shares, random_state=np.random.default_rng(seed))
-    return np.clip(found.first_order.ravel(), 0, 1), np.clip(found.total_order.ravel(), 0, 1)
+    indices = stats.sobol_indices(func=function, n=POINTS, dists=shares, random_state=np.random.default_rng(seed))
+    return np.clip(indices.first_order.ravel(), 0, 1), np.clip(indices.total_order.ravel(), 0, 1)
 
 
 def _ordered(space: ParameterSpace, keys: list[str]) -> ParameterSpace:

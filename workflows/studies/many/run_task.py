@@ -48,8 +48,8 @@ class StudyRun:
     def key(self) -> str:
         """Hash of all that the row depends on: scene, overrides, contents of the files that they name, version."""
         content = hashlib.sha256(repr((__version__, self.text, self.overrides, self.slopes)).encode())
-        said = [tomllib.loads(self.text), *(one.partition("=")[2].strip(" \"'") for one in self.overrides)]
-        content.update(repr(digests(said, self.folder)).encode())
+        tables = [tomllib.loads(self.text), *(override.partition("=")[2].strip(" \"'") for override in self.overrides)]
+        content.update(repr(digests(tables, self.folder)).encode())
         return content.hexdigest()
 
     def scene(self) -> SceneFile:
@@ -81,8 +81,8 @@ def solve(task: StudyRun) -> RunRow:
     start = time.perf_counter()
 
     def ended(status: Status, sentence: object, numbers: dict[str, float] | None = None) -> RunRow:
-        told = " ".join(str(sentence).split())
-        return RunRow(task.number, task.key, status, told, numbers or {}, time.perf_counter() - start)
+        text = " ".join(str(sentence).split())
+        return RunRow(task.number, task.key, status, text, numbers or {}, time.perf_counter() - start)
 
     with _one_at_a_time:
         try:
@@ -103,8 +103,8 @@ def solve(task: StudyRun) -> RunRow:
         except Exception as error:  # one run that nobody foresaw does not stop the others
             return ended("failed", f"{type(error).__name__}: {error}")
         frf = result.response
-        why = frf.no_peak(frf.output_names[0]) if frf is not None and numbers.get("peak_at_end") else ""
-        return ended("complete", f"{result.state}; no peak: {why}" if why else result.state, numbers)
+        reason = frf.no_peak(frf.output_names[0]) if frf is not None and numbers.get("peak_at_end") else ""
+        return ended("complete", f"{result.state}; no peak: {reason}" if reason else result.state, numbers)
 
 
 def slope_column(number: str, key: str) -> str:

@@ -150,8 +150,8 @@ class ParameterStudy:
     @property
     def scene(self) -> str:
         """Name or path of the scene."""
-        beside = self.folder / self.settings.scene
-        return str(beside) if beside.suffix == ".toml" and beside.is_file() else self.settings.scene
+        path = self.folder / self.settings.scene
+        return str(path) if path.suffix == ".toml" and path.is_file() else self.settings.scene
 
 
 def read(study: AnyPath | Mapping[str, Any]) -> ParameterStudy:
@@ -168,8 +168,8 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> ParameterStudy:
     leaves = dict(_leaves(file.vary))
     if not leaves:
         raise SceneError(f'{label}: vary is empty, give keys of the scene such as "contact.friction" = [0.3, 0.5]')
-    given = (*leaves, *file.study.set, *file.study.same)
-    if any(key.partition("=")[0].strip() == "solver.threads" for key in given):
+    changed_keys = (*leaves, *file.study.set, *file.study.same)
+    if any(key.partition("=")[0].strip() == "solver.threads" for key in changed_keys):
         raise SceneError(f"{label}: solver.threads: every run has one thread, say by --workers how many run at a time")
     varied = {key: _read(key, value, file.study.design, label) for key, value in leaves.items()}
     design, lengths = file.study.design, {key: len(v) for key, v in varied.items() if isinstance(v, tuple)}
@@ -193,11 +193,11 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> ParameterStudy:
 
 def _leaves(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
     """Dotted keys with their values: `contact.friction = ...` and `"contact.friction" = ...` are the same."""
-    found = []
+    leaves = []
     for name, value in table.items():
         inner = isinstance(value, Mapping) and "distribution" not in value
-        found += _leaves(value, f"{before}{name}.") if inner else [(f"{before}{name}", value)]
-    return found
+        leaves += _leaves(value, f"{before}{name}.") if inner else [(f"{before}{name}", value)]
+    return leaves
 
 
 def _read(key: str, value: Any, design: str, label: str) -> tuple[Any, ...] | Marginal:

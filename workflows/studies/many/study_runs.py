@@ -69,8 +69,8 @@ def grid(
     retry : resume, and do failed runs again
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
-    asked = study_file.read(study)
-    return run(asked, Runner(place(asked, folder), reporter(progress), workers, scheduler, resume or retry, retry))
+    plan = study_file.read(study)
+    return run(plan, Runner(place(plan, folder), reporter(progress), workers, scheduler, resume or retry, retry))
 
 
 def place(study: ParameterStudy, folder: AnyPath | None) -> Path:
@@ -79,7 +79,11 @@ def place(study: ParameterStudy, folder: AnyPath | None) -> Path:
 
 
 def run(
-    study: ParameterStudy, runner: Runner, more: Sequence[dict[str, Any]] = (), drawn: bool = True, inside: bool = False
+    study: ParameterStudy,
+    runner: Runner,
+    added: Sequence[dict[str, Any]] = (),
+    drawn: bool = True,
+    inside: bool = False,
 ) -> StudyTable:
     """Do the runs of a study, and leave its tables and pictures in a folder.
 
@@ -89,7 +93,7 @@ def run(
     """
     if not (runner.scheduler or inside):
         pool.prepared()  # imports while the runs are read
-    folder, varied = runner.folder, [*parameter_space.runs(study), *more]
+    folder, varied = runner.folder, [*parameter_space.runs(study), *added]
     tasks, refused = _tasks(study, varied)
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
@@ -97,13 +101,13 @@ def run(
         try:
             finish(tasks, runner, rows, solve, inside=inside)
         finally:
-            found = table(study.name, varied, rows, folder) if rows else None
-            if found is not None:
-                write(found, folder)
-        assert found is not None
-        if drawn and study_pictures.shown(found):
-            found.plot().savefig(folder / "study.png")
-    return found
+            study_table = table(study.name, varied, rows, folder) if rows else None
+            if study_table is not None:
+                write(study_table, folder)
+        assert study_table is not None
+        if drawn and study_pictures.shown(study_table):
+            study_table.plot().savefig(folder / "study.png")
+    return study_table
 
 
 def finish(
@@ -111,42 +115,44 @@ def finish(
     runner: Runner,
     rows: dict[int, RunRow],
     solve: Callable[[Work], RunRow],
-    what: str = "runs",
+    noun: str = "runs",
     inside: bool = False,
 ) -> None:
     """Do what the folder does not hold already: every row is on disk, and in `rows`, as it comes; see `run`."""
     progress, scheduler, resume = runner.progress, runner.scheduler, runner.resume
     journal, refused = Journal(runner.folder), len(rows)
-    earlier, again = journal.rows() if resume else {}, ("lost", "failed") if runner.retry else ("lost",)
-    known = [replace(earlier[task.key], run=task.number) for task in tasks if task.key in earlier]
-    known = [row for row in known if row.status not in again]
-    rows |= {row.run: row for row in known}
+    earlier, repeated = journal.rows() if resume else {}, ("lost", "failed") if runner.retry else ("lost",)
+    finished_rows = [replace(earlier[task.key], run=task.number) for task in tasks if task.key in earlier]
+    finished_rows = [row for row in finished_rows if row.status not in repeated]
+    rows |= {row.run: row for row in finished_rows}
     # rows that are not asked for now stay too: a study that is larger may
-    previous = journal.begin((earlier | {row.key: row for row in known}).values(), resume)
+    previous = journal.begin((earlier | {row.key: row for row in finished_rows}).values(), resume)
     if previous:
         progress.say(f"the rows that were here are now {previous}")
     if resume:
-        progress.say(f"{len(known)} of {len(tasks) + refused} {what} are done already")
-    left = [task for task in tasks if task.number not in rows]
+        progress.say(f"{len(finished_rows)} of {len(tasks) + refused} {noun} are done already")
+    remaining = [task for task in tasks if task.number not in rows]
     count = runner.workers or usable(sys.maxsize)
-    if left:
-        where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(left))} processes"
-        progress.say(f"{len(left)} {what} on {where}, one thread for each")
-    with progress.track(f"{len(left)} {what}") as advance:
-        if not left:
+    if remaining:
+        where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(remaining))} processes"
+        progress.say(f"{len(remaining)} {noun} on {where}, one thread for each")
+    with progress.track(f"{len(remaining)} {noun}") as advance:
+        if not remaining:
             coming: Iterator[RunRow] = iter(())
         elif scheduler:
-            coming = pool.on_cluster(left, scheduler, count, solve)
+            coming = pool.on_cluster(remaining, scheduler, count, solve)
         else:
-            coming = _here(left, solve) if inside and count == 1 else pool.finished(left, count, solve)
+            coming = (
+                _in_this_process(remaining, solve) if inside and count == 1 else pool.finished(remaining, count, solve)
+            )
         for done, row in enumerate(coming, 1):
             journal.add(row)
             rows[row.run] = row
-            bad = sum(one.status != "complete" for one in rows.values())
-            advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
+            bad = sum(finished_row.status != "complete" for finished_row in rows.values())
+            advance(done / len(remaining), f"{done} of {len(remaining)}{f', {bad} not complete' if bad else ''}")
 
 
-def _here(tasks: Sequence[Work], solve: Callable[[Work], RunRow]) -> Iterator[RunRow]:
+def _in_this_process(tasks: Sequence[Work], solve: Callable[[Work], RunRow]) -> Iterator[RunRow]:
     with limited(1), kept.at_hand():
         yield from map(solve, tasks)
 
@@ -158,8 +164,8 @@ def task_at(study: ParameterStudy, values: Mapping[str, Any]) -> StudyRun:
 
 
 def _overrides(study: ParameterStudy, values: Mapping[str, Any]) -> list[str]:
-    every = {**values, **{copy: values[original] for copy, original in study.settings.same.items()}}
-    return [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in every.items()]
+    values_by_key = {**values, **{copy: values[original] for copy, original in study.settings.same.items()}}
+    return [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in values_by_key.items()]
 
 
 def _tasks(study: ParameterStudy, varied: Sequence[dict[str, Any]]) -> tuple[list[StudyRun], dict[int, RunRow]]:

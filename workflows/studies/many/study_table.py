@@ -89,16 +89,18 @@ class StudyTable(StudyResult):
 
         Number -> key -> correlation; what does not vary or has fewer than FEWEST values is left out
         """
-        found: dict[str, dict[str, float]] = {}
+        correlations: dict[str, dict[str, float]] = {}
         for number in self.computed:
             for key in self.varied if not number.startswith("d ") else ():
                 x, y = self.columns[key], self.columns[number]
                 if x.dtype.kind != "f":
                     continue
-                there = np.isfinite(x) & np.isfinite(y)
-                if there.sum() >= FEWEST and np.ptp(x[there]) > 0 and np.ptp(y[there]) > 0:
-                    found.setdefault(number, {})[key] = float(stats.spearmanr(x[there], y[there]).statistic)
-        return found
+                is_finite = np.isfinite(x) & np.isfinite(y)
+                if is_finite.sum() >= FEWEST and np.ptp(x[is_finite]) > 0 and np.ptp(y[is_finite]) > 0:
+                    correlations.setdefault(number, {})[key] = float(
+                        stats.spearmanr(x[is_finite], y[is_finite]).statistic
+                    )
+        return correlations
 
     @property
     def files(self) -> list[Path]:
@@ -120,12 +122,12 @@ class StudyTable(StudyResult):
                 lines.append(f"{number:14} rank correlation with {', '.join(f'{k} {rank:+.2f}' for k, rank in ranks)}")
         return lines
 
-    def troubles(self, most: int = 5) -> list[str]:
+    def troubles(self, max_lines: int = 5) -> list[str]:
         """The first runs that are not complete, with their sentences."""
         columns = self.columns
         bad = [i for i, status in enumerate(columns[STATUS]) if status != "complete"]
-        lines = [f"run {columns[RUN][i]} {columns[STATUS][i]}: {columns[SENTENCE][i]}" for i in bad[:most]]
-        return lines + ([f"... and {len(bad) - most} more, in the table"] if len(bad) > most else [])
+        lines = [f"run {columns[RUN][i]} {columns[STATUS][i]}: {columns[SENTENCE][i]}" for i in bad[:max_lines]]
+        return lines + ([f"... and {len(bad) - max_lines} more, in the table"] if len(bad) > max_lines else [])
 
     def to_pandas(self) -> pd.DataFrame:
         """The table as a DataFrame with the runs as its index."""
@@ -152,8 +154,8 @@ def table(
     keys = tuple(varied[0])
     for key in keys:
         columns[key] = _values([run[key] for run in varied], [n - 1 for n in numbers])
-    known = dict.fromkeys(name for n in numbers for name in rows[n].numbers)
-    for column in _ordered(known):
+    names = dict.fromkeys(name for n in numbers for name in rows[n].numbers)
+    for column in _ordered(names):
         columns[column] = np.array([rows[n].numbers.get(column, np.nan) for n in numbers])
     return StudyTable(name, columns, keys, folder)
 
@@ -173,13 +175,13 @@ def _values(values: Sequence[Any], chosen: Sequence[int]) -> np.ndarray:
     return np.array([str(values[i]) for i in chosen], dtype=object)
 
 
-def write(found: StudyTable, folder: Path) -> None:
+def write(study: StudyTable, folder: Path) -> None:
     """Write study.csv; the same table gives the same bytes."""
-    with replacing(folder / "study.csv") as new, new.open("w", encoding="utf-8", newline="") as file:
+    with replacing(folder / "study.csv") as path, path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(found.columns)
-        for i in range(len(found.columns[RUN])):
-            writer.writerow([_cell(column[i]) for column in found.columns.values()])
+        writer.writerow(study.columns)
+        for i in range(len(study.columns[RUN])):
+            writer.writerow([_cell(column[i]) for column in study.columns.values()])
 
 
 def _cell(value: Any) -> str:
@@ -196,15 +198,15 @@ class Journal:
 
     def rows(self) -> dict[str, RunRow]:
         """Rows by their keys; a last line that was torn when the study was killed is left out."""
-        found: dict[str, RunRow] = {}
+        rows_by_key: dict[str, RunRow] = {}
         if self.path.exists():
             for line in self.path.read_text(encoding="utf-8").splitlines():
                 try:
                     row = RunRow(**json.loads(line))
                 except (ValueError, TypeError):
                     continue
-                found[row.key] = row
-        return found
+                rows_by_key[row.key] = row
+        return rows_by_key
 
     def begin(self, rows: Iterable[RunRow], resume: bool) -> Path | None:
         """Begin with rows that are there already; returns where an earlier journal is now, None if none was."""

@@ -36,18 +36,18 @@ def covariance(log: np.ndarray, a: np.ndarray, i: np.ndarray, b: np.ndarray, j: 
     d = (a[:, None] - b[None]) / length
     r = np.sqrt(5 * np.einsum("nmk,nmk->nm", d, d))
     fall = variance * np.exp(-r)
-    found = np.asarray(fall * (1 + r + r**2 / 3) + trend * (1 + a @ b.T))
+    blocks = np.asarray(fall * (1 + r + r**2 / 3) + trend * (1 + a @ b.T))
     n, m = np.flatnonzero(i >= 0), np.flatnonzero(j >= 0)
     slope = 5 / 3 * fall * (1 + r)
     by_i = d[n, :, i[n]] / length[i[n], None]  # (n, m) the own coordinate's distance over its length squared
     by_j = d[:, m, j[m]] / length[j[m]]
-    found[n] = trend * b.T[i[n]] - slope[n] * by_i
-    found[:, m] = trend * a[:, j[m]] + slope[:, m] * by_j
-    both = np.ix_(n, m)
-    same = i[n, None] == j[m]
-    own = same * (slope[both] / length[i[n], None] ** 2 + trend)
-    found[both] = own - 25 / 3 * fall[both] * by_i[:, m] * by_j[n]
-    return found
+    blocks[n] = trend * b.T[i[n]] - slope[n] * by_i
+    blocks[:, m] = trend * a[:, j[m]] + slope[:, m] * by_j
+    product = np.ix_(n, m)
+    is_same = i[n, None] == j[m]
+    diagonal = is_same * (slope[product] / length[i[n], None] ** 2 + trend)
+    blocks[product] = diagonal - 25 / 3 * fall[product] * by_i[:, m] * by_j[n]
+    return blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +57,14 @@ class Law:
     direction: np.ndarray
     slope: float
 
-    def along(self, points: np.ndarray) -> np.ndarray:
+    def coordinate(self, points: np.ndarray) -> np.ndarray:
         """(n,) how many times the direction points (n, k) lie from the plane that is left for a process."""
-        moved = self.direction != 0
-        return np.asarray((points[:, moved] / self.direction[moved]).mean(axis=1))
+        shifted = self.direction != 0
+        return np.asarray((points[:, shifted] / self.direction[shifted]).mean(axis=1))
 
-    def known(self, points: np.ndarray) -> np.ndarray:
-        """(n,) what values there have from the law."""
-        return self.slope * self.along(points)
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """(n,) part of the values at points that the law gives."""
+        return self.slope * self.coordinate(points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,38 +93,38 @@ class Surrogate:
         values: np.ndarray,
         slopes: np.ndarray | None = None,
         laws: tuple[Law, ...] = (),
-        few: bool = False,
+        is_small: bool = False,
     ) -> Surrogate:
         """The most likely process: coordinates (n, k) of order 1, values (n,), derivatives (n, k) or nan.
 
         Of a number that has laws no derivatives are taken.
 
-        few : where fewer than FEWEST numbers are known, a process that is nearly linear
-        Raises  ValueError where fewer are known, and `few` is not asked for
+        is_small : where fewer than FEWEST numbers are known, a process that is nearly linear
+        Raises  ValueError where fewer are known, and `is_small` is not asked for
         Source  Rasmussen and Williams 2006, eq. 2.30
         """
         slopes = np.full(points.shape, np.nan) if slopes is None else slopes
-        known = len(values) + int(np.isfinite(slopes).sum())
-        if known < FEWEST and not few:
-            raise Refusal(f"{known} numbers of runs are known, a surrogate needs {FEWEST} at least")
-        left = values - sum(law.known(points) for law in laws)
-        middle, width = float(np.mean(left)), float(np.std(left)) or 1.0
+        by_law = len(values) + int(np.isfinite(slopes).sum())
+        if by_law < FEWEST and not is_small:
+            raise Refusal(f"{by_law} numbers of runs are known, a surrogate needs {FEWEST} at least")
+        residual = values - sum(law.values(points) for law in laws)
+        middle, width = float(np.mean(residual)), float(np.std(residual)) or 1.0
         k = points.shape[1]
         bounds = [*BOUNDS[:3], *[BOUNDS[3]] * k]
 
         def unlikely(log: np.ndarray) -> float:
-            tried = cls(log, points, values, slopes, laws, middle, width)
+            candidates = cls(log, points, values, slopes, laws, middle, width)
             try:
-                root, alpha = tried._conditioned
+                root, alpha = candidates._conditioned
             except np.linalg.LinAlgError:
                 return 1e6
-            return float(0.5 * tried._given @ alpha + np.log(np.diag(root)).sum())
+            return float(0.5 * candidates._targets @ alpha + np.log(np.diag(root)).sum())
 
         # derivatives leave little doubt of lengths; where little is known they are long, and the process nearly linear
-        lengths = STARTS[2:] if known < FEWEST else STARTS[:1] if np.isfinite(slopes).any() else STARTS
+        lengths = STARTS[2:] if by_law < FEWEST else STARTS[:1] if np.isfinite(slopes).any() else STARTS
         starts = [np.array([0.0, -3.0, -9.0, *[length] * k]) for length in lengths]
         climb = partial(minimize, unlikely, method="L-BFGS-B", bounds=bounds, tol=LIKELY)
-        likely = min(map(climb, starts), key=lambda one: one.fun).x if known >= FEWEST else starts[0]
+        likely = min(map(climb, starts), key=lambda known_law: known_law.fun).x if by_law >= FEWEST else starts[0]
         fitted = cls(likely, points, values, slopes, laws, middle, width)
         spread, missed = fitted._leaving_out
         return replace(fitted, stretch=max(1.0, float(np.sqrt(np.mean(missed**2 / spread)))))
@@ -137,30 +137,30 @@ class Surrogate:
         return np.concatenate([np.arange(n), run]), np.concatenate([np.full(n, -1), by])
 
     @property
-    def _given(self) -> np.ndarray:
+    def _targets(self) -> np.ndarray:
         run, by = self._rows
-        left = self.values - self.known(self.points) - self.middle
-        return np.where(by < 0, left[run], self.slopes[run, by]) / self.width
+        remaining = self.values - self.values_by_laws(self.points) - self.middle
+        return np.where(by < 0, remaining[run], self.slopes[run, by]) / self.width
 
-    def known(self, points: np.ndarray) -> np.ndarray:
-        """(n,) what the laws say."""
-        return np.asarray(sum((law.known(points) for law in self.laws), start=np.zeros(len(points))))
+    def values_by_laws(self, points: np.ndarray) -> np.ndarray:
+        """(n,) values that the laws give."""
+        return np.asarray(sum((law.values(points) for law in self.laws), start=np.zeros(len(points))))
 
-    def _own(self, points: np.ndarray) -> np.ndarray:
+    def _coordinates(self, points: np.ndarray) -> np.ndarray:
         """Coordinates of the process."""
         for law in self.laws:
-            points = points - law.along(points)[:, None] * law.direction
+            points = points - law.coordinate(points)[:, None] * law.direction
         return points
 
     @cached_property
     def _conditioned(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower root L of the covariance of what is known, and that covariance's inverse times what it is."""
         run, by = self._rows
-        at = self._own(self.points)[run]
-        own = covariance(self.log, at, by, at, by)
-        own[np.diag_indices_from(own)] += np.exp(self.log[2]) + JITTER * np.exp(self.log[0])
-        root = np.linalg.cholesky(own)
-        return root, sla.cho_solve((root, True), self._given)
+        at = self._coordinates(self.points)[run]
+        values = covariance(self.log, at, by, at, by)
+        values[np.diag_indices_from(values)] += np.exp(self.log[2]) + JITTER * np.exp(self.log[0])
+        root = np.linalg.cholesky(values)
+        return root, sla.cho_solve((root, True), self._targets)
 
     @cached_property
     def _leaving_out(self) -> tuple[np.ndarray, np.ndarray]:
@@ -172,9 +172,9 @@ class Surrogate:
         inverse, run = sla.cho_solve((root, True), np.eye(len(root))), self._rows[0]
         spread, missed = np.empty(len(self.values)), np.empty(len(self.values))
         for i in range(len(self.values)):
-            own = np.flatnonzero(run == i)  # its value first
-            block = np.linalg.inv(inverse[np.ix_(own, own)])
-            spread[i], missed[i] = block[0, 0], block[0] @ alpha[own]
+            run_values = np.flatnonzero(run == i)  # its value first
+            block = np.linalg.inv(inverse[np.ix_(run_values, run_values)])
+            spread[i], missed[i] = block[0, 0], block[0] @ alpha[run_values]
         return spread, missed
 
     @property
@@ -189,8 +189,10 @@ class Surrogate:
 
     def with_run(self, point: np.ndarray, value: float) -> Surrogate:
         """The same process with one run more, nothing fitted again."""
-        more = np.vstack([self.slopes, np.full(len(point), np.nan)])
-        return replace(self, points=np.vstack([self.points, point]), values=np.append(self.values, value), slopes=more)
+        extended = np.vstack([self.slopes, np.full(len(point), np.nan)])
+        return replace(
+            self, points=np.vstack([self.points, point]), values=np.append(self.values, value), slopes=extended
+        )
 
     def mean(self, points: np.ndarray) -> np.ndarray:
         """Expected values (n,)."""
@@ -201,31 +203,33 @@ class Surrogate:
         root, alpha = self._conditioned
         means, deviations = [], []
         for part in _blocks(points):
-            seen = self._seen(part)
-            known = sla.solve_triangular(root, seen.T, lower=True)
-            size = 1 + (self._own(part) ** 2).sum(axis=1)
-            own = np.exp(self.log[0]) + np.exp(self.log[1]) * size
-            means.append(seen @ alpha)
-            deviations.append(np.sqrt(np.maximum(own - np.einsum("mn,mn->n", known, known), 0.0)))
+            cross = self._covariance_with_runs(part)
+            by_law = sla.solve_triangular(root, cross.T, lower=True)
+            size = 1 + (self._coordinates(part) ** 2).sum(axis=1)
+            prior = np.exp(self.log[0]) + np.exp(self.log[1]) * size
+            means.append(cross @ alpha)
+            deviations.append(np.sqrt(np.maximum(prior - np.einsum("mn,mn->n", by_law, by_law), 0.0)))
         scale = self.width * self.stretch
-        expected = self.known(points) + self.middle + self.width * np.concatenate(means)
+        expected = self.values_by_laws(points) + self.middle + self.width * np.concatenate(means)
         return expected, scale * np.concatenate(deviations)
 
     def departures(self, points: np.ndarray, draws: int, seed: int = 0) -> np.ndarray:
         """(draws, n) drawn jointly: how far the function may lie from its expected values."""
         value = np.full(len(points), -1)
-        known = sla.solve_triangular(self._conditioned[0], self._seen(points).T, lower=True)
-        own = self._own(points)
-        left = covariance(self.log, own, value, own, value) - known.T @ known
-        values, vectors = np.linalg.eigh(left)
+        mean = sla.solve_triangular(self._conditioned[0], self._covariance_with_runs(points).T, lower=True)
+        run_values = self._coordinates(points)
+        residual = covariance(self.log, run_values, value, run_values, value) - mean.T @ mean
+        values, vectors = np.linalg.eigh(residual)
         normal = np.random.default_rng(seed).standard_normal((draws, len(points)))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         return np.asarray(self.width * self.stretch * normal @ root.T)
 
-    def _seen(self, points: np.ndarray) -> np.ndarray:
+    def _covariance_with_runs(self, points: np.ndarray) -> np.ndarray:
         """(n, n_known) covariance of values at points with what is known."""
         run, by = self._rows
-        return covariance(self.log, self._own(points), np.full(len(points), -1), self._own(self.points)[run], by)
+        return covariance(
+            self.log, self._coordinates(points), np.full(len(points), -1), self._coordinates(self.points)[run], by
+        )
 
 
 def _blocks(points: np.ndarray) -> list[np.ndarray]:

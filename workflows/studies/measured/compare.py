@@ -64,37 +64,37 @@ class MeasurementComparison(StudyResult):
     band: Mapping[str, tuple[ComparedRun, ...]]
 
     @property
-    def along(self) -> str:
+    def abscissa(self) -> str:
         """Column over which the others are compared."""
         return {"response": "frequency_hz", "backbone": "amplitude_m", "modes": "number"}[self.measured.kind]
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each measured point; `X` measured, `computed_X`, `X_difference` (relative, of a phase absolute)."""
-        found = []
-        for k, one in enumerate(self.runs):
-            measured, computed = self._columns(one.measured), self._columns(one.computed)
-            columns: dict[str, np.ndarray] = {self.along: measured.pop(self.along)}
+        table = []
+        for k, run in enumerate(self.runs):
+            measured, computed = self._columns(run.measured), self._columns(run.computed)
+            columns: dict[str, np.ndarray] = {self.abscissa: measured.pop(self.abscissa)}
             for name, values in measured.items():
                 columns |= {name: values, f"computed_{name}": computed[name]}
-                columns[f"{name}_difference"] = _apart(name, values, computed[name])
+                columns[f"{name}_difference"] = _difference(name, values, computed[name])
                 if self.band:
-                    every = [computed[name], *(self._columns(b[k].computed)[name] for b in self.band.values())]
-                    columns |= {f"least_{name}": np.min(every, axis=0), f"most_{name}": np.max(every, axis=0)}
-            for name, errors in self._errors(one.measured).items():
+                    variants = [computed[name], *(self._columns(b[k].computed)[name] for b in self.band.values())]
+                    columns |= {f"least_{name}": np.min(variants, axis=0), f"most_{name}": np.max(variants, axis=0)}
+            for name, errors in self._errors(run.measured).items():
                 columns[f"{name}_scatter"] = errors
             rows = np.array([*columns.values()]).T
-            found += [{"run": one.measured.name, **dict(zip(columns, map(float, row), strict=True))} for row in rows]
-        return found
+            table += [{"run": run.measured.name, **dict(zip(columns, map(float, row), strict=True))} for row in rows]
+        return table
 
     def _columns(self, run: Run) -> dict[str, np.ndarray]:
         """What is compared, and over what."""
         if self.measured.kind == "response":
             phase = {"phase_deg": np.degrees(np.angle(run.displacement))} if self.measured.phased else {}
             return {"frequency_hz": run.frequency, "amplitude_m": run.amplitude, **phase}
-        found = {"frequency_hz": run.frequency, "damping": run.damping}
+        columns = {"frequency_hz": run.frequency, "damping": run.damping}
         if self.measured.kind == "modes":
-            return {"number": np.arange(1.0, 1 + len(run.frequency)), **found}
-        return {"amplitude_m": run.amplitude, **found, "force_N": run.force}
+            return {"number": np.arange(1.0, 1 + len(run.frequency)), **columns}
+        return {"amplitude_m": run.amplitude, **columns, "force_N": run.force}
 
     def _errors(self, run: Run) -> dict[str, np.ndarray]:
         """Relative scatter of what has one."""
@@ -103,23 +103,23 @@ class MeasurementComparison(StudyResult):
 
     def largest(self) -> dict[str, float | None]:
         """Largest difference of every quantity over all points that the scene reaches, None where there is none."""
-        rows, found = self.rows(), {}
+        rows, largest_by_name = self.rows(), {}
         for name in (n for n in rows[0] if n.endswith("_difference")):
             sizes = [abs(row[name]) for row in rows if np.isfinite(row[name])]
-            found[name] = max(sizes) if sizes else None
-        return found
+            largest_by_name[name] = max(sizes) if sizes else None
+        return largest_by_name
 
     def peaks(self) -> list[dict[str, Any]]:
         """Of every run of a response: frequency and amplitude of the highest point, measured and computed."""
-        found = []
-        for one in self.runs if self.measured.kind == "response" else ():
-            tops = [(r.frequency[i], r.amplitude[i]) for r in (one.measured, one.curve) for i in [r.amplitude.argmax()]]
-            row: dict[str, Any] = {"run": one.measured.name, "force_N": float(one.computed.force[0])}
+        peaks_of_runs = []
+        for run in self.runs if self.measured.kind == "response" else ():
+            tops = [(r.frequency[i], r.amplitude[i]) for r in (run.measured, run.curve) for i in [r.amplitude.argmax()]]
+            row: dict[str, Any] = {"run": run.measured.name, "force_N": float(run.computed.force[0])}
             for name, ours, theirs in zip(("frequency_hz", "amplitude_m"), tops[1], tops[0], strict=True):
-                apart = float(ours / theirs - 1)
-                row |= {name: float(theirs), f"computed_{name}": float(ours), f"{name}_difference": apart}
-            found.append(row)
-        return found
+                difference = float(ours / theirs - 1)
+                row |= {name: float(theirs), f"computed_{name}": float(ours), f"{name}_difference": difference}
+            peaks_of_runs.append(row)
+        return peaks_of_runs
 
     def record(self) -> dict[str, Any]:
         """For machines, SI units; what is not known is None."""
@@ -135,7 +135,7 @@ class MeasurementComparison(StudyResult):
         return sum(not np.isfinite(row[f"computed_{first}"]) for row in self.rows())
 
     def _shown(self) -> dict[str, ColumnFormat]:
-        unit, scale = length_unit(max(float(np.nan_to_num(one.measured.amplitude).max()) for one in self.runs))
+        unit, scale = length_unit(max(float(np.nan_to_num(run.measured.amplitude).max()) for run in self.runs))
         return {
             "number": ColumnFormat("mode", ""),
             "frequency_hz": ColumnFormat("frequency", "Hz"),
@@ -149,7 +149,7 @@ class MeasurementComparison(StudyResult):
         """For people: peaks or points, measured, computed and the difference; the largest of all points below."""
         rows, shown = self.peaks() or self.rows(), self._shown()
         names = [n for n in shown if f"{n}_difference" in rows[0] and any(np.isfinite(row[n]) for row in rows)]
-        first = [] if self.measured.kind == "response" else [self.along]
+        first = [] if self.measured.kind == "response" else [self.abscissa]
         heads = [shown[n].word for n in first] + [w for n in names for w in (shown[n].word, "computed", "")]
         table = [f"{'run':20}" + "".join(f"{head:>13}" for head in heads)]
         for row in rows:
@@ -171,31 +171,35 @@ class MeasurementComparison(StudyResult):
 
     def plot(self) -> Figure:
         """Amplitude, phase and force over frequency, or frequency, damping and force over amplitude."""
-        shown, place = self._shown(), self.along
-        columns = [self._columns(one.measured) for one in self.runs]
+        shown, place = self._shown(), self.abscissa
+        columns = [self._columns(run.measured) for run in self.runs]
         names = [n for n in columns[0] if n != place and any(np.isfinite(c[n]).any() for c in columns)]
         names += ["force_N"] if self.measured.kind == "response" else []
-        with axes_of(7.2, 1.0 + 2.4 * len(names), rows=len(names)) as (figure, found):
-            every = np.atleast_1d(found)
-            for axes, name in zip(every, names, strict=True):
-                for k, one in enumerate(self.runs):
+        with axes_of(7.2, 1.0 + 2.4 * len(names), rows=len(names)) as (figure, panes_of_names):
+            columns_of_runs = np.atleast_1d(panes_of_names)
+            for axes, name in zip(columns_of_runs, names, strict=True):
+                for k, run in enumerate(self.runs):
                     once = "" if not k else "_"  # in the legend
                     for other in self.band.values():
                         self._draw(axes, name, other[k].curve, fmt="-", color=GREY, label=f"{once}changed")
                     look = {"fmt": "os^dv"[k % 5], "color": ORANGE, "ms": 3.5, "mfc": "none"}
-                    self._draw(axes, name, one.measured, label=f"measured, {one.measured.name}", **look)
-                    curve, mark = (one.computed, "x") if self.measured.kind == "modes" else (one.curve, "-")
+                    self._draw(axes, name, run.measured, label=f"measured, {run.measured.name}", **look)
+                    curve, mark = (run.computed, "x") if self.measured.kind == "modes" else (run.curve, "-")
                     self._draw(axes, name, curve, fmt=mark, color=BLUE, label=f"{once}computed")
                 axes.set(ylabel=shown[name].label, yscale="log" if shown[name].log else "linear")
-            every[-1].set(xlabel=shown[place].label, xscale="log" if shown[place].log else "linear")
-            every[0].set_title(named(self.name, f"beside {self.measured.source}"))
-            every[0].legend(fontsize=9)
+            columns_of_runs[-1].set(xlabel=shown[place].label, xscale="log" if shown[place].log else "linear")
+            columns_of_runs[0].set_title(named(self.name, f"beside {self.measured.source}"))
+            columns_of_runs[0].legend(fontsize=9)
         return figure
 
     def _draw(self, axes: Any, name: str, run: Run, **look: Any) -> None:
         """A quantity of a run, with its scatter."""
-        shown, own, error = self._shown(), {**self._columns(run), "force_N": run.force}, self._errors(run).get(name)
-        x, y = (shown[n].factor * own[n] for n in (self.along, name))
+        shown, shown_format, error = (
+            self._shown(),
+            {**self._columns(run), "force_N": run.force},
+            self._errors(run).get(name),
+        )
+        x, y = (shown[n].factor * shown_format[n] for n in (self.abscissa, name))
         axes.errorbar(x, y, None if error is None else np.nan_to_num(error) * y, lw=1.1, **look)
 
 
@@ -222,26 +226,28 @@ def compare(
     report = reporter(progress)
     measured = read(Path(measurement), dict(_named(text) for text in facts))
     files = changed(scene, overrides, band)
-    own = files[""]
+    base_runs = files[""]
     try:
-        measured = prepared(measured, own.scene, resonance)
+        measured = prepared(measured, base_runs.scene, resonance)
         found = {}
         for change, file in files.items():
             with limited(file.scene.solver.threads):
                 model = modelling.build(file, report)
-                measured.near(file.scene, model.part)
+                measured.check_position(file.scene, model.part)
                 found[change] = compare_runs(file, model, measured, report)
     except ValueError as trouble:
         raise Refusal(f"{measured.source}: {trouble}") from None
     first = found.pop("")
-    return MeasurementComparison(own.name, measured, first, found)
+    return MeasurementComparison(base_runs.name, measured, first, found)
 
 
 def changed(scene: Source, overrides: Overrides, changes: Sequence[str]) -> dict[str, SceneFile]:
     """The scene, and the scene with each of the changes; raises SceneError for one that it does not know."""
     base = read_scene(scene, overrides)
-    own = {change: [one.strip() for one in change.split(";") if one.strip()] for change in changes}
-    return {"": base} | {change: base.changed(*keys) for change, keys in own.items()}
+    base_scene = {
+        change: [override.strip() for override in change.split(";") if override.strip()] for change in changes
+    }
+    return {"": base} | {change: base.changed(*keys) for change, keys in base_scene.items()}
 
 
 def _named(text: str) -> tuple[str, str]:
@@ -251,7 +257,7 @@ def _named(text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def _apart(name: str, measured: np.ndarray, computed: np.ndarray) -> np.ndarray:
+def _difference(name: str, measured: np.ndarray, computed: np.ndarray) -> np.ndarray:
     """Relative difference; of a phase in degrees, the shorter way round."""
     if name == "phase_deg":
         return np.asarray((computed - measured + 180) % 360 - 180)

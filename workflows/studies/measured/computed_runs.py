@@ -14,10 +14,10 @@ from tribodyn.workflows.run import curve, modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, along
+from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, follow_mode
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run, driving_load
 
-SAME = 1e-5  # relative difference of frequencies that a universal file, with six digits, may make
+SAME_FREQUENCY = 1e-5  # relative difference of frequencies that a universal file, with six digits, may make
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ def compare_runs(
     Raises  ValueError, SolveFailed: what the scene cannot compute
     """
     if measured.kind == "modes":
-        own = file.scene.backbone
-        omega, ratio = FreeVibration(model.balance, own.mode if own else 0, measured.output).about_rest()
-        found = _run(omega / (2 * np.pi), np.full(len(omega), np.nan), ratio)
-        return tuple(ComparedRun(run, _nearest(found, run), found) for run in measured.runs)
+        table = file.scene.backbone
+        omega, ratio = FreeVibration(model.balance, table.mode if table else 0, measured.output).about_rest()
+        computed = _run(omega / (2 * np.pi), np.full(len(omega), np.nan), ratio)
+        return tuple(ComparedRun(run, _nearest(computed, run), computed) for run in measured.runs)
     if measured.kind == "backbone":
-        found = _backbone(file, model, measured, progress)
-        return tuple(ComparedRun(run, _at_amplitude(found, run), found) for run in measured.runs)
+        computed = _backbone(file, model, measured, progress)
+        return tuple(ComparedRun(run, _at_amplitude(computed, run), computed) for run in measured.runs)
     return tuple(_response(file, model, measured.output, run, progress) for run in measured.runs)
 
 
@@ -59,8 +59,8 @@ def _run(hertz: np.ndarray, x: np.ndarray, damping: np.ndarray, force: np.ndarra
 
 def _backbone(file: SceneFile, model: modelling.Model, measured: Measurement, progress: Progress) -> Run:
     """The backbone of the scene by the first harmonic of the output, with the force of phase resonance there."""
-    asked = AmplitudeRange.of(file, None, None, None, None)
-    mode = along(file, model.balance, asked, progress, measured.output)
+    range_ = AmplitudeRange.of(file, None, None, None, None)
+    mode = follow_mode(file, model.balance, range_, progress, measured.output)
     good = mode.converged
     if good.sum() < 2 or (measured.decay and not good.all()):
         raise SolveFailed(f"the backbone {mode.end}")
@@ -71,23 +71,23 @@ def _backbone(file: SceneFile, model: modelling.Model, measured: Measurement, pr
     return _run(mode.frequency[good], mode.first_harmonic[good], damping[good], force[good])
 
 
-def _at_amplitude(found: Run, run: Run) -> Run:
-    a, order = np.unique(np.log(found.amplitude), return_index=True)
+def _at_amplitude(mode: Run, run: Run) -> Run:
+    a, order = np.unique(np.log(mode.amplitude), return_index=True)
     at = np.log(run.amplitude)
     for end in (a[0], a[-1]):
-        at = np.where(np.abs(at - end) < SAME, end, at)
+        at = np.where(np.abs(at - end) < SAME_FREQUENCY, end, at)
     hertz, damping, force = (
         PchipInterpolator(a, values[order], extrapolate=False)(at)
         if np.isfinite(values).all()
         else np.full(len(at), np.nan)
-        for values in (found.frequency, found.damping, found.force)
+        for values in (mode.frequency, mode.damping, mode.force)
     )
     return replace(run, frequency=hertz, damping=damping, force=force)
 
 
-def _nearest(found: Run, run: Run) -> Run:
-    at = np.abs(found.frequency[None] - run.frequency[:, None]).argmin(axis=1)
-    return replace(run, frequency=found.frequency[at], damping=found.damping[at])
+def _nearest(modes_of_scene: Run, run: Run) -> Run:
+    at = np.abs(modes_of_scene.frequency[None] - run.frequency[:, None]).argmin(axis=1)
+    return replace(run, frequency=modes_of_scene.frequency[at], damping=modes_of_scene.damping[at])
 
 
 def _response(file: SceneFile, model: modelling.Model, output: str, run: Run, progress: Progress) -> ComparedRun:
@@ -98,9 +98,9 @@ def _response(file: SceneFile, model: modelling.Model, output: str, run: Run, pr
     if branch.converged.sum() < 2:
         raise SolveFailed(f"the response beside {run.name} {branch.end}")
     at_level = replace(run, displacement=run.displacement * (level / run.force))
-    whole = _first_harmonic(branch, output, model.balance.basis.order, scale, level)
-    there = replace(at_level, displacement=_at_frequency(whole, at_level), force=np.full(len(run.force), level))
-    return ComparedRun(at_level, there, whole)
+    curve_run = _first_harmonic(branch, output, model.balance.basis.order, scale, level)
+    computed = replace(at_level, displacement=_at_frequency(curve_run, at_level), force=np.full(len(run.force), level))
+    return ComparedRun(at_level, computed, curve_run)
 
 
 def _first_harmonic(branch: Branch, output: str, order: np.ndarray, force: complex, level: float) -> Run:
@@ -111,20 +111,22 @@ def _first_harmonic(branch: Branch, output: str, order: np.ndarray, force: compl
     return replace(_run(branch.frequency[good], x, np.full(len(x), np.nan)), force=np.full(len(x), level))
 
 
-def _at_frequency(found: Run, run: Run) -> np.ndarray:
+def _at_frequency(curve_run: Run, run: Run) -> np.ndarray:
     """(n,) complex displacement at the frequencies of a run, nan beyond the ends.
 
     Between computed points 1 / x goes straight: that of one mode is a parabola in frequency. Where a curve with folds
     has several values, the one nearest to the measured amplitude is taken.
     """
-    hertz, inverse = found.frequency, 1 / found.displacement
+    hertz, inverse = curve_run.frequency, 1 / curve_run.displacement
     best = np.full(len(run.frequency), np.nan, complex)
     for i, (f, measured) in enumerate(zip(run.frequency, run.amplitude, strict=True)):
-        same = np.flatnonzero(np.abs(hertz / f - 1) < SAME)
-        left = np.flatnonzero((hertz[:-1] - f) * (hertz[1:] - f) < 0)
-        share = (f - hertz[left]) / (hertz[left + 1] - hertz[left])
+        matches = np.flatnonzero(np.abs(hertz / f - 1) < SAME_FREQUENCY)
+        segments = np.flatnonzero((hertz[:-1] - f) * (hertz[1:] - f) < 0)
+        share = (f - hertz[segments]) / (hertz[segments + 1] - hertz[segments])
         values = list(
-            found.displacement[same] if len(same) else 1 / (inverse[left] * (1 - share) + inverse[left + 1] * share)
+            curve_run.displacement[matches]
+            if len(matches)
+            else 1 / (inverse[segments] * (1 - share) + inverse[segments + 1] * share)
         )
         if len(values):
             best[i] = min(values, key=lambda x: abs(np.log(abs(x) / measured)))

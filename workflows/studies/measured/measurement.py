@@ -86,12 +86,12 @@ class Measurement:
             raise Refusal(f'output = "{self.output}": the scene has {", ".join(outputs)}; give output = NAME')
         sign = 1.0
         if not isinstance(scene, MatrixScene):
-            sign = _along(self.direction, outputs[self.output].direction, f"output {self.output}")
+            sign = _sign(self.direction, outputs[self.output].direction, f"output {self.output}")
         if self.kind != "response":
             return self
         load, force = driving_load(scene)
         if load.direction is not None:
-            sign *= _along(self.force_direction, load.direction, "the force")
+            sign *= _sign(self.force_direction, load.direction, "the force")
         factor = sign * (abs(force) if self.per_force else 1.0) * (abs(force) / force if self.timed else 1.0)
         forces = [np.where(np.isfinite(run.force), run.force, abs(force)) for run in self.runs]
         runs = (
@@ -102,11 +102,11 @@ class Measurement:
     def force_at_output(self, scene: Scene) -> bool:
         """Whether the one force of a scene acts where and along what the output observes."""
         loads = [*scene.loads.harmonic.values()]
-        seen = outputs_of(scene)[self.output]
-        where = [one.model_dump(include={"group", "direction", "dof"}) for one in (seen, *loads)]
+        observed = outputs_of(scene)[self.output]
+        where = [entry.model_dump(include={"group", "direction", "dof"}) for entry in (observed, *loads)]
         return len(where) == 2 and where[0] == where[1]
 
-    def near(self, scene: Scene, part: Part | None) -> None:
+    def check_position(self, scene: Scene, part: Part | None) -> None:
         """Refuse a position farther from the scene's output than a twentieth of the part; raises ValueError."""
         if self.position is None or part is None or isinstance(scene, MatrixScene):
             return
@@ -114,28 +114,28 @@ class Measurement:
         nodes = part.node_sets.get(group)
         if nodes is None:
             return
-        away = float(np.linalg.norm(part.points[nodes] - np.array(self.position), axis=1).min())
-        if away > 0.05 * float(np.ptp(part.points, axis=0).max()):
+        distance = float(np.linalg.norm(part.points[nodes] - np.array(self.position), axis=1).min())
+        if distance > 0.05 * float(np.ptp(part.points, axis=0).max()):
             raise Refusal(
-                f"position: measured {1e3 * away:.4g} mm from {group}, where the scene observes {self.output}: "
+                f"position: measured {1e3 * distance:.4g} mm from {group}, where the scene observes {self.output}: "
                 "observe the measured place in [response.others], or correct position"
             )
 
 
-def _along(measured: tuple[float, float, float] | None, ours: tuple[float, float, float], what: str) -> float:
+def _sign(measured: tuple[float, float, float] | None, ours: tuple[float, float, float], subject: str) -> float:
     """1, or -1 for the opposite direction; raises ValueError for another one."""
     if measured is None:
         return 1.0
     cosine = float(np.dot(measured, ours))
     if abs(abs(cosine) - 1.0) > 1e-3:
         raise Refusal(
-            f"direction: measured along {_said(measured)}, {what} of the scene is along {_said(ours)}: "
+            f"direction: measured along {_describe(measured)}, {subject} of the scene is along {_describe(ours)}: "
             "give the output of that direction, or correct direction"
         )
     return float(np.sign(cosine))
 
 
-def _said(direction: tuple[float, float, float]) -> str:
+def _describe(direction: tuple[float, float, float]) -> str:
     for axis, name in enumerate("xyz"):
         if abs(abs(direction[axis]) - 1.0) < 1e-6:
             return name if direction[axis] > 0 else f"-{name}"
@@ -191,8 +191,8 @@ def _mean(kind: Kind, runs: list[Run]) -> Run:
 def prepared(measured: Measurement, scene: Scene, resonance: bool) -> Measurement:
     """A measurement as it is compared: in the directions of a scene, repeats as their mean, resonances where wanted."""
     measured = measured.on(scene)
-    held = any(run.control == "response" for run in measured.runs)
-    if measured.kind == "response" and (resonance or held):
+    has_constant_response = any(run.control == "response" for run in measured.runs)
+    if measured.kind == "response" and (resonance or has_constant_response):
         measured = resonances(measured)
     return merged(measured)
 
@@ -204,10 +204,12 @@ def resonances(measured: Measurement) -> Measurement:
     """
     if not measured.phased or any(not np.isfinite(run.force).all() for run in measured.runs) or measured.per_force:
         raise Refusal("the resonance of a run needs its force and its phase in every row")
-    found: dict[str, list[Run]] = {}
+    points_by_control: dict[str, list[Run]] = {}
     for run in measured.runs:
-        found.setdefault(run.control, []).append(resonance(run))
-    return replace(measured, kind="backbone", runs=tuple(_joined(name, points) for name, points in found.items()))
+        points_by_control.setdefault(run.control, []).append(resonance(run))
+    return replace(
+        measured, kind="backbone", runs=tuple(_joined(name, points) for name, points in points_by_control.items())
+    )
 
 
 def _joined(control: str, points: list[Run]) -> Run:
@@ -236,16 +238,18 @@ def resonance(run: Run) -> Run:
     target = np.concatenate([stiffness.real, stiffness.imag])
     design = weight[:, None] * rows / scale
     solved, _, rank, _ = np.linalg.lstsq(design, weight * target, rcond=None)
-    which = [0, 1, 1 + powers.shape[1]]
-    mass, square, rate = (solved / scale)[which]
+    chosen = [0, 1, 1 + powers.shape[1]]
+    mass, square, rate = (solved / scale)[chosen]
     if rank < design.shape[1] or not (square / mass > 0 and rate / mass > 0):
         raise Refusal(f"run {run.name}: no resonance of one mode is within it")
     natural = float(np.sqrt(square / mass))
-    left = weight * target - design @ solved
+    residual = weight * target - design @ solved
     covariance = (
-        np.linalg.inv(design.T @ design)[np.ix_(which, which)] * (left @ left) / max(len(left) - len(solved), 1)
+        np.linalg.inv(design.T @ design)[np.ix_(chosen, chosen)]
+        * (residual @ residual)
+        / max(len(residual) - len(solved), 1)
     )
-    slopes = np.array([[-0.5, 0.5, 0.0], [-0.5, -0.5, 1.0]]) / solved[which]  # of the logarithms of w_0 and zeta
+    slopes = np.array([[-0.5, 0.5, 0.0], [-0.5, -0.5, 1.0]]) / solved[chosen]  # of the logarithms of w_0 and zeta
     errors = np.sqrt(np.einsum("ij,jk,ik->i", slopes, covariance, slopes))
     order = np.argsort(omega)
     size = a.max() if bent else np.interp(natural, omega[order], a[order])  # held constant, as an acceleration perhaps

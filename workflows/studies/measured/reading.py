@@ -54,24 +54,24 @@ def read(path: str | Path, facts: Mapping[str, str] | None = None) -> Measuremen
     if not path.is_file():
         raise Refusal(f"there is no file of a measurement {path}")
     try:
-        given = {name: str(text) for name, text in (facts or {}).items()}
-        for name in given:
+        facts_given = {name: str(text) for name, text in (facts or {}).items()}
+        for name in facts_given:
             if name not in FACTS:
                 raise Refusal(unknown_key(name, [*FACTS]))
-        said, raw = readers[path.suffix.lower()](path, given)
-        return _measurement(raw, {**said, **given}, path.name)
+        file_facts, raw = readers[path.suffix.lower()](path, facts_given)
+        return _measurement(raw, {**file_facts, **facts_given}, path.name)
     except (ValueError, KeyError, IndexError, OSError, UnicodeDecodeError) as trouble:
         raise Refusal(f"{path.name}: {trouble}") from None
 
 
-def _of_csv(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
+def _of_csv(path: Path, facts_given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
     lines = path.read_text(encoding="utf-8").splitlines()
     facts = {}
     for line in lines:
-        if line.startswith("#") and (found := re.match(r"#\s*(\w+)\s*=\s*(.*?)\s*$", line)):
-            if found[1] not in FACTS:
-                raise Refusal(unknown_key(found[1], [*FACTS]))
-            facts[found[1]] = found[2].strip('"')
+        if line.startswith("#") and (fact := re.match(r"#\s*(\w+)\s*=\s*(.*?)\s*$", line)):
+            if fact[1] not in FACTS:
+                raise Refusal(unknown_key(fact[1], [*FACTS]))
+            facts[fact[1]] = fact[2].strip('"')
     rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
     if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
         raise Refusal("expected a line of column names and rows of as many values below it")
@@ -80,7 +80,7 @@ def _of_csv(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
     }
 
 
-def _of_mat(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
+def _of_mat(path: Path, facts_given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
     from scipy.io import loadmat
 
     try:
@@ -89,10 +89,10 @@ def _of_mat(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
         raise Refusal("MATLAB files of version 7.3 are not read: save it with -v7") from None
     facts = {name: str(content[name]) for name in FACTS if isinstance(content.get(name), str)}
     structs = {name: table for name, table in content.items() if isinstance(table, dict)}
-    if "table" in given:
-        if given["table"] not in structs:
-            raise Refusal(f"table = {given['table']}: there is {', '.join(structs) or 'no struct'}")
-        return facts, structs[given["table"]]
+    if "table" in facts_given:
+        if facts_given["table"] not in structs:
+            raise Refusal(f"table = {facts_given['table']}: there is {', '.join(structs) or 'no struct'}")
+        return facts, structs[facts_given["table"]]
     plain = {name: v for name, v in content.items() if isinstance(v, np.ndarray) and not name.startswith("__")}
     tables = [
         plain,
@@ -100,36 +100,36 @@ def _of_mat(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
         *structs.values(),
     ]
     words = [{word for word in (_word(name)[0] for name in table)} for table in tables]
-    for table, known in zip(tables, words, strict=True):
-        if known & {"frequency", "time"}:
+    for table, words_of_table in zip(tables, words, strict=True):
+        if words_of_table & {"frequency", "time"}:
             return facts, table
     raise Refusal(f"no struct has a column frequency or time: there is {', '.join([*plain, *structs])}")
 
 
-def _of_uff(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
+def _of_uff(path: Path, facts_given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
     sets = package("pyuff").UFF(str(path)).read_sets()
     sets = sets if isinstance(sets, list) else [sets]
     length = next((s["length"] for s in sets if s["type"] == 164), 1.0) or 1.0
     units = {DataKind.DISPLACEMENT: "m", DataKind.VELOCITY: "m/s", DataKind.ACCELERATION: "m/s2"}
     nodal = [s for s in sets if s["type"] == 55]
     curves = [s for s in sets if s["type"] == 58 and s["ordinate_spec_data_type"] in units]
-    for wanted in (Function.FRF, Function.GENERAL, Function.TIME):
-        x = DataKind.TIME if wanted == Function.TIME else DataKind.FREQUENCY
-        chosen = [s for s in curves if s["func_type"] == wanted and s["abscissa_spec_data_type"] == x]
+    for function in (Function.FRF, Function.GENERAL, Function.TIME):
+        x = DataKind.TIME if function == Function.TIME else DataKind.FREQUENCY
+        chosen = [s for s in curves if s["func_type"] == function and s["abscissa_spec_data_type"] == x]
         if chosen:
-            return _of_58(chosen, given, length, units)
+            return _of_58(chosen, facts_given, length, units)
     if nodal:
         return {}, _of_55(nodal)
     raise Refusal("it has no response (dataset 58 over frequency or time, of displacement, velocity or acceleration)")
 
 
 def _of_58(
-    sets: list[dict[str, Any]], given: Mapping[str, str], length: float, units: Mapping[DataKind, str]
+    sets: list[dict[str, Any]], facts_given: Mapping[str, str], length: float, units: Mapping[DataKind, str]
 ) -> tuple[dict[str, str], dict[str, Any]]:
     """Sets of one node and direction, as columns; those that name an output of ours are taken by its name."""
-    output = given.get("output", OUTPUT)
+    output = facts_given.get("output", OUTPUT)
     named = [s for s in sets if s["id1"].startswith((f"{output} over force", f"{output}, harmonic 1"))]
-    sets = named or [s for s in sets if "node" not in given or str(s["rsp_node"]) == given["node"]]
+    sets = named or [s for s in sets if "node" not in facts_given or str(s["rsp_node"]) == facts_given["node"]]
     places = sorted({(s["rsp_node"], s["rsp_dir"]) for s in sets})
     if len(places) != 1:
         nodes = ", ".join(sorted({str(s["rsp_node"]) for s in sets})) or "no such"
@@ -168,9 +168,13 @@ def _of_55(sets: list[dict[str, Any]]) -> dict[str, Any]:
 def _word(name: str) -> tuple[str, str]:
     """The word and the unit in the name of a column."""
     for word in sorted(COLUMNS, key=len, reverse=True):
-        found = re.match(rf"{word}(?:\s*\[(.*)\]|_(.*))?$", name.strip(), re.IGNORECASE)
-        if found:
-            unit = found[1] if found[1] is not None else (found[2] or "").replace("_per_", "/").replace("_", "/")
+        column_match = re.match(rf"{word}(?:\s*\[(.*)\]|_(.*))?$", name.strip(), re.IGNORECASE)
+        if column_match:
+            unit = (
+                column_match[1]
+                if column_match[1] is not None
+                else (column_match[2] or "").replace("_per_", "/").replace("_", "/")
+            )
             return word, re.sub(r"\bhz\b", "Hz", unit)
     return name, ""
 
@@ -178,57 +182,67 @@ def _word(name: str) -> tuple[str, str]:
 def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) -> Measurement:
     """Columns as a measurement."""
     output = facts.get("output", OUTPUT)
-    own = {name: raw.get(f"{output}_{name}_m") for name in ("a1", "b1")}
-    timed = all(column is not None for column in own.values())
+    export_columns = {name: raw.get(f"{output}_{name}_m") for name in ("a1", "b1")}
+    timed = all(column is not None for column in export_columns.values())
     if timed:  # an export of ours: x = a cos + b sin
-        kept = {name: column for name, column in raw.items() if _word(name)[0] == "frequency"}
-        raw = {**kept, "real [m]": own["a1"], "imag [m]": -np.asarray(own["b1"], float)}
-    found: Columns = {}
+        frequency_columns = {name: column for name, column in raw.items() if _word(name)[0] == "frequency"}
+        raw = {
+            **frequency_columns,
+            "real [m]": export_columns["a1"],
+            "imag [m]": -np.asarray(export_columns["b1"], float),
+        }
+    columns: Columns = {}
     for name, column in raw.items():
         word, unit = _word(name)
-        if word in COLUMNS and word not in found:
-            found[word] = np.atleast_1d(np.asarray(column)).astype(float), unit
-    what = next((word for word in RESPONSES if word in found), None)
-    if "frequency" not in found and "time" not in found:
+        if word in COLUMNS and word not in columns:
+            columns[word] = np.atleast_1d(np.asarray(column)).astype(float), unit
+    response_word = next((word for word in RESPONSES if word in columns), None)
+    if "frequency" not in columns and "time" not in columns:
         raise Refusal(f"no column frequency or time among {', '.join(raw)}")
-    if what is None and "damping" not in found:
+    if response_word is None and "damping" not in columns:
         raise Refusal(f"no column {' or '.join(RESPONSES)}, with its unit, among {', '.join(raw)}")
-    n = len(found["frequency" if "frequency" in found else "time"][0])
-    frequency = _si(found, "frequency", "Hz", n)
-    order, factor, per_force = (0, 1.0, False) if what is None else _kind_of_response(what, found[what][1])
-    values = np.full(n, np.nan, complex) if what is None else factor * found[what][0].astype(complex)
-    phased = "imag" in found or "phase" in found
-    if "imag" in found:
-        values = values + 1j * factor * found["imag"][0]
-    elif "phase" in found:
-        values = np.abs(values) * np.exp(1j * _si(found, "phase", "rad", n))
+    n = len(columns["frequency" if "frequency" in columns else "time"][0])
+    frequency = _si(columns, "frequency", "Hz", n)
+    order, factor, per_force = (
+        (0, 1.0, False) if response_word is None else _kind_of_response(response_word, columns[response_word][1])
+    )
+    values = (
+        np.full(n, np.nan, complex) if response_word is None else factor * columns[response_word][0].astype(complex)
+    )
+    phased = "imag" in columns or "phase" in columns
+    if "imag" in columns:
+        values = values + 1j * factor * columns["imag"][0]
+    elif "phase" in columns:
+        values = np.abs(values) * np.exp(1j * _si(columns, "phase", "rad", n))
     reference = facts.get("phase", "response over force")
     if reference not in ("response over force", "force over response"):
         raise Refusal(f'phase = "{reference}": expected "response over force" or "force over response"')
     if reference == "force over response":
         values = values.conj()
-    damping, force = _si(found, "damping", "", n), np.abs(_si(found, "force", "N", n))
-    errors = np.stack([_si(found, f"{name}_error", "", n) for name in ("frequency", "damping")], axis=1)
-    kind: Kind = "modes" if what is None else "backbone" if "damping" in found else "response"
+    damping, force = _si(columns, "damping", "", n), np.abs(_si(columns, "force", "N", n))
+    errors = np.stack([_si(columns, f"{name}_error", "", n) for name in ("frequency", "damping")], axis=1)
+    kind: Kind = "modes" if response_word is None else "backbone" if "damping" in columns else "response"
     names, controls = (_texts(raw, key, n, facts.get(key, "")) for key in ("run", "control"))
     labels, runs = list(zip(controls, names, _texts(raw, "repeat", n, ""), strict=True)), []
-    if "time" in found:
-        kind, time = "backbone", _si(found, "time", "s", n)
+    if "time" in columns:
+        kind, time = "backbone", _si(columns, "time", "s", n)
     for label in dict.fromkeys(labels):
-        at = np.array([one == label for one in labels])
+        at = np.array([label_of_row == label for label_of_row in labels])
         name = " ".join(word for word in label[:2] if word) or source
-        if "time" in found:
+        if "time" in columns:
             runs.append(_decayed(name, label[0], time[at], values[at].real, order))
             continue
         spin = 2j * np.pi * frequency[at]
         x = np.abs(values[at]) / np.abs(spin) ** order if kind == "backbone" else values[at] / spin**order
         runs.append(Run(name, label[0], frequency[at], x.astype(complex), force[at], damping[at], errors[at]))
-    known = [run.frequency for run in runs] if what is None else [run.frequency * run.amplitude for run in runs]
-    if not all(np.isfinite(k).all() and (k > 0).all() for k in known):
+    positive = (
+        [run.frequency for run in runs] if response_word is None else [run.frequency * run.amplitude for run in runs]
+    )
+    if not all(np.isfinite(k).all() and (k > 0).all() for k in positive):
         raise Refusal("frequency and response must be numbers above 0 in every row")
     return Measurement(
         kind, tuple(runs), source, output, order, _direction(facts, "direction"), _direction(facts, "force_direction"),
-        _position(facts), per_force, phased, timed, "time" in found,
+        _position(facts), per_force, phased, timed, "time" in columns,
     )  # fmt: skip
 
 
@@ -241,42 +255,42 @@ def _decayed(name: str, control: str, time: np.ndarray, values: np.ndarray, orde
     spectrum = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values))))
     guess = 2 * np.pi * max(int(spectrum.argmax()), 1) / (step.mean() * len(values))
     try:
-        found = from_decay(even, values, guess)
-    except IntegrationFailed as several:
-        raise Refusal(str(several)) from None
-    none = np.full((len(found.omega), 2), np.nan)
-    x = (found.amplitude / found.omega**order).astype(complex)
-    return Run(name, control, found.omega / (2 * np.pi), x, none[:, 0], found.damping, none)
+        decay = from_decay(even, values, guess)
+    except IntegrationFailed as failure:
+        raise Refusal(str(failure)) from None
+    none = np.full((len(decay.omega), 2), np.nan)
+    x = (decay.amplitude / decay.omega**order).astype(complex)
+    return Run(name, control, decay.omega / (2 * np.pi), x, none[:, 0], decay.damping, none)
 
 
 def _kind_of_response(word: str, unit: str) -> tuple[int, float, bool]:
     """Order of the derivative, factor to SI units, and whether it is per force."""
     if not unit:
         raise Refusal(f"column {word}: give its unit, such as {word} [m/s2]")
-    given = parse_unit(unit)
+    unit_of_column = parse_unit(unit)
     for per_force in (False, True):
         for order, base in enumerate(("m", "m/s", "m/s2")):
-            wanted = parse_unit(f"{base}/N" if per_force else base)
-            if given.dimension == wanted.dimension:
+            target = parse_unit(f"{base}/N" if per_force else base)
+            if unit_of_column.dimension == target.dimension:
                 if word in RESPONSES[:3] and word != ("displacement", "velocity", "acceleration")[order]:
                     raise Refusal(f"column {word}: {unit} is no unit of it")
-                return order, float(given.factor / wanted.factor), per_force
+                return order, float(unit_of_column.factor / target.factor), per_force
     raise Refusal(f"column {word}: expected a displacement, velocity or acceleration, or one per force, not {unit}")
 
 
-def _si(found: Columns, word: str, unit: str, n: int) -> np.ndarray:
+def _si(columns: Columns, word: str, unit: str, n: int) -> np.ndarray:
     """A column in a unit; nan where it is not there."""
-    if word not in found:
+    if word not in columns:
         return np.full(n, np.nan)
-    values, given = found[word]
+    values, unit_of_column = columns[word]
     try:
-        return values * to_si(f"1 {given}".strip(), unit)
+        return values * to_si(f"1 {unit_of_column}".strip(), unit)
     except ValueError as trouble:
         raise Refusal(f"column {word}: {trouble}") from None
 
 
 def _texts(raw: Mapping[str, Any], key: str, n: int, missing: str) -> list[str]:
-    return [str(one) for one in np.atleast_1d(raw[key])] if key in raw else [missing] * n
+    return [str(text) for text in np.atleast_1d(raw[key])] if key in raw else [missing] * n
 
 
 def _direction(facts: Mapping[str, str], key: str) -> tuple[float, float, float] | None:

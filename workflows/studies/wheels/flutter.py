@@ -56,28 +56,35 @@ class Flutter(StudyResult):
                 for j, value in self.eigenvalues.items()
             ],
             "limit_cycles": [
-                {"index": j, "m": one.amplitude, "hz": one.frequency, "moved": one.moved, "growth": one.growth}
-                for j, (found, _) in self.cycles.items()
-                for one in found
+                {
+                    "index": j,
+                    "m": wave_row.amplitude,
+                    "hz": wave_row.frequency,
+                    "moved": wave_row.moved,
+                    "growth": wave_row.growth,
+                }
+                for j, (wave, _) in self.cycles.items()
+                for wave_row in wave
             ],
-            "not_found": {str(j): why for j, (_, why) in self.cycles.items() if why},
+            "not_found": {str(j): reason for j, (_, reason) in self.cycles.items() if reason},
         }
 
     def lines(self) -> list[str]:
         """For people."""
-        said = [
+        texts = [
             f"wave {j:3}: {value.imag / (2 * np.pi):.6g} Hz, damping {self.damping[j]:+.4%}"
             + (", flutters" if value.real > 0 else "")
             for j, value in self.eigenvalues.items()
         ]
-        for j, (found, why) in self.cycles.items():
-            said += [
-                f"limit cycle of wave {j}: {one.amplitude:.4g} m at {one.frequency:.6g} Hz" + _in_time(one)
-                for one in found
+        for j, (wave, reason) in self.cycles.items():
+            texts += [
+                f"limit cycle of wave {j}: {wave_row.amplitude:.4g} m at {wave_row.frequency:.6g} Hz"
+                + _in_time(wave_row)
+                for wave_row in wave
             ]
-            if why:
-                said.append(f"limit cycles of wave {j}: {why}")
-        return said
+            if reason:
+                texts.append(f"limit cycles of wave {j}: {reason}")
+        return texts
 
     def write(self, folder: Path) -> list[Path]:
         """Write flutter.csv, index, frequency and damping ratio of every wave, and flutter.png."""
@@ -136,27 +143,29 @@ def of_scene(file: SceneFile, start: float | None = None, stop: float | None = N
             if start is None or stop is None or value.real <= 0:
                 break
             options = BackboneOptions(points, newton=settings.newton_options(scene))
-            balance, why = in_flow(wheel, index), ""
-            found: list[LimitCycle] = []
+            balance, reason = in_flow(wheel, index), ""
+            waves: list[LimitCycle] = []
             try:
-                found, why = limit_cycles(balance, start, stop, None, OUTPUT, options)
-                found = [in_time(balance, one, OUTPUT, MARCH) for one in found]
+                waves, reason = limit_cycles(balance, start, stop, None, OUTPUT, options)
+                waves = [in_time(balance, wave, OUTPUT, MARCH) for wave in waves]
             except (ValueError, IntegrationFailed) as error:
-                why = f"{why}; whether time keeps them is not known: {error}" if found else str(error)
-            cycles[index] = found, why
+                reason = f"{reason}; whether time keeps them is not known: {error}" if waves else str(error)
+            cycles[index] = waves, reason
     return Flutter(file.name, eigenvalues, cycles)
 
 
 def _in_time(cycle: LimitCycle) -> str:
     if cycle.stays is None:
         return ""
-    beside = "what is beside it dies away" if cycle.stays else f"what is beside it grows by {cycle.growth:.2%} a period"
-    return f"; in time its amplitude moves by {cycle.moved:+.2%} and {beside}"
+    neighbour = (
+        "what is beside it dies away" if cycle.stays else f"what is beside it grows by {cycle.growth:.2%} a period"
+    )
+    return f"; in time its amplitude moves by {cycle.moved:+.2%} and {neighbour}"
 
 
 def in_flow(wheel: wheels.Wheel, index: int) -> HarmonicBalance:
     """The balance of the wave of an index with the forces of the flow of its scene."""
-    scene = wheel.asked(index)
+    scene = wheel.scene_for(index)
     assert scene.flow is not None
     flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)
     wave = with_flow(modelling.damped(scene, travelling_wave(wheel.reduced, index)), wheel.springs, flow)

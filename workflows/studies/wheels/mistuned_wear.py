@@ -55,15 +55,15 @@ class MistunedWear(StudyResult):
     def lines(self) -> list[str]:
         """For people."""
         h, last = self.history, -1
-        said = [f"pattern {self.number}: {len(h.cycles)} wear steps, {h.cycles[last]:.4g} cycles, {h.end}"]
-        for row, when in ((0, "unworn"), (last, "worn")):
+        texts = [f"pattern {self.number}: {len(h.cycles)} wear steps, {h.cycles[last]:.4g} cycles, {h.end}"]
+        for row, state in ((0, "unworn"), (last, "worn")):
             heights, preload = self.heights[row], self.preload[row]
-            said.append(
-                f"{when}: {heights.max():.4g} m at blade {heights.argmax()}, {heights.max() / heights.mean():.4f} of "
+            texts.append(
+                f"{state}: {heights.max():.4g} m at blade {heights.argmax()}, {heights.max() / heights.mean():.4f} of "
                 f"the mean of all blades; preload of a blade {preload.min():.5g} to {preload.max():.5g} N"
             )
         low, high = 1e9 * self.volume[last].min(), 1e9 * self.volume[last].max()
-        return [*said, f"worn volume of a blade: {low:.4g} to {high:.4g} mm3"]
+        return [*texts, f"worn volume of a blade: {low:.4g} to {high:.4g} mm3"]
 
     def record(self) -> dict[str, object]:
         """For machines."""
@@ -92,9 +92,9 @@ class MistunedWear(StudyResult):
         """The wheel at a wear step."""
         h, balance = self.history, self.blades.balance(self.blades.pattern(self.number))
         omega = float(h.omega[row])
-        moved = nodes(self.blades, balance, h.displacement[row], h.force[row], omega)
+        motion = nodes(self.blades, balance, h.displacement[row], h.force[row], omega)
         label = f"pattern {self.number}, {h.cycles[row]:.3g} cycles, {omega / (2 * np.pi):.4g} Hz"
-        return WheelState(label, moved, self.heights[row], self.volume[row])
+        return WheelState(label, motion, self.heights[row], self.volume[row])
 
     def plot(self) -> Figure:
         """Amplitude, preload and worn volume of every blade as the wheel wears."""
@@ -132,9 +132,9 @@ def pattern_wear(
     Raises  SceneError where the scene lacks a table; SolveFailed
     """
     file, report = read_scene(scene, overrides), reporter(progress)
-    wanted = file.mesh_scene.wear
+    wear_settings = file.mesh_scene.wear
     asked_of(file)
-    if wanted is None:
+    if wear_settings is None:
         raise SceneError(f"{file.name} has no [wear]: there is nothing to wear the blades by")
 
     def on_row(row: WearRow) -> None:
@@ -145,13 +145,22 @@ def pattern_wear(
         n, drawn = blades.wheel.n_sectors, blades.pattern(pattern)
         balance = blades.balance(drawn)
         _, blade = blades.peak(drawn)
-        one = wear_run.wear_problem(file.scene, file.folder, blades.wheel.wave, wanted.lost_below)
+        sector_problem = wear_run.wear_problem(file.scene, file.folder, blades.wheel.wave, wear_settings.lost_below)
         output = f"{OUTPUT}@{blade}"
         duties = [replace(duty, site=_of_output(duty.site, output)) for duty in settings.mission(file.scene)]
-        area = np.tile(one.area, n)
-        limit = settings.step_limit(file.scene, references.free_deflection(blades.wheel.wave), one.area)
-        problem = WearProblem(balance, tuple(duties), one.wear, area, one.lost_below, None, one.any_joint, n)
-        history = wear_run.evolve(problem, wanted, limit, wanted.max_steps, on_row)
+        area = np.tile(sector_problem.area, n)
+        limit = settings.step_limit(file.scene, references.free_deflection(blades.wheel.wave), sector_problem.area)
+        problem = WearProblem(
+            balance,
+            tuple(duties),
+            sector_problem.wear,
+            area,
+            sector_problem.lost_below,
+            None,
+            sector_problem.any_joint,
+            n,
+        )
+        history = wear_run.evolve(problem, wear_settings, limit, wear_settings.max_steps, on_row)
     names = list(balance.compliance.output_names)
     rows = [names.index(f"{OUTPUT}@{k}") for k in range(n)]
     per = (len(history.cycles), n, -1)
@@ -180,10 +189,10 @@ def write_wheel(
         raise Refusal("this part has bodies of different elements: its wheel cannot be drawn")
     wheel = Around(info.sectors, info.engine_order, np.array(info.axis, float))
     harmonics = blades.wheel.wave.basis.harmonics
-    made = MistunedWheelFilm(blades.file.name, wheel, mesh, harmonics, states, IMAGES if formats else 1)
+    wheel_film = MistunedWheelFilm(blades.file.name, wheel, mesh, harmonics, states, IMAGES if formats else 1)
     folder.mkdir(parents=True, exist_ok=True)
-    made.figure.savefig(drawing := folder / f"{made.name}.png")
-    films = film.encode(film.drawn(made), folder / made.name, formats) if formats else []
+    wheel_film.figure.savefig(drawing := folder / f"{wheel_film.name}.png")
+    films = film.encode(film.drawn(wheel_film), folder / wheel_film.name, formats) if formats else []
     return [drawing, *films]
 
 
@@ -192,4 +201,4 @@ def nodes(
 ) -> np.ndarray:
     """Displacement (N, n_node, 3, n_coeff) of every blade [m]."""
     full = blades.wheel.full_displacement(blades.reduced, balance, displacement, force, omega)
-    return np.stack([blades.part.field(one) for one in full])
+    return np.stack([blades.part.field(blade_motion) for blade_motion in full])

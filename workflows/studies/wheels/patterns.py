@@ -60,12 +60,12 @@ class Pattern:
     gap: np.ndarray
 
 
-def drawn(asked: Mistuning, n_sectors: int, number: int) -> Pattern:
+def drawn(mistuning: Mistuning, n_sectors: int, number: int) -> Pattern:
     """One of the patterns of a scene; it depends on the seed and its number alone."""
-    normal = np.random.default_rng([asked.seed, number]).normal(size=(3, n_sectors))
+    normal = np.random.default_rng([mistuning.seed, number]).normal(size=(3, n_sectors))
     frequency, friction, gap = np.clip(normal, -FURTHEST, FURTHEST)
-    stiffness = (1 + asked.frequency * frequency) ** 2 - 1
-    return Pattern(number, stiffness, asked.friction * friction, asked.gap * gap)
+    stiffness = (1 + mistuning.frequency * frequency) ** 2 - 1
+    return Pattern(number, stiffness, mistuning.friction * friction, mistuning.gap * gap)
 
 
 def whitehead(n_sectors: int) -> float:
@@ -89,14 +89,16 @@ class MistunedBlades:
     @classmethod
     def of(cls, file: SceneFile) -> MistunedBlades:
         """Mesh and reduce; raises SceneError for a scene without [wheel] or [mistuning]."""
-        asked = asked_of(file)
+        mistuning = asked_of(file)
         wheel = wheels.build(file)
-        K = deviating(wheel, asked.body)
+        K = deviating(wheel, mistuning.body)
         loads = sorted({name for _, name in wheel.wave().excitation.loads})
-        shapes = reduction.nominal_shapes(wheel.reduced, wheel.springs, K, asked.families, loads, asked.left_out)
+        shapes = reduction.nominal_shapes(
+            wheel.reduced, wheel.springs, K, mistuning.families, loads, mistuning.left_out
+        )
         reduced = reduction.with_ports(wheel.reduced, K, shapes)
         wave = replace(wheel, reduced=reduced).wave()
-        if asked.friction and not wave.contact.has_friction:
+        if mistuning.friction and not wave.contact.has_friction:
             raise SceneError("mistuning.friction: no contact of this scene has friction: leave it out")
         ports = tuple(reduction.port_name(k) for k in range(shapes.shape[1]))
         return cls(file, wheel.part, reduced, MistunedWheel(wave, ports))
@@ -108,7 +110,7 @@ class MistunedBlades:
         return drawn(asked_of(self.file), self.wheel.n_sectors, number)
 
     @cached_property
-    def alike(self) -> OperatingPoint:
+    def tuned(self) -> OperatingPoint:
         """The peak of the wheel of sectors alike; raises SolveFailed."""
         point = settings.peak_of(self.file.scene).first(self.wheel.wave)
         if not point.solution.converged:
@@ -118,12 +120,12 @@ class MistunedBlades:
     @cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """(n_pair, n_component, n_coeff) of sectors alike at both ends of the range, where patterns begin."""
-        one, order = self.wheel.wave, self.wheel.model.engine_order
-        found, n = [], self.wheel.n_sectors
+        tuned_wave, order = self.wheel.wave, self.wheel.model.engine_order
+        starts, n = [], self.wheel.n_sectors
         for omega in settings.response_range(self.file.scene):
-            x = arc_length.solve_along_load(one, omega, settings.newton_options(self.file.scene)).state.x
-            found.append(np.concatenate([at_sector(one.basis, x, order, n, k) for k in range(n)]))
-        return found[0], found[1]
+            x = arc_length.solve_along_load(tuned_wave, omega, settings.newton_options(self.file.scene)).state.x
+            starts.append(np.concatenate([at_sector(tuned_wave.basis, x, order, n, k) for k in range(n)]))
+        return starts[0], starts[1]
 
     def balance(self, pattern: Pattern) -> HarmonicBalance:
         """The whole wheel of a pattern."""
@@ -155,21 +157,21 @@ class MistunedBlades:
         def tall(branch: Branch) -> np.ndarray:
             return amplitude(branch.response[:, [branch.output_names.index(name) for name in names]])
 
-        def passed(branch: Branch) -> bool:
+        def is_past_peak(branch: Branch) -> bool:
             return tall(branch).argmax() // len(names) not in (0, len(branch.omega) - 1)
 
         # friction softens: from above the response is followed over its peak, and jumps behind it if at all
         branch = adaptive.follow(balance, high, low, replace(scan, guess=self.ends[1], jumps=False))
-        if not branch.arrived and passed(branch):
-            below = adaptive.follow(balance, low, branch.omega[-1], replace(scan, jumps=False))
-            whole = below.arrived and tall(below).max() < tall(branch).max()
+        if not branch.arrived and is_past_peak(branch):
+            lower = adaptive.follow(balance, low, branch.omega[-1], replace(scan, jumps=False))
+            is_complete = lower.arrived and tall(lower).max() < tall(branch).max()
         else:
-            whole = branch.arrived and passed(branch)
-        if not whole:
+            is_complete = branch.arrived and is_past_peak(branch)
+        if not is_complete:
             branch = adaptive.follow(balance, low, high, scan)
             if not branch.arrived:
                 raise SolveFailed(f"the frequency response {branch.end}")
-            if not passed(branch):
+            if not is_past_peak(branch):
                 raise SolveFailed("the response still rises at an end of response.frequency: extend it")
         heights = tall(branch)
         best, blade = highest_peak.highest(balance, branch, names, settings.peak_of(scene))
@@ -190,16 +192,16 @@ def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
     reduced: ReducedSector = wheel.reduced
     if body is None:
         return np.asarray(reduced.sector.system.stiffness)
-    bodies = [one.name for one in getattr(wheel.part.mesh, "bodies", ()) if one.name]
+    bodies = [body_of_mesh.name for body_of_mesh in getattr(wheel.part.mesh, "bodies", ()) if body_of_mesh.name]
     if body not in bodies:
         raise SceneError(unknown_key(f"mistuning.body: {body}", bodies))
     if wheel.part.follow is not None:
         raise SceneError("mistuning.body: bodies that are glued or tied have no stiffness of their own: leave it out")
     nodes = np.zeros(len(wheel.part.points), bool)
     nodes[find_group(wheel.part.node_sets, body)] = True
-    own = np.flatnonzero(np.repeat(nodes, 3)[wheel.part.free])
-    basis = reduced.origin.basis[own]
-    return np.asarray(basis.T @ (wheel.full.system.stiffness[own][:, own] @ basis))
+    free_dofs = np.flatnonzero(np.repeat(nodes, 3)[wheel.part.free])
+    basis = reduced.origin.basis[free_dofs]
+    return np.asarray(basis.T @ (wheel.full.system.stiffness[free_dofs][:, free_dofs] @ basis))
 
 
 def _hertz(omega: float) -> str:
@@ -229,19 +231,19 @@ def solve(task: PatternRun) -> RunRow:
                 file = scene_file.parse(task.text, f"{task.name}.toml", task.overrides, task.folder)
                 _ready = wheel, MistunedBlades.of(file)
             blades = _ready[1]
-            alike, _ = blades.alike, blades.ends  # of all patterns
+            tuned, _ = blades.tuned, blades.ends  # of all patterns
             start = time.process_time()
-            found, blade = blades.peak(blades.pattern(task.number))
+            highest, blade = blades.peak(blades.pattern(task.number))
         except (ValueError, RuntimeError, np.linalg.LinAlgError, MemoryError) as error:
             status: Status = "refused" if isinstance(error, SceneError) else "failed"
             return RunRow(task.number, task.key, status, " ".join(str(error).split()), {}, time.process_time() - start)
     numbers = {
-        "amplification": found.amplitude / alike.amplitude,
-        "peak_m": found.amplitude,
-        "peak_hz": found.state.omega / (2 * np.pi),
+        "amplification": highest.amplitude / tuned.amplitude,
+        "peak_m": highest.amplitude,
+        "peak_hz": highest.state.omega / (2 * np.pi),
         "blade": float(blade),
-        "peak_alike_m": alike.amplitude,
-        "solves": float(found.solves),
+        "peak_alike_m": tuned.amplitude,
+        "solves": float(highest.solves),
     }
     return RunRow(task.number, task.key, "complete", "complete", numbers, time.process_time() - start)
 
@@ -269,18 +271,18 @@ class Patterns(StudyResult):
 
     def record(self) -> dict[str, object]:
         """For machines."""
-        found = self.column("amplification")
-        if not len(found):
+        amplifications = self.column("amplification")
+        if not len(amplifications):
             return {"patterns": len(self.rows), "complete": 0}
-        p50, p95, p99 = np.percentile(found, (50, 95, 99))
-        worst = self.complete[int(found.argmax())]
+        p50, p95, p99 = np.percentile(amplifications, (50, 95, 99))
+        worst = self.complete[int(amplifications.argmax())]
         return {
             "patterns": len(self.rows),
-            "complete": len(found),
+            "complete": len(amplifications),
             "p50": float(p50),
             "p95": float(p95),
             "p99": float(p99),
-            "largest": float(found.max()),
+            "largest": float(amplifications.max()),
             "largest_pattern": worst.run,
             "largest_blade": int(worst.numbers["blade"]),
             "whitehead": whitehead(self.n_sectors),
@@ -290,17 +292,17 @@ class Patterns(StudyResult):
 
     def lines(self) -> list[str]:
         """For people."""
-        said = self.record()
-        lines = [f"{said['complete']} of {said['patterns']} patterns of {self.n_sectors} blades solved"]
+        summary = self.record()
+        lines = [f"{summary['complete']} of {summary['patterns']} patterns of {self.n_sectors} blades solved"]
         lines += [f"pattern {row.run}: {row.status}, {row.sentence}" for row in self.rows if row.status != "complete"]
-        if "p50" in said:
+        if "p50" in summary:
             lines += [
                 "largest amplitude of any blade over that of blades alike:",
-                f"  half of the wheels below {said['p50']:.4f}, 95 % below {said['p95']:.4f}, "
-                f"99 % below {said['p99']:.4f}",
-                f"  largest {said['largest']:.4f}, pattern {said['largest_pattern']}, blade {said['largest_blade']}; "
-                f"no linear wheel passes {said['whitehead']:.4f} (Whitehead 1966)",
-                f"{said['seconds']:.4g} s of processor",
+                f"  half of the wheels below {summary['p50']:.4f}, 95 % below {summary['p95']:.4f}, "
+                f"99 % below {summary['p99']:.4f}",
+                f"  largest {summary['largest']:.4f}, pattern {summary['largest_pattern']}, "
+                f"blade {summary['largest_blade']}; no linear wheel passes {summary['whitehead']:.4f} (Whitehead 1966)",
+                f"{summary['seconds']:.4g} s of processor",
             ]
         return lines
 
@@ -312,11 +314,11 @@ class Patterns(StudyResult):
 
     def plot(self) -> Figure:
         """How often which amplification was met, with its percentiles and what no linear wheel passes."""
-        values, said = self.column("amplification"), self.record()
+        values, summary = self.column("amplification"), self.record()
         with axes_of(7.6, 4.2) as (figure, axes):
             axes.hist(values, bins="auto" if len(values) > 20 else 10, color=BLUE, alpha=0.8)
             for name, colour in (("p50", INK), ("p95", ORANGE), ("p99", RED)):
-                axes.axvline(said[name], color=colour, label=f"{name.upper()} {said[name]:.3f}")
+                axes.axvline(summary[name], color=colour, label=f"{name.upper()} {summary[name]:.3f}")
             bound = whitehead(self.n_sectors)
             shown = [bound] if bound < 1.5 * values.max() else []  # further out it would squeeze the distribution
             axes.vlines(
@@ -330,8 +332,8 @@ class Patterns(StudyResult):
 
 def tasks_of(file: SceneFile, count: int) -> list[PatternRun]:
     """The patterns 1 to `count` of a scene, whose rows do not depend on how many there are."""
-    others = tuple(one for one in file.overrides if one.partition("=")[0].strip() != "mistuning.patterns")
-    return [PatternRun(n, file.name, file.text, others, file.folder) for n in range(1, count + 1)]
+    remaining = tuple(first for first in file.overrides if first.partition("=")[0].strip() != "mistuning.patterns")
+    return [PatternRun(n, file.name, file.text, remaining, file.folder) for n in range(1, count + 1)]
 
 
 def patterns(
@@ -353,19 +355,23 @@ def patterns(
     """
     file, report = read_scene(scene, overrides), reporter(progress)
     folder = Path("results") / file.name if folder is None else Path(folder)
-    asked, wheel = asked_of(file), file.mesh_scene.wheel
+    mistuning, wheel = asked_of(file), file.mesh_scene.wheel
     if wheel is None:
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
     runner = Runner(folder, report, workers, resume=resume, retry=resume)
     folder.mkdir(parents=True, exist_ok=True)
     rows: dict[int, RunRow] = {}
     with alone_in(folder):
-        finish(tasks := tasks_of(file, asked.patterns), runner, rows, solve, "patterns", inside=True)
-    found = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks), folder)
+        finish(tasks := tasks_of(file, mistuning.patterns), runner, rows, solve, "patterns", inside=True)
+    rows_by_number = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks), folder)
     names = ("amplification", "peak_m", "peak_hz", "blade", "solves")
-    columns = {name: [row.numbers.get(name, np.nan) for row in found.rows] for name in names}
-    every = {"pattern": [row.run for row in found.rows], "status": [row.status for row in found.rows], **columns}
-    write_columns({**every, "seconds": [row.seconds for row in found.rows]}, folder / "patterns.csv")
-    if found.complete:
-        found.plot().savefig(folder / "mistuning.png")
-    return found
+    columns = {name: [row.numbers.get(name, np.nan) for row in rows_by_number.rows] for name in names}
+    n_patterns = {
+        "pattern": [row.run for row in rows_by_number.rows],
+        "status": [row.status for row in rows_by_number.rows],
+        **columns,
+    }
+    write_columns({**n_patterns, "seconds": [row.seconds for row in rows_by_number.rows]}, folder / "patterns.csv")
+    if rows_by_number.complete:
+        rows_by_number.plot().savefig(folder / "mistuning.png")
+    return rows_by_number

@@ -48,13 +48,13 @@ class MistunedSectors(StudyResult):
     stiffness: np.ndarray
     branch: Branch
     heights: np.ndarray
-    alike: Branch
+    tuned: Branch
     peak: ResponseDerivatives | NoDerivative
 
     @property
     def amplification(self) -> float:
         """Largest amplitude of any sector over that of a wheel of sectors alike."""
-        return float(self.heights.max() / self.alike.amplitude(OUTPUT).max())
+        return float(self.heights.max() / self.tuned.amplitude(OUTPUT).max())
 
     def record(self) -> dict[str, object]:
         """For machines."""
@@ -64,7 +64,7 @@ class MistunedSectors(StudyResult):
             "amplification": self.amplification,
             "worst_sector": worst,
             "peak_m": float(self.heights.max()),
-            "peak_alike_m": float(self.alike.amplitude(OUTPUT).max()),
+            "peak_alike_m": float(self.tuned.amplitude(OUTPUT).max()),
             "derivatives": None if isinstance(self.peak, NoDerivative) else self.peak.record(),
         }
 
@@ -76,8 +76,8 @@ class MistunedSectors(StudyResult):
         ]
         if isinstance(self.peak, NoDerivative):
             return [*lines, f"it has no derivatives by the factors: {self.peak}"]
-        row, lines = self.peak.found.names.index("amplitude"), [*lines, *self.peak.lines()]
-        norm = np.linalg.norm([one[row] for one in self.peak.elasticities.values()])
+        row, lines = self.peak.derivatives.names.index("amplitude"), [*lines, *self.peak.lines()]
+        norm = np.linalg.norm([elasticity[row] for elasticity in self.peak.elasticities.values()])
         lines.append(f"to first order a scatter of 0.1 % of all factors scatters the amplitude by {0.1 * norm:.3g} %")
         tall = self.heights.max(axis=0)
         if (tall > (1 - TOLERANCE) * tall.max()).sum() > 1:
@@ -99,8 +99,8 @@ class MistunedSectors(StudyResult):
             for n, colour in enumerate(colours):
                 label = f"sector {n}: {100 * (self.stiffness[n] - 1):+.1f} %" if len(colours) <= 12 else None
                 axes.plot(self.branch.frequency, scale * self.heights[:, n], color=colour, label=label)
-            alike = scale * self.alike.amplitude(OUTPUT)
-            axes.plot(self.alike.frequency, alike, "--", color=INK, label="sectors alike")
+            tuned = scale * self.tuned.amplitude(OUTPUT)
+            axes.plot(self.tuned.frequency, tuned, "--", color=INK, label="sectors alike")
             axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}")
             axes.set_title("Sectors whose stiffnesses deviate")
             axes.legend(ncols=2)
@@ -133,19 +133,19 @@ def stiffer(wheel: wheels.Wheel, balance: HarmonicBalance) -> Iterator[Parameter
 
     Raises  NoDerivative for Rayleigh's damping of two modes, which may be a pair of the wheel that parts
     """
-    own, model, damping = BalanceInputs.of(balance), balance.model, wheel.scene.damping
+    base, model, damping = BalanceInputs.of(balance), balance.model, wheel.scene.damping
     if damping.ratios is not None:
         raise NoDerivative("damping.ratios goes by two modes of the wheel: give damping.modal, or mass and stiffness")
     of_modes = None if damping.modal is None else modal_damping_towards(model.system, damping.modal)
     for n, P in enumerate(sector_maps(wheel.reduced.sector)):
         change = P.T @ (wheel.reduced.sector.system.stiffness @ P)
-        moved = replace(model.system, stiffness=model.system.stiffness + change)
+        changed = replace(model.system, stiffness=model.system.stiffness + change)
         if damping.given:
             damped = of_modes(change) if of_modes else (damping.stiffness or 0.0) * change
-            moved = replace(moved, damping=model.system.damping + damped)
+            changed = replace(changed, damping=model.system.damping + damped)
         # from here to there is a step of one half to both sides of their middle
         yield ParameterChange(
-            f"stiffness of sector {n}", 0.5, replace(own, model=replace(model, system=moved)), own, ()
+            f"stiffness of sector {n}", 0.5, replace(base, model=replace(model, system=changed)), base, ()
         )
 
 
@@ -171,16 +171,18 @@ def mistuned(
         n = wheel.n_sectors
         factors = deviations(n, spread, seed) if stiffness is None else checked(stiffness, n)
         frequency = file.scene.response.range
-        balance, start = wheel.whole([float(one) for one in factors]), process_time()
+        balance, start = wheel.whole_wheel([float(factor) for factor in factors]), process_time()
         branch = wheels.follow(balance, frequency, TOLERANCE)
         heights = np.column_stack([branch.amplitude(f"{OUTPUT}@{i}") for i in range(n)])
         solved, output = process_time(), f"{OUTPUT}@{heights.max(axis=0).argmax()}"
         try:
-            found = of_branch(file.scene, balance, branch, stiffer(wheel, balance), output=output)
-            at = dict(zip(found.parameters, factors.tolist(), strict=True))
+            derivatives_found = of_branch(file.scene, balance, branch, stiffer(wheel, balance), output=output)
+            at = dict(zip(derivatives_found.parameters, factors.tolist(), strict=True))
             times = solved - start, process_time() - solved
-            peak: ResponseDerivatives | NoDerivative = ResponseDerivatives(file.name, found, at, {}, *times, ())
+            peak: ResponseDerivatives | NoDerivative = ResponseDerivatives(
+                file.name, derivatives_found, at, {}, *times, ()
+            )
         except NoDerivative as reason:
             peak = reason
-        alike = wheels.follow(wheel.wave(), frequency, TOLERANCE)
-    return MistunedSectors(factors, branch, heights, alike, peak)
+        tuned = wheels.follow(wheel.wave(), frequency, TOLERANCE)
+    return MistunedSectors(factors, branch, heights, tuned, peak)

@@ -65,12 +65,12 @@ class Wheel:
 
     def wave(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> HarmonicBalance:
         """The balance under a travelling wave; engine order and range of frequencies [Hz] default to the scene's."""
-        scene = self.asked(engine_order, frequency)
+        scene = self.scene_for(engine_order, frequency)
         assert scene.wheel is not None
         reduced = modelling.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
         return modelling.make_model(scene, self.part, reduced).balance
 
-    def asked(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> MeshScene:
+    def scene_for(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> MeshScene:
         """The scene with another engine order or range of frequencies [Hz]; raises SceneError along the speed."""
         wheel, response = self.scene.wheel, self.scene.response
         assert wheel is not None
@@ -85,19 +85,21 @@ class Wheel:
             response = response.model_copy(update={"frequency": frequency, "references": None})
         return self.scene.model_copy(update={"wheel": wheel, "response": response})
 
-    def whole(self, stiffness: Sequence[float] | None = None) -> HarmonicBalance:
+    def whole_wheel(self, stiffness: Sequence[float] | None = None) -> HarmonicBalance:
         """The balance of all sectors at once, outputs and loads named "<name>@<sector>".
 
         stiffness : (n_sectors,) factor on the stiffness of each sector, such as blades that differ: what a travelling
             wave of one sector cannot say
         """
-        one, wheel = self.wave(), self.scene.wheel
+        wave_balance, wheel = self.wave(), self.scene.wheel
         assert wheel is not None
-        springs = np.tile(one.contact.stiffness, (self.n_sectors, 1))
-        whole = wheel_model(self.reduced, stiffness)
-        whole = whole.with_damping(partial(modelling.damping_matrix, self.scene, springs))
-        load = on_wheel(one.excitation, wheel.engine_order, self.n_sectors)
-        return HarmonicBalance.of(whole, one.contact.repeated(self.n_sectors), one.basis, load, one.omega_max)
+        springs = np.tile(wave_balance.contact.stiffness, (self.n_sectors, 1))
+        model = wheel_model(self.reduced, stiffness)
+        model = model.with_damping(partial(modelling.damping_matrix, self.scene, springs))
+        load = on_wheel(wave_balance.excitation, wheel.engine_order, self.n_sectors)
+        return HarmonicBalance.of(
+            model, wave_balance.contact.repeated(self.n_sectors), wave_balance.basis, load, wave_balance.omega_max
+        )
 
     def at_speed(self, speed: float) -> Wheel:
         """The same wheel turning at a speed [Hz]: stiffened by its stress, softened by its frame; not meshed again."""
@@ -143,12 +145,12 @@ def campbell(
     highest : speed [Hz]; count : speeds from rest to it
     """
     speeds = np.linspace(0.0, highest, count)
-    found: dict[str, list[np.ndarray]] = {"free": [], "stuck": []}
+    frequencies: dict[str, list[np.ndarray]] = {"free": [], "stuck": []}
     for speed in speeds:
         spinning = wheel.at_speed(float(speed))
-        for state, rows in found.items():
+        for state, rows in frequencies.items():
             rows.append(spinning.diagram(orders, families, state == "stuck"))
-    return speeds, {state: np.array(rows) for state, rows in found.items()}
+    return speeds, {state: np.array(rows) for state, rows in frequencies.items()}
 
 
 def critical_speeds(speeds: np.ndarray, frequency: np.ndarray, order: int) -> list[float]:

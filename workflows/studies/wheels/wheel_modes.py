@@ -61,42 +61,46 @@ class WheelModes(StudyResult):
 
     def figures(self) -> dict[str, Figure]:
         """The pictures by name."""
-        found = {"nodal_diameters": wheel_diagrams.nodal_diameters(self.families, self.name)}
+        figures_by_name = {"nodal_diameters": wheel_diagrams.nodal_diameters(self.families, self.name)}
         if self.slow is not None and self.fast is not None:
-            found["safe"] = wheel_diagrams.safe(self.families, self.n_sectors, self.slow, self.fast, self.name)
+            figures_by_name["safe"] = wheel_diagrams.safe(
+                self.families, self.n_sectors, self.slow, self.fast, self.name
+            )
         if len(self.speeds):
-            found["campbell"] = wheel_diagrams.campbell(self.speeds, self.waves, self.orders, self.critical, self.name)
-        return found
+            figures_by_name["campbell"] = wheel_diagrams.campbell(
+                self.speeds, self.waves, self.orders, self.critical, self.name
+            )
+        return figures_by_name
 
     def record(self) -> dict[str, Any]:
         """What was found, for machines."""
         return {
             "sectors": self.n_sectors,
             "families_hz": {state: values.tolist() for state, values in self.families.items()},
-            "met": {state: [asdict(m) for m in met] for state, met in self.meetings().items()},
+            "met": {state: [asdict(m) for m in crossing] for state, crossing in self.meetings().items()},
             "critical_hz": {str(order): at for order, at in self.critical.items()},
         }
 
     def lines(self) -> list[str]:
         """What was found, for people."""
-        said = []
+        texts = []
         for state, values in self.families.items():
             if np.isnan(values).all():
-                said.append(f"contact {state}: rotation carries away what only the contact holds")
+                texts.append(f"contact {state}: rotation carries away what only the contact holds")
                 continue
             low, high = values[:, 0].min(), values[:, 0].max()
-            said.append(f"first family, contact {state}: {low:.6g} to {high:.6g} Hz")
-        for state, met in self.meetings().items():
-            for order in sorted({m.engine_order for m in met}):
-                of_order = [m for m in met if m.engine_order == order]
+            texts.append(f"first family, contact {state}: {low:.6g} to {high:.6g} Hz")
+        for state, crossing in self.meetings().items():
+            for order in sorted({m.engine_order for m in crossing}):
+                of_order = [m for m in crossing if m.engine_order == order]
                 each = [f"family {m.family + 1} at {60 * m.speed:.5g} rpm, {m.frequency:.5g} Hz" for m in of_order]
                 where = f"engine order {order}, nodal diameter {of_order[0].diameter}, contact {state}"
-                said.append(f"{where}: {', '.join(each)}")
+                texts.append(f"{where}: {', '.join(each)}")
         for order, at in self.critical.items():
-            said.append(
+            texts.append(
                 f"engine order {order}: critical at {', '.join(f'{60 * s:.0f}' for s in at) or 'no'} rpm, stuck"
             )
-        return said
+        return texts
 
     def write(self, folder: Path) -> list[Path]:
         """Write nodal_diameters.csv and the pictures."""
@@ -144,14 +148,16 @@ def modes(
     file = read_scene(scene, overrides)
     with limited(file.scene.solver.threads):
         wheel = build(file)
-        own = wheel.scene.wheel
-        assert own is not None
+        default_orders = wheel.scene.wheel
+        assert default_orders is not None
         diameters = range(wheel.n_sectors // 2 + 1)
-        found = {state: wheel.diagram(diameters, families, state == "stuck") for state in ("free", "stuck")}
+        diagrams = {state: wheel.diagram(diameters, families, state == "stuck") for state in ("free", "stuck")}
         if turns := wheel.full.system.gyroscopic is not None:
             back = [-d for d in diameters]
-            found |= {state + AGAINST: wheel.diagram(back, families, state == "stuck") for state in ("free", "stuck")}
-        chosen = tuple(orders) or (own.engine_order or 1,)
+            diagrams |= {
+                state + AGAINST: wheel.diagram(back, families, state == "stuck") for state in ("free", "stuck")
+            }
+        chosen = tuple(orders) or (default_orders.engine_order or 1,)
         turning, waves = np.zeros(0), dict[str, np.ndarray]()
         if fast is not None:
             shown = chosen + (tuple(-order for order in chosen) if turns else ())
@@ -159,4 +165,4 @@ def modes(
             waves = {state: rows[:, : len(chosen)] for state, rows in each.items()}
             if turns:
                 waves["stuck" + AGAINST] = each["stuck"][:, len(chosen) :]
-    return WheelModes(file.name, wheel.n_sectors, found, slow, fast, chosen, turning, waves, tuple(formats))
+    return WheelModes(file.name, wheel.n_sectors, diagrams, slow, fast, chosen, turning, waves, tuple(formats))
