@@ -15,6 +15,7 @@ import tribodyn as td
 from proof import reference
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.quantity import names_with_error
+from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.errors import accuracy, change_table, judgement, operating_states, refine
 from tribodyn.workflows.errors.accuracy import Bound
 from tribodyn.workflows.errors.operating_states import relative_change, with_more_harmonics
@@ -381,3 +382,29 @@ def test_an_accuracy_is_read() -> None:
     wanted = accuracy.parsed("1 % of life and peak frequency")
     assert wanted.error == pytest.approx(0.01)
     assert wanted.quantities == ("life", "peak_frequency")
+
+
+@pytest.mark.parametrize("defect", [IndexError("planted"), ValueError("planted"), AttributeError("planted")])
+def test_a_defect_in_the_refined_model_ends_the_run(defect: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is no error that is not known: nothing but refusals and failures of solvers counts as that."""
+    file = scene_file.read("beam", (*TINY, "wear=", "verdict.enabled=false"))
+    result, model = td.run(file), td.build(file)
+
+    def fail(*_: object) -> None:
+        raise defect
+
+    monkeypatch.setattr(change_table.modelling, "build", fail)
+    with pytest.raises(type(defect), match="planted"):
+        judgement.judge(file, model, result, td_progress())
+
+
+def test_a_solver_that_fails_on_the_refined_model_leaves_the_error_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = scene_file.read("beam", (*TINY, "wear=", "verdict.enabled=false"))
+    result, model = td.run(file), td.build(file)
+
+    def fail(*_: object) -> None:
+        raise SolverFailure("no solution")
+
+    monkeypatch.setattr(change_table.modelling, "build", fail)
+    verdict = judgement.judge(file, model, result, td_progress())
+    assert {verdict.statements[name].status for name in OF_STATE} == {Status.NOT_KNOWN}
