@@ -37,8 +37,8 @@ RULES: dict[str, dict[str, Any]] = {
     "continuation.methods.natural.Rules": {
         "least_spacing": 0.0, "max_fold_points": 10**9, "abrupt": NEVER, "max_corner_points": 200,
     },
-    "continuation.operating_point.AtPeak": {
-        "scan_misses": 0.0, "overtakes": 1.0, "near": NEVER, "reach": 1e9, "tried": 1,
+    "continuation.resonance_peak.AtPeak": {
+        "scan_miss": 0.0, "dominance": 1.0, "near_peak": NEVER, "outside_reach": 1e9, "max_refined": 1,
     },
     "wear.error_controlled_rule.StepRules": {
         "error_trend_power": 0.0, "unexpected": NEVER,

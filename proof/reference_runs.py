@@ -19,7 +19,8 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.time.stepper import Options
@@ -237,7 +238,7 @@ def peak() -> Numbers:
     """A peak of a mass that slips, and one of a mass that lifts."""
     body = rigid(1)
     balance = body.balance(body.ordinary)
-    at = AtPeak("mass", 800.0, 1700.0).first(balance)
+    at = AtPeak("mass", 800.0, 1700.0).solve(balance)
     point = {"peak frequency": np.array([at.state.omega]), "peak amplitude": np.array([at.amplitude])}
     system = SecondOrderSystem(
         np.eye(1), np.array([[1e4]]), np.array([[2.0]]), {"press": np.ones(1)}, {"mass": np.ones(1)}

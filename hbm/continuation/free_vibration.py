@@ -150,9 +150,7 @@ class FreeVibration:
             raise Refusal("nonlinear modes need harmonic 1 among the harmonics")
         names = balance.compliance.output_names
         if not names or (output is not None and output not in names):
-            raise Refusal(
-                f"no output '{output}' to measure the amplitude: the model has {', '.join(names) or 'none'}"
-            )
+            raise Refusal(f"no output '{output}' to measure the amplitude: the model has {', '.join(names) or 'none'}")
         self.k = balance.compliance.k
         made: dict[int, Modes] = {}
         self.modes: list[Modes] = []

@@ -14,7 +14,8 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch, amplitude
-from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def highest(
         if best is not None and (1 + doubt) * height < best.amplitude:
             continue
         known = dict(zip(omega, map(balance.shaped, branch.contact[near]), strict=True))
-        found = replace(site, output=outputs[output]).within(balance, omega[1], known, min(omega), max(omega))
+        found = replace(site, output=outputs[output]).solve_between(balance, omega[1], known, min(omega), max(omega))
         solves += found.solves
         if not found.solution.converged:
             continue

@@ -13,11 +13,14 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import bordered, parameter
+from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
 from tribodyn.hbm.continuation.branch import Branch, BranchPoint
 from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.highest_peak import vertex
-from tribodyn.hbm.continuation.operating_point import AtPeak, NoPeak, OperatingPoint, Slope
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.peak_refinement import NoPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 from tribodyn.hbm.threads import single
@@ -74,7 +77,7 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
             known = {float(branch.omega[k]): balance.shaped(branch.contact[k]) for k in three}
             point = None
             with suppress(NoPeak):  # it still rises at the highest frequency that is modelled
-                point = site.within(balance, float(branch.omega[i]), known, candidate.low, candidate.high)
+                point = site.solve_between(balance, float(branch.omega[i]), known, candidate.low, candidate.high)
         same = (1 - site.tolerance) * heights[i]  # lower than that lies on another part of the curve
         if point is None or not point.solution.converged or point.amplitude < same:
             failed += [candidate]
@@ -131,7 +134,7 @@ def _hidden(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> f
         return 0.0
     for k, way in ((i, 1.0), (i + 1, -1.0)):
         state = balance.evaluate(float(branch.omega[k]), balance.shaped(branch.contact[k]))
-        slope = Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), site.output).slope
+        slope = AmplitudeSlope.of(balance, Solution(state, CONVERGED, 0, 0, ()), site.output).slope
         if slope * way * (w[1] - w[0]) <= 0:
             return 0.0
     return float(abs(a) * abs(pole - w[0]) / max(abs(pole.imag), 1e-12 * abs(pole)))
@@ -158,13 +161,14 @@ def along_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) ->
     metric = Metric(size, span)
     places = [Direction(branch.contact[k], float(branch.omega[k])) for k in (i - 1, i, i + 1)]
 
-    def solved(guess: Direction, border: Direction) -> tuple[CurvePoint, Slope] | None:
+    def solved(guess: Direction, border: Direction) -> tuple[CurvePoint, AmplitudeSlope] | None:
         solution, value = bordered.correct(path, guess, border, metric, site.newton)
         if not solution.converged:
             return None
         tangent = bordered.tangent(path, value, solution.state, border, metric, site.newton, RULES.tangent)
         point = CurvePoint.of(value, solution, tangent)
-        return point, Slope.along(balance, balance.linearise(solution.state), solution, site.output, tangent)
+        linear = balance.linearise(solution.state)
+        return point, AmplitudeSlope.on_tangent(balance, linear, solution, site.output, tangent)
 
     spent = 0
     try:

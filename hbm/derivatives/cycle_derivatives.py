@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation.operating_point import Slope
+from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
 from tribodyn.hbm.derivatives.adjoint_gradient import CycleNumber, Gradient, cycle_numbers
 from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import (
@@ -71,7 +71,7 @@ def at_peak(
     """
     ends, width = exact_peak(balance, state, output, options)
 
-    def gradient_near(end: Slope, widths: float) -> Gradient:
+    def gradient_near(end: AmplitudeSlope, widths: float) -> Gradient:
         omega = end.omega + widths * width
         near = exact_state(balance, omega, end.predict(omega), options)
         return Gradient(balance, near, tuple(cycle_numbers(balance, near, output, wear)))

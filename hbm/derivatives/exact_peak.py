@@ -5,28 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
 from tribodyn.hbm.continuation.branch import amplitude
-from tribodyn.hbm.continuation.operating_point import Slope
 from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import exact_state
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 
 
-def slope_at(balance: HarmonicBalance, state: State, output: str) -> Slope:
+def slope_at(balance: HarmonicBalance, state: State, output: str) -> AmplitudeSlope:
     """Slope of the amplitude of an output at a solved state."""
-    return Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), output)
+    return AmplitudeSlope.of(balance, Solution(state, CONVERGED, 0, 0, ()), output)
 
 
 def exact_peak(
     balance: HarmonicBalance, state: State, output: str, options: NewtonOptions | None
-) -> tuple[tuple[Slope, ...], float]:
+) -> tuple[tuple[AmplitudeSlope, ...], float]:
     """The peak next to a state, by secants of the slope, and half width of the resonance [rad/s].
 
     Two points where the slope does not vanish but jumps: those on both sides of the corner
     """
 
-    def solve_at(omega: float, near: Slope) -> Slope:
+    def solve_at(omega: float, near: AmplitudeSlope) -> AmplitudeSlope:
         return slope_at(balance, exact_state(balance, omega, near.predict(omega), options), output)
 
     row = balance.compliance.output_names.index(output)

@@ -119,7 +119,7 @@ def _stage(
             reached = newton.Solution(state, solution.outcome, solution.steps, solution.products, solution.history)
             points.append(OperatingPoint.of(worn, reached, duty.site.output, 0))
             if solution.converged:
-                corrections.append(duty.site.correct(worn, state))
+                corrections.append(duty.site.correction(worn, state))
         solves += sum(c.solves for c in corrections)
         found = worn_state(problem, depth, cycles, points, solves)
         if not solution.converged:

@@ -14,7 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
+from tribodyn.hbm.continuation.peak_refinement import NoPeak
 from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time.stepper import IntegrationFailed
@@ -399,7 +400,7 @@ class _Overtaken:
 def _overtaken(problem: WearProblem, state: WearState) -> _Overtaken:
     """Look for peaks that have overtaken those of a state's duties."""
     searched = [
-        duty.site.overtaken(problem.in_duty(duty, state.depth), point)
+        duty.site.dominant_peak(problem.in_duty(duty, state.depth), point)
         for duty, point in zip(problem.mission, state.points, strict=True)
     ]
     points = None

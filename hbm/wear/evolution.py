@@ -11,8 +11,8 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import SEPARATES
+from tribodyn.hbm.continuation.operating_condition import OperatingCondition
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
-from tribodyn.hbm.continuation.sites import Site
 from tribodyn.hbm.newton import lead
 from tribodyn.hbm.outcome import CONVERGED, Outcome, WearEnd
 from tribodyn.hbm.time.time_integration import PeriodicMotion
@@ -33,7 +33,7 @@ class Duty:
     start : frequency [rad/s] and x (n_pair, n_component, n_coeff) [m] beside its unworn cycle; looked for where None
     """
 
-    site: Site
+    site: OperatingCondition
     share: float = 1.0
     load: float = 1.0
     balance: HarmonicBalance | None = None
@@ -42,9 +42,9 @@ class Duty:
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """The cycle without a neighbouring state."""
         if self.start is None:
-            return self.site.first(balance)
-        point = self.site.next(balance, *self.start)
-        return point if point.solution.converged else self.site.first(balance)
+            return self.site.solve(balance)
+        point = self.site.solve_near(balance, *self.start)
+        return point if point.solution.converged else self.site.solve(balance)
 
 
 @dataclass(frozen=True)
@@ -233,15 +233,15 @@ def _neighbour(
     omega, opening = known.state.omega, depth - known_depth
     before = problem.in_duty(duty, known_depth)
     guess = known.state.x + before.gap_response(before.evaluate(omega, known.state.x), opening)
-    point = duty.site.next(balance, omega, guess)
+    point = duty.site.solve_near(balance, omega, guess)
     if point.solution.converged:
         return point
     x, solves = _carry(before, omega, known.state.x, opening)
     solves += point.solves
-    again = duty.site.next(balance, omega, x)
+    again = duty.site.solve_near(balance, omega, x)
     if not again.solution.converged:  # the neighbour's branch has ended: look as at the start
         solves += again.solves
-        again = duty.site.first(balance)
+        again = duty.site.solve(balance)
     return OperatingPoint(again.solution, again.amplitude, again.response, again.solves + solves)
 
 

@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.evolution import WearProblem, WearState, worn_state
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, WearRow
@@ -37,7 +38,7 @@ def settled(whole: WearProblem, state: WearState) -> tuple[WearProblem, WearStat
         points, solves = [], state.solves
         for duty, point in zip(more.mission, carried(more, state).points, strict=True):
             balance = more.in_duty(duty, state.depth)
-            found = duty.site.next(balance, point.state.omega, point.state.x)
+            found = duty.site.solve_near(balance, point.state.omega, point.state.x)
             solves += found.solves
             far = abs(found.state.omega - point.state.omega) > LARGEST_SHIFT * point.state.omega
             if far or not found.solution.converged:
@@ -64,7 +65,7 @@ def with_fewer(problem: WearProblem) -> WearProblem | None:
 def of_scans(whole: WearProblem) -> WearProblem:
     """The problem with the harmonics that scans for peaks have."""
     return _with_harmonics(
-        whole, tuple(h for h in whole.balance.basis.harmonics if h <= _needed(whole, AtPeak.scanned))
+        whole, tuple(h for h in whole.balance.basis.harmonics if h <= _needed(whole, AtPeak.scan_harmonic))
     )
 
 

@@ -30,8 +30,8 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
+from tribodyn.hbm.continuation.operating_condition import AtPeakRatio
 from tribodyn.hbm.continuation.operating_point import AtFrequency
-from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.derivatives.cycle_derivatives import peak_moves
 from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives
@@ -318,8 +318,8 @@ class _Cycle:
     def moves(self) -> np.ndarray:
         """(n_change + n_pair,) d omega of a place that moves with a peak, see `peak_moves`."""
         site, balance, state, ratio = self.duty.site, self.balance, self.solved, 1.0
-        if isinstance(site, BesidePeak):
-            ratio, state = site.ratio, site.at_peak(balance, state.omega, state.x).state
+        if isinstance(site, AtPeakRatio):
+            ratio, state = site.ratio, site.peak_near(balance, state.omega, state.x).state
         try:
             return ratio * peak_moves(balance, state, site.output, self.changes, site.newton)
         except NoDerivative as reason:

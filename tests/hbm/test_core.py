@@ -11,7 +11,7 @@ from tests.helpers.verification_models import interface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import natural
-from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
@@ -114,7 +114,7 @@ def test_tracked_peak_is_that_of_a_fine_sweep(
     """Forces at equidistant samples bend the curve in steps, where a peak is no better known than they are wide."""
     balance = balance_of(model)
     balance = balance.with_samples(balance.basis.n_samples, located)
-    peak = AtPeak("tip", 250.0, 1200.0, tolerance=1e-7).first(balance)
+    peak = AtPeak("tip", 250.0, 1200.0, tolerance=1e-7).solve(balance)
     omega = peak.state.omega
     sweep = natural.follow(balance, 0.99 * omega, 1.01 * omega, natural.Options(n_points=201))
     height = sweep.amplitude("tip")

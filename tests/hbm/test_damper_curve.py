@@ -12,7 +12,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
@@ -29,7 +29,7 @@ def peak(limit: float, harmonics: tuple[int, ...] = (1,)) -> float:
     basis = HarmonicBasis(harmonics, 64, "located")
     load = Excitation.of({}, {1: {"wave": FORCE}})
     balance = HarmonicBalance.of(model, Joint("damper", "jenkins_constant", numbers), basis, load, 2.0)
-    found = AtPeak("tip", 0.9, 1.4).first(balance)
+    found = AtPeak("tip", 0.9, 1.4).solve(balance)
     assert found.solution.converged
     return float(found.amplitude)
 
@@ -47,7 +47,7 @@ def chain_peak(limit: float, waves: int, blades: int = 6) -> tuple[float, float]
     basis = HarmonicBasis((1,), 64, "located")
     load = Excitation.of({}, {1: {"cos": FORCE, "sin": -1j * FORCE}})
     balance = HarmonicBalance.of(model, Joint("shroud", "jenkins_constant", numbers), basis, load, 3.0)
-    found = AtPeak("tip 0", 0.9, 1.9).first(balance)
+    found = AtPeak("tip 0", 0.9, 1.9).solve(balance)
     assert found.solution.converged
     heights = np.linalg.norm(found.response, axis=1)
     return float(found.amplitude), float(np.ptp(heights) / heights.max())

@@ -12,8 +12,9 @@ from scipy.optimize import brentq
 from tests.helpers.pressed_body import balance_of, growth_by_few_modes, pressed_body, wear_problem
 from tests.helpers.steps_again import EXACT, elasticity_anew
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
-from tribodyn.hbm.continuation.sites import BesidePeak
+from tribodyn.hbm.continuation.operating_condition import AtPeakRatio
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.wear import error_controlled_rule, tangent, thesis_rule
@@ -108,7 +109,7 @@ def depth_rate(e):
     return n["coefficient"] * e.energy**1.1 / e.area * faces
 """
 TWO = (Duty(AT, 0.6), Duty(AtFrequency("tip", 300.0, EXACT), 0.4, 1.3))
-BESIDE = (Duty(BesidePeak(PEAK, 0.97)),)
+BESIDE = (Duty(AtPeakRatio(PEAK, 0.97)),)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from tests.helpers.pressed_body import balance_of, pressed_body
 from tribodyn.hbm.continuation import highest_peak
 from tribodyn.hbm.continuation.methods import adaptive
-from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 
 
 def resonance(omega: np.ndarray, at: float, width: float, height: float) -> np.ndarray:
@@ -49,7 +49,7 @@ def test_the_peak_is_the_one_that_its_slope_finds() -> None:
     balance, site = balance_of(pressed_body(), (0, 1)), AtPeak("tip", 300.0, 700.0)
     branch = adaptive.follow(balance, site.start, site.stop, adaptive.Options(tolerance=0.03, newton=site.newton))
     found, which = highest_peak.highest(balance, branch, [site.output], replace(site, output="none"))
-    exact = site.first(balance)
+    exact = site.solve(balance)
     assert found is not None
     assert which == 0
     assert found.amplitude == pytest.approx(exact.amplitude, rel=1e-4)

@@ -19,8 +19,8 @@ from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
-from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.continuation.peaks import with_peaks
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import BranchEnd, SolveEnd
@@ -63,7 +63,7 @@ class StuckOscillator:
 @pytest.mark.parametrize("ratio", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
 def test_a_linear_resonance_has_its_height_at_any_damping(ratio: float) -> None:
     problem = StuckOscillator(ratio)
-    found = AtPeak("mass", *RANGE).first(problem.balance)
+    found = AtPeak("mass", *RANGE).solve(problem.balance)
     assert found.solution.converged
     assert found.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
     assert found.state.omega == pytest.approx(problem.peak[1], rel=0.05 * ratio + 1e-9)
@@ -80,7 +80,7 @@ def test_a_scan_that_ends_on_its_way_is_begun_at_the_other_end(monkeypatch: pyte
         return replace(follow(balance, start, below, options), end=BranchEnd.ENDED.say(" here"))
 
     monkeypatch.setattr(adaptive, "follow", ends)
-    found = AtPeak("mass", *RANGE).first(problem.balance)
+    found = AtPeak("mass", *RANGE).solve(problem.balance)
     assert found.solution.converged
     assert found.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
 
@@ -119,7 +119,7 @@ def test_a_peak_beside_solves_that_fail_is_found_or_told(failing, monkeypatch: p
 
 def test_a_search_that_ends_lower_than_its_point_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on the other side of a jump."""
-    problem, within = StuckOscillator(1e-2), AtPeak.within
+    problem, within = StuckOscillator(1e-2), AtPeak.solve_between
     branch = natural.follow(problem.balance, *RANGE, natural.Options(n_points=30))
 
     for share, found in ((1e-6, True), (0.1, False)):
@@ -128,7 +128,7 @@ def test_a_search_that_ends_lower_than_its_point_is_told(monkeypatch: pytest.Mon
             height = branch.amplitude("mass")[np.abs(branch.omega - omega).argmin()]
             return replace(within(site, balance, omega, *rest), amplitude=(1 - share) * height)
 
-        monkeypatch.setattr(AtPeak, "within", lower)
+        monkeypatch.setattr(AtPeak, "solve_between", lower)
         solved = with_peaks(problem.balance, branch, AtPeak("mass", *RANGE))
         assert (solved.peak("mass") is not None) is found
         assert (solved.no_peak("mass") == "") is found

@@ -12,7 +12,8 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -37,8 +38,8 @@ ENTRIES = {
     "adaptive": lambda b: adaptive.follow(b, OMEGA, 1.1 * OMEGA),
     "arc length": lambda b: arc_length.follow(b, OMEGA, 1.1 * OMEGA),
     "at rest": lambda b: rest.displacement(b),
-    "at a frequency": lambda b: AtFrequency("mass", OMEGA).first(b),
-    "at the peak": lambda b: AtPeak("mass", 80.0, 160.0, n_scan=5).first(b),
+    "at a frequency": lambda b: AtFrequency("mass", OMEGA).solve(b),
+    "at the peak": lambda b: AtPeak("mass", 80.0, 160.0, n_scan=5).solve(b),
 }
 
 

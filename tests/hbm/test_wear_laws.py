@@ -22,7 +22,7 @@ def problem() -> WearProblem:
 
 
 def test_archard_and_energy_law_agree_up_to_the_uncoupled_directions(problem: WearProblem) -> None:
-    point = problem.mission[0].site.first(problem.balance)
+    point = problem.mission[0].site.solve(problem.balance)
     area = problem.area
     own = {"coefficient": np.ones(N_PAIR)}
     exposure = wear_law.Exposure(problem.balance, point.state, area, own, np.zeros(N_PAIR), 0.0)

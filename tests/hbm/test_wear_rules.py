@@ -12,15 +12,10 @@ from tests.helpers.pressed_body import N_PAIR, balance_of, growth_by_few_modes, 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import SEPARATES
-from tribodyn.hbm.continuation.operating_point import (
-    AtFrequency,
-    AtPeak,
-    Correction,
-    NoPeak,
-    OperatingPoint,
-    Overtaking,
-)
-from tribodyn.hbm.continuation.sites import BesidePeak
+from tribodyn.hbm.continuation.operating_condition import AtPeakRatio
+from tribodyn.hbm.continuation.operating_point import AtFrequency, DominantPeak, FrequencyCorrection, OperatingPoint
+from tribodyn.hbm.continuation.peak_refinement import NoPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.hbm.wear import dirk_stages, error_controlled_rule, machine_motion, thesis_rule
@@ -125,8 +120,8 @@ def test_missions_average_their_duties(problem: WearProblem) -> None:
         for load, start in ((1.0, (np.zeros(N_PAIR), 0.0, None)), (0.5, (np.zeros(N_PAIR), 0.0, None)))
     )
     assert state.rate == pytest.approx(0.25 * full.rate + 0.75 * half.rate, rel=1e-6)
-    beside = BesidePeak(AtPeak("tip", 250.0, 1200.0), 0.97).first(problem.balance)
-    peak = AtPeak("tip", 250.0, 1200.0).first(problem.balance)
+    beside = AtPeakRatio(AtPeak("tip", 250.0, 1200.0), 0.97).solve(problem.balance)
+    peak = AtPeak("tip", 250.0, 1200.0).solve(problem.balance)
     assert beside.state.omega == pytest.approx(0.97 * peak.state.omega, rel=1e-4)
     assert beside.amplitude < peak.amplitude
 
@@ -163,8 +158,8 @@ def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> N
     """Where no way leads on from the neighbour, the site is asked as at the start, and its solves are counted."""
 
     class Lost(AtFrequency):
-        def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
-            found = self.first(balance)
+        def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+            found = self.solve(balance)
             return replace(found, solution=replace(found.solution, outcome="no way from here"))
 
     lost = replace(problem, mission=(Duty(Lost("tip", 420.0)),))
@@ -182,14 +177,14 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
     over = []
 
     class Ending(AtFrequency):
-        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        def solve(self, balance: HarmonicBalance) -> OperatingPoint:
             if (balance.contact.gap - gap).max() > end + 2e-6:
                 over.append(True)
-            return super().first(balance)
+            return super().solve(balance)
 
-        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
             ended = not over and (balance.contact.gap - gap).max() > end
-            return Correction(state.omega if ended else 0.0, 0)
+            return FrequencyCorrection(state.omega if ended else 0.0, 0)
 
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Ending("tip", 420.0)),)), tolerance)
     leaps = np.flatnonzero(worn.plan[:-1, 0] == 0.0)
@@ -214,12 +209,12 @@ def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None
         return len(balance.basis.harmonics) == 6 and 1e-5 < (balance.contact.gap - gap).max() < 6e-5
 
     class Missing(AtFrequency):
-        def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
-            found = super().next(balance, omega, x)
+        def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+            found = super().solve_near(balance, omega, x)
             return replace(found, solution=replace(found.solution, outcome="gone")) if gone(balance) else found
 
-        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-            return Correction(state.omega if gone(balance) else 0.0, 0)
+        def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
+            return FrequencyCorrection(state.omega if gone(balance) else 0.0, 0)
 
     lacking = replace(whole, mission=(Duty(Missing("tip", 420.0)),))
     worn = error_controlled_rule.evolve(lacking, tolerance)
@@ -244,8 +239,8 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
     missed, over = [], []
 
     class Blind(AtFrequency):
-        def first(self, balance: HarmonicBalance) -> OperatingPoint:
-            found, deepest = super().first(balance), (balance.contact.gap - gap).max()
+        def solve(self, balance: HarmonicBalance) -> OperatingPoint:
+            found, deepest = super().solve(balance), (balance.contact.gap - gap).max()
             if end < deepest < end + 5e-6:
                 missed.append(deepest)
                 return replace(found, solution=replace(found.solution, outcome="nothing here"))
@@ -253,9 +248,9 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
                 over.append(deepest)
             return found
 
-        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
             ended = not over and (balance.contact.gap - gap).max() > end
-            return Correction(state.omega if ended else 0.0, 0)
+            return FrequencyCorrection(state.omega if ended else 0.0, 0)
 
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Blind("tip", 420.0)),)), tolerance)
     assert missed
@@ -269,8 +264,8 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
 
 def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(problem: WearProblem) -> None:
     class Never(AtFrequency):
-        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-            return Correction(state.omega, 0)
+        def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
+            return FrequencyCorrection(state.omega, 0)
 
     tolerance = Tolerance(0.1, 2e-4)
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance)
@@ -287,12 +282,12 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
     seen = []
 
     class Never(AtFrequency):
-        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        def solve(self, balance: HarmonicBalance) -> OperatingPoint:
             seen.append(len(balance.basis.harmonics))
-            return super().first(balance)
+            return super().solve(balance)
 
-        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-            return Correction(state.omega, 0)
+        def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
+            return FrequencyCorrection(state.omega, 0)
 
     tolerance = Tolerance(0.1, 2e-4)
     never = replace(whole, mission=(Duty(Never("tip", 420.0)),))
@@ -302,10 +297,10 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
     assert np.all(np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2)))  # the step wears with all of them
 
     class Ends(Never):
-        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        def solve(self, balance: HarmonicBalance) -> OperatingPoint:
             if len(balance.basis.harmonics) == 8 and balance.contact.gap.max() > whole.balance.contact.gap.max():
                 raise NoPeak("the scan with all of them ends early")
-            return super().first(balance)
+            return super().solve(balance)
 
     seen.clear()
     ends = replace(whole, mission=(Duty(Ends("tip", 420.0)),))
@@ -356,37 +351,37 @@ def test_a_contact_that_outlives_its_wear_is_told_with_what_is_left() -> None:
 
 def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearProblem) -> None:
     site = AtPeak("tip", 250.0, 1200.0)
-    highest = site.first(problem.balance)
-    lower = AtPeak("tip", 500.0, 545.0).first(problem.balance)
+    highest = site.solve(problem.balance)
+    lower = AtPeak("tip", 500.0, 545.0).solve(problem.balance)
     assert lower.amplitude < highest.amplitude / 2
-    found = site.overtaken(problem.balance, lower)
+    found = site.dominant_peak(problem.balance, lower)
     assert found.point is not None
     assert found.solves > found.point.solves > 0  # the sweep's, too
     assert found.point.state.omega == pytest.approx(highest.state.omega, rel=1e-4)
-    assert found.nearness == pytest.approx(highest.amplitude / (site.overtakes * lower.amplitude), rel=1e-6)
-    none = site.overtaken(problem.balance, highest)
+    assert found.nearness == pytest.approx(highest.amplitude / (site.dominance * lower.amplitude), rel=1e-6)
+    none = site.dominant_peak(problem.balance, highest)
     assert none.point is None
-    assert lower.amplitude / (1.01 * site.overtakes * highest.amplitude) < none.nearness < 0.5
-    beside = BesidePeak(site, 1.01)
-    here = beside.next(problem.balance, 1.01 * lower.state.omega, lower.state.x)
-    moved = beside.overtaken(problem.balance, here).point
+    assert lower.amplitude / (1.01 * site.dominance * highest.amplitude) < none.nearness < 0.5
+    beside = AtPeakRatio(site, 1.01)
+    here = beside.solve_near(problem.balance, 1.01 * lower.state.omega, lower.state.x)
+    moved = beside.dominant_peak(problem.balance, here).point
     assert moved is not None
     assert moved.state.omega == pytest.approx(1.01 * highest.state.omega, rel=1e-4)
 
 
 def test_no_higher_peak_is_looked_for_above_what_any_linear_response_reaches(problem: WearProblem) -> None:
     site = AtPeak("tip", 250.0, 1200.0)
-    point = site.first(problem.balance)
+    point = site.solve(problem.balance)
     low, high = 1.1 * point.amplitude, 2 * point.amplitude
-    assert replace(site, highest=low).overtaken(problem.balance, point) == Overtaking()
-    assert replace(site, highest=high).overtaken(problem.balance, point).solves > 0
-    assert replace(site, highest=high).overtaken(problem.balance.with_load(0.5), point) == Overtaking()
+    assert replace(site, linear_bound=low).dominant_peak(problem.balance, point) == DominantPeak()
+    assert replace(site, linear_bound=high).dominant_peak(problem.balance, point).solves > 0
+    assert replace(site, linear_bound=high).dominant_peak(problem.balance.with_load(0.5), point) == DominantPeak()
 
 
 def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypatch: pytest.MonkeyPatch) -> None:
     site = AtPeak("tip", 250.0, 1200.0)
-    peak = site.first(problem.balance).state
-    below = site.next(problem.balance, 0.99 * peak.omega, peak.x)
+    peak = site.solve(problem.balance).state
+    below = site.solve_near(problem.balance, 0.99 * peak.omega, peak.x)
     assert below.solution.converged
     assert below.state.omega == pytest.approx(peak.omega, rel=1e-4)
     solve = newton.solve
@@ -396,7 +391,7 @@ def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypat
         return found if omega < 0.97 * peak.omega else replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1"))
 
     monkeypatch.setattr(newton, "solve", ends)
-    stopped = site.next(problem.balance, 0.96 * peak.omega, peak.x)
+    stopped = site.solve_near(problem.balance, 0.96 * peak.omega, peak.x)
     assert stopped.solution.outcome.kind is SolveEnd.SITE_NOT_FOUND
     assert "where it still rises" in str(stopped.solution.outcome)
 
@@ -406,7 +401,7 @@ def test_no_lower_peak_is_taken_for_one_that_is_not_refined(
 ) -> None:
     """Rig 41 of the scoreboard's seed 16180: its peak was a fold, and one a fifteenth as high was taken for it."""
     site = AtPeak("tip", 250.0, 1200.0)
-    highest, solve = site.first(problem.balance), newton.solve
+    highest, solve = site.solve(problem.balance), newton.solve
 
     def ends(balance: HarmonicBalance, omega: float, x: np.ndarray, *rest: object) -> newton.Solution:
         found = solve(balance, omega, x, *rest)
@@ -416,7 +411,7 @@ def test_no_lower_peak_is_taken_for_one_that_is_not_refined(
     branch = site._scan(problem.balance)
     monkeypatch.setattr(AtPeak, "_scan", lambda *given: branch)
     monkeypatch.setattr(newton, "solve", ends)
-    found = site.first(problem.balance)
+    found = site.solve(problem.balance)
     assert not found.solution.converged
     assert found.amplitude > 0.7 * highest.amplitude
 
@@ -427,15 +422,15 @@ LEAP_DEPTH, SECOND = 2e-5, 520.0  # depth [m] from which on a second place is th
 class TwoPlaces(AtFrequency):
     """A fixed frequency that another one overtakes at a given depth."""
 
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> Overtaking:
+    def dominant_peak(self, balance: HarmonicBalance, point: OperatingPoint) -> DominantPeak:
         depth = float(balance.contact.gap.max())
         if depth < LEAP_DEPTH or point.state.omega != self.omega:
-            return Overtaking(nearness=depth / LEAP_DEPTH)
-        found = AtFrequency("tip", SECOND).first(balance)
-        return Overtaking(found, found.solves, depth / LEAP_DEPTH)
+            return DominantPeak(nearness=depth / LEAP_DEPTH)
+        found = AtFrequency("tip", SECOND).solve(balance)
+        return DominantPeak(found, found.solves, depth / LEAP_DEPTH)
 
-    def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-        return Correction(0.0, 0)
+    def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
+        return FrequencyCorrection(0.0, 0)
 
 
 def test_the_jump_to_a_peak_that_overtakes_is_located_and_said(problem: WearProblem) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.coarse_beam import make
-from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.interface_modes import interface_modes
 from tribodyn.reduction.linear import linear_modes
@@ -131,7 +132,7 @@ def peak(tmp_path: Path, *overrides: str) -> tuple[ReducedModel, np.ndarray]:
     model = modelling.build(file, Progress())
     site = settings.peak_of(file.scene)
     assert isinstance(site, AtPeak)
-    point: OperatingPoint = site.first(model.balance)
+    point: OperatingPoint = site.solve(model.balance)
     assert point.solution.converged
     energy, preload = model.balance.energy(point.state).sum(), model.balance.preload(point.state)
     return model.reduced, np.array([point.state.omega, point.amplitude, energy, preload])

@@ -7,7 +7,7 @@ from importlib import import_module
 
 from proof import ablations
 from tribodyn.hbm.continuation import curve
-from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 
 
 def test_a_neutral_value_acts_and_is_taken_back():
@@ -17,9 +17,9 @@ def test_a_neutral_value_acts_and_is_taken_back():
         assert curve.RULES.largest_slant == before.largest_slant
     assert curve.RULES is before
     assert curve.CurveRules() == before
-    with ablations.without("continuation.operating_point.AtPeak", "tried", 1):
-        assert AtPeak("tip", 1.0, 2.0).tried == 1
-    assert AtPeak("tip", 1.0, 2.0).tried == 3
+    with ablations.without("continuation.resonance_peak.AtPeak", "max_refined", 1):
+        assert AtPeak("tip", 1.0, 2.0).max_refined == 1
+    assert AtPeak("tip", 1.0, 2.0).max_refined == 3
 
 
 def test_every_rule_that_is_listed_is_a_field_with_another_default():

@@ -13,7 +13,7 @@ import pytest
 
 import tribodyn as td
 from proof import reference
-from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.quantity import names_with_error
 from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.errors import accuracy, change_table, judgement, operating_states, refine
@@ -193,7 +193,7 @@ def test_a_refined_run_begins_at_the_peak_that_is_known(monkeypatch: pytest.Monk
     file = scene_file.read("beam", (*TINY, "wear.rule=thesis", "wear.step=1 um", "wear.max_steps=1"))
     model = td.build(file)
     first, wanted = operating_states.unworn_state(file, model), wear_run.worn_out(file, model)
-    monkeypatch.delattr(AtPeak, "first")
+    monkeypatch.delattr(AtPeak, "solve")
     begun = wear_run.worn_out(file, model, start=(first.point.state.omega, first.point.state.x))
     assert begun.amplitude == pytest.approx(wanted.amplitude, rel=1e-5)
 

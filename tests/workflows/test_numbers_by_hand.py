@@ -12,9 +12,8 @@ from proof.extremes_march import march_checks
 from proof.extremes_models import lattice, rigid
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation import operating_point
+from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.continuation.operating_point import Slope
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import recovery
@@ -194,7 +193,7 @@ def test_force_times_slip_is_the_friction_work_over_the_coefficient_of_friction(
 
 def test_a_peak_is_looked_for_where_the_line_through_two_distances_vanishes() -> None:
     rises, falls = (SimpleNamespace(omega=w, distance=d) for w, d in ((1.0, 2.0), (5.0, -6.0)))
-    assert operating_point._zero(rises, falls) == pytest.approx(2.0)
+    assert AmplitudeSlope.zero_with(rises, falls) == pytest.approx(2.0)
 
 
 def test_the_peak_of_one_mode_is_where_the_slopes_at_two_points_tell() -> None:
@@ -206,8 +205,8 @@ def test_the_peak_of_one_mode_is_where_the_slopes_at_two_points_tell() -> None:
         of = {"omega": w, "height": 7 / np.sqrt(level), "slope": -49 * 2 * (w - 3.0) / level**2}
         solved.append(SimpleNamespace(**of, dx=3 * w**2 - 2, solution=x))
     for one, other in (solved, solved[::-1]):
-        assert Slope.peak_before(one, other) == pytest.approx(3.0)  # type: ignore[arg-type]
-        assert Slope.between(one, other, 2.5) == pytest.approx(2.5**3 - 5.0)  # type: ignore[arg-type]
+        assert AmplitudeSlope.peak_before(one, other) == pytest.approx(3.0)  # type: ignore[arg-type]
+        assert AmplitudeSlope.between(one, other, 2.5) == pytest.approx(2.5**3 - 5.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("transitions", ["located", "sampled"])

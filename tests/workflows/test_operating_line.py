@@ -11,7 +11,7 @@ from tests.helpers.wheel_scene import WHEEL
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
@@ -73,7 +73,7 @@ def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz, law)
 def test_the_peak_of_a_line_is_where_it_meets_a_mode():
     """The slope over the frequency is that of the whole problem, speed and all; the peak that it finds is the top."""
     one = line(5, -2, 'response.frequency=["240 Hz", "280 Hz"]')
-    peak = AtPeak("response", 2 * np.pi * 240, 2 * np.pi * 280).first(one)
+    peak = AtPeak("response", 2 * np.pi * 240, 2 * np.pi * 280).solve(one)
     omega, x = peak.state.omega, peak.state.x
     beside = [one.evaluate(omega * (1 + s), x).residual for s in (1e-4, -1e-4)]
     expected = (beside[0] - beside[1]) / (2e-4 * omega)

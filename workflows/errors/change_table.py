@@ -160,7 +160,7 @@ def _with_more_modes(
     try:
         model = modelling.build(finer, Progress(), first.balance.basis.harmonics)
         balance = model.balance.with_load(1.0 if wear is None else wear.duties[0].load)
-        point = first.site.next(balance, first.point.state.omega, first.point.state.x)
+        point = first.site.solve_near(balance, first.point.state.omega, first.point.state.x)
         if not point.solution.converged:
             raise SolverFailure(str(point.solution.outcome))
     except NOT_SOLVED as refusal:

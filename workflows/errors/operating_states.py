@@ -9,8 +9,9 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint
-from tribodyn.hbm.continuation.sites import Site
+from tribodyn.hbm.continuation.operating_condition import OperatingCondition
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.peak_refinement import NoPeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
@@ -37,7 +38,7 @@ class OperatingState:
 
     cycles: float
     balance: HarmonicBalance
-    site: Site | PeakOfCurve
+    site: OperatingCondition | PeakOfCurve
     point: OperatingPoint
 
     @property
@@ -61,16 +62,16 @@ class PeakOfCurve:
 
     scene: Scene
 
-    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+    def solve(self, balance: HarmonicBalance) -> OperatingPoint:
         """Follow the curve of a contact as the run does. Raises NoPeak, SolveFailed."""
         branch = curve.follow_response(self.scene, balance)
         if not branch.converged[-1]:
             raise SolveFailed(f"the frequency response {branch.end}")
         return highest_point(branch, balance)
 
-    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+    def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """The same: a neighbouring solution may lie beyond a fold."""
-        return self.first(balance)
+        return self.solve(balance)
 
 
 def highest_point(branch: Branch, balance: HarmonicBalance) -> OperatingPoint:
@@ -114,7 +115,7 @@ def state_at_peak(scene: Scene, balance: HarmonicBalance, branch: Branch) -> Ope
     if turns_back(branch):
         return OperatingState(0.0, balance, PeakOfCurve(scene), highest_point(branch, balance))
     best, site = _peak(branch), settings.peak_of(scene)
-    point = site.next(balance, float(branch.omega[best]), balance.shaped(branch.contact[best]))
+    point = site.solve_near(balance, float(branch.omega[best]), balance.shaped(branch.contact[best]))
     return _checked(OperatingState(0.0, balance, site, point))
 
 
@@ -126,7 +127,7 @@ def worn_state(file: SceneFile, balance: HarmonicBalance, result: Result, row: i
     basis = HarmonicBasis(result.harmonics, balance.basis.n_samples)
     worn = balance.with_gap(balance.contact.gap + wear.depth[row]).with_load(duty.load)
     x = balance.shaped(basis.transfer(wear.displacement[row], balance.basis))
-    point = duty.site.next(worn, float(wear.omega[row]), x)
+    point = duty.site.solve_near(worn, float(wear.omega[row]), x)
     return _checked(OperatingState(float(wear.cycles[row]), worn, duty.site, point))
 
 
@@ -142,7 +143,7 @@ def later_rows(result: Result) -> list[int]:
 
 
 def unworn_state(
-    file: SceneFile, model: modelling.Model, reference: Site | PeakOfCurve | None = None
+    file: SceneFile, model: modelling.Model, reference: OperatingCondition | PeakOfCurve | None = None
 ) -> OperatingState:
     """The contact of a model before wear, its operating point searched from the start.
 
@@ -150,13 +151,14 @@ def unworn_state(
     Raises  NoPeak, Refusal where it has no peak; SolverFailure where it has no solution
     """
     scene = file.scene
-    site: Site | PeakOfCurve = PeakOfCurve(scene) if isinstance(reference, PeakOfCurve) else settings.peak_of(scene)
+    site: OperatingCondition | PeakOfCurve = settings.peak_of(scene)
+    site = PeakOfCurve(scene) if isinstance(reference, PeakOfCurve) else site
     load = 1.0
     if scene.wear is not None:
         duty = settings.mission(scene)[0]
         site, load = duty.site, duty.load
     balance = model.balance.with_load(load)
-    return _checked(OperatingState(0.0, balance, site, site.first(balance)))
+    return _checked(OperatingState(0.0, balance, site, site.solve(balance)))
 
 
 def with_more_harmonics(state: OperatingState, top: int) -> OperatingState:
@@ -167,9 +169,9 @@ def with_more_harmonics(state: OperatingState, top: int) -> OperatingState:
     wide = harmonic_choice.widened(state.balance, top, harmonic_choice.ROUGH)
     wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top))
     x = state.balance.basis.transfer(state.point.state.x, wide.basis)
-    point = state.site.next(wide, state.point.state.omega, x)
+    point = state.site.solve_near(wide, state.point.state.omega, x)
     if not point.solution.converged:  # no solution is near: the operating point is searched from the start
-        point = state.site.first(wide)
+        point = state.site.solve(wide)
     return _checked(replace(state, balance=wide, point=point))
 
 

@@ -14,7 +14,7 @@ from tribodyn.hbm.continuation.branch import Branch, BranchPoint, amplitude
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
-from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.workflows.result.readable import measured, sparkline
@@ -82,7 +82,7 @@ def choose_harmonics(
     """
     before = 0.0
     for _ in range(most):
-        point = peak.first(balance)
+        point = peak.solve(balance)
         if not point.solution.converged:
             raise harmonic_choice.NotSolved(f"harmonics cannot be chosen: no peak was found: {point.solution.outcome}")
         omega = point.state.omega

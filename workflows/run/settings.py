@@ -9,8 +9,9 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.contact import contact_law
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
-from tribodyn.hbm.continuation.sites import BesidePeak
+from tribodyn.hbm.continuation.operating_condition import AtPeakRatio
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Duty
@@ -76,13 +77,13 @@ def mission(scene: Scene, highest: float = np.inf) -> tuple[Duty, ...]:
     return tuple(Duty(site_of(scene, duty.at, highest), duty.share, duty.load) for duty in scene.wear.duties)
 
 
-def site_of(scene: Scene, place: Place, highest: float = np.inf) -> AtFrequency | AtPeak | BesidePeak:
+def site_of(scene: Scene, place: Place, highest: float = np.inf) -> AtFrequency | AtPeak | AtPeakRatio:
     """A place of the scene's response; highest : as for `mission`."""
     if place.frequency is not None:
         return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton_options(scene))
     assert place.peak is not None
-    peak = replace(peak_of(scene), highest=highest)
-    return peak if place.peak == 1.0 else BesidePeak(peak, place.peak)
+    peak = replace(peak_of(scene), linear_bound=highest)
+    return peak if place.peak == 1.0 else AtPeakRatio(peak, place.peak)
 
 
 def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:

@@ -21,7 +21,8 @@ from tribodyn.hbm.continuation import nonlinear_modes as modes
 from tribodyn.hbm.continuation.branch import Branch, amplitude as vibration
 from tribodyn.hbm.continuation.control import constant_response, driven, phase_resonance
 from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
@@ -217,7 +218,7 @@ class HertzBalance:
 
     def peak(self, start: float, stop: float, output: str | None = None) -> Cycle:
         """The highest resonance of an output, the first by default, between two frequencies [Hz]."""
-        point = AtPeak(self._output(output), HZ * start, HZ * stop, newton=self.newton).first(self.problem)
+        point = AtPeak(self._output(output), HZ * start, HZ * stop, newton=self.newton).solve(self.problem)
         return Cycle(self.problem, point.state, point.solution.outcome)
 
     def response(

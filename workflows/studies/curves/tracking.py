@@ -169,9 +169,9 @@ def _peaks(
         balance = path.make(value)
         if peaks:
             last = peaks[-1][1]
-            point = site.next(balance, last.state.omega, last.state.x)
+            point = site.solve_near(balance, last.state.omega, last.state.x)
         if not peaks or not point.solution.converged:  # the peak has left its branch: looked for afresh
-            point = site.first(balance)
+            point = site.solve(balance)
         if not point.solution.converged:
             end = BranchEnd.ENDED.say(f" {path.say(value)}: {point.solution.outcome}")
             break

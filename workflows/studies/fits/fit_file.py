@@ -460,9 +460,9 @@ class SceneAnswers:
             site = settings.site_of(self.file.scene, where)
             balance, previous, point = self.model.balance.with_load(load), self._near_points.get((where, load)), None
             if previous is not None and previous.state.x.shape == (balance.contact.n_pair, *previous.state.x.shape[1:]):
-                point = site.next(balance, previous.state.omega, previous.state.x)
+                point = site.solve_near(balance, previous.state.omega, previous.state.x)
             if point is None or not point.solution.converged:
-                point = site.first(balance)
+                point = site.solve(balance)
             if not point.solution.converged:
                 raise SolveFailed(point.solution.outcome)
             self._points[where, load] = point

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import amplitude
-from tribodyn.hbm.continuation.sites import BesidePeak, Site
+from tribodyn.hbm.continuation.operating_condition import AtPeakRatio, OperatingCondition
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow
@@ -170,8 +170,8 @@ def pattern_wear(
     return MistunedWear(blades, pattern, blade, history, volume, heights, preload, tuple(formats))
 
 
-def _of_output(site: Site, output: str) -> Site:
-    if isinstance(site, BesidePeak):
+def _of_output(site: OperatingCondition, output: str) -> OperatingCondition:
+    if isinstance(site, AtPeakRatio):
         return replace(site, peak=replace(site.peak, output=output))
     return replace(site, output=output)
 

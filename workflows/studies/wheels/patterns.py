@@ -112,7 +112,7 @@ class MistunedBlades:
     @cached_property
     def tuned(self) -> OperatingPoint:
         """The peak of the wheel of sectors alike; raises SolveFailed."""
-        point = settings.peak_of(self.file.scene).first(self.wheel.wave)
+        point = settings.peak_of(self.file.scene).solve(self.wheel.wave)
         if not point.solution.converged:
             raise SolveFailed(f"the peak of sectors alike: {point.solution.outcome}")
         return point

@@ -1,0 +1,90 @@
+"""Slope of the vibration amplitude along a response curve, and what it tells of the peak nearby."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance, Linearisation
+from tribodyn.hbm.continuation.bordered import Direction
+from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.newton import Solution
+
+
+@dataclass(frozen=True)
+class AmplitudeSlope:
+    """A solved point with d A^2 / d omega and d x / d omega, or along another tangent of its curve.
+
+    height : of the output [m]
+    distance : to the peak [rad/s], were the response that of one mode, y = R / (p - omega)
+    width : half width of the resonance at its peak, abs(p - omega) elsewhere [rad/s]
+    """
+
+    solution: Solution
+    omega: float
+    slope: float
+    height: float
+    distance: float
+    width: float
+    dx: np.ndarray
+
+    @property
+    def miss(self) -> float:
+        """Distance to the peak in widths: the cosine between the response and its derivative, 0 at the peak."""
+        return abs(self.distance) / self.width
+
+    @classmethod
+    def of(cls, balance: HarmonicBalance, solution: Solution, output: str) -> AmplitudeSlope:
+        """The slope over the frequency."""
+        slope_r, _ = balance.frequency_slope(solution.state)
+        linear = balance.linearise(solution.state)
+        tangent = Direction(linear.solve_refined(-slope_r, 1e-8), 1.0)
+        return cls.on_tangent(balance, linear, solution, output, tangent)
+
+    @classmethod
+    def on_tangent(
+        cls, balance: HarmonicBalance, linear: Linearisation, solution: Solution, output: str, tangent: Direction
+    ) -> AmplitudeSlope:
+        """The slope along a tangent of the curve; distance and width in lengths of that."""
+        state, dx = solution.state, tangent.x
+        _, slope_y = balance.frequency_slope(state)
+        dy = tangent.p * slope_y + balance.at(state.omega).outputs(linear.departure_slope(dx))
+        row = balance.compliance.output_names.index(output)
+        y = balance.outputs(state)[row]
+        dynamic = balance.basis.order > 0
+        product, steepness = y[dynamic] @ dy[row][dynamic], dy[row][dynamic] @ dy[row][dynamic]
+        distance = product / steepness if steepness > 0 else 0.0
+        width = np.sqrt(y[dynamic] @ y[dynamic] / steepness) if steepness > 0 else state.omega
+        height, dx = float(amplitude(y)), dx.reshape(state.x.shape)
+        return cls(solution, state.omega, float(2 * product), height, float(distance), float(width), dx)
+
+    def predict(self, omega: float) -> np.ndarray:
+        """x at a frequency, along the tangent."""
+        return self.solution.state.x + (omega - self.omega) * self.dx
+
+    def between(self, other: AmplitudeSlope, omega: float) -> np.ndarray:
+        """x of the Hermite cubic between two points."""
+        t = (omega - self.omega) / (other.omega - self.omega)
+        return (1 - t) ** 2 * ((1 + 2 * t) * self.solution.state.x + (omega - self.omega) * self.dx) + t**2 * (
+            (3 - 2 * t) * other.solution.state.x + (omega - other.omega) * other.dx
+        )
+
+    def peak_before(self, other: AmplitudeSlope) -> float:
+        """Frequency of the peak between two points from both of which the curve rises towards the other [rad/s].
+
+        By the Hermite cubic of 1 / height^2, which is a parabola for one mode
+        """
+        h, ratio = other.omega - self.omega, (self.height / other.height) ** 2
+        a, b = -h * self.slope / self.height**2, -h * other.slope / other.height**2 * ratio
+        square, cubic = 3 * (ratio - 1) - 2 * a - b, 3 * (a + b - 2 * (ratio - 1))
+        root = np.sqrt(square**2 - a * cubic)
+        return self.omega + h * float(-a / (square + root) if square > 0 else (root - square) / cubic)
+
+    def zero_with(self, other: AmplitudeSlope) -> float:
+        """Where a straight line through the distances of two points vanishes [rad/s].
+
+        Distances of one mode lie on a line, slopes do not
+        """
+        fa, fb = self.distance, other.distance
+        return (self.omega * fb - other.omega * fa) / (fb - fa) if fa != fb else 0.5 * (self.omega + other.omega)
