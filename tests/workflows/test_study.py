@@ -23,8 +23,9 @@ from tests.helpers import dying
 from tests.helpers.command import leave
 from tribodyn.hbm.linear import compliance
 from tribodyn.workflows.run import kept, modelling
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many import parameter_space, pool, study_file, study_pictures
+from tribodyn.workflows.studies.many import parameter_space, pool, run_task, study_file, study_pictures
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, solve
 from tribodyn.workflows.studies.many.study_table import Journal
 
@@ -250,7 +251,7 @@ def test_the_command_resumes_a_study_that_was_killed(
         time.sleep(0.05)
     code, out, _ = leave([*words, "--resume", "--json"], capsys)
     assert code == 0
-    assert json.loads(out)["runs"] == {"complete": 2, "failed": 0, "refused": 2, "lost": 0}
+    assert json.loads(out)["runs"] == {"complete": 2, "failed": 0, "refused": 2, "defect": 0, "lost": 0}
     after = journal.rows()
     assert all(after[key].seconds == row.seconds for key, row in before.items())
     assert (tmp_path / "out" / "study.csv").read_bytes() == (done / "study.csv").read_bytes()
@@ -261,6 +262,26 @@ def _runs(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
+
+
+def test_a_defect_stops_its_own_run_alone_and_shows_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(file: Any, *_: Any, **__: Any) -> Any:
+        if f"{FRICTION}=0.2" in file.overrides:
+            return [][1]
+        raise SolveFailed("no balance at 400 Hz")
+
+    monkeypatch.setattr(run_task.pipeline, "run", broken)
+    monkeypatch.setattr(pool, "finished", lambda tasks, workers, solve: map(solve, tasks))
+    study = study_file.parse(TABLES | {"vary": {FRICTION: [0.2, 0.3]}}, "mine.toml", Path())
+    monkeypatch.setattr(study_file, "read", lambda _: study)
+    table = td.studies.grid("mine.toml", tmp_path)
+    assert list(table.columns["status"]) == ["defect", "failed"]
+    assert table.defects[0].startswith("run 1: IndexError: list index out of range (test_study.py, line ")
+    code, _, message = leave(["study", "grid", "mine.toml", "--out", str(tmp_path / "out")], capsys)
+    assert code == 70
+    assert "IndexError" in message
 
 
 def test_what_runs_share_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

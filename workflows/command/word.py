@@ -25,6 +25,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress
 from tribodyn.workflows.scene import source
 from tribodyn.workflows.scene.fields import Quantity
+from tribodyn.workflows.studies.study_result import DefectInRuns, StudyResult
 
 NAMES = {"start": "--from", "stop": "--to", "overrides": "--set"}
 Into = Literal["results", "beside", "pictures", "here", "asked"]
@@ -195,10 +196,10 @@ _OUT = {
 }
 
 
-def print_result(result: Any, files: Sequence[Path] = (), as_json: bool = False) -> None:
+def print_result(result: StudyResult, files: Sequence[Path] = (), as_json: bool = False) -> None:
     """Print a result of a study, as JSON or as lines, and the files that hold it.
 
-    Raises  SolveFailed where the result has a sentence in `failure`
+    Raises  SolveFailed where the result has a sentence in `failure`; DefectInRuns where a run was stopped by a defect
     """
     if as_json:
         record = result.record()
@@ -209,6 +210,8 @@ def print_result(result: Any, files: Sequence[Path] = (), as_json: bool = False)
         print(*result.lines(), *files, sep="\n")
     if failure := getattr(result, "failure", ""):
         raise SolveFailed(failure)
+    if result.defects:
+        raise DefectInRuns("; ".join(result.defects))
 
 
 def meanings(doc: str, names: Sequence[str]) -> dict[str, str]:

@@ -11,7 +11,7 @@ from importlib import import_module
 from multiprocessing import get_context
 
 from tribodyn.extras import package
-from tribodyn.refusal import SolverFailure
+from tribodyn.refusal import Refusal, SolverFailure
 
 SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
 PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
@@ -30,7 +30,7 @@ def check() -> None:
     """
     try:
         package("pyvista")
-    except ValueError as missing:
+    except Refusal as missing:
         raise RenderingUnavailable(str(missing)) from None
     if sys.platform.startswith("linux"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")

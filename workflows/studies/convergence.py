@@ -187,7 +187,7 @@ def _advice(table: LadderTables) -> Iterator[str]:
         if any(quantity in settling.limits and settling.ladder.base is None for settling in table.ladders):
             try:
                 rows, error, seconds = table.choose(TARGET_ERROR, quantity)
-            except ValueError as refusal:
+            except Refusal as refusal:
                 yield str(refusal)
                 continue
             used = ", ".join(row.setting.label for row in rows)
@@ -232,7 +232,7 @@ def _front(table: LadderTables, quantity: str) -> tuple[list[float], list[float]
     for target in np.logspace(-0.5, -5, 37):
         try:
             _, error, needed = table.choose(float(target), quantity)
-        except ValueError:
+        except Refusal:
             break
         seconds.append(needed)
         errors.append(error)

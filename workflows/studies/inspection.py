@@ -158,7 +158,7 @@ def _of_file(
         mesh, node_sets = decks.with_elements(body.mesh, dict(body.node_sets), table, name)
         try:
             material_of_body = deck_materials.material(source.deck, name, mesh, table, named)
-        except ValueError as sentence:  # no or no whole material
+        except Refusal as sentence:  # no or no whole material
             material_of_body, lacking = {}, str(sentence)
         solids.append(Body(name, mesh, node_sets, material_of_body))
     inspection = measured(solids, decks.notes_of(source, table), source.unused)
@@ -211,7 +211,7 @@ def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, flo
         for ends in product(first, second):
             try:
                 matches.append(Tie(name, *ends, pair.tolerance).meeting(assembly))
-            except ValueError as sentence:
+            except Refusal as sentence:
                 trouble = str(sentence)
         if not matches:
             (refused if kind == "tie" else remarks).append(trouble)

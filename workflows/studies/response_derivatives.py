@@ -27,6 +27,7 @@ from tribodyn.hbm.quantity import CycleQuantity, StatedQuantity, WearQuantity
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
+from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.theme import CYCLE, GREY
 from tribodyn.workflows.result.result import Result
@@ -279,7 +280,7 @@ def _changes(
         try:
             if key in varying.numbers:
                 yield varying.change(key, value)
-        except (NoDerivative, ValueError) as reason:
+        except (NoDerivative, Refusal) as reason:
             if without is None:
                 raise
             without[key] = str(reason)
@@ -353,7 +354,7 @@ def of_summary(varying: Varying, result: Result, names_of_keys: Sequence[str]) -
         return slopes
 
     def add(find: Callable[[], Derivatives], names: Mapping[str, str]) -> None:
-        with suppress(ValueError, RuntimeError):  # nothing is found, or a model beside this one is none
+        with suppress(Refusal, SolverFailure):  # no derivative here, or no model with a changed parameter
             derivatives_found = find()
             by = {key: derivatives_found.slopes[:, i] for i, key in enumerate(derivatives_found.parameters)}
             by |= {key: derivatives_found.by_gap[:, rows].sum(axis=1) for key, rows in gaps.items()}

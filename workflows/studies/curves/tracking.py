@@ -139,7 +139,7 @@ def track(
 def _end(option: str, value: float | str, against: str) -> float:
     try:
         return to_si(value, "m" if against == "gap" else "")
-    except ValueError as error:
+    except Refusal as error:
         raise Refusal(f"{option}: {error}") from None
 
 

@@ -67,7 +67,7 @@ class CurveTarget:
             if not chosen_runs:
                 raise Refusal(f"no run has control = {table.control}")
             return cls(name, table, prepared(replace(measurement, runs=chosen_runs), file.scene, table.resonance))
-        except ValueError as trouble:
+        except Refusal as trouble:
             raise SceneError(f"curves.{name}: {trouble}") from None
 
     def numbers(self) -> list[MeasuredNumber]:

@@ -305,7 +305,7 @@ class SceneFit:
         """A distribution that was known before."""
         try:
             return Marginal.of(table)
-        except ValueError as error:
+        except Refusal as error:
             raise SceneError(f"parameters.{name}.prior: {error}") from None
 
 
@@ -350,7 +350,7 @@ def _si(key: str, value: Quantity, units: tuple[str, ...]) -> tuple[float, str]:
     for unit in units if isinstance(value, str) else units[-1:]:
         try:
             return to_si(value, unit), unit
-        except ValueError as error:
+        except Refusal as error:
             problem = error
     raise SceneError(f"{key}: {problem}")
 

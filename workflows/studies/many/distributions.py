@@ -141,5 +141,5 @@ def si(value: Any) -> float | None:
         return None
     try:
         return units.to_si(value, unit_of(value))
-    except ValueError:
+    except Refusal:
         return None

@@ -126,6 +126,11 @@ class LifeDistribution(StudyResult):
         return self.table.troubles() + texts
 
     @property
+    def defects(self) -> list[str]:
+        """Runs that a defect of the program stopped."""
+        return self.table.defects
+
+    @property
     def files(self) -> list[Path]:
         """What it left beside the study's tables."""
         folder = self.table.folder

@@ -103,6 +103,11 @@ class Optimum(StudyResult):
         return f"run {self.table.columns[RUN][row]}: {values}   with {keys}"
 
     @property
+    def defects(self) -> list[str]:
+        """Runs that a defect of the program stopped."""
+        return self.table.defects
+
+    @property
     def files(self) -> list[Path]:
         """What it left beside the study's tables."""
         folder = self.table.folder

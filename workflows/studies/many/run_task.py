@@ -6,12 +6,14 @@ import hashlib
 import threading
 import time
 import tomllib
+import traceback
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.version import __version__
 from tribodyn.workflows.errors.judgement import with_verdict
 from tribodyn.workflows.result.answers import answers_of
@@ -24,7 +26,7 @@ from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies import response_derivatives
 
-Status = Literal["complete", "failed", "refused", "lost"]
+Status = Literal["complete", "failed", "refused", "defect", "lost"]
 RUN = "run"  # the column of their numbers
 UNDRAWN = ("pictures.plots=false", "pictures.renders=false")
 
@@ -62,7 +64,7 @@ class RunRow:
     """What a run leaves.
 
     key : of the task; sentence : how it ended; numbers : by column, SI units, what there is none of is left out
-    status : complete, failed in a solve, refused as a scene, or lost with the process that worked on it
+    status : complete, failed in a solve, refused as a scene, stopped by a defect, or lost with its process
     """
 
     run: int
@@ -77,7 +79,7 @@ _one_at_a_time = threading.Lock()  # workers may have several threads, Gmsh and 
 
 
 def solve(task: StudyRun) -> RunRow:
-    """Do one run; whatever goes wrong in it becomes its row."""
+    """Do one run; an exception in it becomes its row."""
     start = time.perf_counter()
 
     def ended(status: Status, sentence: object, numbers: dict[str, float] | None = None) -> RunRow:
@@ -92,19 +94,26 @@ def solve(task: StudyRun) -> RunRow:
             if task.slopes and not numbers.get("peak_at_end"):
                 slopes = response_derivatives.of_summary(Varying(file, Progress()), result, task.slopes)
                 numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
-        except np.linalg.LinAlgError as error:
-            return ended("failed", error)
-        except (ValueError, OSError) as error:
-            return ended("refused", error)
-        except MemoryError as error:
-            return ended("failed", str(error) or "the memory of this machine is not enough")
-        except RuntimeError as error:
-            return ended("failed", error)
-        except Exception as error:  # one run that nobody foresaw does not stop the others
-            return ended("failed", f"{type(error).__name__}: {error}")
+        except Exception as error:  # the other runs go on
+            return ended(*outcome_of(error))
         frf = result.response
         reason = frf.no_peak(frf.output_names[0]) if frf is not None and numbers.get("peak_at_end") else ""
         return ended("complete", f"{result.state}; no peak: {reason}" if reason else result.state, numbers)
+
+
+def outcome_of(error: Exception) -> tuple[Status, str]:
+    """How a run ended by an exception: refused as bad input, failed in a solve, or stopped by a defect of the program.
+
+    The sentence of a defect has its type and place.
+    """
+    if isinstance(error, (Refusal, OSError)):
+        return "refused", str(error)
+    if isinstance(error, MemoryError):
+        return "failed", str(error) or "the memory of this machine is not enough"
+    if isinstance(error, (SolverFailure, np.linalg.LinAlgError)):
+        return "failed", str(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return "defect", f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
 
 
 def slope_column(number: str, key: str) -> str:

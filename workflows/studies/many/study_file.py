@@ -207,7 +207,7 @@ def _read(key: str, value: Any, design: str, label: str) -> tuple[Any, ...] | Ma
         table = scene_file.checked(Distribution, dict(value), f"{label}: vary.{key}")
         try:
             return Marginal.of(table)
-        except ValueError as error:
+        except Refusal as error:
             raise SceneError(f"{label}: vary.{key}: {error}") from None
     if not isinstance(value, list) or not value:
         raise SceneError(f"{label}: vary.{key}: expected a list of values or a distribution, got {value!r}")

@@ -121,7 +121,7 @@ def finish(
     """Do what the folder does not hold already: every row is on disk, and in `rows`, as it comes; see `run`."""
     progress, scheduler, resume = runner.progress, runner.scheduler, runner.resume
     journal, refused = Journal(runner.folder), len(rows)
-    earlier, repeated = journal.rows() if resume else {}, ("lost", "failed") if runner.retry else ("lost",)
+    earlier, repeated = journal.rows() if resume else {}, ("lost", "failed", "defect") if runner.retry else ("lost",)
     finished_rows = [replace(earlier[task.key], run=task.number) for task in tasks if task.key in earlier]
     finished_rows = [row for row in finished_rows if row.status not in repeated]
     rows |= {row.run: row for row in finished_rows}

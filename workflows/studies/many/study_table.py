@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -19,7 +19,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.store import replacing, set_aside
 from tribodyn.workflows.studies.many import study_pictures
 from tribodyn.workflows.studies.many.distributions import si
-from tribodyn.workflows.studies.many.run_task import RUN, RunRow
+from tribodyn.workflows.studies.many.run_task import RUN, RunRow, Status
 from tribodyn.workflows.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class StudyTable(StudyResult):
 
     def record(self) -> dict[str, Any]:
         """Counts of the runs and their rank correlations, for machines."""
-        counts = {status: self.count(status) for status in ("complete", "failed", "refused", "lost")}
+        counts = {status: self.count(status) for status in get_args(Status)}
         return {"study": self.name, "runs": counts, "influence": self.influence()}
 
     def lines(self) -> list[str]:
@@ -128,6 +128,12 @@ class StudyTable(StudyResult):
         bad = [i for i, status in enumerate(columns[STATUS]) if status != "complete"]
         lines = [f"run {columns[RUN][i]} {columns[STATUS][i]}: {columns[SENTENCE][i]}" for i in bad[:max_lines]]
         return lines + ([f"... and {len(bad) - max_lines} more, in the table"] if len(bad) > max_lines else [])
+
+    @property
+    def defects(self) -> list[str]:
+        """Runs that a defect of the program stopped, with type and place."""
+        stopped = np.flatnonzero(self.columns[STATUS] == "defect")
+        return [f"run {self.columns[RUN][i]}: {self.columns[SENTENCE][i]}" for i in stopped]
 
     def to_pandas(self) -> pd.DataFrame:
         """The table as a DataFrame with the runs as its index."""
@@ -203,7 +209,7 @@ class Journal:
             for line in self.path.read_text(encoding="utf-8").splitlines():
                 try:
                     row = RunRow(**json.loads(line))
-                except (ValueError, TypeError):
+                except (json.JSONDecodeError, TypeError):
                     continue
                 rows_by_key[row.key] = row
         return rows_by_key

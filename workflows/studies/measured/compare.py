@@ -235,7 +235,7 @@ def compare(
                 model = modelling.build(file, report)
                 measured.check_position(file.scene, model.part)
                 found[change] = compare_runs(file, model, measured, report)
-    except ValueError as trouble:
+    except Refusal as trouble:
         raise Refusal(f"{measured.source}: {trouble}") from None
     first = found.pop("")
     return MeasurementComparison(base_runs.name, measured, first, found)

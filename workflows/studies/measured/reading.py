@@ -60,7 +60,7 @@ def read(path: str | Path, facts: Mapping[str, str] | None = None) -> Measuremen
                 raise Refusal(unknown_key(name, [*FACTS]))
         file_facts, raw = readers[path.suffix.lower()](path, facts_given)
         return _measurement(raw, {**file_facts, **facts_given}, path.name)
-    except (ValueError, KeyError, IndexError, OSError, UnicodeDecodeError) as trouble:
+    except (Refusal, OSError, UnicodeDecodeError) as trouble:
         raise Refusal(f"{path.name}: {trouble}") from None
 
 
@@ -87,6 +87,8 @@ def _of_mat(path: Path, facts_given: Mapping[str, str]) -> tuple[dict[str, str],
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:
         raise Refusal("MATLAB files of version 7.3 are not read: save it with -v7") from None
+    except (ValueError, TypeError) as error:
+        raise Refusal(f"no MATLAB file: {error}") from None
     facts = {name: str(content[name]) for name in FACTS if isinstance(content.get(name), str)}
     structs = {name: table for name, table in content.items() if isinstance(table, dict)}
     if "table" in facts_given:
@@ -107,7 +109,11 @@ def _of_mat(path: Path, facts_given: Mapping[str, str]) -> tuple[dict[str, str],
 
 
 def _of_uff(path: Path, facts_given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
-    sets = package("pyuff").UFF(str(path)).read_sets()
+    pyuff = package("pyuff")
+    try:
+        sets = pyuff.UFF(str(path)).read_sets()
+    except (ValueError, KeyError, IndexError) as error:
+        raise Refusal(f"no universal file: {error}") from None
     sets = sets if isinstance(sets, list) else [sets]
     length = next((s["length"] for s in sets if s["type"] == 164), 1.0) or 1.0
     units = {DataKind.DISPLACEMENT: "m", DataKind.VELOCITY: "m/s", DataKind.ACCELERATION: "m/s2"}
@@ -195,7 +201,7 @@ def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) 
     for name, column in raw.items():
         word, unit = _word(name)
         if word in COLUMNS and word not in columns:
-            columns[word] = np.atleast_1d(np.asarray(column)).astype(float), unit
+            columns[word] = _numbers(name, column), unit
     response_word = next((word for word in RESPONSES if word in columns), None)
     if "frequency" not in columns and "time" not in columns:
         raise Refusal(f"no column frequency or time among {', '.join(raw)}")
@@ -285,7 +291,7 @@ def _si(columns: Columns, word: str, unit: str, n: int) -> np.ndarray:
     values, unit_of_column = columns[word]
     try:
         return values * to_si(f"1 {unit_of_column}".strip(), unit)
-    except ValueError as trouble:
+    except Refusal as trouble:
         raise Refusal(f"column {word}: {trouble}") from None
 
 
@@ -298,16 +304,26 @@ def _direction(facts: Mapping[str, str], key: str) -> tuple[float, float, float]
         return None
     text = facts[key].strip().strip("()[]")
     try:
-        return parsed_direction(text if "," not in text else [float(c) for c in text.split(",")])
-    except ValueError as trouble:
+        return parsed_direction(text if "," not in text else _numbers(key, text.split(",")).tolist())
+    except Refusal as trouble:
         raise Refusal(f"{key}: {trouble}") from None
 
 
 def _position(facts: Mapping[str, str]) -> tuple[float, float, float] | None:
     if "position" not in facts:
         return None
+    texts = facts["position"].strip("()[]").split(",")
     try:
-        x, y, z = (to_si(c.strip().strip('"'), "m") for c in facts["position"].strip("()[]").split(","))
-    except ValueError:
-        raise Refusal('position: expected three lengths such as "-0.3 m, 0 m, 6 mm"') from None
-    return x, y, z
+        lengths = tuple(to_si(text.strip().strip('"'), "m") for text in texts)
+    except Refusal:
+        lengths = ()
+    if len(lengths) != 3:
+        raise Refusal('position: expected three lengths such as "-0.3 m, 0 m, 6 mm"')
+    return lengths
+
+
+def _numbers(name: str, column: Any) -> np.ndarray:
+    try:
+        return np.atleast_1d(np.asarray(column)).astype(float)
+    except (ValueError, TypeError) as error:
+        raise Refusal(f"column {name}: {error}") from None

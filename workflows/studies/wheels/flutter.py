@@ -148,7 +148,7 @@ def of_scene(file: SceneFile, start: float | None = None, stop: float | None = N
             try:
                 waves, reason = limit_cycles(balance, start, stop, None, OUTPUT, options)
                 waves = [in_time(balance, wave, OUTPUT, MARCH) for wave in waves]
-            except (ValueError, IntegrationFailed) as error:
+            except (Refusal, IntegrationFailed) as error:
                 reason = f"{reason}; whether time keeps them is not known: {error}" if waves else str(error)
             cycles[index] = waves, reason
     return Flutter(file.name, eigenvalues, cycles)

@@ -41,7 +41,7 @@ from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
-from tribodyn.workflows.studies.many.run_task import RunRow, Status, StudyRun
+from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, outcome_of
 from tribodyn.workflows.studies.many.study_runs import Runner, finish
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel_model as wheels
@@ -234,9 +234,9 @@ def solve(task: PatternRun) -> RunRow:
             tuned, _ = blades.tuned, blades.ends  # of all patterns
             start = time.process_time()
             highest, blade = blades.peak(blades.pattern(task.number))
-        except (ValueError, RuntimeError, np.linalg.LinAlgError, MemoryError) as error:
-            status: Status = "refused" if isinstance(error, SceneError) else "failed"
-            return RunRow(task.number, task.key, status, " ".join(str(error).split()), {}, time.process_time() - start)
+        except Exception as error:  # the other patterns go on
+            status, sentence = outcome_of(error)
+            return RunRow(task.number, task.key, status, " ".join(sentence.split()), {}, time.process_time() - start)
     numbers = {
         "amplification": highest.amplitude / tuned.amplitude,
         "peak_m": highest.amplitude,
@@ -305,6 +305,11 @@ class Patterns(StudyResult):
                 f"{summary['seconds']:.4g} s of processor",
             ]
         return lines
+
+    @property
+    def defects(self) -> list[str]:
+        """Patterns that a defect of the program stopped."""
+        return [f"pattern {row.run}: {row.sentence}" for row in self.rows if row.status == "defect"]
 
     @property
     def files(self) -> list[Path]:
