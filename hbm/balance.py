@@ -8,30 +8,25 @@ Source  design of tribodyn; x_lin and G in hbm.linear.compliance; f_c from a con
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any, Protocol
 
 import numpy as np
-import scipy.linalg as sla
-from scipy.sparse import issparse
 
 from tribodyn.hbm.contact.contact_law import STICKS, ContactCycle
 from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.krylov import gmres
-from tribodyn.hbm.linear import pair_slopes
-from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance, compliance_of
+from tribodyn.hbm.linear.compliance import ContactCompliance
+from tribodyn.hbm.linear.compliance_point import CompliancePoint
+from tribodyn.hbm.linear.linear_side import compliance_of
+from tribodyn.hbm.linearisation import Linearisation, Rest
+from tribodyn.hbm.reference_springs import reference_springs
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.residual_flexibility import FlexibleModel
 from tribodyn.refusal import Refusal
 
 ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
-NEARLY_ALL = 0.03  # share of the flexibility that products may leave out and still find Newton's directions alone
-Rest = Callable[[np.ndarray], np.ndarray] | None  # (n_contact, n_coeff) departures g [N] -> contact displacement [m]
-INNER, INNER_PRODUCTS = 0.05, 60  # residual and products of a direction within a direction, where they leave out more
 
 
 @dataclass(frozen=True)
@@ -112,7 +107,7 @@ class HarmonicBalance:
         if isinstance(model, FlexibleModel):
             springs = model.residual.stiffness
         else:
-            springs = _reference(contact.stiffness, model, basis, omega_max)
+            springs = reference_springs(contact.stiffness, model, basis, omega_max)
         if like is not None and like._serves(model, springs, basis, excitation, omega_max):
             compliance = like.compliance.under(excitation)
         else:
@@ -277,231 +272,3 @@ class HarmonicBalance:
     def history(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Displacement [m] and contact force [N] over one period, both (n_pair, n_component, n_samples)."""
         return self.contact.history(state.x, self.basis, self.memory)
-
-
-class LinearSide(Protocol):
-    """The linear side of a balance at its frequency or frequencies, G; see `CompliancePoint`.
-
-    blocks : (n_block, m, m) diagonal blocks of G over equal runs of contact rows with all their coefficients, which
-        then precondition; None where `coarse_part` does
-    """
-
-    @property
-    def blocks(self) -> np.ndarray | None: ...
-
-    def apply(self, g: np.ndarray) -> np.ndarray: ...
-
-    def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]: ...
-
-    def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
-
-    @property
-    def left_out(self) -> float: ...
-
-    def nearly(self, g: np.ndarray) -> np.ndarray: ...
-
-
-class Linearisation:
-    """I - G dg/dx, with dg/dx block diagonal over pairs and zero where a pair stays stuck and closed.
-
-    active : pairs with a derivative; rows : their contact rows
-    """
-
-    def __init__(self, point: LinearSide, stiffness: np.ndarray, x: np.ndarray, cycle: ContactCycle, rest: Rest = None):
-        """G, the stuck springs (n_contact,) [N/m], the contact cycle at x with its derivative, what `nearly` lacks."""
-        jac = cycle.jacobian
-        if jac is None:
-            raise Refusal("linearise needs a state evaluated with its contact derivative")
-        n_pair, n_comp, n_coeff = x.shape
-        self.active, self._dg = pair_slopes.departures(jac, stiffness.reshape(n_pair, n_comp))
-        self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
-        self._shape, self._n_pair = (n_pair * n_comp, n_coeff), n_pair
-        self._point, self._rest = point, rest
-        self._product = self._point.jacobian_product(self.rows)
-
-    def departure_slope(self, direction: np.ndarray) -> np.ndarray:
-        """dg/dx . direction: (n_contact, n_coeff)."""
-        return self._in_all_rows(self.g_slope(direction[self.rows]))
-
-    def _in_all_rows(self, active: np.ndarray) -> np.ndarray:
-        """(n_contact, n_coeff) of what vanishes but on the rows of active pairs."""
-        out = np.zeros(self._shape)
-        out[self.rows] = active
-        return out
-
-    def g_slope(self, active_direction: np.ndarray) -> np.ndarray:
-        """dg/dx . direction on the rows of active pairs, both (n_active_rows, n_coeff)."""
-        found: np.ndarray = pair_slopes.times(self._dg, active_direction)
-        return found
-
-    def product(self, d: np.ndarray) -> np.ndarray:
-        """(I - G dg/dx) d on the rows of active pairs, d (n_active_rows, n_coeff)."""
-        slope = self.g_slope(d)
-        moved = self._product(slope)
-        return d - (moved if self._rest is None else moved + self._rest(self._in_all_rows(slope))[self.rows])
-
-    def precondition(self, d: np.ndarray) -> np.ndarray:
-        """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs, by blocks or coarse part of G."""
-        if self._block_inverse is not None:
-            full, n = self._in_all_rows(d), len(self._block_inverse)
-            solved: np.ndarray = np.matmul(self._block_inverse, full.reshape(n, -1, 1)).reshape(self._shape)
-            return solved[self.rows]
-        if self._coarse_factors is None:
-            return d
-        found: np.ndarray = pair_slopes.preconditioned(d, self._dg, *self._coarse_factors)
-        return found
-
-    @cached_property
-    def _block_inverse(self) -> np.ndarray | None:
-        """Inverses of the diagonal blocks of I - G dg/dx; None where there are none or one is singular."""
-        g = self._point.blocks
-        if g is None:
-            return None
-        n, m = len(g), g.shape[1]
-        pairs, width = self._n_pair, self._dg.shape[1]
-        slope = np.zeros((pairs, width, width))
-        slope[self.active] = self._dg
-        of_block = slope.reshape(n, pairs // n, width, width)
-        columns = g.reshape(n, m, pairs // n, width).transpose(0, 2, 1, 3)
-        through = np.matmul(columns, of_block).transpose(0, 2, 1, 3)
-        try:
-            return np.linalg.inv(np.eye(m) - through.reshape(n, m, m))
-        except np.linalg.LinAlgError:
-            return None
-
-    @cached_property
-    def _coarse_factors(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """U, A and the factors of I - A U^T D U; None where there is no coarse part or it is singular."""
-        if self.coarse is None:
-            return None
-        u, a, matrix = self.coarse
-        lower_upper, pivots, zero = sla.lapack.dgetrf(matrix)
-        return (u, a, lower_upper.T, pivots) if zero == 0 else None
-
-    @cached_property
-    def coarse(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """U (n_active_rows, r) and A, I - A U^T D U (r n_coeff, r n_coeff), where G ~ U A U^T; None where r = 0.
-
-        With D = dg/dx the inverse of I - U A U^T D is I + U (I - A U^T D U)^-1 A U^T D (Woodbury).
-        """
-        u, a = self._point.coarse_part(self.rows)
-        r, m = u.shape[1], self._shape[1]
-        if r == 0:
-            return None
-        inside = pair_slopes.projected(self._dg, u.astype(np.float32), m)
-        return u, a, np.eye(r * m) - a @ inside
-
-    def spread(self, d: np.ndarray, rhs: np.ndarray) -> np.ndarray:
-        """The solution of (I - G dg/dx) d = rhs in all rows (n_contact, n_coeff) from that in the active rows."""
-        if len(self.rows) == self._shape[0]:
-            return d
-        g = self._in_all_rows(self.g_slope(d))
-        full = rhs + self._point.nearly(g) + (0.0 if self._rest is None else self._rest(g))
-        full[self.rows] = d
-        return full
-
-    def solve(self, rhs: np.ndarray, tolerance: float, max_products: int = 200) -> tuple[np.ndarray, int, float]:
-        """Solve (I - G dg/dx) d = rhs for rhs (n_contact, n_coeff).
-
-        Returns d, products spent, relative residual reached
-        """
-        if len(self.active) == 0:
-            return rhs.copy(), 0, 0.0
-        shape = (len(self.rows), self._shape[1])
-
-        def nearly(b: np.ndarray, wanted: float, most: int) -> tuple[np.ndarray, int, float]:
-            return gmres(
-                lambda v: self.product(v.reshape(shape)).ravel(),
-                b,
-                wanted,
-                most,
-                lambda v: self.precondition(v.reshape(shape)).ravel(),
-            )
-
-        def exactly(v: np.ndarray) -> np.ndarray:
-            return v - self._point.apply(self._in_all_rows(self.g_slope(v.reshape(shape))))[self.rows].ravel()
-
-        b = rhs[self.rows].ravel()
-        if self._point.left_out <= NEARLY_ALL:
-            d, spent, reached = nearly(b, tolerance, max_products)
-        else:
-            # products that leave much out find a direction for one that leaves nothing out
-            d, spent, reached = gmres(
-                exactly, b, tolerance, max_products, lambda v: nearly(v, INNER, INNER_PRODUCTS)[0]
-            )
-        return self.spread(d.reshape(shape), rhs), spent, reached
-
-    def solve_refined(self, rhs: np.ndarray, tolerance: float) -> np.ndarray:
-        """As `solve`, but its products are of single precision: refined with the exact one to the tolerance."""
-        d, _, _ = self.solve(rhs, max(tolerance, 1e-6))
-        size = float(np.linalg.norm(rhs))
-        for _ in range(4):
-            residual = rhs - d + self._point.apply(self.departure_slope(d))
-            error = float(np.linalg.norm(residual))
-            if error <= tolerance * size:
-                break
-            d = d + self.solve(residual, max(tolerance * size / error, 1e-6))[0]
-        return d
-
-    def dense(self) -> np.ndarray:
-        """The Jacobian as a matrix (n_contact * n_coeff, same); for checks and as fallback.
-
-        G couples no harmonics, and a sine is a cosine turned: one product for each active row finds all its columns.
-        """
-        n, m = self._shape
-        full = np.eye(n * m)
-        if len(self.active) == 0:
-            return full
-        n_comp, s = n // self._n_pair, m % 2  # the constant, where it is kept, comes first
-        columns = full.reshape(n, m, self._n_pair, n_comp * m)
-        slope = self._dg.reshape(-1, m, n_comp * m)
-        unit = np.zeros(m)
-        unit[:s] = unit[s::2] = 1.0
-        for row, pushed in zip(self.rows, slope, strict=True):
-            g = np.zeros(self._shape)
-            g[row] = unit
-            moved = self._point.apply(g)[..., None]
-            cosine, sine = moved[:, s::2], moved[:, s + 1 :: 2]  # a unit of sine moves by -sine and cosine
-            block = columns[:, :, row // n_comp]
-            block[:, :s] -= moved[:, :s] * pushed[:s]
-            block[:, s::2] -= cosine * pushed[s::2] - sine * pushed[s + 1 :: 2]
-            block[:, s + 1 :: 2] -= sine * pushed[s::2] + cosine * pushed[s + 1 :: 2]
-        return full
-
-
-def body_stiffness(model: ReducedModel, basis: HarmonicBasis) -> np.ndarray:
-    """(n_pair, n_component) stiffness of the body against a contact displacement with all others held [N/m]."""
-    system, b = model.at_harmonic(basis.harmonics[-1])
-    return _against(system.stiffness, b).reshape(model.interface.n_pair, -1)
-
-
-def _against(matrix: Any, b: Any) -> np.ndarray:
-    """(n_contact,) what a matrix of the body (n, n) has against each row of the contact map b (n_contact, n)."""
-    matrix, b = (np.asarray(m.toarray() if issparse(m) else m) for m in (matrix, b))
-    length = (np.abs(b) ** 2).sum(axis=1) ** 2  # zero for a component that a pair has not
-    against: np.ndarray = ((b @ matrix) * b.conj()).sum(axis=1).real / np.where(length > 0, length, 1.0)
-    return against
-
-
-def _reference(
-    springs: np.ndarray,
-    model: ReducedModel,
-    basis: HarmonicBasis,
-    omega_max: float,
-    hard: float = 1e5,
-    cut: float = 1e2,
-    most: int = 3000,
-) -> np.ndarray:
-    """Springs (n_pair, n_component) [N/m], those harder than `hard` times the body cut to `cut` times it.
-
-    Where body and springs are both zero, as of a mass on a cubic spring, the reference is the inertia at omega_max. All
-    that of few contacts only (`most` unknowns): where many stick, all would depart from a reference not their own
-    """
-    if not 0 < springs.size * basis.n_coeff <= most:
-        return springs
-    body = body_stiffness(model, basis)
-    if not (springs + body).all():
-        system, b = model.at_harmonic(basis.harmonics[-1])
-        inertia = omega_max**2 * _against(system.mass, b).reshape(springs.shape)
-        springs = np.where((springs == 0) & (body == 0), inertia, springs)
-    return np.where((springs > hard * body) & (body > 0), cut * body, springs)

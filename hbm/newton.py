@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, TypeVar, cast
+from typing import Generic, TypeVar, cast
 
-import numba
 import numpy as np
 
-from tribodyn.hbm.balance import NEARLY_ALL, HarmonicBalance, Linearisation, State
-from tribodyn.hbm.contact.contact_law import ContactCycle
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.criterion import (
+    CRITERION,
+    Balance,
+    Evaluated,
+    Evaluation,
+    Frequency,
+    NewtonOptions,
+    relative_residual,
+    required_residual,
+    spring_stretch,
+)
+from tribodyn.hbm.linearisation import NEARLY_ALL
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 from tribodyn.reduction.residual_flexibility import FlexibleModel, ResidualFlexibility
@@ -26,9 +35,6 @@ class Rules:
     most_direct: int = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
     most_corrections: int = 8  # of a residual flexibility
     closer: float = 0.1  # what a step is to leave over what comes after it, with a residual flexibility
-    # of the contact forces, wanted where these stretch their springs far less than x is large
-    force_accuracy: float = 1e-4
-    least_tolerance: float = 1e-12  # residual over displacement that rounding still lets through
     force_unknown: float = 1e-2  # error of the contact forces from which on a small residual is no solution
     shortest: float = 4e-4  # share of a Newton step that is tried
     held: float = 1e-3  # contact force over that of the stuck contact from which on the structure leans on it
@@ -50,62 +56,11 @@ class Strides:
 STRIDES = Strides()  # of a load, of an opening, of a decimal logarithm
 
 
-class Evaluation(Protocol):
-    """A balance evaluated at one x; the fields are those of `State`, without the frequency."""
-
-    @property
-    def x(self) -> np.ndarray: ...
-
-    @property
-    def cycle(self) -> ContactCycle: ...
-
-    @property
-    def g(self) -> np.ndarray: ...
-
-    @property
-    def residual(self) -> np.ndarray: ...
-
-
-Frequency = TypeVar("Frequency", contravariant=True)
-Evaluated = TypeVar("Evaluated", bound=Evaluation)
-EvaluatedThere = TypeVar("EvaluatedThere", bound=Evaluation, covariant=True)
-
-
-class Balance(Protocol[Frequency, Evaluated]):
-    """What Newton's method solves: R(x) = 0 at a frequency, or at one for each of several duties.
-
-    reference_stiffness : (n_contact,) stuck springs that the departure g is measured from [N/m]
-    """
-
-    @property
-    def reference_stiffness(self) -> np.ndarray: ...
-
-    def x_lin(self, omega: Frequency) -> np.ndarray: ...
-
-    def evaluate(self, omega: Frequency, x: np.ndarray) -> Evaluated: ...
-
-    def linearise(self, state: Evaluated) -> Linearisation: ...
+Solvable = TypeVar("Solvable", bound=Evaluation, covariant=True)
 
 
 @dataclass(frozen=True)
-class NewtonOptions:
-    """How exactly and how long Newton works.
-
-    tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction
-    krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
-    least_motion : take the shortest of all directions that solve the linear problem, by its dense matrix: a body that
-        slips on all its faces can be at rest in many places
-    """
-
-    tolerance: float = 1e-8
-    max_steps: int = 40
-    max_products: int = 300
-    krylov: float = 0.1
-    least_motion: bool = False
-
-
-@dataclass(frozen=True)
-class Solved(Generic[EvaluatedThere]):
+class Solved(Generic[Solvable]):
     """Where Newton ended.
 
     outcome : CONVERGED, or what went wrong
@@ -113,7 +68,7 @@ class Solved(Generic[EvaluatedThere]):
     history : relative residual after each step, the start first
     """
 
-    state: EvaluatedThere
+    state: Solvable
     outcome: Outcome[SolveEnd]
     steps: int
     products: int
@@ -127,18 +82,6 @@ class Solved(Generic[EvaluatedThere]):
 
 Solution = Solved[State]
 """Where Newton ended on a `HarmonicBalance`."""
-
-
-def relative_residual(state: Evaluation, x_lin: np.ndarray) -> float:
-    """|R| / max(|x|, |x_lin|), Euclidean, 1 where only these vanish; invariant to the units."""
-    scale = max(_size(state.x), _size(x_lin))
-    return _size(state.residual) / scale if scale > 0 else float(state.residual.any())
-
-
-def _size(values: np.ndarray) -> float:
-    """The Euclidean norm of all; numpy's own takes ten times as long where they are few."""
-    flat = values.ravel()
-    return math.sqrt(flat @ flat)
 
 
 @single
@@ -179,7 +122,7 @@ def _solve_with_rest(
     for _ in range(2 * RULES.most_corrections):
         lacking = residual.lacking(state.g, asked)
         unsure, error = residual.at_most(lacking, state.flat), relative_residual(state, x_lin)
-        goal, history = wanted(balance, state, x_lin, options), (*history, error + unsure)
+        goal, history = required_residual(balance, state, x_lin, options), (*history, error + unsure)
         if error + unsure <= goal:
             return Solved(state, CONVERGED, steps, products, history)
         if not np.isfinite(unsure):
@@ -209,7 +152,7 @@ def _solve(
     forcing = 1e-3
     products = 0
     for step in range(1, options.max_steps + 1):
-        goal = wanted(balance, state, x_lin, options)
+        goal = required_residual(balance, state, x_lin, options)
         if error <= goal:
             break
         if not np.isfinite(error):
@@ -249,44 +192,16 @@ def _solve(
     outcome = CONVERGED
     if error > options.tolerance:
         outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
-    off = error / _stretched(balance, state, x_lin)
+    off = error / spring_stretch(balance, state, x_lin)
     stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)  # the contact carries a share of that
     leans = float(np.linalg.norm(state.cycle.force)) > RULES.held * float(np.linalg.norm(stuck))
-    doubtful = error <= options.tolerance and off > RULES.force_accuracy and leans
+    doubtful = error <= options.tolerance and off > CRITERION.force_accuracy and leans
     if doubtful and (off > RULES.force_unknown or _unheld(balance, state)):
         far = float(np.abs(state.x).max())
         outcome = SolveEnd.SLIDES_AWAY.say(
             f" {far:.1e} m, and its forces are known to {off:.1%} only: nothing holds it"
         )
     return Solved(state, outcome, len(history) - 1, products, tuple(history))
-
-
-def wanted(
-    balance: Balance[Frequency, Evaluated],
-    state: Evaluated,
-    x_lin: np.ndarray,
-    options: NewtonOptions,
-) -> float:
-    """The relative residual wanted: the tolerance, or less where contact forces need it and rounding lets it."""
-    return min(options.tolerance, max(RULES.force_accuracy * _stretched(balance, state, x_lin), RULES.least_tolerance))
-
-
-def _stretched(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> float:
-    """The stretch of the contact springs over the displacement; infinite where nothing touches or moves."""
-    size = float(_stretch(state.cycle.force.reshape(state.g.shape), balance.reference_stiffness))
-    scale = max(_size(state.x), _size(x_lin))
-    return size / scale if size > 0.0 and scale > 0.0 else np.inf
-
-
-@numba.njit(cache=True)
-def _stretch(force, stiffness):
-    """The Euclidean norm of forces (n_contact, n) over their springs (n_contact,), those of no spring left out."""
-    total = 0.0
-    for i in range(len(stiffness)):
-        if stiffness[i] > 0.0:
-            for value in force[i]:
-                total += (value / stiffness[i]) ** 2
-    return math.sqrt(total)
 
 
 def _search(

@@ -26,12 +26,13 @@ from threadpoolctl import threadpool_limits
 from proof.bench import Machine, Work
 from tests.helpers.reduced import reduce_part
 from tribodyn.fem.factor import Pardiso, factorise
-from tribodyn.hbm.balance import HarmonicBalance, Linearisation
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import JointSet
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.linear import all_harmonics
-from tribodyn.hbm.linear.compliance import CompliancePoint
+from tribodyn.hbm.linear.compliance_point import CompliancePoint
+from tribodyn.hbm.linearisation import Linearisation
 from tribodyn.reduction import residual_flexibility
 from tribodyn.reduction.residual_flexibility import FlexibleModel, ResidualFlexibility
 from tribodyn.workflows.run import memory, modelling, settings

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance, Linearisation
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.bordered import Direction
 from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.linearisation import Linearisation
 from tribodyn.hbm.newton import Solution
 
 

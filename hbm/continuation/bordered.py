@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.hbm.balance import Linearisation, State
+from tribodyn.hbm.balance import State
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.krylov import gmres
+from tribodyn.hbm.linearisation import Linearisation
 from tribodyn.hbm.newton import NewtonOptions, Solution, relative_residual
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 from tribodyn.refusal import SolverFailure

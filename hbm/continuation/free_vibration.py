@@ -22,7 +22,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import SEPARATES, ContactCycle
 from tribodyn.hbm.krylov import gmres
-from tribodyn.hbm.linear.expansion import stuck_modes
+from tribodyn.hbm.linear.stuck_modes import stuck_modes
 from tribodyn.refusal import Refusal
 
 FEW = 120  # lowest modes among which the reference mode of a turning or a flown-about structure is looked for

@@ -19,7 +19,8 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.linear.compliance import ContactCompliance, compliance_of
+from tribodyn.hbm.linear.compliance import ContactCompliance
+from tribodyn.hbm.linear.linear_side import compliance_of
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 from tribodyn.refusal import SolverFailure

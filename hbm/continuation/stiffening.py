@@ -20,11 +20,12 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.hbm import newton
-from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
-from tribodyn.hbm.linear.compliance import compliance_of
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
+from tribodyn.hbm.linear.linear_side import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.reference_springs import body_stiffness
 from tribodyn.hbm.threads import single
 from tribodyn.reduction.residual_flexibility import FlexibleModel
 
@@ -136,7 +137,7 @@ def _damped(
     x_lin = balance.x_lin(omega)
     state = balance.evaluate(omega, start)
     for step in range(options.max_steps):
-        small = newton.relative_residual(state, x_lin) <= newton.wanted(balance, state, x_lin, options)
+        small = newton.relative_residual(state, x_lin) <= newton.required_residual(balance, state, x_lin, options)
         try:
             factor = sla.lu_factor(balance.linearise(state).dense(), check_finite=True)
         except ValueError:  # numbers beyond all bounds

@@ -26,6 +26,7 @@ import scipy.linalg as sla
 from scipy.sparse import csr_matrix
 
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.hbm.linear.stuck_modes import RIGID_MODES, lowest_modes, rigid_motions
 from tribodyn.refusal import Refusal
 
 
@@ -45,10 +46,6 @@ class ExpansionRules:
     sparse_share: float = 0.05
     # of a frequency from an undamped resonance, relative: the response is rounding alone
     resonance_distance: float = 1e-13
-    rigid: float = 1e3  # squared frequency of a mode over rounding from which on it is looked whether it is rigid
-    gap: float = 1e-10  # squared frequency of a rigid mode over that of the first elastic one, at the most
-    rounded: float = 1e-6  # the same where it is the rounding of far stiffer modes
-    most_rigid: int = 24  # those of four bodies that nothing joins
     # displacement at the contacts beside that elsewhere from which on a motion is not free of them
     resisted: float = 1e-6
 
@@ -122,12 +119,12 @@ class Expansion:
         rounding = n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real)
         try:
             factor = sla.cho_factor(stuck)
-            lam, phi = _modes(stuck, mass, count)
+            lam, phi = lowest_modes(stuck, mass, count)
         except np.linalg.LinAlgError:
             lam = np.zeros(1)
-        if lam[0] <= RULES.rigid * rounding:
+        if lam[0] <= RIGID_MODES.suspect * rounding:
             try:
-                self.rigid, shift = _rigid(stuck, mass)
+                self.rigid, shift = rigid_motions(stuck, mass)
             except np.linalg.LinAlgError:
                 if lam[0] <= rounding:
                     raise loose from None
@@ -138,7 +135,7 @@ class Expansion:
                 held = mass @ self.rigid
                 stuck = stuck + shift * held @ held.conj().T
                 factor = sla.cho_factor(stuck)
-                lam, phi = _modes(stuck, mass, count)
+                lam, phi = lowest_modes(stuck, mass, count)
             except np.linalg.LinAlgError:
                 raise loose from None
             phi[:, : self.rigid.shape[1]] = self.rigid  # the lowest ones, and no others are as low
@@ -261,66 +258,6 @@ class Expansion:
                 "is infinite: give it damping or take another frequency"
             )
         return found
-
-
-def _rigid(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]:
-    """Mass-normalised motions (n, r) that nothing resists, and a squared frequency between them and the others.
-
-    Raises  LinAlgError where there are none, or the mass is not positive
-    """
-    squares, shapes = sla.eigh(stiffness, mass, subset_by_index=(0, min(len(mass), RULES.most_rigid + 1) - 1))
-    largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real)) or 1.0
-    size = np.maximum.accumulate(np.abs(squares))
-    rounding = len(mass) * float(np.finfo(float).eps) * largest
-    above = [float(squares[r]) if r < len(squares) else largest for r in range(1, len(squares) + 1)]
-    gaps = [
-        r
-        for r, next_one in enumerate(above, start=1)
-        if size[r - 1] <= max(RULES.gap * next_one, min(rounding, RULES.rounded * next_one))
-    ]
-    if not gaps or gaps[-1] > RULES.most_rigid:
-        raise np.linalg.LinAlgError
-    r = gaps[-1]
-    # two steps of inverse iteration take the rounding of the stiff modes out of the shapes
-    factor = sla.cho_factor(stiffness + 0.3 * above[r - 1] * mass)
-    R = shapes[:, :r]
-    for _ in range(2):
-        R = sla.cho_solve(factor, mass @ R)
-        R = R @ np.linalg.inv(np.linalg.cholesky(R.conj().T @ mass @ R)).conj().T
-    return R, 0.3 * above[r - 1]
-
-
-def stuck_modes(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All modes of a stuck structure: squared frequencies (n,), shapes (n, n) of unit modal mass, which are rigid (n,).
-
-    Those that nothing resists come first, with zero for their squared frequency.
-    """
-    largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real))
-    squares, shapes = sla.eigh(stiffness, mass)
-    free = np.zeros(len(mass), bool)
-    if squares[0] <= RULES.rigid * len(mass) * np.finfo(float).eps * largest:
-        try:
-            rigid, shift = _rigid(stiffness, mass)
-        except np.linalg.LinAlgError:
-            return squares, shapes, free
-        held = mass @ rigid
-        squares, shapes = sla.eigh(stiffness + shift * held @ held.T, mass)
-        free[: rigid.shape[1]] = True
-        squares[free], shapes[:, free] = 0.0, rigid
-    return squares, shapes, free
-
-
-def _modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest modes: squared frequencies (count,) and shapes (n, count) of unit modal mass.
-
-    They come from the compliance's side, M phi = nu K phi: rounding is then relative to the softest mode, however much
-    stiffer the contact springs are, and what it does to stiff ones is as small as their share in the compliance.
-    """
-    n = len(mass)
-    nu, phi = sla.eigh(mass, stiffness, subset_by_index=None if count >= n else (n - count, n - 1))
-    nu, phi = nu[::-1], phi[:, ::-1]
-    lam = 1.0 / np.maximum(nu, np.finfo(float).eps ** 2 * nu[0])  # without mass: as good as rigid
-    return lam, phi * np.sqrt(lam)
 
 
 @dataclass(frozen=True)

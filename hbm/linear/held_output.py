@@ -15,7 +15,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.compliance import ContactCompliance
+from tribodyn.hbm.linear.compliance_point import CompliancePoint
 from tribodyn.refusal import Refusal
 
 
@@ -25,6 +27,7 @@ class HeldOutput(ContactCompliance):
     row : of the output; the load factor of a balance multiplies the amplitude
     """
 
+    inner: ContactCompliance
     row: int
     amplitude: float
 
@@ -33,8 +36,13 @@ class HeldOutput(ContactCompliance):
         """The expansions are shared."""
         held = object.__new__(cls)
         held.__dict__.update(inner.__dict__)
-        held.row, held.amplitude, held._points = inner.output_names.index(output), amplitude, {}
+        held.inner, held.row, held.amplitude = inner, inner.output_names.index(output), amplitude
+        held._points = {}
         return held
+
+    def restricted(self, basis: HarmonicBasis) -> HeldOutput:
+        """The same for fewer of the harmonics."""
+        return HeldOutput.of(self.inner.restricted(basis), self.output_names[self.row], self.amplitude)
 
     def at(self, omega: float) -> HeldPoint:
         """The compliance at one excitation frequency [rad/s]."""
@@ -52,17 +60,24 @@ class HeldPoint(CompliancePoint):
     compliance: HeldOutput
 
     def __init__(self, compliance: HeldOutput, omega: float):
-        super().__init__(compliance, omega)
+        self.inner = compliance.inner.at(omega)
+        self.__dict__.update(self.inner.__dict__)
+        self.compliance = compliance
         self._first = compliance.basis.harmonics.index(1)
         x, y = self._fundamental(self.x_lin), self._fundamental(self.outputs_lin)
         self.receptance = complex(y[compliance.row])
         if self.receptance == 0.0:
             name = compliance.output_names[compliance.row]
             raise Refusal(f"the loads do not move output '{name}' in harmonic 1: its amplitude cannot be held")
-        self._ways = x / self.receptance, y / self.receptance
+        self._per_output = x / self.receptance, y / self.receptance
         missing = compliance.amplitude - self.receptance
-        self.x_lin = self._moved(self.x_lin, self._ways[0] * missing)
-        self.outputs_lin = self._moved(self.outputs_lin, self._ways[1] * missing)
+        self.x_lin = self._moved(self.x_lin, self._per_output[0] * missing)
+        self.outputs_lin = self._moved(self.outputs_lin, self._per_output[1] * missing)
+
+    @property
+    def left_out(self) -> float:
+        """As of the structure without the held output."""
+        return self.inner.left_out
 
     def _fundamental(self, coefficients: np.ndarray) -> np.ndarray:
         """(n,) complex amplitudes of harmonic 1 of coefficients (n, n_coeff)."""
@@ -77,37 +92,33 @@ class HeldPoint(CompliancePoint):
         out[:, cosine + 1] -= by.imag
         return out
 
-    def loose(self, g: np.ndarray) -> complex:
-        """What contact forces g (n_contact, n_coeff) alone would move the output by in harmonic 1 [m]."""
-        return complex(self._fundamental(super().outputs(g))[self.compliance.row])
+    def contact_motion(self, g: np.ndarray) -> complex:
+        """Motion of the output in harmonic 1 under contact forces g (n_contact, n_coeff) alone [m]."""
+        return complex(self._fundamental(self.inner.outputs(g))[self.compliance.row])
 
     def force(self, g: np.ndarray, factor: float) -> complex:
-        """The excitation that it takes, over the one that is given; factor : on the amplitude held."""
-        return (self.compliance.amplitude * factor - self.loose(g)) / self.receptance
+        """The necessary excitation over the given one; factor : on the amplitude held."""
+        return (self.compliance.amplitude * factor - self.contact_motion(g)) / self.receptance
 
     def apply(self, g: np.ndarray) -> np.ndarray:
         """G g."""
-        if self.compliance.residual is not None:  # made of `nearly`
-            return super().apply(g)
-        return self._moved(super().apply(g), -self.loose(g) * self._ways[0])
+        return self._moved(self.inner.apply(g), -self.contact_motion(g) * self._per_output[0])
 
     def nearly(self, g: np.ndarray) -> np.ndarray:
-        """G g without what a factor would have to be asked for."""
-        if self.compliance.residual is None:  # made of `apply`
-            return super().nearly(g)
-        return self._moved(super().nearly(g), -self.loose(g) * self._ways[0])
+        """G g without what needs a solution by a sparse factor."""
+        return self._moved(self.inner.nearly(g), -self.contact_motion(g) * self._per_output[0])
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
-        return self._moved(super().outputs(g), -self.loose(g) * self._ways[1])
+        return self._moved(self.inner.outputs(g), -self.contact_motion(g) * self._per_output[1])
 
     def slope(self, g: np.ndarray, load_factor: float) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega of contact displacement and outputs under g and what is held, vibrating part times factor."""
         c = self.compliance
-        excited, free = self._slope(c.excited), self._slope(c.pushed(g))
+        excited, free = self.inner._slope(c.excited), self.inner._slope(c.pushed(g))
         turn, turn_free = (self._fundamental(part[1])[c.row] for part in (excited, free))
         driven, moved = self.force(g, load_factor), []
-        for e, f, way in zip(excited, free, self._ways, strict=True):
+        for e, f, way in zip(excited, free, self._per_output, strict=True):
             first = self._fundamental(e)
             by = driven * (first - way * turn) - way * turn_free - load_factor * first
             moved.append(self._moved(e * np.where(c.basis.order, load_factor, 1.0) + f, by))
@@ -115,11 +126,11 @@ class HeldPoint(CompliancePoint):
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The product with G restricted to contact rows (active ones)."""
-        free, way = super().jacobian_product(rows), self._ways[0][rows]
+        free, way = self.inner.jacobian_product(rows), self._per_output[0][rows]
         whole = np.zeros((self.compliance.n_contact, self.compliance.basis.n_coeff))
 
         def product(d: np.ndarray) -> np.ndarray:
             whole[rows] = d
-            return self._moved(free(d), -self.loose(whole) * way)
+            return self._moved(free(d), -self.contact_motion(whole) * way)
 
         return product

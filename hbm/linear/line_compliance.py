@@ -10,7 +10,8 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
+from tribodyn.hbm.linear.compliance import ContactCompliance
+from tribodyn.hbm.linear.compliance_point import CompliancePoint
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.speed_line import SpeedLineModel

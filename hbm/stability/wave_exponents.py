@@ -25,7 +25,7 @@ import scipy.linalg as sla
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.linear.expansion import stuck_modes
+from tribodyn.hbm.linear.stuck_modes import stuck_modes
 from tribodyn.reduction.model import ReducedModel
 
 COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: how far truncation drives copies apart

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance, Linearisation
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactCycle
-from tribodyn.hbm.linear.compliance import CompliancePoint
+from tribodyn.hbm.linear.compliance_point import CompliancePoint
+from tribodyn.hbm.linearisation import Linearisation
 
 MAX_ITERATIONS = 80
 ROUNDING = 4e-16
@@ -107,7 +108,7 @@ class WearingBalance:
     gain : (n_pair,) depth per friction work [m/J]
     guess : (n_pair,) depth to look from [m]; each search starts where the last one ended
     x runs over the duties of a pair, then its components: (n_pair, n_duty * n_component, n_coeff); frequencies are a
-    tuple, one per duty. `hbm.newton` solves it as any `newton.Balance`.
+    tuple, one per duty. `hbm.newton` solves it as any `criterion.Balance`.
     reference_stiffness : (n_pair * n_duty * n_component,) stuck springs [N/m]
     """
 

@@ -29,7 +29,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.operating_condition import AtPeakRatio
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.derivatives.cycle_derivatives import peak_moves
@@ -37,6 +37,7 @@ from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives
 from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.derivatives.parameter_effects import ParameterEffects
+from tribodyn.hbm.linearisation import Linearisation
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.dirk_stages import GAMMA, Search, begun, depth_per_work, first_stage

@@ -18,7 +18,7 @@ from tribodyn.hbm.continuation.free_vibration import DenseBordered, DiagonalBord
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.linear.expansion import stuck_modes
+from tribodyn.hbm.linear.stuck_modes import stuck_modes
 from tribodyn.reduction.model import ReducedModel
 
 MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.01

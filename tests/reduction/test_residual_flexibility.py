@@ -12,12 +12,13 @@ from scipy.sparse import csr_matrix, diags_array
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
-from tribodyn.hbm.balance import NEARLY_ALL, HarmonicBalance
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
+from tribodyn.hbm.linearisation import NEARLY_ALL
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time.stepper import Options, TimeStepper

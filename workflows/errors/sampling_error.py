@@ -27,7 +27,7 @@ def sampling_error(balance: HarmonicBalance, omega: float, x: np.ndarray) -> flo
     state, start = balance.evaluate(omega, x, jacobian=False), fine.evaluate(omega, x, jacobian=False)
     residual = newton.relative_residual(start, fine.x_lin(omega))
     options = NewtonOptions()
-    loose = replace(options, tolerance=max(CONVERGED_SHARE * residual, newton.RULES.least_tolerance))
+    loose = replace(options, tolerance=max(CONVERGED_SHARE * residual, newton.CRITERION.least_tolerance))
     solution = newton.solve(fine, omega, x, loose)
     if not solution.converged and solution.history[-1] > options.tolerance:  # too far off to be a start
         solution = newton.solve_from_rest(fine, omega)
