@@ -36,9 +36,9 @@ def rank(item: pytest.Item) -> tuple[int, bool, int]:
 def pytest_configure(config: pytest.Config) -> None:
     """Parts and reductions that these tests make serve all of them and their subprocesses, and no other run."""
     if "TRIBODYN_CACHE" not in os.environ:
-        kept = TemporaryDirectory(prefix="tribodyn-kept-")
-        config.add_cleanup(kept.cleanup)
-        os.environ["TRIBODYN_CACHE"] = kept.name
+        temporary_directory = TemporaryDirectory(prefix="tribodyn-kept-")
+        config.add_cleanup(temporary_directory.cleanup)
+        os.environ["TRIBODYN_CACHE"] = temporary_directory.name
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -19,12 +19,12 @@ WHEELS = {"td.wheel.flutter", "td.wheel.pattern_wear"}  # take minutes: shown in
 
 def functions() -> set[str]:
     """Every function of the front door and its modules, as `td.plot.response`."""
-    found = set()
+    result = set()
     for place in (td, td.plot, td.studies, td.wheel, td.matrices):
         short = place.__name__.replace("tribodyn", "td")
         ours = {name: getattr(place, name) for name in dir(place) if not name.startswith("_")}
-        found |= {f"{short}.{name}" for name, thing in ours.items() if inspect.isfunction(thing)}
-    return found
+        result |= {f"{short}.{name}" for name, item in ours.items() if inspect.isfunction(item)}
+    return result
 
 
 def test_every_function_has_an_example() -> None:

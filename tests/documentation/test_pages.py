@@ -29,11 +29,11 @@ ELSEWHERE = {"docs/tutorials/own_part.md"}  # in test_own_part, which looks at i
 def after_the_first_command(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder where the first command of README and site has run; left to the build of the site where it asks."""
     folder = prepare(tmp_path_factory.mktemp("first"))
-    left = Path(os.environ.get("TRIBODYN_FIRST", tmp_path_factory.mktemp("left") / "first"))
-    with FileLock(f"{left}.lock"):
+    path = Path(os.environ.get("TRIBODYN_FIRST", tmp_path_factory.mktemp("left") / "first"))
+    with FileLock(f"{path}.lock"):
         printed = shell(FIRST, folder)
-        shutil.copytree(folder / "results", left / "results")
-        (left / "printed").write_text(printed, encoding="utf-8")
+        shutil.copytree(folder / "results", path / "results")
+        (path / "printed").write_text(printed, encoding="utf-8")
     return folder
 
 
@@ -70,11 +70,11 @@ def test_the_first_command_draws_what_is_shown(after_the_first_command: Path) ->
     assert {path.stem for path in pictures.glob("*.png")} == curves | {"patch", "status_maps", "part", "contact"}
     with Image.open(ROOT / "docs/figures/beam_patch.png") as page, Image.open(pictures / "patch.png") as drawn:
         # the unworn state alone: rounding on another processor changes where the contact wears later
-        shown, made = (one.crop((0, 0, one.width // 3, one.height)) for one in (page, drawn))
+        shown, built = (item.crop((0, 0, item.width // 3, item.height)) for item in (page, drawn))
         size = shown.width // 8, shown.height // 8
-        assert abs(shown.width / shown.height / (made.width / made.height) - 1) < 0.02
-        apart = np.subtract(*(np.asarray(one.convert("RGB").resize(size), float) for one in (shown, made)))
-    assert np.abs(apart).mean() < 5  # of 255: the same picture, up to fonts and rounding
+        assert abs(shown.width / shown.height / (built.width / built.height) - 1) < 0.02
+        distance = np.subtract(*(np.asarray(item.convert("RGB").resize(size), float) for item in (shown, built)))
+    assert np.abs(distance).mean() < 5  # of 255: the same picture, up to fonts and rounding
 
 
 def test_the_readme_shows_what_the_first_command_prints(after_the_first_command: Path) -> None:
@@ -97,8 +97,8 @@ def test_the_readme_shows_what_the_first_command_prints(after_the_first_command:
     of_wear = [re.search(r"life +(\d+) million cycles +([\d.]+) %", lines) for lines in (shown, printed)]
     assert of_wear[0] is not None
     assert of_wear[1] is not None, printed
-    (there, _), (here, error) = (map(float, found.groups()) for found in of_wear if found is not None)
-    assert abs(there / here - 1) < error / 100
+    (refined, _), (current, error) = (map(float, result.groups()) for result in of_wear if result is not None)
+    assert abs(refined / current - 1) < error / 100
 
 
 def test_the_scene_of_the_readme_is_one_of_fifteen_lines() -> None:
@@ -123,14 +123,14 @@ def test_the_check_is_what_ci_runs() -> None:
 
 def test_pictures_and_links_are_there() -> None:
     for page in pages():
-        said = re.sub(r"`[^`\n]*`", "", page.read_text(encoding="utf-8"))
-        for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", said, re.S):
+        message = re.sub(r"`[^`\n]*`", "", page.read_text(encoding="utf-8"))
+        for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", message, re.S):
             if "://" in target:
                 continue
-            there = page.parent / target if target else page
-            assert there.exists(), (name(page), target)
-            if anchor and there.suffix == ".md":
-                assert anchor in anchors(there), (name(page), target, anchor)
+            refined = page.parent / target if target else page
+            assert refined.exists(), (name(page), target)
+            if anchor and refined.suffix == ".md":
+                assert anchor in anchors(refined), (name(page), target, anchor)
 
 
 def anchors(page: Path) -> set[str]:
@@ -141,25 +141,25 @@ def anchors(page: Path) -> set[str]:
 
 
 def test_tests_that_pages_name_exist() -> None:
-    kept = {one.name for one in (ROOT / "tests").rglob("test_*.py")}
+    saved = {item.name for item in (ROOT / "tests").rglob("test_*.py")}
     named = {(page.name, test) for page in pages() for test in re.findall(r"test_\w+\.py", page.read_text("utf-8"))}
     assert named
-    assert not [one for one in named if one[1] not in kept]
+    assert not [item for item in named if item[1] not in saved]
 
 
 def test_names_of_python_in_pages_exist() -> None:
     called = re.compile(r"(?<![\w./\"-])(?:td|tribodyn)\.((?!NAME)[a-zA-Z_][\w.]*\w)")
     for page in [*pages(), *(ROOT / "docs").glob("examples/*.py"), ROOT / "docs/reference/examples.py"]:
-        for found in set(called.findall(page.read_text(encoding="utf-8"))):
-            assert exists(found.split(".")), (name(page), found)
+        for result in set(called.findall(page.read_text(encoding="utf-8"))):
+            assert exists(result.split(".")), (name(page), result)
 
 
 def exists(names: list[str]) -> bool:
     """Whether `tribodyn.A.B` is a module, or a name of one."""
-    thing: object = td
+    item: object = td
     for count, word in enumerate(names, 1):
         try:
-            thing = getattr(thing, word, None) or importlib.import_module(".".join(["tribodyn", *names[:count]]))
+            item = getattr(item, word, None) or importlib.import_module(".".join(["tribodyn", *names[:count]]))
         except ImportError:
             return False
     return True
@@ -168,15 +168,15 @@ def exists(names: list[str]) -> bool:
 def test_the_paper_states_what_the_first_command_prints() -> None:
     """Its numbers are those of the README, which are those of the command."""
     paper = (ROOT / "paper/paper.md").read_text(encoding="utf-8")
-    told = re.search(r"`tribodyn run beam`.*?less than a minute", paper, re.DOTALL)
-    assert told is not None
+    match = re.search(r"`tribodyn run beam`.*?less than a minute", paper, re.DOTALL)
+    assert match is not None
     (shown,) = [fence.text for fence in fences(README) if fence.language == "text"]
-    numbers = re.findall(r"\d[\d.]*(?: million cycles| DOFs| %)?", told[0])
+    numbers = re.findall(r"\d[\d.]*(?: million cycles| DOFs| %)?", match[0])
     assert len(numbers) >= 4
     assert [number for number in numbers if number not in shown] == []
     life = re.search(r"life +(\d+ million cycles) +([\d.]+ %)", shown)
     assert life is not None
-    assert "{} with an error of {}".format(*life.groups()) in " ".join(told[0].split())
+    assert "{} with an error of {}".format(*life.groups()) in " ".join(match[0].split())
 
 
 def test_readme_is_short() -> None:

@@ -49,17 +49,17 @@ def test_waves_of_a_rotating_ring_split_as_the_closed_form_says(waves: int) -> N
     sector = ring()
     with_it, against = (2 * np.pi * nodal_diameters(sector, [index], 6)[0] for index in (waves, -waves))
     still = replace(sector, system=replace(sector.system, gyroscopic=None))
-    rest = 2 * np.pi * nodal_diameters(still, [waves], 6)[0]
+    remainder = 2 * np.pi * nodal_diameters(still, [waves], 6)[0]
     inertia, section = DEPTH**4 / 12, DEPTH**2
     # n waves in the plane of the ring: omega2 = E I n2 (n2 - 1)2 / (rho A R4 (n2 + 1))
     plane = (
         np.sqrt(STEEL.E * inertia / (STEEL.rho * section) * waves**2 * (waves**2 - 1) ** 2 / (waves**2 + 1)) / RADIUS**2
     )
-    mode = int(np.abs(rest - plane).argmin())
-    out = rest[1 - mode]  # bending out of the plane of the ring hardly feels the rotation about its axis
-    assert rest[mode] == pytest.approx(plane, rel=5e-3)
-    own = [values[:2][np.abs(values[:2] - out).argmax()] for values in (with_it, against)]
-    assert own[1] - own[0] == pytest.approx(4 * waves * SPEED / (waves**2 + 1), rel=1e-3)
+    mode = int(np.abs(remainder - plane).argmin())
+    out = remainder[1 - mode]  # bending out of the plane of the ring hardly feels the rotation about its axis
+    assert remainder[mode] == pytest.approx(plane, rel=5e-3)
+    rows = [values[:2][np.abs(values[:2] - out).argmax()] for values in (with_it, against)]
+    assert rows[1] - rows[0] == pytest.approx(4 * waves * SPEED / (waves**2 + 1), rel=1e-3)
 
 
 def test_frequencies_are_those_of_the_first_order_system() -> None:
@@ -70,6 +70,6 @@ def test_frequencies_are_those_of_the_first_order_system() -> None:
     companion = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, G)]])
     values = np.linalg.eigvals(companion)
     assert np.abs(values.real).max() < 1e-5 * np.abs(values).max()
-    found = np.sort(values.imag[values.imag > 0])[:4]
-    assert turning_frequencies(K, M, G, 4) == pytest.approx(found, rel=1e-6)
+    result = np.sort(values.imag[values.imag > 0])[:4]
+    assert turning_frequencies(K, M, G, 4) == pytest.approx(result, rel=1e-6)
     assert np.abs(G + G.conj().T).max() == 0.0

@@ -103,8 +103,8 @@ def manufactured(mesh, exact, body_force):
     free = np.setdiff1d(np.arange(K.shape[0]), (fixed[:, None] * 3 + np.arange(3)).ravel())
     u = exact(x)
     u.ravel()[free] = 0
-    known = K @ u.ravel()
-    u.ravel()[free] = factorise(K[free][:, free]).solve((load.ravel() - known)[free])
+    reference = K @ u.ravel()
+    u.ravel()[free] = factorise(K[free][:, free]).solve((load.ravel() - reference)[free])
     error = norm = slope = slope_norm = 0.0
     h = 1e-5
     for elements, N, gradient, weight in batches(mesh, 8):
@@ -145,9 +145,9 @@ def test_materials_of_subdomains():
     M, K = assemble(mesh, {"left": STEEL, "right": light})
     e = np.tile([0.0, 0, 1], mesh.doflocs.shape[1])
     assert e @ M @ e == pytest.approx(0.175 * (7860 + 2700), rel=1e-13)
-    same, K_same = assemble(mesh, {"left": STEEL, "right": STEEL})
+    equal, K_same = assemble(mesh, {"left": STEEL, "right": STEEL})
     M_one, K_one = assemble(mesh, STEEL)
-    assert abs(same - M_one).max() == 0
+    assert abs(equal - M_one).max() == 0
     assert abs(K_same - K_one).max() == 0
     assert abs(K - K_one).max() > 0
     with pytest.raises(ValueError, match=r"4 elements have no material.*left.*right"):

@@ -36,8 +36,8 @@ def everywhere(mesh, vector):
 
 def test_an_orthotropic_material_of_isotropic_constants_is_isotropic(block):
     E, nu, G = STEEL.E, STEEL.nu, STEEL.E / (2 * (1 + STEEL.nu))
-    same = Orthotropic((E, E, E), (nu, nu, nu), (G, G, G), STEEL.rho)
-    for ours, plain in zip(assemble(block[0], same), assemble(block[0], STEEL), strict=True):
+    equal = Orthotropic((E, E, E), (nu, nu, nu), (G, G, G), STEEL.rho)
+    for ours, plain in zip(assemble(block[0], equal), assemble(block[0], STEEL), strict=True):
         assert abs(ours - plain).max() < 1e-13 * abs(plain).max()
 
 
@@ -52,8 +52,8 @@ def test_a_lumped_mass_weighs_what_it_says(block):
 
 def test_loads_that_act_together_add_up(block):
     mesh, sets = block
-    both = Sum([(NodalForce("top", (1, 0, 0)), 2.0), (NodalForce("left", (0, 1, 0)), -3.0)])
-    assert both.vector(mesh, sets, None).reshape(-1, 3).sum(axis=0) == pytest.approx([2, -3, 0], rel=1e-12)
+    two_results = Sum([(NodalForce("top", (1, 0, 0)), 2.0), (NodalForce("left", (0, 1, 0)), -3.0)])
+    assert two_results.vector(mesh, sets, None).reshape(-1, 3).sum(axis=0) == pytest.approx([2, -3, 0], rel=1e-12)
 
 
 def test_the_gap_of_a_bowed_and_inclined_face_is_its_height_above_the_ground(block):
@@ -62,12 +62,12 @@ def test_the_gap_of_a_bowed_and_inclined_face_is_its_height_above_the_ground(blo
     at_bottom = bowed[2] < 1e-9
     bowed[2, at_bottom] += 1e-3 * bowed[0, at_bottom] ** 2
     mesh = type(mesh)(bowed, mesh.t).with_boundaries({"bottom": mesh.boundaries["bottom"]})
-    found = ContactFaces("bottom", (1, 0, 0), plane=(0, 0, -1)).build(mesh)
-    np.testing.assert_allclose(found.gap, 1e-3 * found.points[:, 0] ** 2, atol=1e-15)
+    built = ContactFaces("bottom", (1, 0, 0), plane=(0, 0, -1)).build(mesh)
+    np.testing.assert_allclose(built.gap, 1e-3 * built.points[:, 0] ** 2, atol=1e-15)
     leaning = ContactFaces("bottom", (1, 0, 0), plane=(0, 0, -1), inclination=1e-2).build(mesh)
-    t2 = found.frames[0, 1]
-    away = found.gap + np.tan(1e-2) * found.points @ t2
-    np.testing.assert_allclose(leaning.gap, away - away.min(), atol=1e-15)
+    t2 = built.frames[0, 1]
+    distant = built.gap + np.tan(1e-2) * built.points @ t2
+    np.testing.assert_allclose(leaning.gap, distant - distant.min(), atol=1e-15)
 
 
 def test_the_area_of_a_curved_face_is_its_arc_length_times_its_width() -> None:
@@ -81,10 +81,10 @@ def test_the_area_of_a_curved_face_is_its_arc_length_times_its_width() -> None:
     facets = [
         f for f in facets if np.ptp(mesh.p[0, mesh.facets[:, f]]) > 0.5 and np.ptp(mesh.p[1, mesh.facets[:, f]]) > 0
     ]
-    found = surface(mesh, np.array(facets))
+    result = surface(mesh, np.array(facets))
     arc = np.sqrt(1 + 4 * a**2) / 2 + np.arcsinh(2 * a) / (4 * a)
-    assert found.area.sum() == pytest.approx(arc, rel=1e-4)
-    assert found.area @ found.points[:, 1] == pytest.approx(0.5 * arc, rel=1e-4)
+    assert result.area.sum() == pytest.approx(arc, rel=1e-4)
+    assert result.area @ result.points[:, 1] == pytest.approx(0.5 * arc, rel=1e-4)
 
 
 def test_forces_of_a_turning_frame_have_their_resultants(block):
@@ -106,12 +106,12 @@ def test_a_body_that_expands_freely_carries_no_stress_and_one_that_is_held_does(
     mesh, _ = block
     warm = np.full(mesh.doflocs.shape[1], 50.0)
     x = mesh.doflocs.T
-    held = geometric_stiffness(mesh, STEEL, np.zeros_like(x), warm)
+    fixed = geometric_stiffness(mesh, STEEL, np.zeros_like(x), warm)
     free = geometric_stiffness(mesh, STEEL, STEEL.expansion * 50.0 * x, warm)
-    assert abs(free).max() < 1e-12 * abs(held).max()
+    assert abs(free).max() < 1e-12 * abs(fixed).max()
     tilt = (x[:, :1] * [0, 0, 1.0]).ravel()
     stress = -STEEL.E * STEEL.expansion * 50.0 / (1 - 2 * STEEL.nu)
-    assert tilt @ held @ tilt == pytest.approx(stress * np.prod(SIZE), rel=1e-12)
+    assert tilt @ fixed @ tilt == pytest.approx(stress * np.prod(SIZE), rel=1e-12)
 
 
 def test_the_work_of_heat_is_stress_times_strain(block):

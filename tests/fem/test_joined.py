@@ -41,9 +41,9 @@ def block(x, y, z, tets=False, linear=False):
 def two(x_1, x_2, n_1=(3, 3), n_2=(4, 4), tets=False, materials=(STEEL, STEEL), points=None):
     """Two blocks of section 1 x 1 that meet where the first ends; 8-node hexahedra where a material asks for them."""
     linear = [isinstance(material, Material) and material.linear_reduced for material in materials]
-    one = block(x_1, L(0, 1, n_1[0]), L(0, 1, n_1[1]), linear=linear[0])
+    item = block(x_1, L(0, 1, n_1[0]), L(0, 1, n_1[1]), linear=linear[0])
     other = block(x_2, L(0, 1, n_2[0]), L(0, 1, n_2[1]), tets, linear[1])
-    return Assembly([Body("a", *one, materials[0]), Body("b", *other, materials[1])], points)
+    return Assembly([Body("a", *item, materials[0]), Body("b", *other, materials[1])], points)
 
 
 def part(of, clamps=(), loads=None, outputs=None, **more) -> Part:
@@ -56,7 +56,7 @@ def static(of: Part, load: str) -> np.ndarray:
 
 @pytest.mark.parametrize(("tets", "linear"), [(False, (0, 0)), (True, (0, 0)), (False, (1, 1)), (True, (1, 0))])
 def test_a_tie_of_different_meshes_carries_a_bar_in_tension_exactly(tets, linear):
-    materials = [replace(STEEL, nu=0.0, linear_reduced=bool(one)) for one in linear]
+    materials = [replace(STEEL, nu=0.0, linear_reduced=bool(item)) for item in linear]
     bar = two(L(0, 2, 3), L(2, 5, 4), tets=tets, materials=materials)
     pull = {"pull": NodalForce("b.x_max", (1, 0, 0), "area")}
     tied = part(bar, [Clamp("a.x_min")], pull, constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
@@ -71,11 +71,11 @@ KINDS = [(False, False), (True, False), (False, True)]  # tetrahedra, eight node
 
 @pytest.mark.parametrize(("tets", "linear"), KINDS)
 def test_a_tie_carries_constant_tractions_of_each_node_to_the_nodes_near_it(tets, linear):
-    one = block(L(0, 1, 2), L(0, 1, 9), L(0, 1, 9), tets, linear)
+    item = block(L(0, 1, 2), L(0, 1, 9), L(0, 1, 9), tets, linear)
     other = block(L(1, 2, 2), L(0, 1, 8), L(0, 1, 8), linear=linear)
-    both = Assembly([Body("a", *one, STEEL), Body("b", *other, STEEL)])
-    tied = Tie("ties.t", "a.x_max", "b.x_min").build(both, {})
-    pressure = [Pressure(face).vector(both, both.node_sets, None) for face in ("a.x_max", "b.x_min")]
+    assembly = Assembly([Body("a", *item, STEEL), Body("b", *other, STEEL)])
+    tied = Tie("ties.t", "a.x_max", "b.x_min").build(assembly, {})
+    pressure = [Pressure(face).vector(assembly, assembly.node_sets, None) for face in ("a.x_max", "b.x_min")]
     assert np.abs(tied.map.T @ pressure[0][tied.dofs] + pressure[1]).max() < 1e-12 * np.abs(pressure[1]).max()
     assert np.diff(tied.map.indptr).max() <= (25 if linear else 81)  # 64 and 225 nodes has the other face
 
@@ -84,15 +84,15 @@ def test_a_tie_carries_constant_tractions_of_each_node_to_the_nodes_near_it(tets
 @pytest.mark.parametrize("turn", [0.0, 1e-3, 0.3])
 def test_a_face_that_another_covers_in_part_follows_its_linear_motions(tets, linear, turn):
     """At 1e-3 slivers are cut on which shape functions look alike."""
-    one = block(L(0, 1, 2), L(0, 1, 6), L(0, 1, 6), tets, linear)
+    item = block(L(0, 1, 2), L(0, 1, 6), L(0, 1, 6), tets, linear)
     mesh, sets = block(L(1, 2, 2), L(0.2, 0.8, 4), L(0.2, 0.9, 5), linear=linear)
     c, s = np.cos(turn), np.sin(turn)
     mesh = replace(mesh, doflocs=np.array([[1, 0, 0], [0, c, s], [0, -s, c]]) @ mesh.doflocs)
-    both = Assembly([Body("a", *one, STEEL), Body("b", mesh, sets, STEEL)])
-    tied = Tie("ties.t", "a.x_max", "b.x_min").build(both, {})
-    u = (both.doflocs.T @ np.random.default_rng(0).normal(size=(3, 3))).ravel()
+    assembly = Assembly([Body("a", *item, STEEL), Body("b", mesh, sets, STEEL)])
+    tied = Tie("ties.t", "a.x_max", "b.x_min").build(assembly, {})
+    u = (assembly.doflocs.T @ np.random.default_rng(0).normal(size=(3, 3))).ravel()
     assert np.abs(tied.map @ u - u[tied.dofs]).max() < 1e-10
-    assert len(tied.dofs) < 3 * len(both.node_sets["a.x_max"])  # what is not covered stays free
+    assert len(tied.dofs) < 3 * len(assembly.node_sets["a.x_max"])  # what is not covered stays free
 
 
 def frequencies(n: int) -> tuple[float, float]:
@@ -100,8 +100,8 @@ def frequencies(n: int) -> tuple[float, float]:
     bar = two(L(0, 2, n + 1), L(2, 5, n + 2), (n + 1, n + 1), (n + 2, n + 2))
     tied = part(bar, [Clamp("a.x_min")], constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
     mesh, sets = block(L(0, 5, 2 * n + 2), L(0, 1, n + 2), L(0, 1, n + 2))
-    whole = build(mesh, sets, STEEL, [Clamp("x_min")], [], {}, {})
-    return tuple(modes(of.system.stiffness, of.system.mass, 3)[0][2] for of in (tied, whole))
+    full = build(mesh, sets, STEEL, [Clamp("x_min")], [], {}, {})
+    return tuple(modes(of.system.stiffness, of.system.mass, 3)[0][2] for of in (tied, full))
 
 
 def test_a_tie_converges_with_the_mesh_like_the_one_piece_mesh():
@@ -149,11 +149,11 @@ def test_a_heavy_point_swings_on_the_bar_that_carries_it():
 
 
 def test_a_heated_bar_between_walls_and_a_free_one():
-    along = [  # they expand along the bar alone, and do not contract across
+    path = [  # they expand along the bar alone, and do not contract across
         Orthotropic((E,) * 3, (0.0,) * 3, (E / 2,) * 3, 1000.0, expansion=(alpha, 0.0, 0.0))
         for E, alpha in ((210e9, 12e-6), (70e9, 23e-6))
     ]
-    bar = two(L(0, 2, 3), L(2, 5, 3), materials=along)
+    bar = two(L(0, 2, 3), L(2, 5, 3), materials=path)
     heat = {"heat": Heating(bar.material)}
     tie = [Tie("ties.t", "a.x_max", "b.x_min")]
     free = part(bar, [Clamp("a.x_min")], heat, constraints=tie)
@@ -177,9 +177,9 @@ def test_an_orthotropic_bar_and_its_turned_axes():
     mesh, sets = block(L(0, 3, 4), L(0, 1, 2), L(0, 1, 2))
     modulus = {}
     for first, second, E in (((1, 0, 0), (0, 1, 0), 120e9), ((0, 1, 0), (1, 0, 0), 80e9), ((0, 1, 0), (0, 0, 1), 60e9)):
-        held = [Clamp(f"{axis}_min", axis) for axis in "xyz"]
+        fixed = [Clamp(f"{axis}_min", axis) for axis in "xyz"]
         pull = {"pull": NodalForce("x_max", (1, 0, 0), "area")}
-        of = build(mesh, sets, crystal(axes=(first, second)), held, [], pull, {})
+        of = build(mesh, sets, crystal(axes=(first, second)), fixed, [], pull, {})
         modulus[E] = 3 / static(of, "pull")[sets["x_max"], 0].mean()
     assert list(modulus.values()) == pytest.approx(list(modulus), rel=1e-9)
 
@@ -191,20 +191,20 @@ def test_turning_material_and_mesh_alike_changes_no_frequency():
     R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     turned = replace(mesh, doflocs=R @ mesh.doflocs)
     axes = np.array([[0.6, 0.5, 0.2], [-0.3, 0.9, 0.1]])
-    found = []
+    rows = []
     for of, directions in ((mesh, axes), (turned, axes @ R.T)):
         M, K = assemble(of, crystal(axes=directions))
         free = np.setdiff1d(np.arange(K.shape[0]), (sets["x_min"][:, None] * 3 + np.arange(3)).ravel())
-        found.append(modes(K[free][:, free], M[free][:, free], 6)[0])
-    assert found[0] == pytest.approx(found[1], rel=1e-9)
+        rows.append(modes(K[free][:, free], M[free][:, free], 6)[0])
+    assert rows[0] == pytest.approx(rows[1], rel=1e-9)
 
 
 def test_an_isotropic_material_is_the_special_case():
     mesh, _ = block(L(0, 3, 4), L(0, 1, 2), L(0, 1.5, 2), tets=True)
     G = STEEL.E / (2 * (1 + STEEL.nu))
-    same = Orthotropic((STEEL.E,) * 3, (STEEL.nu,) * 3, (G,) * 3, STEEL.rho, ((1, 2, 3), (0, 1, 1)))
-    for one, other in zip(assemble(mesh, STEEL), assemble(mesh, same), strict=True):
-        assert abs(one - other).max() < 1e-11 * abs(one).max()
+    equal = Orthotropic((STEEL.E,) * 3, (STEEL.nu,) * 3, (G,) * 3, STEEL.rho, ((1, 2, 3), (0, 1, 1)))
+    for item, other in zip(assemble(mesh, STEEL), assemble(mesh, equal), strict=True):
+        assert abs(item - other).max() < 1e-11 * abs(item).max()
 
 
 def test_a_link_joins_the_points_of_two_bodies_in_all_motions_or_leaves_one_free():
@@ -215,9 +215,9 @@ def test_a_link_joins_the_points_of_two_bodies_in_all_motions_or_leaves_one_free
     bar = Assembly([Body("a", *mesh, STEEL), Body("b", *sets, STEEL)], points)
     rigid = [RigidCoupling("one", "a.x_max"), RigidCoupling("two", "b.x_min")]
     joined = part(bar, [Clamp("a.x_min")], loads, constraints=[*rigid, Link("links.l", *rigid)])
-    same = Assembly([Body("a", *mesh, STEEL), Body("b", *sets, STEEL)], {"one": points["one"]})
-    whole = [RigidCoupling("one", "a.x_max"), RigidCoupling("one", "b.x_min")]
-    one_point = part(same, [Clamp("a.x_min")], loads, constraints=whole)
+    equal = Assembly([Body("a", *mesh, STEEL), Body("b", *sets, STEEL)], {"one": points["one"]})
+    full = [RigidCoupling("one", "a.x_max"), RigidCoupling("one", "b.x_min")]
+    one_point = part(equal, [Clamp("a.x_min")], loads, constraints=full)
     for load in loads:
         expected = static(one_point, load)[: bar.doflocs.shape[1] - 4]
         assert np.abs(static(joined, load)[: len(expected)] - expected).max() < 1e-9 * np.abs(expected).max()
@@ -239,7 +239,7 @@ def test_tied_faces_that_are_apart_are_refused_by_name_unless_a_reach_bridges_th
         part(bar, constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
     bridged = part(bar, constraints=[Tie("ties.t", "a.x_max", "b.x_min", 0.05)])
     assert abs(modes(bridged.system.stiffness, bridged.system.mass, 7)[0][:6]).max() < 1e-2
-    beside = two(L(0, 2, 3), L(0, 2, 3))
+    neighbour = two(L(0, 2, 3), L(0, 2, 3))
     for tied in (("a.x_max", "b.x_max"), ("a.x_max", "b.y_min"), ("a.y_max", "b.x_min")):
         with pytest.raises(ValueError, match=r"ties\.t: the two faces"):
-            part(beside, constraints=[Tie("ties.t", *tied)])
+            part(neighbour, constraints=[Tie("ties.t", *tied)])

@@ -33,8 +33,8 @@ def test_rigid_motions_cost_nothing_and_the_mass_is_that_of_the_block():
     for axis in np.eye(3):
         for motion in (np.broadcast_to(axis, x.shape), np.cross(axis, x)):
             assert np.abs(K @ motion.ravel()).max() < 1e-10 * size
-        along = np.broadcast_to(axis, x.shape).ravel()
-        assert along @ M @ along == pytest.approx(REDUCED.rho * 0.35, rel=1e-3)
+        path = np.broadcast_to(axis, x.shape).ravel()
+        assert path @ M @ path == pytest.approx(REDUCED.rho * 0.35, rel=1e-3)
     assert (M != M.T).nnz == (K != K.T).nnz == 0
     assert np.linalg.eigvalsh(K.toarray())[6] > 0  # no hourglass mode is free
 
@@ -57,8 +57,8 @@ def test_eight_node_hexahedra_are_those_on_the_nodes_of_a_27_node_mesh():
     coarse = skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor(*[np.linspace(0, s, 3) for s in (1.0, 0.7, 0.5)]))
     order = [int(np.linalg.norm(coordinates(coarse) - x, axis=1).argmin()) for x in coordinates(fine)]
     dofs = (3 * np.array(order)[:, None] + np.arange(3)).ravel()
-    for own, other in zip(assemble(fine, REDUCED), assemble(coarse, REDUCED), strict=True):
-        assert abs(own - other[dofs][:, dofs]).max() < 1e-10 * abs(own).max()
+    for base, other in zip(assemble(fine, REDUCED), assemble(coarse, REDUCED), strict=True):
+        assert abs(base - other[dofs][:, dofs]).max() < 1e-10 * abs(base).max()
 
 
 def test_an_hourglass_strain_bears_no_stress_and_a_field_of_temperature_acts_by_the_mean_gradient():
@@ -67,15 +67,15 @@ def test_an_hourglass_strain_bears_no_stress_and_a_field_of_temperature_acts_by_
     x = coordinates(cube)
     hourglass = np.outer(np.prod(1 - 2 * x[:, 1:], axis=1), (1.0, 0.0, 0.0))  # its mean gradient is zero
     stretch = 1e-3 * x * [1.0, 0.0, 0.0]
-    alone, both = (geometric_stiffness(cube, REDUCED, u) for u in (stretch, stretch + hourglass))
-    assert abs(both - alone).max() < 1e-10 * abs(alone).max()
+    single, two_results = (geometric_stiffness(cube, REDUCED, u) for u in (stretch, stretch + hourglass))
+    assert abs(two_results - single).max() < 1e-10 * abs(single).max()
     lam, mu = REDUCED.lame
     turned = (x - 0.5)[:, [0]] * [0.0, 1.0, 0.0]  # sigma_xx stiffens a rotation: its slope along x is 1 everywhere
-    assert turned.ravel() @ alone @ turned.ravel() == pytest.approx(1e-3 * (lam + 2 * mu), rel=1e-9)
+    assert turned.ravel() @ single @ turned.ravel() == pytest.approx(1e-3 * (lam + 2 * mu), rel=1e-9)
     warm = 1.0 + np.arange(8.0)
     force = Heating(heated, values=warm).vector(cube, {}).reshape(-1, 3)
-    held = (3 * lam + 2 * mu) * 12e-6 * warm.mean()
-    assert force == pytest.approx(np.where(x > 0.5, 1, -1) * held / 4, rel=1e-9)
+    fixed = (3 * lam + 2 * mu) * 12e-6 * warm.mean()
+    assert force == pytest.approx(np.where(x > 0.5, 1, -1) * fixed / 4, rel=1e-9)
 
 
 def test_tetrahedra_are_refused():

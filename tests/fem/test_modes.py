@@ -82,9 +82,9 @@ def test_modes_of_a_chain():
     omega, phi = modes(K, M, 5)
     assert omega == pytest.approx(np.sin(np.arange(1, 6) * np.pi / (2 * (n + 1))), rel=1e-9)
     assert phi.T @ M @ phi == pytest.approx(np.eye(5), abs=1e-9)
-    again, same = modes(K, M, 5)
-    assert (again == omega).all()
-    assert (same == phi).all()
+    repeated, equal = modes(K, M, 5)
+    assert (repeated == omega).all()
+    assert (equal == phi).all()
     with pytest.raises(ValueError, match="501 modes were asked of a system with 500"):
         modes(K, M, 501)
 
@@ -158,8 +158,8 @@ def test_part_names_what_is_missing():
 
 
 def test_partition():
-    others, chosen = partition(5, np.array([3, 1, 3]), "prescribed DOF")
-    assert others.tolist() == [0, 2, 4]
+    remaining, chosen = partition(5, np.array([3, 1, 3]), "prescribed DOF")
+    assert remaining.tolist() == [0, 2, 4]
     assert chosen.tolist() == [1, 3]
     with pytest.raises(ValueError, match="a prescribed DOF lies outside the 5 DOFs"):
         partition(5, np.array([5]), "prescribed DOF")

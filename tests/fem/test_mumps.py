@@ -53,11 +53,11 @@ def spring_chain(n: int) -> csr_matrix:
 @installed
 @pytest.mark.usefixtures("two_processes")
 def test_two_processes_give_the_model_of_the_direct_solver() -> None:
-    found = [plain(scene_file.read("beam", (*SMALL, f"reduction.solver={s}"))) for s in ("direct", "mumps")]
-    assert "2 MPI processes" in str(found[1].origin.factorisation)
-    assert found[1].free_frequency == pytest.approx(found[0].free_frequency, rel=1e-9)
-    K, own = (model.system.stiffness for model in found)
-    np.testing.assert_allclose(own, K, atol=1e-11 * np.abs(K).max())
+    rows = [plain(scene_file.read("beam", (*SMALL, f"reduction.solver={s}"))) for s in ("direct", "mumps")]
+    assert "2 MPI processes" in str(rows[1].origin.factorisation)
+    assert rows[1].free_frequency == pytest.approx(rows[0].free_frequency, rel=1e-9)
+    K, base = (model.system.stiffness for model in rows)
+    np.testing.assert_allclose(base, K, atol=1e-11 * np.abs(K).max())
 
 
 @installed
@@ -67,9 +67,9 @@ def test_one_process_solves_what_is_definite_and_what_is_not() -> None:
         factor = factorise(matrix, definite, solver="mumps")
         assert "1 MPI process" in factor.name
         for b in (rhs, rhs[:, 0]):
-            found = factor.solve(b)
-            assert found.shape == b.shape
-            np.testing.assert_allclose(matrix @ found, b, atol=1e-12)
+            solution = factor.solve(b)
+            assert solution.shape == b.shape
+            np.testing.assert_allclose(matrix @ solution, b, atol=1e-12)
 
 
 @installed
@@ -81,7 +81,7 @@ def test_a_singular_matrix_is_refused() -> None:
 
 
 def test_without_petsc_the_cure_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    for command, why in ((str(tmp_path / "python"), "cannot start"), ("false", "does not start")):
+    for command, reason in ((str(tmp_path / "python"), "cannot start"), ("false", "does not start")):
         monkeypatch.setenv(mumps.COMMAND, command)
-        with pytest.raises(ValueError, match=f"{why}.*apt-get install python3-petsc4py-real"):
+        with pytest.raises(ValueError, match=f"{reason}.*apt-get install python3-petsc4py-real"):
             factorise(spring_chain(5), solver="mumps")

@@ -34,9 +34,9 @@ def beam():
 def loaded(part, force, softening=0):
     """The stiffness of the part in its equilibrium under a force (n_free,)."""
     linear = factorise(part.system.stiffness).solve(force)
-    rest = solve_prestress(part, SOFT, lambda k: factorise(k, definite=False).solve(force), linear, softening)
-    check_stability(rest.stiffness)
-    return rest.stiffness
+    remainder = solve_prestress(part, SOFT, lambda k: factorise(k, definite=False).solve(force), linear, softening)
+    check_stability(remainder.stiffness)
+    return remainder.stiffness
 
 
 def test_uniform_stress_is_exact():

@@ -48,8 +48,8 @@ def test_every_format_gives_the_same_frequencies_and_set(name, kind, tmp_path):
     (body,) = source.bodies.values()
     np.testing.assert_allclose(squared_frequencies(body.mesh), expected, rtol=1e-7 if name == "d.bdf" else 2e-9)
     if name[-3:] not in ("msh", "med"):
-        (held,) = (nodes for group, nodes in body.node_sets.items() if group in ("ROOT", "SET 7"))
-        np.testing.assert_array_equal(held, np.flatnonzero(abs(body.mesh.doflocs[0]) < 1e-9))
+        (fixed,) = (nodes for group, nodes in body.node_sets.items() if group in ("ROOT", "SET 7"))
+        np.testing.assert_array_equal(fixed, np.flatnonzero(abs(body.mesh.doflocs[0]) < 1e-9))
 
 
 @pytest.mark.parametrize(
@@ -71,9 +71,9 @@ def test_broken_files_are_refused_in_one_sentence(name, old, new, sentence, tmp_
     data = path.read_bytes()
     assert old.encode() in data
     path.write_bytes(data.replace(old.encode(), new.encode(), 1))
-    with pytest.raises(ValueError, match=sentence) as said:
+    with pytest.raises(ValueError, match=sentence) as message:
         foreign_file.read(path)
-    assert "\n" not in str(said.value)
+    assert "\n" not in str(message.value)
 
 
 @pytest.mark.parametrize("more", ["", ",7."])
@@ -87,5 +87,7 @@ def test_a_free_line_with_a_star_has_four_fields(more, tmp_path):
         with pytest.raises(ValueError, match="more than the four fields of a star"):
             foreign_file.read(tmp_path / "free.bdf")
         return
-    own, other = (next(iter(foreign_file.read(tmp_path / name).bodies.values())).mesh for name in ("d.bdf", "free.bdf"))
-    assert np.array_equal(own.doflocs, other.doflocs)
+    base, other = (
+        next(iter(foreign_file.read(tmp_path / name).bodies.values())).mesh for name in ("d.bdf", "free.bdf")
+    )
+    assert np.array_equal(base.doflocs, other.doflocs)

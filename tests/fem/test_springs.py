@@ -13,12 +13,12 @@ SIDE = 0.1
 @pytest.fixture(scope="module")
 def cubes():
     """Two cubes side by side that share no nodes: faces "left" and "right" coincide at x = 0.1 m."""
-    one = MeshHex.init_tensor(np.linspace(0, SIDE, 3), np.array([0.0, 0.03, 0.1]), np.linspace(0, SIDE, 2))
-    p = np.hstack([one.p, one.p + [[SIDE], [0.0], [0.0]]])
-    t = np.hstack([one.t, one.t + one.p.shape[1]])
+    item = MeshHex.init_tensor(np.linspace(0, SIDE, 3), np.array([0.0, 0.03, 0.1]), np.linspace(0, SIDE, 2))
+    p = np.hstack([item.p, item.p + [[SIDE], [0.0], [0.0]]])
+    t = np.hstack([item.t, item.t + item.p.shape[1]])
     mesh = MeshHex2.from_mesh(MeshHex(p, t, sort_t=False))
     middle = mesh.p[:, mesh.facets].mean(axis=1)
-    inside_first = mesh.f2t[0] < one.t.shape[1]
+    inside_first = mesh.f2t[0] < item.t.shape[1]
     outer = mesh.f2t[1] < 0
     at_joint = np.isclose(middle[0], SIDE) & outer
     boundaries = {
@@ -46,9 +46,9 @@ def test_ground_spring_has_its_resultant_and_direction(cubes):
         u = translation(mesh, axis)
         assert u @ K @ u == pytest.approx(5e6 * cosine**2)
     x = coordinates(mesh)
-    moved = np.zeros(len(x), bool)
-    moved[np.unique(K.indices) // 3] = True
-    np.testing.assert_allclose(x[moved, 0], 2 * SIDE)
+    shifted = np.zeros(len(x), bool)
+    shifted[np.unique(K.indices) // 3] = True
+    np.testing.assert_allclose(x[shifted, 0], 2 * SIDE)
 
 
 def test_face_resists_tilting_as_a_uniform_bedding(cubes):

@@ -149,22 +149,22 @@ def test_cyclic_halves():
     contact, B_2 = ContactFaces("end", (0, 0, 1), "start", turn=turn.T).halves(mesh)
     spin = np.cross([0, 0, 1.0], mesh.doflocs.T).ravel()
     lift = np.tile([0, 0, 1.0], mesh.doflocs.shape[1])
-    for same in (spin, lift):  # every sector does the same in its own coordinates
-        assert contact.B @ same == pytest.approx(B_2 @ same, abs=1e-14)
+    for equal in (spin, lift):  # every sector does the same in its own coordinates
+        assert contact.B @ equal == pytest.approx(B_2 @ equal, abs=1e-14)
     assert (contact.B @ spin).reshape(-1, 3)[:, 2].min() > 0.99  # this sector closes on the next
 
 
 def test_contacts_join():
     mesh = block()
-    one = ContactFaces("bottom", (1, 0, 0)).build(mesh)
-    two = ContactFaces("top", (1, 0, 0), gap=1e-5).build(mesh)
-    both = join([one, two])
-    assert both.n_pair == 30
-    assert both.points[both.faces[8:]][..., 2] == pytest.approx(np.ones((8, 4)))
-    assert both.gap[15:] == pytest.approx(two.gap)
-    assert (both.B[45:] != two.B).nnz == 0
+    item = ContactFaces("bottom", (1, 0, 0)).build(mesh)
+    pair = ContactFaces("top", (1, 0, 0), gap=1e-5).build(mesh)
+    text = join([item, pair])
+    assert text.n_pair == 30
+    assert text.points[text.faces[8:]][..., 2] == pytest.approx(np.ones((8, 4)))
+    assert text.gap[15:] == pytest.approx(pair.gap)
+    assert (text.B[45:] != pair.B).nnz == 0
     with pytest.raises(ValueError, match="same components"):
-        join([one, replace(two, components=("n",))])
+        join([item, replace(pair, components=("n",))])
 
 
 def test_a_face_of_tetrahedra_has_its_pairs_at_its_sides():
@@ -188,14 +188,14 @@ def test_pairs_at_face_centres_are_means_of_their_corners():
     assert (nodes.n_pair, centres.n_pair) == (25, 16)
     assert centres.area == pytest.approx(np.full(16, 1 / 16))
     slope = np.array([[1e-3, 2e-3, 0.0], [0.0, -1e-3, 3e-3], [4e-3, 1e-3, 2e-3]])
-    moved = mesh.doflocs.T @ slope.T
-    moved[mesh.doflocs[2] < 1 - 1e-9] = 0.0  # the upper body alone, whose face is at z = 1
-    moved[np.unique(facet_nodes(mesh, mesh.boundaries["lower"]))] = 0.0
+    shifted = mesh.doflocs.T @ slope.T
+    shifted[mesh.doflocs[2] < 1 - 1e-9] = 0.0  # the upper body alone, whose face is at z = 1
+    shifted[np.unique(facet_nodes(mesh, mesh.boundaries["lower"]))] = 0.0
     expected = np.einsum("pij,pj->pi", centres.frames, centres.points @ slope.T)
-    np.testing.assert_allclose((centres.B @ moved.ravel()).reshape(-1, 3), expected, atol=1e-15)
+    np.testing.assert_allclose((centres.B @ shifted.ravel()).reshape(-1, 3), expected, atol=1e-15)
     assert centres.frames[:, 2] == pytest.approx(np.tile([0, 0, -1.0], (16, 1)))
-    both = join([nodes, centres])
-    np.testing.assert_allclose(both.mean @ both.nodes.points, both.points, atol=1e-15)
+    text = join([nodes, centres])
+    np.testing.assert_allclose(text.mean @ text.nodes.points, text.points, atol=1e-15)
     with pytest.raises(ValueError, match="face_centres needs nodes at the corners"):
         ContactFaces("bottom", (1, 0, 0), face_centres=True).build(block(tets=True))
 
@@ -217,8 +217,8 @@ def test_pairs_at_face_centres_are_means_of_their_corners():
 )
 def test_contact_refuses(face, t1, changes, why):
     mesh = block()
-    more = {"none": np.zeros(0, int), "inner": np.flatnonzero(mesh.f2t[1] >= 0)}
-    mesh = mesh.with_boundaries({**mesh.boundaries, **more})
+    extra = {"none": np.zeros(0, int), "inner": np.flatnonzero(mesh.f2t[1] >= 0)}
+    mesh = mesh.with_boundaries({**mesh.boundaries, **extra})
     with pytest.raises(ValueError, match=why):
         ContactFaces(face, t1, **changes).build(mesh)
 

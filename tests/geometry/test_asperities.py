@@ -27,18 +27,18 @@ def some_heights(n: int = 8) -> np.ndarray:
 
 def test_caps_give_their_radius_density_and_gaps():
     heights = some_heights()
-    found = identify(caps(RADIUS, heights, APART, STEP))
-    assert len(found.height) == heights.size
-    assert found.radius == pytest.approx(RADIUS, rel=1e-4)
-    assert found.density == pytest.approx(1 / APART**2, rel=0.02)  # the rim is left out
-    np.testing.assert_allclose(np.sort(found.gap), np.sort(heights.max() - heights.ravel()), atol=1e-12)
+    fit = identify(caps(RADIUS, heights, APART, STEP))
+    assert len(fit.height) == heights.size
+    assert fit.radius == pytest.approx(RADIUS, rel=1e-4)
+    assert fit.density == pytest.approx(1 / APART**2, rel=0.02)  # the rim is left out
+    np.testing.assert_allclose(np.sort(fit.gap), np.sort(heights.max() - heights.ravel()), atol=1e-12)
 
 
 def test_two_faces_of_caps_that_meet_have_half_the_radius_and_both_heights():
     first = caps(RADIUS, some_heights(), APART, STEP)
-    single, both = td.studies.asperities(first).found, td.studies.asperities(first, first).found
-    assert both.radius == pytest.approx(RADIUS / 2, rel=1e-4)
-    np.testing.assert_allclose(np.sort(both.gap), 2 * np.sort(single.gap), atol=1e-12)
+    single, two_results = td.studies.asperities(first).found, td.studies.asperities(first, first).found
+    assert two_results.radius == pytest.approx(RADIUS / 2, rel=1e-4)
+    np.testing.assert_allclose(np.sort(two_results.gap), 2 * np.sort(single.gap), atol=1e-12)
     lower = replace(first, z=first.z * (1 - 0.4 * (first.x < first.x.mean()))[:, None])
     turned = td.studies.asperities(lower, lower, mirror="x").found
     assert turned.height.std() < 0.8 * td.studies.asperities(lower, lower).found.height.std()
@@ -46,49 +46,49 @@ def test_two_faces_of_caps_that_meet_have_half_the_radius_and_both_heights():
 
 def test_two_random_faces_of_different_grids_have_the_sum_of_their_moments():
     """Greenwood and Tripp 1970."""
-    first, one = gaussian(400, 1e-6, 60e-6, 16e-6, 0.3e-6, 8)
+    first, item = gaussian(400, 1e-6, 60e-6, 16e-6, 0.3e-6, 8)
     second, other = gaussian(220, 2e-6, 60e-6, 20e-6, 0.5e-6, 9)
-    for found in (identify(first, second), identify(second, first)):
-        wanted = Moments(one.m0 + other.m0, one.m2 + other.m2, one.m4 + other.m4)
-        assert found.radius == pytest.approx(wanted.radius, rel=0.05)
-        assert found.density == pytest.approx(wanted.density, rel=0.08)
-        assert found.height.std() == pytest.approx(wanted.deviation, rel=0.08)
+    for result in (identify(first, second), identify(second, first)):
+        expected = Moments(item.m0 + other.m0, item.m2 + other.m2, item.m4 + other.m4)
+        assert result.radius == pytest.approx(expected.radius, rel=0.05)
+        assert result.density == pytest.approx(expected.density, rel=0.08)
+        assert result.height.std() == pytest.approx(expected.deviation, rel=0.08)
 
 
 @pytest.mark.parametrize("shortest", [12e-6, 16e-6])
 def test_a_random_face_has_the_summits_that_nayak_counts(shortest):
-    face, known = gaussian(512, 1e-6, 60e-6, shortest, 0.3e-6, 1)
-    found = identify(face)
-    assert found.density == pytest.approx(known.density, rel=0.05)
-    assert found.radius == pytest.approx(known.radius, rel=0.05)
-    assert found.height.std() == pytest.approx(known.deviation, rel=0.05)
-    assert found.height.mean() == pytest.approx(known.mean, rel=0.05)
-    own = moments(face)
-    np.testing.assert_allclose([own.m0, own.m2, own.m4], [known.m0, known.m2, known.m4], rtol=0.04)
+    face, reference = gaussian(512, 1e-6, 60e-6, shortest, 0.3e-6, 1)
+    fit = identify(face)
+    assert fit.density == pytest.approx(reference.density, rel=0.05)
+    assert fit.radius == pytest.approx(reference.radius, rel=0.05)
+    assert fit.height.std() == pytest.approx(reference.deviation, rel=0.05)
+    assert fit.height.mean() == pytest.approx(reference.mean, rel=0.05)
+    base = moments(face)
+    np.testing.assert_allclose([base.m0, base.m2, base.m4], [reference.m0, reference.m2, reference.m4], rtol=0.04)
 
 
 def test_cut_off_and_noise_filter_leave_the_roughness_between_them():
-    face, known = gaussian(400, 1e-6, 40e-6, 16e-6, 0.3e-6, 2)
+    face, reference = gaussian(400, 1e-6, 40e-6, 16e-6, 0.3e-6, 2)
     form = 1e-6 * np.cos(2 * np.pi * face.x / 400e-6)[:, None] + 1e-2 * face.y
     noise = 6e-9 * np.random.default_rng(4).standard_normal(face.z.shape)
     measured = replace(face, z=face.z + form + noise)
-    assert identify(measured, cutoff=100e-6).density > 1.2 * known.density
-    assert identify(measured).height.std() > 2 * known.deviation
-    found = identify(measured, cutoff=100e-6, shortest=5e-6)
-    assert found.density == pytest.approx(known.density, rel=0.1)
-    assert found.radius == pytest.approx(known.radius, rel=0.1)
-    assert found.height.std() == pytest.approx(known.deviation, rel=0.1)
+    assert identify(measured, cutoff=100e-6).density > 1.2 * reference.density
+    assert identify(measured).height.std() > 2 * reference.deviation
+    fit = identify(measured, cutoff=100e-6, shortest=5e-6)
+    assert fit.density == pytest.approx(reference.density, rel=0.1)
+    assert fit.radius == pytest.approx(reference.radius, rel=0.1)
+    assert fit.height.std() == pytest.approx(reference.deviation, rel=0.1)
 
 
 @pytest.mark.parametrize("rows", [2, 11, 101])
 def test_a_table_keeps_the_number_of_summits_and_their_mean_gap(rows):
-    found = identify(gaussian(256, 1e-6, 60e-6, 12e-6, 0.3e-6, 5)[0])
-    gap, density = found.table(rows).T
+    fit = identify(gaussian(256, 1e-6, 60e-6, 12e-6, 0.3e-6, 5)[0])
+    gap, density = fit.table(rows).T
     width = np.full(rows, gap[1])
     width[[0, -1]] /= 2
-    assert (width * density).sum() == pytest.approx(found.density, rel=1e-12)
-    assert (width * density * gap).sum() / found.density == pytest.approx(found.gap.mean(), rel=1e-12)
-    assert gap[-1] == found.gap.max()
+    assert (width * density).sum() == pytest.approx(fit.density, rel=1e-12)
+    assert (width * density * gap).sum() / fit.density == pytest.approx(fit.gap.mean(), rel=1e-12)
+    assert gap[-1] == fit.gap.max()
 
 
 def stepped() -> HeightMap:
@@ -112,8 +112,8 @@ def test_what_has_no_asperities_is_one_sentence(call, words):
 
 
 def test_heights_in_steps_are_cured_by_the_filter_that_the_sentence_names():
-    known = gaussian(200, 1e-6, 60e-6, 16e-6, 0.3e-6, 6)[1]
-    assert identify(stepped(), shortest=8e-6).radius == pytest.approx(known.radius, rel=0.25)
+    reference = gaussian(200, 1e-6, 60e-6, 16e-6, 0.3e-6, 6)[1]
+    assert identify(stepped(), shortest=8e-6).radius == pytest.approx(reference.radius, rel=0.25)
 
 
 def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.CaptureFixture[str], tmp_path: Path):
@@ -121,14 +121,14 @@ def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.Captur
     np.savetxt(tmp_path / "scan.txt", face.z.T * 1e6)
     units = ["--spacing", "1um,1um", "--lateral-unit", "1 m", "--height-unit", "1um"]
     out, command = tmp_path / "asperities.csv", ["study", "asperities", str(tmp_path / "scan.txt")]
-    code, said, err = leave([*command, *units, "--out", str(tmp_path), "--json"], capsys)
+    code, message, err = leave([*command, *units, "--out", str(tmp_path), "--json"], capsys)
     assert code == 0, err
-    record, found = json.loads(said), identify(face)
-    assert record["radius_m"] == pytest.approx(found.radius, rel=1e-6)
-    np.testing.assert_allclose(np.loadtxt(out, delimiter=","), found.table(), rtol=1e-6, atol=1e-3)
-    code, said, _ = leave([*command, *units, "--out", str(tmp_path)], capsys)
+    record, fit = json.loads(message), identify(face)
+    assert record["radius_m"] == pytest.approx(fit.radius, rel=1e-6)
+    np.testing.assert_allclose(np.loadtxt(out, delimiter=","), fit.table(), rtol=1e-6, atol=1e-3)
+    code, message, _ = leave([*command, *units, "--out", str(tmp_path)], capsys)
     assert code == 0
-    assert 'law = "rough", table = "asperities.csv", radius = "' in said
+    assert 'law = "rough", table = "asperities.csv", radius = "' in message
     contact = {
         "law": "rough", "table": out.name, "radius": record["radius_m"], "young": "200 GPa", "poisson": 0.3,
         "tangential_stiffness": None, "normal_stiffness": None,

@@ -71,10 +71,10 @@ def test_surface_names_survive_as_boundaries_with_area(tmp_path):
     names = dict(zip(blocks.SIDES, ("a", "b", "c", "d", "e", "f"), strict=True))
     block = blocks.Block(LINE, 2 * LINE, 3 * LINE, "box", names)
     mesh, _ = read(tmp_path / "sides.msh", blocks.body([block]))
-    one = skfem.Functional(lambda w: 1.0 + 0.0 * w.x[0])
+    item = skfem.Functional(lambda w: 1.0 + 0.0 * w.x[0])
     for name, area in zip("abcdef", (6, 6, 3, 3, 2, 2), strict=True):
         facets = skfem.FacetBasis(mesh, mesh.elem(), facets=mesh.boundaries[name], intorder=2)
-        assert one.assemble(facets) == pytest.approx(area)
+        assert item.assemble(facets) == pytest.approx(area)
 
 
 @pytest.mark.parametrize(

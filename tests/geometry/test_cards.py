@@ -142,23 +142,24 @@ def said(text: str, ending: str) -> tuple[object, ...]:
         folder = Path(name)
         (folder / f"more.{ending}").write_text(MORE[ending])
         (folder / f"own.{ending}").write_text(text)
-        found = foreign_file.read(folder / f"own.{ending}", "mm")
+        content = foreign_file.read(folder / f"own.{ending}", "mm")
     bodies = {
         name: (body.mesh.doflocs.tolist(), {key: of.tolist() for key, of in body.node_sets.items()})
-        for name, body in found.bodies.items()
+        for name, body in content.bodies.items()
     }
-    places = {name: place.tolist() for name, place in found.points.items()}
+    places = {name: place.tolist() for name, place in content.points.items()}
     return (
-        repr(bodies) + repr(found.deck) + repr(places), list(found.notes), list(found.unused), dict(found.refused)
+        repr(bodies) + repr(content.deck) + repr(places), list(content.notes), list(content.unused),
+        dict(content.refused),
     )  # fmt: skip
 
 
 def built(ending: str, card: str) -> str:
-    base, more = READ[ending][card]
+    base, extra = READ[ending][card]
     text = BASES.get(base, "")
-    if "BEGIN BULK" in more:
-        return more.replace("BULK\n", f"BULK\n{text}")
-    return text.replace("MATERIAL=S\n", "MATERIAL=S, ORIENTATION=OWN\n") + more if "=OWN" in more else text + more
+    if "BEGIN BULK" in extra:
+        return extra.replace("BULK\n", f"BULK\n{text}")
+    return text.replace("MATERIAL=S\n", "MATERIAL=S, ORIENTATION=OWN\n") + extra if "=OWN" in extra else text + extra
 
 
 def test_every_card_that_is_read_has_its_deck() -> None:
@@ -169,12 +170,12 @@ def test_every_card_that_is_read_has_its_deck() -> None:
 @pytest.mark.parametrize(("ending", "card"), [(ending, card) for ending, cards in READ.items() for card in cards])
 def test_a_card_that_is_read_matters(ending: str, card: str) -> None:
     text = built(ending, card)
-    less = without(text, card, ending)
-    assert less != text
-    *_, refused = whole = said(text, ending)
+    smaller = without(text, card, ending)
+    assert smaller != text
+    *_, refused = full = said(text, ending)
     assert not refused or card in ("ET", "KEYOPT", "KEYOP", "CSYS", "LOCAL")  # what these choose is refused
     with suppress(ValueError):  # of a deck that lacks what it cannot do without
-        assert card in FRAMES or said(less, ending) != whole
+        assert card in FRAMES or said(smaller, ending) != full
 
 
 @pytest.mark.parametrize("ending", TABLES)
@@ -182,9 +183,9 @@ def test_harmless_cards_are_named_and_others_refused(ending: str) -> None:
     table, base = TABLES[ending], said(BASES[ending], ending)
     line = {"inp": "*{}\n", "bdf": "{},1\n", "cdb": "{},1\n"}[ending]
     for card in table.spares:
-        what = card.replace("PARAM ", "PARAM,").replace("MP ", "MP,")
-        found, _, unused, refused = said(BASES[ending] + line.format(what), ending)
-        assert found == base[0], card
+        kind = card.replace("PARAM ", "PARAM,").replace("MP ", "MP,")
+        result, _, unused, refused = said(BASES[ending] + line.format(kind), ending)
+        assert result == base[0], card
         assert card in unused[-1], card
         assert not refused, card
     for card in table.silents - {"BEGIN", "RESTART"}:
@@ -286,16 +287,16 @@ def test_elements_that_two_instances_label_alike_keep_their_own_axes(tmp_path: P
     for label, angle in (("1", 0.0), ("2", 40.0)):
         c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         cards += f"{label}, {c:.9f}, {s:.9f}, 0., {-s:.9f}, {c:.9f}, 0.\n"
-    own = "*ORIENTATION, NAME=OWN\nD\n*DISTRIBUTION, NAME=D\n, 1., 0., 0., 0., 1., 0.\n" + cards
-    part = bricks(SMALL, straight) + own + "*SOLID SECTION, ELSET=ALL, MATERIAL=PLY, ORIENTATION=OWN\n*END PART\n"
+    base = "*ORIENTATION, NAME=OWN\nD\n*DISTRIBUTION, NAME=D\n, 1., 0., 0., 0., 1., 0.\n" + cards
+    part = bricks(SMALL, straight) + base + "*SOLID SECTION, ELSET=ALL, MATERIAL=PLY, ORIENTATION=OWN\n*END PART\n"
     material = PLY_INP[: PLY_INP.index("*SOLID")]
-    one, two = "*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n", "*INSTANCE, NAME=J, PART=P\n0., 90., 0.\n*END INSTANCE\n"
-    found = [
+    item, pair = "*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n", "*INSTANCE, NAME=J, PART=P\n0., 90., 0.\n*END INSTANCE\n"
+    rows = [
         frequencies(f"*PART, NAME=P\n{part}*ASSEMBLY\n{of}*END ASSEMBLY\n{material}", count, tmp_path)
-        for of, count in ((one, 8), (one + two, 16))
+        for of, count in ((item, 8), (item + pair, 16))
     ]
-    np.testing.assert_allclose(found[1][12::2], found[0][6:], rtol=1e-6)
-    np.testing.assert_allclose(found[1][13::2], found[0][6:], rtol=1e-6)
+    np.testing.assert_allclose(rows[1][12::2], rows[0][6:], rtol=1e-6)
+    np.testing.assert_allclose(rows[1][13::2], rows[0][6:], rtol=1e-6)
 
 
 def ring(x: np.ndarray) -> np.ndarray:
@@ -308,7 +309,7 @@ def test_supports_along_axes_of_nodes_turn_with_the_body(ending: str, tmp_path: 
     """A half ring that slides on planes through its axis, as it lies and turned by 30 degrees about z."""
     c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
     turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    found = []
+    rows = []
     for shape in (ring, lambda x: ring(x) @ turn):
         foot = cut((6, 1, 1), shape)[2]
         if ending == "bdf":
@@ -316,9 +317,9 @@ def test_supports_along_axes_of_nodes_turn_with_the_body(ending: str, tmp_path: 
         else:
             text = archive((6, 1, 1), shape, () if shape is ring else (30.0, 0.0, 0.0), held="UY") + STEEL_CDB
             text += "".join(f"D,{n},UZ,0\n" for n in foot)
-        found.append(frequencies(text, 8, tmp_path, ending))
-    assert found[0][0] < 1e-2 * found[0][1]  # it can slide along the radius
-    np.testing.assert_allclose(found[1][1:], found[0][1:], rtol=1e-6)
+        rows.append(frequencies(text, 8, tmp_path, ending))
+    assert rows[0][0] < 1e-2 * rows[0][1]  # it can slide along the radius
+    np.testing.assert_allclose(rows[1][1:], rows[0][1:], rtol=1e-6)
 
 
 WARM = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nEVERY, 50.\n"

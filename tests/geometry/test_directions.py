@@ -67,13 +67,13 @@ def test_an_anisotropic_material_is_that_of_calculix(tmp_path: Path) -> None:
 def test_a_turned_deck_is_the_same_structure(tmp_path: Path) -> None:
     """Body and orientation turned together change nothing; the orientation alone does."""
     deck = bricks((4, 1, 1), straight) + "{}" + ENDING
-    along = frequencies(deck.format("*ORIENTATION, NAME=OWN\n1., 0., 0., 0., 1., 0.\n"), 3, tmp_path)
+    path = frequencies(deck.format("*ORIENTATION, NAME=OWN\n1., 0., 0., 0., 1., 0.\n"), 3, tmp_path)
     other = frequencies(deck.format(CASES["30"][1]), 3, tmp_path)
     a = np.pi / 6
     R = np.array([[np.cos(a), np.sin(a), 0], [-np.sin(a), np.cos(a), 0], [0, 0, 1]])
-    moved = bricks((4, 1, 1), lambda x: straight(x) @ R) + CASES["30"][1] + ENDING
-    np.testing.assert_allclose(frequencies(moved, 3, tmp_path), along, rtol=1e-6)
-    assert abs(other[0] / along[0] - 1) > 0.05
+    shifted = bricks((4, 1, 1), lambda x: straight(x) @ R) + CASES["30"][1] + ENDING
+    np.testing.assert_allclose(frequencies(shifted, 3, tmp_path), path, rtol=1e-6)
+    assert abs(other[0] / path[0] - 1) > 0.05
 
 
 def test_a_cylinder_has_radial_tangential_and_axial_directions() -> None:

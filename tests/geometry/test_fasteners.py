@@ -43,8 +43,8 @@ def test_the_lap_meets_itself_turned_by_half_a_turn(tmp_path):
     lap = body.doflocs.T[sets["lap"]]
     assert np.abs(lap[:, 2]).max() < 1e-12
     turned = lap * [-1, 1, -1]
-    apart = np.linalg.norm(lap[:, None] - turned[None], axis=2).min(axis=1)
-    assert apart.max() < 1e-12
+    distance = np.linalg.norm(lap[:, None] - turned[None], axis=2).min(axis=1)
+    assert distance.max() < 1e-12
     pads = [mesh.area(body, body.boundaries[f"pad_{i}"]) for i in (1, 2, 3)]
     np.testing.assert_allclose(pads, disk(p.pad) - disk(p.hole), rtol=1e-3)
     assert mesh.area(body, body.boundaries["lap"]) == pytest.approx(p.lap * p.width - 3 * disk(p.hole), rel=1e-4)

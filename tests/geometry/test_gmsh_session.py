@@ -27,19 +27,19 @@ def test_a_mesh_that_the_disk_does_not_take_whole_is_told(tmp_path: Path, share:
             gmsh.write(name)
             os.truncate(name, int(share * Path(name).stat().st_size))
 
-        there = SimpleNamespace(option=gmsh.option, write=write)
+        simple_namespace = SimpleNamespace(option=gmsh.option, write=write)
         if share == 1.0:
-            save(there, path)
+            save(simple_namespace, path)
         else:
             with pytest.raises(OSError, match=r"box\.msh': is the disk full"):
-                save(there, path)
+                save(simple_namespace, path)
 
 
 @pytest.mark.faults
 def test_a_session_that_was_cut_off_before_it_could_end_is_ended_first(capfd):
     gmsh = pytest.importorskip("gmsh")
     gmsh.initialize(readConfigFiles=False, interruptible=False)
-    with session() as again:
-        assert again.model.getEntities() == []
-    assert "already" not in (told := "".join(capfd.readouterr())).replace("aleady", "already"), told
+    with session() as repeated:
+        assert repeated.model.getEntities() == []
+    assert "already" not in (text := "".join(capfd.readouterr())).replace("aleady", "already"), text
     assert not gmsh.isInitialized()

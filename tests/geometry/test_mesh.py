@@ -36,12 +36,12 @@ def box(path: Path, cell: str, order: int = 2, skew: float = 0.0) -> Path:
         gmsh.model.mesh.setOrder(order)
 
         def at(dimension: int, **place: float) -> list[int]:
-            found = []
+            rows = []
             for _, tag in gmsh.model.getEntities(dimension):
                 bounds = np.array(gmsh.model.getBoundingBox(dimension, tag)).reshape(2, 3)
                 if all(np.allclose(bounds[:, "xyz".index(axis)], value, atol=1e-6) for axis, value in place.items()):
-                    found.append(tag)
-            return found
+                    rows.append(tag)
+            return rows
 
         for dimension, tags, name in (
             (3, [volume], "box"),
@@ -63,11 +63,11 @@ def read_box(request, tmp_path):
 def test_box_has_its_volume_and_faces_their_area(read_box):
     _, mesh, _ = read_box
     assert mesh_file.quality(mesh).volume == pytest.approx(np.prod(EDGES), rel=1e-12)
-    left, both = (mesh.boundaries[name] for name in ("left", "left_and_bottom"))
-    assert mesh_file.area(mesh, left) == pytest.approx(0.7 * 0.4, rel=1e-12)
-    assert mesh_file.area(mesh, both) == pytest.approx(0.7 * 0.4 + 0.7, rel=1e-12)
+    remaining, two_results = (mesh.boundaries[name] for name in ("left", "left_and_bottom"))
+    assert mesh_file.area(mesh, remaining) == pytest.approx(0.7 * 0.4, rel=1e-12)
+    assert mesh_file.area(mesh, two_results) == pytest.approx(0.7 * 0.4 + 0.7, rel=1e-12)
     far = replace(mesh, doflocs=1e-4 * mesh.doflocs + 1.0)  # as a small face at the rim of a wheel
-    assert mesh_file.area(far, left) == pytest.approx(1e-8 * 0.7 * 0.4, rel=1e-9)
+    assert mesh_file.area(far, remaining) == pytest.approx(1e-8 * 0.7 * 0.4, rel=1e-9)
 
 
 def test_node_numbering_is_right_quadratics_are_reproduced(read_box):
@@ -191,9 +191,9 @@ def test_a_body_that_reaches_into_another_is_found_and_one_that_touches_or_is_pr
         turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
         for R in (np.eye(3), turn):
             pair = [replace(mesh, doflocs=R @ mesh.doflocs) for mesh in (upper, lower)]
-            for one, other in (pair, pair[::-1]):
-                found = overlap(one, other)
-                assert (found is None) if share is None else found[0] == pytest.approx(share, abs=0.05)
+            for item, other in (pair, pair[::-1]):
+                result = overlap(item, other)
+                assert (result is None) if share is None else result[0] == pytest.approx(share, abs=0.05)
     box = skfem.MeshHex.init_tensor(line(-2, 2, 9), line(-2, 2, 9), line(0, 1, 2))
     ring, shaft = (
         skfem.MeshHex2.from_mesh(box.restrict(lambda x, out=out: (np.abs(x[:2]).max(axis=0) > 1) == out))
@@ -209,9 +209,9 @@ def test_bolt_and_nut_of_few_elements_do_not_overlap(tmp_path: Path):
     bolt.build(bolt.Parameters(), paths[0])
     nut.build(nut.Parameters(n_around=6), paths[1])
     shank, ring = (mesh_file.read(path)[0] for path in paths)
-    below = bolt.Parameters().grip + bolt.Parameters().nut_height
-    held = replace(ring, doflocs=ring.doflocs - np.array([[0.0], [0.0], [below]]))
-    assert overlap(shank, held) is None
-    assert overlap(held, shank) is None
-    aside = replace(held, doflocs=held.doflocs + np.array([[2e-3], [0.0], [0.0]]))
-    assert overlap(aside, shank) is not None
+    lower = bolt.Parameters().grip + bolt.Parameters().nut_height
+    fixed = replace(ring, doflocs=ring.doflocs - np.array([[0.0], [0.0], [lower]]))
+    assert overlap(shank, fixed) is None
+    assert overlap(fixed, shank) is None
+    neglected = replace(fixed, doflocs=fixed.doflocs + np.array([[2e-3], [0.0], [0.0]]))
+    assert overlap(neglected, shank) is not None

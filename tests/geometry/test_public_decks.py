@@ -29,12 +29,12 @@ TIED = "*TIE, NAME=T1, POSITION TOLERANCE=1.\nHIGH, LOW\n"
 
 def fine_at_the_corner(counts: tuple[int, int, int], upper: bool) -> Shape:
     """The lower or the upper block of a lap, whose elements shrink towards the line where clamp and lap meet."""
-    along, across = (np.linspace(0, 1, n + 1) for n in (counts[0], counts[2]))
+    path, across = (np.linspace(0, 1, n + 1) for n in (counts[0], counts[2]))
 
     def shape(x: np.ndarray) -> np.ndarray:
-        away = np.interp(x[:, 2] if upper else 1 - x[:, 2], across, across**2)
+        distant = np.interp(x[:, 2] if upper else 1 - x[:, 2], across, across**2)
         return straight(
-            np.stack([np.interp(x[:, 0], along, along**2), x[:, 1], 1 + away if upper else 1 - away], axis=1)
+            np.stack([np.interp(x[:, 0], path, path**2), x[:, 1], 1 + distant if upper else 1 - distant], axis=1)
         )
 
     return shape
@@ -137,19 +137,19 @@ def test_what_is_read_has_the_frequencies_of_calculix(name: str, tmp_path: Path)
 
 
 def test_a_tie_of_equal_meshes_makes_one_body(tmp_path: Path) -> None:
-    one = (12, 4, 4)
-    lower = [n for n, x in enumerate(cut(one, double)[0], 1) if x[0] == 0 and x[2] <= 10]
-    held = "*NSET, NSET=LOWER\n" + "".join(f"{n},\n" for n in lower) + STEEL + FIX.replace("FOOT", "LOWER")
-    whole = frequencies(bricks(one, double) + held, 4, tmp_path)
-    apart = lap(N, straight, lambda x: straight(x) + [0, 0, 10]) + TIED
-    np.testing.assert_allclose(frequencies(apart, 4, tmp_path), whole, rtol=1e-6)
+    item = (12, 4, 4)
+    lower = [n for n, x in enumerate(cut(item, double)[0], 1) if x[0] == 0 and x[2] <= 10]
+    fixed = "*NSET, NSET=LOWER\n" + "".join(f"{n},\n" for n in lower) + STEEL + FIX.replace("FOOT", "LOWER")
+    full = frequencies(bricks(item, double) + fixed, 4, tmp_path)
+    distance = lap(N, straight, lambda x: straight(x) + [0, 0, 10]) + TIED
+    np.testing.assert_allclose(frequencies(distance, 4, tmp_path), full, rtol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["C3D20", "C3D8"])
 def test_equations_between_two_faces_make_one_body_of_them_added_nodes_too(kind: str, tmp_path: Path) -> None:
     """Blocks joined node by node, of which the first of each equation is once of one and once of the other body."""
     corners = 20 if kind == "C3D20" else 8
-    whole, half = (cut((n, 2, 1), straight) for n in (4, 2))
+    full, half = (cut((n, 2, 1), straight) for n in (4, 2))
 
     def block(of: tuple[np.ndarray, list[list[int]], list[int]], name: str, first: int, shift: float) -> str:
         points, cells, _ = of
@@ -159,8 +159,8 @@ def test_equations_between_two_faces_make_one_body_of_them_added_nodes_too(kind:
         elements = [", ".join(str(n + first) for n in c[:10]) + ",\n" + ", ".join(str(n + first) for n in c[10:corners])
                     if corners > 10 else ", ".join(str(n + first) for n in c[:8]) for c in cells]  # fmt: skip
         numbered = [f"{e + first}, {row}" for e, row in enumerate(elements, 1)]
-        own = f"*SOLID SECTION, ELSET={name}, MATERIAL=EL"
-        return "\n".join(["*NODE", *rows, f"*ELEMENT, TYPE={kind}, ELSET={name}", *numbered, own, ""])
+        base = f"*SOLID SECTION, ELSET={name}, MATERIAL=EL"
+        return "\n".join(["*NODE", *rows, f"*ELEMENT, TYPE={kind}, ELSET={name}", *numbered, base, ""])
 
     steel = "*MATERIAL, NAME=EL\n*ELASTIC\n210000., .3\n*DENSITY\n7.8E-9\n"
     foot = [n for n in half[2] if any(n in c[:corners] for c in half[1])]
@@ -169,8 +169,8 @@ def test_equations_between_two_faces_make_one_body_of_them_added_nodes_too(kind:
     pairs = [(place[(100.0, *half[0][n - 1][1:])], n + 1000) for n in foot]
     turned = [pair if k % 2 else pair[::-1] for k, pair in enumerate(pairs)]
     joined = "".join(f"*EQUATION\n2\n{n}, {axis}, 1., {m}, {axis}, -1.\n" for n, m in turned for axis in (1, 2, 3))
-    two = steel + block(half, "A", 0, 0.0) + block(half, "B", 1000, 50.0) + support + joined
-    one = steel + block(whole, "A", 0, 0.0) + "*BOUNDARY\n" + "".join(
-        f"{n}, 1, 3\n" for n in whole[2] if any(n in c[:corners] for c in whole[1])
+    second = steel + block(half, "A", 0, 0.0) + block(half, "B", 1000, 50.0) + support + joined
+    item = steel + block(full, "A", 0, 0.0) + "*BOUNDARY\n" + "".join(
+        f"{n}, 1, 3\n" for n in full[2] if any(n in c[:corners] for c in full[1])
     )  # fmt: skip
-    np.testing.assert_allclose(frequencies(two, 6, tmp_path), frequencies(one, 6, tmp_path), rtol=1e-8)
+    np.testing.assert_allclose(frequencies(second, 6, tmp_path), frequencies(item, 6, tmp_path), rtol=1e-8)

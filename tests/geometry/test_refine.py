@@ -47,15 +47,15 @@ def test_the_refined_mesh_is_the_same_body_with_the_same_groups(tets):
     volume = [assemble(of, Material(1.0, 0.0, 1.0))[0].sum() / 3 for of in (mesh, fine)]
     assert volume[1] == pytest.approx(volume[0], rel=1e-12)
     for name in ("left", "top"):
-        one, other = (surface(of, of.boundaries[name], vertices_only=True) for of in (mesh, fine))
+        item, other = (surface(of, of.boundaries[name], vertices_only=True) for of in (mesh, fine))
         assert len(fine.boundaries[name]) == 4 * len(mesh.boundaries[name])
-        assert other.area.sum() == pytest.approx(one.area.sum(), rel=1e-6)  # quadrature of a curved face
-        assert other.area @ other.normals == pytest.approx(one.area @ one.normals, abs=2e-2)
+        assert other.area.sum() == pytest.approx(item.area.sum(), rel=1e-6)  # quadrature of a curved face
+        assert other.area @ other.normals == pytest.approx(item.area @ item.normals, abs=2e-2)
     assert len(fine.subdomains["half"]) == 8 * len(mesh.subdomains["half"])
-    whole = np.unique(fine.dofs.element_dofs[:, fine.subdomains["half"]])
-    np.testing.assert_array_equal(finer_sets["half"], whole)
-    left = np.unique(fine.dofs.get_facet_dofs(fine.boundaries["left"]).flatten())
-    np.testing.assert_array_equal(finer_sets["left"], left)
+    full = np.unique(fine.dofs.element_dofs[:, fine.subdomains["half"]])
+    np.testing.assert_array_equal(finer_sets["half"], full)
+    remaining = np.unique(fine.dofs.get_facet_dofs(fine.boundaries["left"]).flatten())
+    np.testing.assert_array_equal(finer_sets["left"], remaining)
     np.testing.assert_array_equal(finer_sets["corner"], sets["corner"])
     # bodies are bent along x only where x > 0: on the left edge nodes stay where they were
     x, _, z = fine.doflocs
@@ -70,5 +70,5 @@ def test_what_the_mesh_can_represent_the_refined_one_can(tets):
     fine, _ = subdivide(mesh, {})
     steel = Material(210e9, 0.3, 7860.0)
     u = [np.stack([of.doflocs[1], 0.3 * of.doflocs[0], -of.doflocs[2]], axis=1).ravel() for of in (mesh, fine)]
-    for one, other in zip(assemble(mesh, steel), assemble(fine, steel), strict=True):
-        assert u[1] @ other @ u[1] == pytest.approx(u[0] @ one @ u[0], rel=1e-12)
+    for item, other in zip(assemble(mesh, steel), assemble(fine, steel), strict=True):
+        assert u[1] @ other @ u[1] == pytest.approx(u[0] @ item @ u[0], rel=1e-12)

@@ -25,7 +25,7 @@ def test_instances_are_bodies_in_their_places(lap):
     np.testing.assert_allclose(first.p.max(axis=1), [0.02, 0.01, 0.01])
     np.testing.assert_allclose(second.p.min(axis=1), [-0.01, 0.0, 0.01], atol=1e-12)  # moved up, then turned about z
     np.testing.assert_allclose(second.p.max(axis=1), [0.0, 0.02, 0.02], atol=1e-12)
-    assert any("16" not in said and "4 hexahedra of first order" in said for said in lap.order_notes)
+    assert any("16" not in order_note and "4 hexahedra of first order" in order_note for order_note in lap.order_notes)
 
 
 def test_sets_and_surfaces_are_where_the_deck_puts_them(lap):
@@ -41,16 +41,16 @@ def test_sets_and_surfaces_are_where_the_deck_puts_them(lap):
 
 
 def test_what_the_deck_says_beside_its_mesh(lap):
-    said = lap.deck
-    assert said.materials == (
+    message = lap.deck
+    assert message.materials == (
         deck.DeckMaterial("Steel", 210e9, 0.3, pytest.approx(7850.0), 1.2e-5, groups=("Block-1.All", "Block-2.All")),
     )
-    assert said.ties == (deck.DeckTie("glue", "Lower", "Upper", 0.5e-3),)
-    assert said.couplings == (deck.Coupling("carried", "distributing", "RP", "End"),)
-    assert said.equations == (deck.DeckEquation((("node Block-2.11", 0, 1.0), ("node Block-2.12", 0, -1.0))),)
-    assert said.forces == (deck.Force("RP", 1, -100.0),)
-    assert said.pressures == (deck.FacePressure("Upper", pytest.approx(3e6)),)
-    assert said.supports == tuple(deck.Support("Foot", axis) for axis in range(3))
+    assert message.ties == (deck.DeckTie("glue", "Lower", "Upper", 0.5e-3),)
+    assert message.couplings == (deck.Coupling("carried", "distributing", "RP", "End"),)
+    assert message.equations == (deck.DeckEquation((("node Block-2.11", 0, 1.0), ("node Block-2.12", 0, -1.0))),)
+    assert message.forces == (deck.Force("RP", 1, -100.0),)
+    assert message.pressures == (deck.FacePressure("Upper", pytest.approx(3e6)),)
+    assert message.supports == tuple(deck.Support("Foot", axis) for axis in range(3))
     np.testing.assert_allclose(lap.points["RP"], [0.025, 0.005, 0.005])
     node = lap.bodies["Block-2"].node_sets["node Block-2.11"]
     np.testing.assert_allclose(lap.bodies["Block-2"].mesh.doflocs[:, node[0]], [0.0, 0.02, 0.02], atol=1e-12)
@@ -60,8 +60,8 @@ def test_what_the_deck_says_beside_its_mesh(lap):
 def test_orthotropic_stiffness_becomes_engineering_constants():
     E, nu = 210e9, 0.3
     lam, mu = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
-    found = engineering_constants([lam + 2 * mu, lam, lam + 2 * mu, lam, lam, lam + 2 * mu, mu, mu, mu])
-    np.testing.assert_allclose(found, [E, E, E, nu, nu, nu, mu, mu, mu])
+    result = engineering_constants([lam + 2 * mu, lam, lam + 2 * mu, lam, lam, lam + 2 * mu, mu, mu, mu])
+    np.testing.assert_allclose(result, [E, E, E, nu, nu, nu, mu, mu, mu])
 
 
 BROKEN = {
@@ -113,12 +113,12 @@ BROKEN = {
 
 @pytest.mark.parametrize("case", BROKEN)
 def test_broken_decks_are_refused_in_one_sentence(case, tmp_path):
-    old, new, sentence = BROKEN[case]
+    previous, updated, sentence = BROKEN[case]
     text = LAP.read_text()
-    assert old in text
+    assert previous in text
     broken = tmp_path / "broken.inp"
-    broken.write_text(text.replace(old, new))
-    with pytest.raises(ValueError, match=sentence) as said:
+    broken.write_text(text.replace(previous, updated))
+    with pytest.raises(ValueError, match=sentence) as message:
         foreign_file.read(broken, "mm")
-    assert "\n" not in str(said.value)
-    assert ":" in str(said.value)
+    assert "\n" not in str(message.value)
+    assert ":" in str(message.value)

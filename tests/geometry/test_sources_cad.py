@@ -36,9 +36,9 @@ def test_solids_are_bodies_that_stay_apart(blocks):
     source = foreign_file.read(blocks, "mm")
     assert len(source.bodies) == 2
     for body in source.bodies.values():
-        found = facts(body.mesh)
-        assert found.volume == pytest.approx(60e-3 * 20e-3 * 10e-3, rel=1e-9)
-        assert sorted(np.round(found.high - found.low, 9)) == [0.01, 0.02, 0.06]
+        result = facts(body.mesh)
+        assert result.volume == pytest.approx(60e-3 * 20e-3 * 10e-3, rel=1e-9)
+        assert sorted(np.round(result.high - result.low, 9)) == [0.01, 0.02, 0.06]
         areas = {name: area(body.mesh, ids) for name, ids in body.mesh.boundaries.items()}
         assert len(areas) == 6
         assert sum(areas.values()) == pytest.approx(2 * (60 * 20 + 60 * 10 + 20 * 10) * 1e-6)
@@ -53,7 +53,7 @@ def test_sizes_by_body_and_by_face_refine_there(blocks):
     at_face = foreign_file.read(blocks, "mm", Sizes(15.0, faces={number: 3.0}))
     assert fine.bodies[first].mesh.nelements > 4 * coarse.bodies[first].mesh.nelements
     face = f"face {number}"
-    count = {s: len(one.bodies[second].mesh.boundaries[face]) for s, one in (("coarse", coarse), ("fine", at_face))}
+    count = {s: len(item.bodies[second].mesh.boundaries[face]) for s, item in (("coarse", coarse), ("fine", at_face))}
     assert count["fine"] > 6 * count["coarse"]
 
 
@@ -82,9 +82,9 @@ def test_sizes_that_cannot_be_are_refused(blocks, sizes, sentence):
 def test_broken_cad_files_are_refused_in_one_sentence(tmp_path, blocks):
     broken = tmp_path / "broken.step"
     broken.write_text("ISO-10303-21;\nhello\n")
-    with pytest.raises(ValueError, match=r"cannot be read|has no solid") as said:
+    with pytest.raises(ValueError, match=r"cannot be read|has no solid") as message:
         foreign_file.read(broken)
-    assert "\n" not in str(said.value)
+    assert "\n" not in str(message.value)
     drawing = tmp_path / "broken.geo"
     drawing.write_text("Box(1) = {0, 0, 0};")
     with pytest.raises(ValueError, match=r"cannot be meshed|no volume"):
@@ -110,7 +110,7 @@ def test_drawings_are_meshed(tmp_path):
 
 def test_faces_are_picked_by_rule(blocks):
     source = foreign_file.read(blocks, "mm")
-    body = min(source.bodies.values(), key=lambda one: one.mesh.p[2].min())
+    body = min(source.bodies.values(), key=lambda item: item.mesh.p[2].min())
     mesh = body.mesh
     top = face_rules.by_normal(mesh, (0, 0, 1), 5.0)
     assert area(mesh, top) == pytest.approx(60e-3 * 20e-3)

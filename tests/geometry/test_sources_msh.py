@@ -28,8 +28,8 @@ def outside(mesh):
 def test_every_gmsh_file_gives_the_same_body(order, complete, version, save_all, named, tmp_path):
     path = write_mixed(tmp_path / "box.msh", order, complete, version, save_all, named)
     source = foreign_file.read(path)
-    (name, body), *others = source.bodies.items()
-    assert not others
+    (name, body), *remaining = source.bodies.items()
+    assert not remaining
     assert name == ("box" if named else "body")
     mesh = body.mesh
     assert mesh.nelements == 4 * (6 + 5 * 2 + 2 + 2 * 3)
@@ -52,9 +52,9 @@ def test_curved_elements_of_mixed_kinds_keep_their_shape(complete, tmp_path):
     bent = raw.points.copy()
     bent[:, 0] += 0.3 * raw.points[:, 2] ** 2
     body = solid_body.build(replace(raw, points=bent))
-    found = quality(body.mesh)
-    assert found.volume == pytest.approx(12.0, rel=1e-12)
-    assert found.scaled_jacobian > 0.1
+    result = quality(body.mesh)
+    assert result.volume == pytest.approx(12.0, rel=1e-12)
+    assert result.scaled_jacobian > 0.1
     straight = solid_body.build(raw).mesh.doflocs
     straight[0] += 0.3 * straight[2] ** 2
     np.testing.assert_allclose(body.mesh.doflocs, straight, atol=1e-14)
@@ -85,7 +85,7 @@ def test_prisms_numbered_in_a_mirror_are_turned():
 def test_parts_that_share_no_nodes_are_bodies_named_by_their_groups():
     points, cells, _ = mixed_cells(1)
     n = len(points)
-    both = np.vstack([points, points + [5.0, 0, 0], points + [9.0, 0, 0]])
+    two_results = np.vstack([points, points + [5.0, 0, 0], points + [9.0, 0, 0]])
     blocks = [Cells(k, np.vstack([c, c + n, c + 2 * n]), np.arange(3 * len(c))) for k, c in cells.items()]
     number, start, owner = {}, 0, []
     for block in blocks:
@@ -94,7 +94,7 @@ def test_parts_that_share_no_nodes_are_bodies_named_by_their_groups():
     owner = np.concatenate(owner)
     number = {i: np.flatnonzero(owner == i) for i in range(3)}
     raw = RawMesh(
-        both,
+        two_results,
         np.arange(3 * n),
         blocks,
         volumes={"all": np.arange(start), "left": number[0], "half": number[1][:2], "rest": number[1][2:]},
@@ -138,12 +138,12 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, version, bi
         gmsh.option.setNumber("Mesh.Binary", binary)
         gmsh.model.mesh.generate(3)
         gmsh.write(str(path))
-    whole, rng = path.read_bytes(), np.random.default_rng(3)
+    full, rng = path.read_bytes(), np.random.default_rng(3)
     refusals = []
-    for place in rng.integers(0, len(whole) - 8, 24):
-        turned = bytearray(whole)
+    for place in rng.integers(0, len(full) - 8, 24):
+        turned = bytearray(full)
         turned[place] ^= 1 << int(rng.integers(8))
-        for damaged in (whole[:place], bytes(turned), whole[:place] + whole[place + 3 :]):
+        for damaged in (full[:place], bytes(turned), full[:place] + full[place + 3 :]):
             path.write_bytes(damaged)
             try:
                 for body in foreign_file.read(path).bodies.values():
@@ -151,7 +151,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, version, bi
             except ValueError as refusal:
                 refusals.append(str(refusal))
     assert len(refusals) > 24
-    assert not any("\n" in said for said in refusals)
+    assert not any("\n" in message for message in refusals)
 
 
 def test_binary_numbers_that_look_like_a_section_cut_no_file_short(tmp_path):

@@ -147,10 +147,10 @@ def test_spikes_are_taken_out_and_reported():
     places = [(3, 4), (30, 50), (31, 50), (59, 89)]
     for k, place in enumerate(places):
         spiked[place] += (-1) ** k * 40e-6
-    cleaned, said = remove_outliers(replace(face, z=spiked))
+    cleaned, message = remove_outliers(replace(face, z=spiked))
     assert sorted(map(tuple, np.argwhere(np.isnan(cleaned.z)))) == places
-    assert len(said) == 1
-    assert "4 spikes" in said[0]
+    assert len(message) == 1
+    assert "4 spikes" in message[0]
     assert remove_outliers(face) == (face, [])
 
 
@@ -161,15 +161,15 @@ def test_holes_are_filled_without_overshoot_and_planes_are_kept():
     holed = plane.copy()
     holed[10:20, 30:45] = np.nan
     holed[40, 60] = np.nan
-    filled, said = fill_holes(replace(face, z=holed))
+    filled, message = fill_holes(replace(face, z=holed))
     np.testing.assert_allclose(filled.z, plane, atol=1e-15)
-    assert "151 points" in said[0]
+    assert "151 points" in message[0]
     rim = surface()
     rim.z[:8, :8] = np.nan  # a corner: the surface goes on from its rim
     corner, _ = fill_holes(rim)
-    around = np.concatenate([rim.z[8, :9], rim.z[:9, 8]])
-    assert around.min() <= corner.z[:8, :8].min()
-    assert corner.z[:8, :8].max() <= around.max()
+    neighbourhood = np.concatenate([rim.z[8, :9], rim.z[:9, 8]])
+    assert neighbourhood.min() <= corner.z[:8, :8].min()
+    assert corner.z[:8, :8].max() <= neighbourhood.max()
 
 
 # ---- filter ----
@@ -198,10 +198,10 @@ def test_filter_keeps_planes_up_to_the_edges_and_is_direct():
     waviness, _ = split(face, 0.3e-3)
     i, j = 2, 1
     weights = np.exp(-np.pi * ((x - x[i, j]) ** 2 + (y - y[i, j]) ** 2) / (np.log(2) / np.pi * 0.3e-3**2))
-    near = (abs(x - x[i, j]) < 0.3001e-3) & (abs(y - y[i, j]) < 0.3001e-3)
-    u, v = (x - x[i, j])[near] / 1e-4, (y - y[i, j])[near] / 1e-4
-    terms = np.column_stack([np.ones_like(u), u, v, u * v]) * np.sqrt(weights[near])[:, None]
-    fitted = np.linalg.lstsq(terms, face.z[near] * np.sqrt(weights[near]), rcond=None)[0][0]
+    nearby = (abs(x - x[i, j]) < 0.3001e-3) & (abs(y - y[i, j]) < 0.3001e-3)
+    u, v = (x - x[i, j])[nearby] / 1e-4, (y - y[i, j])[nearby] / 1e-4
+    terms = np.column_stack([np.ones_like(u), u, v, u * v]) * np.sqrt(weights[nearby])[:, None]
+    fitted = np.linalg.lstsq(terms, face.z[nearby] * np.sqrt(weights[nearby]), rcond=None)[0][0]
     assert waviness.z[i, j] == pytest.approx(fitted, rel=1e-9)
 
 
@@ -215,8 +215,8 @@ def test_nodes_get_the_mean_over_their_tributary_area():
     tilted = HeightMap(x, y, 1e-3 * x[:, None] + np.zeros(505))
     heights = onto_nodes(tilted, rig_nodes()).reshape(5, 11)
     # inner nodes see their own place, those at the edge the middle of their half cell
-    wanted = 1e-6 * np.array([-0.875, -0.5, 0, 0.5, 0.875])
-    np.testing.assert_allclose(heights, np.tile(wanted[:, None], 11), atol=1e-9)
+    expected = 1e-6 * np.array([-0.875, -0.5, 0, 0.5, 0.875])
+    np.testing.assert_allclose(heights, np.tile(expected[:, None], 11), atol=1e-9)
     bowl = HeightMap(x, y, x[:, None] ** 2 + y**2)
     area = np.outer([0.5, 1, 1, 1, 0.5], [0.5, *[1] * 9, 0.5]).ravel()
     exact = ((1e-3) ** 2 + (2.5e-3) ** 2) / 3
@@ -241,8 +241,8 @@ def test_placing_and_facing():
 
 def test_synthetic_pair_touches_at_its_two_ridges():
     first, second = synthetic_pair(7)
-    again, _ = synthetic_pair(7)
-    np.testing.assert_array_equal(first.z, again.z)
+    repeated, _ = synthetic_pair(7)
+    np.testing.assert_array_equal(first.z, repeated.z)
     assert not np.array_equal(first.z, synthetic_pair(8)[0].z)
     waves = [prepare(face, 0.8e-3, expected_size=(2e-3, 5e-3)) for face in (first, second)]
     assert all(wave.repairs == () for wave in waves)
@@ -261,9 +261,9 @@ def test_damaged_measurement_comes_out_like_the_sound_one():
     tilted = damaged + 2e-2 * sound.x[:, None]
     mended = prepare(replace(sound, z=tilted), 0.8e-3)
     assert len(mended.repairs) == 2
-    wanted = prepare(sound, 0.8e-3).waviness
-    assert abs(mended.waviness.z - wanted.z).max() < 0.4e-6
-    assert abs(onto_nodes(mended.waviness, rig_nodes()) - onto_nodes(wanted, rig_nodes())).max() < 0.15e-6
+    expected = prepare(sound, 0.8e-3).waviness
+    assert abs(mended.waviness.z - expected.z).max() < 0.4e-6
+    assert abs(onto_nodes(mended.waviness, rig_nodes()) - onto_nodes(expected, rig_nodes())).max() < 0.15e-6
 
 
 # ---- garbage ----

@@ -91,10 +91,10 @@ def test_compliance_equals_a_dense_solve(balance):
     assert np.abs(point.apply(g) - x).max() < 1e-8 * scale
     assert np.abs(point.outputs(g) - y).max() < 1e-8 * np.abs(y).max()
     rows = np.arange(3, 9)
-    some = np.zeros_like(g)
-    some[rows] = g[rows]
+    subset = np.zeros_like(g)
+    subset[rows] = g[rows]
     product = point.jacobian_product(rows)(g[rows])
-    assert np.abs(product - point.apply(some)[rows]).max() < 1e-5 * scale  # single precision
+    assert np.abs(product - point.apply(subset)[rows]).max() < 1e-5 * scale  # single precision
 
 
 def test_expansion_holds_up_to_the_highest_harmonic_of_each_system(balance):
@@ -110,14 +110,14 @@ def test_slopes_equal_finite_differences(balance, harmonics):
     compliance, omega, step = balance.compliance.restricted(HarmonicBasis(harmonics, 64)), 0.6 * OMEGA, 2e-4
     g = np.random.default_rng(2).normal(size=(3 * N_PAIR, compliance.basis.n_coeff))
     for factor, part in ((1.0, 0.0), (0.0, 1.0), (0.7, 1.0)):  # of the loads and of g
-        both = []
+        rows = []
         for at in (omega + step, omega - step):
             point, loads = compliance.at(at), np.where(compliance.basis.order, factor, 1.0)
-            both.append(
+            rows.append(
                 (point.x_lin * loads + point.apply(part * g), point.outputs_lin * loads + point.outputs(part * g))
             )
         slopes = compliance.at(omega).slope(part * g, factor)
-        for slope, (up, down) in zip(slopes, zip(*both, strict=True), strict=True):
+        for slope, (up, down) in zip(slopes, zip(*rows, strict=True), strict=True):
             assert np.abs(slope - (up - down) / (2 * step)).max() <= 1e-6 * np.abs(slope).max()
 
 
@@ -152,20 +152,20 @@ def test_coriolis_forces_in_few_modes_against_a_direct_solve(is_complex):
     stiffness = basis.conj().T @ np.diag(omega**2) @ basis
     system = SecondOrderSystem(np.eye(n), stiffness, damping, gyroscopic=gyroscopic)
     ports = matrix(9, n)
-    found = expansion.Expansion(system, ports[:3], np.full(3, 1e3), ports, OMEGA)
-    assert found.n_mode < n
-    assert found.order > 2
+    result = expansion.Expansion(system, ports[:3], np.full(3, 1e3), ports, OMEGA)
+    assert result.n_mode < n
+    assert result.order > 2
     dynamic = stiffness + ports[:3].conj().T @ (1e3 * ports[:3])
     force = rng.normal(size=9) + 1j * rng.normal(size=9)
     for w in (0.0, 0.3 * OMEGA, OMEGA):
         s = 1j * w
         q = np.linalg.solve(dynamic + s * (damping + gyroscopic) + s**2 * np.eye(n), ports.conj().T @ force)
         exact = ports @ q
-        assert np.abs(found.at(s).matrix() @ force - exact).max() < 1e-8 * np.abs(exact).max()
+        assert np.abs(result.at(s).matrix() @ force - exact).max() < 1e-8 * np.abs(exact).max()
     step = 1e-5 * OMEGA
-    ahead, behind = (found.at(1j * (0.5 * OMEGA + d)).matrix() @ force for d in (step, -step))
-    slope = found.at(0.5j * OMEGA).slope(force, 1.0)
-    assert np.abs(slope - (ahead - behind) / (2j * step)).max() < 1e-5 * np.abs(slope).max()
+    ahead, previous = (result.at(1j * (0.5 * OMEGA + d)).matrix() @ force for d in (step, -step))
+    slope = result.at(0.5j * OMEGA).slope(force, 1.0)
+    assert np.abs(slope - (ahead - previous) / (2j * step)).max() < 1e-5 * np.abs(slope).max()
 
 
 def test_all_harmonics_of_one_real_system_in_few_modes_have_the_slopes_of_each():
@@ -187,8 +187,8 @@ def test_all_harmonics_of_one_real_system_in_few_modes_have_the_slopes_of_each()
     force = compliance.basis.to_complex(compliance.excited + compliance.pushed(g))
     each = [port.slope(f, 1j * h) for h, port, f in zip((0, 1, 2), point.ports[0], force.T, strict=True)]
     expected = compliance.basis.to_real(np.stack(each, axis=1))
-    for found, wanted in zip(point.slope(g, 1.0), (expected[:rows], expected[-1:]), strict=True):
-        np.testing.assert_allclose(found, wanted, atol=1e-13 * np.abs(wanted).max())
+    for result, target in zip(point.slope(g, 1.0), (expected[:rows], expected[-1:]), strict=True):
+        np.testing.assert_allclose(result, target, atol=1e-13 * np.abs(target).max())
 
 
 @pytest.mark.parametrize("harmonics", [HARMONICS, (0, 5)])  # the last two share one real system

@@ -31,11 +31,11 @@ def half_space(side: float, n: int):
 
 def law_pressure(table: np.ndarray, radius: float, approach: np.ndarray) -> np.ndarray:
     """Pressure [Pa] of the law per pair at approaches (n,), each the deepest so far."""
-    made = ContactParameters.of(
+    built = ContactParameters.of(
         ("t1", "t2", "n"), np.ones((1, 3)), table=table, friction=0.3, young=YOUNG, poisson=POISSON, radius=radius,
         deepest=float(max(approach.max(), table[:, 0].max())),
     )  # fmt: skip
-    p = contact_law.checked("rough", made).packed().repeat(len(approach), axis=0)
+    p = contact_law.checked("rough", built).packed().repeat(len(approach), axis=0)
     k, g, _, _ = bed(p, approach)
     return (k * np.maximum(approach[:, None] - g, 0.0)).sum(axis=1)
 
@@ -56,9 +56,9 @@ def test_one_sphere_carries_what_boundary_elements_find(approach):
     sunk = np.zeros_like(pressed)
     model.operators["open"](pressed, sunk)
     touching = pressed > 0.05 * pressed.max()
-    found = (sunk - sphere)[touching]
-    assert np.ptp(found) < 1e-6 * approach
-    assert found.mean() == pytest.approx(approach, rel=2e-4)
+    result = (sunk - sphere)[touching]
+    assert np.ptp(result) < 1e-6 * approach
+    assert result.mean() == pytest.approx(approach, rel=2e-4)
     assert pressed.max() == pytest.approx(1.5 * force / (np.pi * radius * approach), rel=2e-3)
 
 
@@ -66,16 +66,16 @@ def test_a_random_face_carries_what_boundary_elements_find_while_its_asperities_
     """Pressure against approach from 0.05 to 3 % of the area in touch; the law is too stiff first, then too soft."""
     n, step = 256, 1e-6
     face, _ = gaussian(n, step, 32e-6, 16e-6, 0.3e-6, 1)
-    found = identify(face)
-    slope = np.sqrt(2 * found.moments.m2)
-    wanted = E_STAR * slope * np.array([1e-4, 1e-3, 1e-2])
+    fit = identify(face)
+    slope = np.sqrt(2 * fit.moments.m2)
+    expected = E_STAR * slope * np.array([1e-4, 1e-3, 1e-2])
     z = np.ascontiguousarray(face.z - face.z.mean())
     approach, share = [], []
-    for pressure in wanted:
+    for pressure in expected:
         model = half_space(n * step, n)
         tm.PolonskyKeerRey(model, z, 1e-7).solve(pressure)
-        approach.append(found.height.max() - np.array(model["gap"]).mean())
+        approach.append(fit.height.max() - np.array(model["gap"]).mean())
         share.append((np.array(model.traction) > 0).mean())
-    law = law_pressure(found.table(), found.radius, np.array(approach))
+    law = law_pressure(fit.table(), fit.radius, np.array(approach))
     assert 2e-4 < share[0] < share[-1] < 0.03
-    np.testing.assert_allclose(law / wanted, [1.14, 1.17, 0.92], atol=0.02)
+    np.testing.assert_allclose(law / expected, [1.14, 1.17, 0.92], atol=0.02)

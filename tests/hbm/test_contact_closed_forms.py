@@ -89,26 +89,26 @@ def test_planar_coulomb_is_right_to_a_thousandth_at_128_samples(top):
     A sampled force has kinks, and that of unequal springs steps implicitly: see the law
     """
     law, rng = contact_law.load("coulomb_planar"), np.random.default_rng(0)
-    kept = tuple(range(top + 1))
-    fine, usual = HarmonicBasis(kept, 2**14), HarmonicBasis(kept, 128)
-    x = rng.normal(size=(24, 3, usual.n_coeff)) * 0.6 / np.maximum(usual.order, 1) ** 1.5
+    saved = tuple(range(top + 1))
+    fine, typical = HarmonicBasis(saved, 2**14), HarmonicBasis(saved, 128)
+    x = rng.normal(size=(24, 3, typical.n_coeff)) * 0.6 / np.maximum(typical.order, 1) ** 1.5
     x[:, 2] *= np.where(np.arange(24) % 3, 0.3, 1.5)[:, None]
     x[:, 2, 0], x[:12, :2, 0] = 1.0, 0.0
     x[:, :2, 1:] *= np.geomspace(0.2, 2.0, 24)[rng.permutation(24), None, None]
     x[12:18, :2, 1:] *= 0.5  # the static shear of these is more than friction holds
     parameters = ContactParameters.of(("t1", "t2", "n"), np.ones((24, 3)), friction=0.4)
     exact = aft.march(law, x, parameters, np.zeros((24, 2)), fine, False).force
-    cycle = aft.cycle(law, x, parameters, usual)
+    cycle = aft.cycle(law, x, parameters, typical)
     assert {s & (STICKS | SLIPS) for s in cycle.status} >= {STICKS, STICKS | SLIPS}
     size = np.linalg.norm(exact[:, :2], axis=(1, 2)).max()
-    more = aft.cycle(law, x, parameters, HarmonicBasis(kept, 256), None, False)
-    error, less = (np.linalg.norm((one.force - exact)[:, :2], axis=(1, 2)).max() for one in (cycle, more))
+    extra = aft.cycle(law, x, parameters, HarmonicBasis(saved, 256), None, False)
+    error, smaller = (np.linalg.norm((item.force - exact)[:, :2], axis=(1, 2)).max() for item in (cycle, extra))
     assert error < 1e-3 * size
-    assert less < 0.4 * error
+    assert smaller < 0.4 * error
     d = 1e-6 * rng.normal(size=x.shape)
-    high, low = (aft.cycle(law, x + side * d, parameters, usual, None, False).force for side in (1, -1))
-    along = np.einsum("pij,pj->pi", cycle.jacobian, d.reshape(24, -1))
-    assert np.abs((high - low).reshape(24, -1) / 2 - along).max() < 1e-6 * np.abs(along).max()
+    high, low = (aft.cycle(law, x + side * d, parameters, typical, None, False).force for side in (1, -1))
+    path = np.einsum("pij,pj->pi", cycle.jacobian, d.reshape(24, -1))
+    assert np.abs((high - low).reshape(24, -1) / 2 - path).max() < 1e-6 * np.abs(path).max()
 
 
 @pytest.mark.parametrize("more", [-1e-9, 0.0, 1e-12, 1e-9])
@@ -139,13 +139,13 @@ def test_planar_coulomb_along_a_line_is_a_jenkins_element():
     planar = ContactParameters.of(("t1", "t2", "n"), np.ones((20, 3)), friction=0.5)
     line = ContactParameters.of(("t1", "n"), np.ones((20, 2)), friction=0.5)
     force = aft.cycle(contact_law.load("coulomb_planar"), x, planar, basis).force
-    along = aft.cycle(contact_law.load("jenkins"), np.stack([motion, x[:, 2]], axis=1), line, basis).force
-    np.testing.assert_allclose(force[:, 0], np.cos(angle)[:, None] * along[:, 0], atol=1e-12)
-    np.testing.assert_allclose(force[:, 1], np.sin(angle)[:, None] * along[:, 0], atol=1e-12)
+    path = aft.cycle(contact_law.load("jenkins"), np.stack([motion, x[:, 2]], axis=1), line, basis).force
+    np.testing.assert_allclose(force[:, 0], np.cos(angle)[:, None] * path[:, 0], atol=1e-12)
+    np.testing.assert_allclose(force[:, 1], np.sin(angle)[:, None] * path[:, 0], atol=1e-12)
     x[:, 0], x[:, 1] = motion, 0.0
     unequal = ContactParameters.of(("t1", "t2", "n"), np.tile([1.0, 50.0, 1.0], (20, 1)), friction=0.5)
     force = aft.cycle(contact_law.load("coulomb_planar"), x, unequal, basis).force
-    np.testing.assert_allclose(force[:, 0], along[:, 0], atol=1e-12)
+    np.testing.assert_allclose(force[:, 0], path[:, 0], atol=1e-12)
     np.testing.assert_allclose(force[:, 1], 0.0, atol=1e-14)
 
 

@@ -75,7 +75,7 @@ def test_step_derivatives_equal_differences_of_order_six(name, components):
     n_comp, n_state = len(components), law.n_state(components)
     memory = np.random.default_rng(2).normal(size=(200, n_state))
     stencil, weights = np.array([-3, -2, -1, 1, 2, 3]), np.array([-1, 9, -45, 45, -9, 1]) / 60
-    checked, seen = 0, 0
+    checked, observed = 0, 0
 
     def advance(i, z):
         s, f = z[n_comp:].copy(), np.zeros(n_comp)
@@ -88,15 +88,15 @@ def test_step_derivatives_equal_differences_of_order_six(name, components):
         bits, _, slope = advance(i, z)
         for column in range(len(z)):
             step = 1e-3 * np.eye(len(z))[column]
-            near = [advance(i, z + k * step) for k in stencil]
-            if all(b == bits for b, _, _ in near):
-                difference = sum(w * out for w, (_, out, _) in zip(weights, near, strict=True)) / 1e-3
+            nearby = [advance(i, z + k * step) for k in stencil]
+            if all(b == bits for b, _, _ in nearby):
+                difference = sum(w * out for w, (_, out, _) in zip(weights, nearby, strict=True)) / 1e-3
                 np.testing.assert_allclose(slope[:, column], difference, atol=2e-11 * (1 + np.abs(difference).max()))
                 checked += 1
-                seen |= bits
+                observed |= bits
     assert checked > 100 * len(components)
     if n_state > 0:
-        assert seen & (SLIPS | STICKS) == SLIPS | STICKS
+        assert observed & (SLIPS | STICKS) == SLIPS | STICKS
 
 
 @EVERY_LAW
@@ -232,8 +232,8 @@ def test_time_origin_does_not_matter(name, components):
         scale = np.abs(first.force).max()
         error = np.abs(second.force - basis.shift(first.force, angle)).max(axis=(1, 2))
         assert error[keep].max() < 1e-11 * scale
-        same = first.status[keep] == second.status[keep]  # a pair on the rim of sticking may touch slip by rounding
-        assert same.mean() > 0.9
+        equal = first.status[keep] == second.status[keep]  # a pair on the rim of sticking may touch slip by rounding
+        assert equal.mean() > 0.9
 
 
 @EVERY_LAW
@@ -282,8 +282,8 @@ def test_action_is_reaction(name, components):
     force = basis.to_complex(flat)
     size = np.abs(force).max()
     assert size > 0.05
-    moved = coordinates(balance, state.flat, flat, 0.8)
-    for at, (h, q) in enumerate(zip(basis.harmonics, moved, strict=True)):
+    shifted = coordinates(balance, state.flat, flat, 0.8)
+    for at, (h, q) in enumerate(zip(basis.harmonics, shifted, strict=True)):
         lacking = (stiffness + 0.8j * h * damping - (0.8 * h) ** 2 * mass) @ q
         for name_of, value in (("press", 0.5 * (h == 0)), ("shake", 1.0 * (h == 1))):
             lacking = lacking - value * loads[name_of]
@@ -331,10 +331,10 @@ def test_memory_repeats(name, components):
             assert aft._settle(pointer(law.step), u, p, phi, s, none) >= 0
         return there
 
-    settled = settle(memory)
-    np.testing.assert_allclose(settle(settled), settled, atol=1e-12)
+    stationary = settle(memory)
+    np.testing.assert_allclose(settle(stationary), stationary, atol=1e-12)
     first = aft.cycle(law, x, parameters, basis, memory)
-    second = aft.cycle(law, x, parameters, basis, settled)
+    second = aft.cycle(law, x, parameters, basis, stationary)
     np.testing.assert_allclose(second.force, first.force, atol=1e-11)
 
 

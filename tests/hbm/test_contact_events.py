@@ -46,17 +46,17 @@ def test_forces_and_jacobians_are_those_of_the_closed_form(name, components, har
     np.testing.assert_allclose(found.force, exact.force, atol=1e-10 * size)
     np.testing.assert_allclose(found.jacobian, exact.jacobian, atol=2e-5 * np.abs(exact.jacobian).max())
     assert (found.status == exact.status).mean() > 0.95  # but where a transition merely grazes
-    alone = events.cycle(law, x, parameters, memory, basis, False)
-    np.testing.assert_allclose(alone.force, exact.force, atol=1e-10 * size)
-    assert alone.jacobian is None
+    single = events.cycle(law, x, parameters, memory, basis, False)
+    np.testing.assert_allclose(single.force, exact.force, atol=1e-10 * size)
+    assert single.jacobian is None
 
 
 @numba.njit
 def two_slopes(x, s, p, f, dfx, dfs, dsx, dss):
     """A spring that is three times as stiff beyond a limit on either side, and says nothing about it."""
-    beyond = max(abs(x[0]) - 0.4, 0.0)
-    f[0] = p[0] * (x[0] + 2.0 * beyond * (1.0 if x[0] > 0.0 else -1.0))
-    dfx[0, 0] = p[0] * (3.0 if beyond > 0.0 else 1.0)
+    outside = max(abs(x[0]) - 0.4, 0.0)
+    f[0] = p[0] * (x[0] + 2.0 * outside * (1.0 if x[0] > 0.0 else -1.0))
+    dfx[0, 0] = p[0] * (3.0 if outside > 0.0 else 1.0)
     return STICKS
 
 
@@ -69,8 +69,8 @@ def test_a_kink_that_only_the_slope_tells_is_located():
     t = 0.5 * (edges[1:] + edges[:-1])
     phi = basis.functions(t)
     motion = x[:, 0] @ phi.T
-    beyond = np.maximum(np.abs(motion) - 0.4, 0) * np.sign(motion)
-    exact = 2.0 * (motion + 2 * beyond) @ phi / len(t) * np.where(np.arange(basis.n_coeff) > 0, 2, 1)
+    outside = np.maximum(np.abs(motion) - 0.4, 0) * np.sign(motion)
+    exact = 2.0 * (motion + 2 * outside) @ phi / len(t) * np.where(np.arange(basis.n_coeff) > 0, 2, 1)
     np.testing.assert_allclose(found.force[:, 0], exact, atol=1e-8)
     step = 1e-6 * np.random.default_rng(6).normal(size=x.shape)
     ahead, back = (events.cycle(law, x + e * step, parameters, np.zeros((20, 0)), basis).force for e in (1, -1))
@@ -113,16 +113,16 @@ def test_a_law_of_ones_own_gives_the_same_curve_from_both_ends(make, name, ends,
     mine, theirs = make(own_file(tmp_path, name)), make(name)
     assert mine.basis.transitions == "located"
     for start, end in (ends, ends[::-1]):
-        own, exact = (arc_length.follow(balance, start, end) for balance in (mine, theirs))
-        assert str(own.end) == str(exact.end)  # reached, or turned back where the stop is within a loop of the curve
-        assert len(own.folds) == len(exact.folds) >= 1
-        np.testing.assert_allclose(own.omega[list(own.folds)], exact.omega[list(exact.folds)], rtol=1e-6)
+        base, exact = (arc_length.follow(balance, start, end) for balance in (mine, theirs))
+        assert str(base.end) == str(exact.end)  # reached, or turned back where the stop is within a loop of the curve
+        assert len(base.folds) == len(exact.folds) >= 1
+        np.testing.assert_allclose(base.omega[list(base.folds)], exact.omega[list(exact.folds)], rtol=1e-6)
         output = next(iter(mine.model.system.outputs))
-        assert own.amplitude(output).max() == pytest.approx(exact.amplitude(output).max(), rel=1e-3)  # of its points
-        harmonic = np.hypot(*own.response[:, 0, theirs.basis.order == 1].T)
-        for omega, contact, amplitude in zip(own.omega, own.contact, harmonic, strict=True):
+        assert base.amplitude(output).max() == pytest.approx(exact.amplitude(output).max(), rel=1e-3)  # of its points
+        harmonic = np.hypot(*base.response[:, 0, theirs.basis.order == 1].T)
+        for omega, contact, amplitude in zip(base.omega, base.contact, harmonic, strict=True):
             x = contact.reshape(theirs.contact.n_pair, -1, contact.shape[-1])
-            found = theirs.evaluate(omega, x, jacobian=False)
-            assert newton.relative_residual(found, theirs.x_lin(omega)) < 1e-6
-            y = theirs.outputs(found)[0]
+            state = theirs.evaluate(omega, x, jacobian=False)
+            assert newton.relative_residual(state, theirs.x_lin(omega)) < 1e-6
+            y = theirs.outputs(state)[0]
             assert np.hypot(*y[theirs.basis.order == 1]) == pytest.approx(amplitude, rel=1e-6)

@@ -10,9 +10,7 @@ from tribodyn.hbm.contact import aft, contact_law, located
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
-EVERY_LAW = pytest.mark.parametrize(
-    ("name", "components"), CLOSED_FORMS, ids=law_id
-)
+EVERY_LAW = pytest.mark.parametrize(("name", "components"), CLOSED_FORMS, ids=law_id)
 WITH_STATIC = HarmonicBasis((0, 1, 2, 3), 8, "located")
 
 
@@ -91,8 +89,8 @@ def test_what_locating_buys(name, components, swing, order):
     for n_samples in samples:
         sampled = aft.cycle(law, x, p, HarmonicBasis((0, 1, 2, 3), int(n_samples)))
         error.append(np.sqrt(np.mean((sampled.force - exact.force) ** 2)))
-        same = aft.cycle(law, x, p, HarmonicBasis((0, 1, 2, 3), int(n_samples), "located"))
-        np.testing.assert_array_equal(same.force, exact.force)
+        equal = aft.cycle(law, x, p, HarmonicBasis((0, 1, 2, 3), int(n_samples), "located"))
+        np.testing.assert_array_equal(equal.force, exact.force)
     slope = -np.polyfit(np.log2(samples[2:]), np.log2(error[2:]), 1)[0]
     assert slope == pytest.approx(order, abs=0.12)
     assert error[4] < 1e-3
@@ -149,10 +147,10 @@ def test_grazing_contact(touch):
     x[1, 1, :2] = -1.0 + touch, 1.0
     p = ContactParameters.of(("t1", "n"), [[1.0, 1.0]] * 2, friction=0.5)
     cycle = aft.cycle(law, x, p, WITH_STATIC)
-    near = aft.cycle(law, x + [[[1e-7], [0.0]]] * (WITH_STATIC.order == 0), p, WITH_STATIC)
+    nearby = aft.cycle(law, x + [[[1e-7], [0.0]]] * (WITH_STATIC.order == 0), p, WITH_STATIC)
     assert np.isfinite(cycle.force).all()
     assert np.isfinite(cycle.jacobian).all()
-    np.testing.assert_allclose(near.force, cycle.force, atol=2e-7)
+    np.testing.assert_allclose(nearby.force, cycle.force, atol=2e-7)
     lifted, touched = (2 * np.sqrt(2) / (3 * np.pi) * max(t, 0.0) ** 1.5 for t in (-touch, touch))
     assert cycle.force[0, 1, 0] == pytest.approx(1.0 + touch + lifted, abs=1e-10)
     assert cycle.force[1, 1, 0] == pytest.approx(touched, abs=1e-10)
@@ -237,7 +235,7 @@ def test_a_touch_of_a_thousandth_of_the_cycle_is_known_to_many_digits(stiffness:
     basis = HarmonicBasis((0, 1), 64, "located")
     law = contact_law.load("jenkins")
     p = ContactParameters.of(("t1", "n"), [[kt, stiffness]], friction=mu)
-    found = aft.cycle(law, x, p, basis).force[0]
+    result = aft.cycle(law, x, p, basis).force[0]
 
     far = np.longdouble
     c0, c1 = far(stiffness) * far(x[0, 1, 0]), far(stiffness) * far(a)
@@ -249,10 +247,10 @@ def test_a_touch_of_a_thousandth_of_the_cycle_is_known_to_many_digits(stiffness:
     def pull(t):  # of the stick that begins with the touch
         return far(kt) * (far(u1) * (np.cos(t) - np.cos(end)) + far(u2) * (np.sin(t) + np.sin(end)))
 
-    left, right = far(0), end  # u falls after the touch at -end and rises again: it slips where |T| reaches mu N
+    remaining, right = far(0), end  # u falls after the touch at -end and rises again: it slips where |T| reaches mu N
     for _ in range(80):
-        middle = (left + right) / 2
-        left, right = (middle, right) if abs(pull(middle)) < mu * load(middle) else (left, middle)
+        middle = (remaining + right) / 2
+        remaining, right = (middle, right) if abs(pull(middle)) < mu * load(middle) else (remaining, middle)
     points, weights = (v.astype(far) for v in np.polynomial.legendre.leggauss(30))
 
     def coefficients(f, start, stop):
@@ -260,9 +258,9 @@ def test_a_touch_of_a_thousandth_of_the_cycle_is_known_to_many_digits(stiffness:
         value = f(t) * weights * (stop - start) / 2 / far(np.pi)
         return np.array([value.sum() / 2, (value * np.cos(t)).sum(), (value * np.sin(t)).sum()])
 
-    stick, slip = coefficients(pull, -end, left), coefficients(lambda t: mu * load(t), left, end)
-    friction = stick + np.sign(pull(left)) * slip
-    for ours, exact in zip(found, (friction, coefficients(load, -end, end)), strict=True):
+    stick, slip = coefficients(pull, -end, remaining), coefficients(lambda t: mu * load(t), remaining, end)
+    friction = stick + np.sign(pull(remaining)) * slip
+    for ours, exact in zip(result, (friction, coefficients(load, -end, end)), strict=True):
         np.testing.assert_allclose(ours, exact.astype(float), atol=1e-8 * float(abs(exact).max()))
 
 

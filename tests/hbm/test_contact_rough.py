@@ -17,14 +17,14 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 
 
 def one_asperity(**numbers: float) -> ContactParameters:
-    given = {"friction": MU, "young": YOUNG, "poisson": POISSON, "radius": RADIUS, "deepest": 2e-6, **numbers}
-    return contact_law.checked("rough", ContactParameters.of(ALL, np.ones((1, 3)), table=[[0.0, 1.0]], **given))
+    inputs = {"friction": MU, "young": YOUNG, "poisson": POISSON, "radius": RADIUS, "deepest": 2e-6, **numbers}
+    return contact_law.checked("rough", ContactParameters.of(ALL, np.ones((1, 3)), table=[[0.0, 1.0]], **inputs))
 
 
 def face(n_pair: int = 1, components: tuple[str, ...] = ALL, friction: float = 0.03) -> ContactParameters:
     springs = np.ones((n_pair, len(components)))
-    made = ContactParameters.of(components, springs, table=FACE, friction=friction, area=2e-6, **STEEL)
-    return contact_law.checked("rough", made)
+    built = ContactParameters.of(components, springs, table=FACE, friction=friction, area=2e-6, **STEEL)
+    return contact_law.checked("rough", built)
 
 
 def pressed(parameters: ContactParameters, deepest: float) -> tuple[np.ndarray, np.ndarray]:
@@ -48,8 +48,8 @@ def test_its_partial_slip_is_that_of_cattaneo_and_mindlin():
     Q = MU * N * np.linspace(0.02, 0.98, 13)
     delta = 3 * MU * N * (2 - POISSON) / (8 * a * G) * (1 - (1 - Q / (MU * N)) ** (2 / 3))
     kt = rough.tangential_ratio(POISSON) * k
-    found = np.minimum(np.outer(delta, kt), MU * k * (d - g)).sum(axis=1)
-    assert np.abs(found - Q).max() < 1e-3 * MU * N
+    total = np.minimum(np.outer(delta, kt), MU * k * (d - g)).sum(axis=1)
+    assert np.abs(total - Q).max() < 1e-3 * MU * N
     assert kt.sum() == pytest.approx(4 * a * G / (2 - POISSON), rel=1e-4)
 
 
@@ -72,15 +72,15 @@ def test_a_loop_loses_what_mindlin_and_deresiewicz_found():
 
 
 def test_beyond_yield_the_loading_is_continuous_and_unloading_keeps_a_plastic_depth():
-    one = asperity((YOUNG, POISSON, RADIUS, 331.7e6, 620e6))
-    near = one.onset * np.array([1 - 1e-9, 1 + 1e-9])
-    assert np.ptp(one.loading(near)) < 1e-7 * one.loading(near)[0]
-    d = np.geomspace(1.01, 60, 200) * one.onset
-    assert (np.diff(one.loading(d)) > 0).all()
-    assert (one.loading(d) < one.hertz(d)).all()
-    depth, root = one.flattened(d)
+    item = asperity((YOUNG, POISSON, RADIUS, 331.7e6, 620e6))
+    nearby = item.onset * np.array([1 - 1e-9, 1 + 1e-9])
+    assert np.ptp(item.loading(nearby)) < 1e-7 * item.loading(nearby)[0]
+    d = np.geomspace(1.01, 60, 200) * item.onset
+    assert (np.diff(item.loading(d)) > 0).all()
+    assert (item.loading(d) < item.hertz(d)).all()
+    depth, root = item.flattened(d)
     assert (np.diff(depth) > 0).all()  # and the unloading curve meets the loading one where it begins
-    np.testing.assert_allclose(4 / 3 * E_STAR * root * (d - depth) ** 1.5, one.loading(d), rtol=1e-12)
+    np.testing.assert_allclose(4 / 3 * E_STAR * root * (d - depth) ** 1.5, item.loading(d), rtol=1e-12)
 
 
 @pytest.mark.parametrize("tangent", [0.0, 620e6, 0.05 * YOUNG])
@@ -97,24 +97,24 @@ def test_beyond_yield_two_spheres_are_twice_one_sphere_on_a_rigid_flat(tangent):
     hardness = 2.84 - 0.92 * (1 - np.cos(np.pi * (a_e + (a_p - a_e) * np.exp(-softer)) / R))
     plastic = np.exp(-0.25 * w ** (5 / 12)) * w**1.5 + 4 * hardness / C * (1 - np.exp(-0.04 * w ** (5 / 9))) * w
     plastic *= 4 / 3 * (R / E) ** 2 * (C * np.pi * S / 2) ** 3
-    known = plastic + (4 / 3 * E * np.sqrt(R) * delta**1.5 - plastic) * (1 - np.exp(-3.3 * ratio))
-    one = asperity((YOUNG, POISSON, RADIUS, S, tangent))
-    assert one.onset == pytest.approx(2 * 1.9 * critical)
-    off = one.loading(2 * delta) / known - 1
+    reference = plastic + (4 / 3 * E * np.sqrt(R) * delta**1.5 - plastic) * (1 - np.exp(-3.3 * ratio))
+    item = asperity((YOUNG, POISSON, RADIUS, S, tangent))
+    assert item.onset == pytest.approx(2 * 1.9 * critical)
+    off = item.loading(2 * delta) / reference - 1
     assert np.abs(off).max() < 6e-3  # the jump that is taken off
     assert np.abs(off[w > 20]).max() < 1e-8
 
 
 def test_a_face_is_the_sum_of_its_asperities_on_loading_and_unloading():
-    one, rows = asperity(tuple(STEEL.values())), heights(FACE)
+    item, rows = asperity(tuple(STEEL.values())), heights(FACE)
     for deepest in (4e-6, 9e-6, 14e-6):
         k, g = pressed(face(), deepest)
-        loading = rows[:, 1] @ one.loading(np.maximum(deepest - rows[:, 0], 0.0))
+        loading = rows[:, 1] @ item.loading(np.maximum(deepest - rows[:, 0], 0.0))
         assert (k * (deepest - g)).sum() == pytest.approx(2e-6 * loading, rel=3e-5)
         u = deepest - (deepest - g[-1]) * np.array([0.02, 0.1, 0.3, 0.6])
-        unloading = 2e-6 * pressure(one, rows, u, deepest)
-        found = (k * np.maximum(u[:, None] - g, 0.0)).sum(axis=1)
-        np.testing.assert_allclose(found, unloading, atol=1e-3 * unloading[0])
+        unloading = 2e-6 * pressure(item, rows, u, deepest)
+        total = (k * np.maximum(u[:, None] - g, 0.0)).sum(axis=1)
+        np.testing.assert_allclose(total, unloading, atol=1e-3 * unloading[0])
         assert (k >= 0).all()
 
 
@@ -123,9 +123,9 @@ def test_the_cycle_is_the_one_that_marching_reaches(components):
     basis, n_pair = HarmonicBasis((0, 1, 2), 48), 6
     parameters = face(n_pair, components)
     x = moving(n_pair, len(components), basis, 1)
-    rest = np.zeros((n_pair, len(components)))
-    rest[:, -1] = 8e-6
-    memory = rough.rested(rest, parameters)
+    values = np.zeros((n_pair, len(components)))
+    values[:, -1] = 8e-6
+    memory = rough.rested(values, parameters)
     fast = aft.cycle(rough, x, parameters, basis, memory)
     slow = aft.march(rough, x, parameters, memory, basis)
     np.testing.assert_allclose(fast.force, slow.force, atol=1e-12 * np.abs(fast.force).max())
@@ -146,8 +146,8 @@ def test_the_located_jacobian_equals_differences(deepest):
     for column in range(15):
         h = np.zeros((3, 5))
         h.flat[column] = 1e-12
-        ahead, behind = (aft.cycle(rough, x + s * h, parameters, basis, memory, False).force for s in (1, -1))
-        slope = (ahead - behind).reshape(n_pair, -1) / 2e-12
+        ahead, previous = (aft.cycle(rough, x + s * h, parameters, basis, memory, False).force for s in (1, -1))
+        slope = (ahead - previous).reshape(n_pair, -1) / 2e-12
         assert np.abs(slope - jac[:, :, column]).max(axis=1) == pytest.approx(np.zeros(n_pair), abs=2e-5 * size.max())
 
 
@@ -186,8 +186,8 @@ def test_a_pair_beyond_its_gap_is_open_and_the_contact_at_rest_has_no_shear():
 
 
 def test_the_springs_at_a_pressure_carry_it():
-    made = ContactParameters.of(ALL, np.ones((1, 3)), table=FACE, friction=0.03, area=2e-6, pressure=5e6, **STEEL)
-    parameters = contact_law.checked("rough", made)
+    built = ContactParameters.of(ALL, np.ones((1, 3)), table=FACE, friction=0.03, area=2e-6, pressure=5e6, **STEEL)
+    parameters = contact_law.checked("rough", built)
     kt, _, kn = rough.springs(parameters)[0]
     deepest = np.linspace(5e-6, 2e-5, 4000)
     p = parameters.packed().repeat(len(deepest), axis=0)
@@ -198,9 +198,9 @@ def test_the_springs_at_a_pressure_carry_it():
 
 
 def test_a_law_without_its_table_or_with_a_wrong_one_is_one_sentence():
-    made = ContactParameters.of(ALL, np.ones((1, 3)), friction=0.03, **STEEL)
+    built = ContactParameters.of(ALL, np.ones((1, 3)), friction=0.03, **STEEL)
     with pytest.raises(ValueError, match="needs its table of asperities: columns gap in m and"):
-        contact_law.checked("rough", made)
+        contact_law.checked("rough", built)
     for table, words in (([[0.0, 1.0, 2.0]], "two columns"), ([[1e-6, 1.0], [0.0, 1.0]], "must rise")):
         wrong = ContactParameters.of(ALL, np.ones((1, 3)), table=np.array(table), friction=0.03, **STEEL)
         with pytest.raises(ValueError, match=words):

@@ -67,8 +67,8 @@ def test_contact_width_satisfies_ciavarella(load):
     assert PUNCH.load(b) == pytest.approx(load, rel=1e-3 if load < 1 else 1e-8)  # b - a is 1e-8 a at the smallest load
     if load > 1e4:
         p0 = np.arcsin(2e-3 / b)
-        left = 2 * load * 5e-3 / (MIXED.modulus * 2e-3**2)
-        assert (pi - 2 * p0) / (2 * np.sin(p0) ** 2) - 1 / np.tan(p0) == pytest.approx(left, rel=1e-9)
+        remaining = 2 * load * 5e-3 / (MIXED.modulus * 2e-3**2)
+        assert (pi - 2 * p0) / (2 * np.sin(p0) ** 2) - 1 / np.tan(p0) == pytest.approx(remaining, rel=1e-9)
 
 
 def test_pressure_carries_the_load_and_is_a_sum_of_flat_punches():
@@ -164,10 +164,10 @@ def test_a_long_strip_is_the_slender_conductor(ratio, within):
     wire of radius w/4 (Jackson, Am. J. Phys. 68 (2000) 789-799)."""
     W = log(4 * ratio) + log(2) - 1
     capacity = ratio / 2 * (1 / W + (1 - pi**2 / 12) / W**3)
-    k_n, along = rectangular_punch(ratio, 1.0, 1.0, 0.3, inf, 0.0)
+    k_n, path = rectangular_punch(ratio, 1.0, 1.0, 0.3, inf, 0.0)
     _, across = rectangular_punch(1.0, ratio, 1.0, 0.3, inf, 0.0)
     assert k_n * (1 - 0.3**2) == pytest.approx(pi * capacity, rel=within)
-    assert along < across < k_n
+    assert path < across < k_n
     # far from its ends a strip under shear across it is a plane problem, as stiff as under pressure; along it is softer
     assert across == pytest.approx(k_n, rel=3 / W)
 
@@ -202,8 +202,8 @@ def test_rectangle_against_boundary_elements_with_both_shear_components(a, b):
         normal.append(np.linalg.solve(_cells(x, y, _love), np.ones(count)).sum() * cell * pi)
         across = _cells(x, y, lambda u, v: along(v, u))
         cross = _cells(x, y, lambda u, v: -nu * np.hypot(u, v))
-        both = np.block([[_cells(x, y, along), cross], [cross, across]])
-        pull = np.linalg.solve(both, np.concatenate([np.ones(count), np.zeros(count)]))
+        two_results = np.block([[_cells(x, y, along), cross], [cross, across]])
+        pull = np.linalg.solve(two_results, np.concatenate([np.ones(count), np.zeros(count)]))
         shear.append(pull[:count].sum() * cell * pi / (1 + nu))
     # the error of uniform cells at the edge singularity falls with h, then h^2
     limits = [np.polyfit(1 / np.array(sizes), values, 2)[-1] for values in (normal, shear)]
@@ -230,10 +230,10 @@ def test_rounded_rectangle_against_unilateral_boundary_elements(radius, depth, w
         for _ in range(40):
             pressure = np.zeros(n * n)
             pressure[active] = np.linalg.solve(influence[np.ix_(active, active)], sunk - gap[active])
-            kept = np.where(active, pressure > 0, influence @ pressure + gap < sunk)
-            if (kept == active).all():
+            places = np.where(active, pressure > 0, influence @ pressure + gap < sunk)
+            if (places == active).all():
                 break
-            active = kept
+            active = places
         return 4 * pressure.sum() * (edge[1] - edge[0]) ** 2
 
     tangent = (load(1.05 * depth) - load(0.95 * depth)) / (0.1 * depth)

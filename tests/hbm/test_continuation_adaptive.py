@@ -21,11 +21,11 @@ def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
     Returns (n, n_output, n_coeff) Fourier coefficients of the outputs [m]
     """
     order = np.argsort(branch.parameter)
-    known, response = branch.parameter[order], branch.response[order]
-    window = min(EXTRAPOLATION_DEGREE + 1, len(known))
-    first = np.clip(np.searchsorted(known, values) - window // 2, 0, len(known) - window)
+    reference, response = branch.parameter[order], branch.response[order]
+    window = min(EXTRAPOLATION_DEGREE + 1, len(reference))
+    first = np.clip(np.searchsorted(reference, values) - window // 2, 0, len(reference) - window)
     pieces = [(slice(i, i + window), value) for i, value in zip(first, values, strict=True)]
-    return np.stack([extrapolate(known[piece], list(response[piece]), value) for piece, value in pieces])
+    return np.stack([extrapolate(reference[piece], list(response[piece]), value) for piece, value in pieces])
 
 
 def worst(branch: Branch, reference: Branch) -> float:
@@ -92,8 +92,8 @@ def test_it_steps_other_parameters_and_ends_in_words():
     branch = adaptive.follow(parameter.load(balance, 1.0), 0.0, 2.0)
     assert branch.parameter_name == "load factor"
     assert branch.parameter[-1] == 2.0
-    few = adaptive.follow(balance, 0.5, 2.0, Options(max_points=5))
-    assert str(few.end).endswith("5 points were allowed")
+    small = adaptive.follow(balance, 0.5, 2.0, Options(max_points=5))
+    assert str(small.end).endswith("5 points were allowed")
     with pytest.raises(ValueError, match="tolerance"):
         Options(tolerance=0.0)
     with pytest.raises(ValueError, match="min_step <= step"):

@@ -77,9 +77,9 @@ def test_corners_of_a_coarsely_sampled_contact_do_not_stop_the_walk(n_samples, t
         assert branch.converged.all()
         np.testing.assert_allclose(branch.amplitude("mass").max(), tip, rtol=0.01)
         folds.append(branch.omega[list(branch.folds)])
-    fewer, more = sorted(folds, key=len)  # a small tooth may be stepped over
+    fewer, extra = sorted(folds, key=len)  # a small tooth may be stepped over
     assert len(fewer) >= 8
-    assert np.abs(fewer[:, None] / more - 1).min(axis=1).max() < 1e-8
+    assert np.abs(fewer[:, None] / extra - 1).min(axis=1).max() < 1e-8
 
 
 def test_several_pairs_with_friction_and_lift_trace_the_same_curve_both_ways():
@@ -184,16 +184,16 @@ def test_derivative_with_respect_to_a_parameter(make):
     path = getattr(parameter, make)(balance, omega, *([depth] if make == "wear" else []))
     at = {"load": 1.0, "gap": 0.0, "wear": 0.0, "stiffness": 1.0, "friction": 1.0}[make]
     change = {"load": 0.01, "gap": 1e-7, "wear": 0.01, "stiffness": 0.01, "friction": 0.01}[make]
-    moved = newton.solve(*path.place(at + change), base.state.x, newton.NewtonOptions(tolerance=1e-11))
+    shifted = newton.solve(*path.place(at + change), base.state.x, newton.NewtonOptions(tolerance=1e-11))
     back = newton.solve(*path.place(at - change), base.state.x, newton.NewtonOptions(tolerance=1e-11))
     metric = Metric(float(np.linalg.norm(base.state.x)), change)
     up = Direction(np.zeros_like(base.state.flat), 1.0)
     tangent = bordered.tangent(path, at, base.state, up, metric, newton.NewtonOptions(), 1e-10)
-    slope = (moved.state.flat - back.state.flat) / (2 * change)
+    slope = (shifted.state.flat - back.state.flat) / (2 * change)
     np.testing.assert_allclose(tangent.x / tangent.p, slope, atol=0.01 * np.abs(slope).max())
-    both = natural.follow(path, at, at + change, natural.Options(n_points=3))
-    assert both.parameter[-1] == at + change
-    np.testing.assert_allclose(both.contact[-1], moved.state.flat, atol=1e-6 * np.abs(base.state.x).max())
+    branch = natural.follow(path, at, at + change, natural.Options(n_points=3))
+    assert branch.parameter[-1] == at + change
+    np.testing.assert_allclose(branch.contact[-1], shifted.state.flat, atol=1e-6 * np.abs(base.state.x).max())
 
 
 def test_bordered_solve_is_that_of_the_full_matrix_and_regular_at_a_fold():
@@ -207,12 +207,12 @@ def test_bordered_solve_is_that_of_the_full_matrix_and_regular_at_a_fold():
     metric = Metric(1e-5, 100.0)
     border = Direction(1e-5 * rng.normal(size=slope.shape), 30.0)
     rhs = 1e-5 * rng.normal(size=slope.shape)
-    found, _ = bordered.solve(linear, slope, border, metric, (rhs, 0.7), 1e-12, 500)
-    defect = linear.dense() @ found.x.ravel() + slope.ravel() * found.p - rhs.ravel()
+    result, _ = bordered.solve(linear, slope, border, metric, (rhs, 0.7), 1e-12, 500)
+    defect = linear.dense() @ result.x.ravel() + slope.ravel() * result.p - rhs.ravel()
     assert np.linalg.norm(defect) < 1e-5 * np.linalg.norm(rhs)
     active = np.isin(np.arange(len(slope)), linear.rows)
     masked = Direction(np.where(active[:, None], border.x, 0.0), border.p)
-    np.testing.assert_allclose(metric.dot(masked, found), 0.7, rtol=1e-8)
+    np.testing.assert_allclose(metric.dot(masked, result), 0.7, rtol=1e-8)
     scale = np.linalg.svd(linear.dense(), compute_uv=False)
     assert scale[-1] < 1e-3 * scale[0]  # while without border it is nearly singular here
 
@@ -229,26 +229,26 @@ def test_a_first_solution_is_found_along_the_load_where_rest_fails():
 
 def test_a_guess_starts_on_another_branch():
     duffing = Duffing()
-    whole = arc_length.follow(duffing.balance(), 0.5, 5.0)
-    upper = int(np.flatnonzero(whole.omega[: whole.folds[0]] < 2.4)[-1])
-    start, guess = whole.omega[upper], whole.contact[upper].reshape(1, 1, -1)
+    full = arc_length.follow(duffing.balance(), 0.5, 5.0)
+    upper = int(np.flatnonzero(full.omega[: full.folds[0]] < 2.4)[-1])
+    start, guess = full.omega[upper], full.contact[upper].reshape(1, 1, -1)
     branch = arc_length.follow(duffing.balance(), start, 0.5, Options(guess=guess))
     assert branch.omega[-1] == 0.5
     assert branch.folds == ()
-    np.testing.assert_allclose(branch.amplitude("mass")[0], whole.amplitude("mass")[upper], rtol=1e-7)
+    np.testing.assert_allclose(branch.amplitude("mass")[0], full.amplitude("mass")[upper], rtol=1e-7)
 
 
 def test_it_says_where_it_ends():
     balance = Duffing().balance()
-    few = arc_length.follow(balance, 0.5, 5.0, Options(max_points=10))
-    assert str(few.end) == f"ended at {few.frequency[-1]:.6g} Hz: 10 points were allowed"
+    small = arc_length.follow(balance, 0.5, 5.0, Options(max_points=10))
+    assert str(small.end) == f"ended at {small.frequency[-1]:.6g} Hz: 10 points were allowed"
     high = Duffing(zeta=0.005, force=0.6).balance()
     back = arc_length.follow(high, 4.0, 0.2)
     assert str(back.end) == f"turned back to {4.0 / (2 * np.pi):.6g} Hz"
     assert back.omega[-1] == 4.0
     impatient = arc_length.follow(high, 4.0, 0.2, Options(patience=5))
-    told, _, furthest = str(impatient.end).removesuffix(" Hz").rpartition(" ")
-    assert told.endswith("5 points brought it hardly further than")
+    messages, _, furthest = str(impatient.end).removesuffix(" Hz").rpartition(" ")
+    assert messages.endswith("5 points brought it hardly further than")
     assert float(furthest) == pytest.approx(impatient.frequency.min(), rel=arc_length.Rules.headway)
     assert impatient.frequency.argmin() + 6 <= len(impatient.omega) < len(back.omega)
     with pytest.raises(ValueError, match="start and stop are the same"):
@@ -261,10 +261,10 @@ def test_it_says_where_it_ends():
         Options(max_points=1)
     with pytest.raises(ValueError, match="wear depth"):
         parameter.wear(balance, 1.0, np.zeros(1))
-    seen = []
-    arc_length.follow(balance, 0.5, 1.0, on_point=lambda done, wanted, _: seen.append((done, wanted)))
-    assert all(wanted >= done > 0 for done, wanted in seen)
-    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
+    observed = []
+    arc_length.follow(balance, 0.5, 1.0, on_point=lambda done, expected, _: observed.append((done, expected)))
+    assert all(expected >= done > 0 for done, expected in observed)
+    assert [done for done, _ in observed] == sorted(done for done, _ in observed)
 
 
 def test_an_unsolved_start_is_said(monkeypatch):

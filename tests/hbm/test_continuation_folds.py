@@ -55,8 +55,8 @@ def test_fold_of_a_lifting_mass_against_branches_traced_anew(make, start, stop):
     assert line.parameter[-1] == stop
     assert line.parameter_name == path.name
     for k in (len(line.omega) // 2, -1):
-        anew = arc_length.follow(path.make(line.parameter[k]), 0.5, 4.0)
-        assert np.abs(anew.omega[list(anew.folds)] / line.omega[k] - 1).min() < 1e-8
+        repeated = arc_length.follow(path.make(line.parameter[k]), 0.5, 4.0)
+        assert np.abs(repeated.omega[list(repeated.folds)] / line.omega[k] - 1).min() < 1e-8
 
 
 def test_fold_of_a_sampled_contact_is_followed_over_its_kinks():
@@ -66,8 +66,8 @@ def test_fold_of_a_sampled_contact_is_followed_over_its_kinks():
     i = branch.folds[0]
     line = track_fold(parameter.load(balance, 1.6), 1.0, 2.0, branch.omega[i], branch.contact[i].reshape(1, 1, -1))
     assert str(line.end) == "reached load factor 2"
-    anew = arc_length.follow(balance.with_load(2.0), 0.5, 1.9, arc_length.Options(max_points=60))
-    np.testing.assert_allclose(line.omega[-1], anew.omega[anew.folds[0]], rtol=1e-6)
+    repeated = arc_length.follow(balance.with_load(2.0), 0.5, 1.9, arc_length.Options(max_points=60))
+    np.testing.assert_allclose(line.omega[-1], repeated.omega[repeated.folds[0]], rtol=1e-6)
 
 
 def test_it_refuses_what_has_no_fold(duffing_branch):
@@ -81,34 +81,34 @@ def test_it_refuses_what_has_no_fold(duffing_branch):
     with pytest.raises(ValueError, match="start and stop are the same"):
         track_fold(path, 1.0, 1.0, 0.5, x)
     i = branch.folds[0]
-    few = track_fold(path, 1.0, 0.1, branch.omega[i], branch.contact[i].reshape(1, 1, -1), FoldOptions(max_points=3))
-    assert str(few.end).endswith("3 points were allowed")
-    assert len(few.omega) == 3
+    small = track_fold(path, 1.0, 0.1, branch.omega[i], branch.contact[i].reshape(1, 1, -1), FoldOptions(max_points=3))
+    assert str(small.end).endswith("3 points were allowed")
+    assert len(small.omega) == 3
 
 
 def test_a_fold_whose_points_rounding_holds_in_place_is_found_in_few_solves(duffing_branch, monkeypatch):
     """Solves that are accurate to 3e-3 only: the tangent of each has the same sign, however often it is asked."""
-    exact, found, solves = curve.bordered.correct, [], []
+    exact, rows, solves = curve.bordered.correct, [], []
 
     def rounded(path, guess, border, metric, options):
         solves.append(guess.p)
-        for point, solution in found:
+        for point, solution in rows:
             if metric.norm(guess - point) < 3e-3:
                 return solution, point.p
         solution, value = exact(path, guess, border, metric, options)
-        found.append((Direction(solution.state.flat, value), solution))
+        rows.append((Direction(solution.state.flat, value), solution))
         return solution, value
 
     balance = Duffing().balance()
     i = duffing_branch.folds[0]
     place = [Direction(duffing_branch.contact[j].reshape(1, -1), duffing_branch.omega[j]) for j in (i - 1, i + 1)]
     metric = Metric(float(np.linalg.norm(place[0].x)), 1.0)
-    along = metric.unit(place[1] - place[0])
+    direction = metric.unit(place[1] - place[0])
     path, newton = parameter.of(balance), NewtonOptions()
     ends = []
     for at in place:
-        solution, value = exact(path, at, along, metric, newton)
-        tangent = curve.bordered.tangent(path, value, solution.state, along, metric, newton, 1e-6)
+        solution, value = exact(path, at, direction, metric, newton)
+        tangent = curve.bordered.tangent(path, value, solution.state, direction, metric, newton, 1e-6)
         ends.append(curve.CurvePoint.of(value, solution, tangent))
     monkeypatch.setattr(curve.bordered, "correct", rounded)
     fold = curve.locate_fold(path, curve.Segment(*ends, metric), newton, 1e-9)

@@ -35,9 +35,9 @@ def subharmonic(balance: HarmonicBalance) -> np.ndarray:
     """A motion of three periods of the drive at 1.2 rad/s."""
     guess = np.zeros((1, 1, balance.basis.n_coeff))
     guess[0, 0, [0, 1, 2]] = -0.55, 0.04, -0.26
-    found = newton.solve(balance, 1.2, guess)
-    assert found.converged
-    return found.state.x
+    solution = newton.solve(balance, 1.2, guess)
+    assert solution.converged
+    return solution.state.x
 
 
 def monodromy(balance: HarmonicBalance, omega: float, x: np.ndarray) -> tuple[np.ndarray, float]:
@@ -62,8 +62,8 @@ def test_subharmonic_curve_closes_from_both_sides_at_every_step(longest, stop):
     options = Options(max_step=longest, width=0.33 / abs(stop - 1.2), bounds=(0.2, 6.0), guess=subharmonic(balance))
     branch = arc_length.follow(balance, 1.2, stop, options)
     assert str(branch.end).startswith("closed curve"), branch.end
-    own = balance.basis.order % 3 != 0  # what the drive does not move on the main branch
-    assert np.abs(branch.contact[:, 0, own]).max(axis=1).min() > 0.05
+    base = balance.basis.order % 3 != 0  # what the drive does not move on the main branch
+    assert np.abs(branch.contact[:, 0, base]).max(axis=1).min() > 0.05
     assert len(branch.folds) == 2
     for i in branch.folds:  # a fold is where a multiplier of the motion, integrated in time, is one
         matrix, miss = monodromy(balance, branch.omega[i], branch.contact[i, 0])
@@ -96,7 +96,7 @@ def test_superharmonic_curve_closes_from_both_sides_at_every_step(longest, way):
 def _along(path: Parameter, start: float, x: np.ndarray) -> np.ndarray:
     """The motion at the value zero, by steps from a motion at another value."""
     for value in np.linspace(start, 0.0, 12):
-        found = newton.solve(*path.place(value), x, NewtonOptions())
-        assert found.converged
-        x = found.state.x
+        solution = newton.solve(*path.place(value), x, NewtonOptions())
+        assert solution.converged
+        x = solution.state.x
     return x

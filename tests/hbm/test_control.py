@@ -34,51 +34,51 @@ def duffing(harmonics: tuple[int, ...] = (1,)) -> HarmonicBalance:
 
 def test_constant_response_of_a_duffing_oscillator_is_the_closed_form_where_constant_force_folds():
     balance, a = duffing(), 5e-3
-    held = constant_response(balance, "mass", a)
-    found = driven(held, arc_length.follow(held, 100.0, 400.0))
-    stiff = STIFFNESS + KT + 0.75 * CUBIC * a**2 - MASS * found.omega**2
-    needed = (stiff + 1j * DASHPOT * found.omega) * a
-    assert str(found.end).startswith("reached")
-    assert found.folds == ()
-    assert (np.diff(found.omega) > 0).all()
-    np.testing.assert_allclose(found.amplitude("mass"), a, rtol=1e-9)
-    np.testing.assert_allclose(FORCE * found.load_factor, np.abs(needed), rtol=1e-6)
-    phase = np.angle(found.fundamental("mass") * np.exp(-0.3j))
+    fixed = constant_response(balance, "mass", a)
+    result = driven(fixed, arc_length.follow(fixed, 100.0, 400.0))
+    stiff = STIFFNESS + KT + 0.75 * CUBIC * a**2 - MASS * result.omega**2
+    needed = (stiff + 1j * DASHPOT * result.omega) * a
+    assert str(result.end).startswith("reached")
+    assert result.folds == ()
+    assert (np.diff(result.omega) > 0).all()
+    np.testing.assert_allclose(result.amplitude("mass"), a, rtol=1e-9)
+    np.testing.assert_allclose(FORCE * result.load_factor, np.abs(needed), rtol=1e-6)
+    phase = np.angle(result.fundamental("mass") * np.exp(-0.3j))
     np.testing.assert_allclose(phase, -np.angle(needed), atol=1e-6)
-    assert found.load_factor.min() * 10 < found.load_factor.max()
-    peak = found.peak("mass")  # where it takes least, up to the spacing of points
+    assert result.load_factor.min() * 10 < result.load_factor.max()
+    peak = result.peak("mass")  # where it takes least, up to the spacing of points
     assert peak is not None
-    np.testing.assert_allclose(found.omega[peak], np.sqrt((STIFFNESS + KT + 0.75 * CUBIC * a**2) / MASS), rtol=0.1)
-    force = FORCE * found.load_factor[peak + 1]  # the curve of that force folds, and goes through the same state
+    np.testing.assert_allclose(result.omega[peak], np.sqrt((STIFFNESS + KT + 0.75 * CUBIC * a**2) / MASS), rtol=0.1)
+    force = FORCE * result.load_factor[peak + 1]  # the curve of that force folds, and goes through the same state
     curve = arc_length.follow(balance.with_load(force / FORCE), 100.0, 2000.0)
     assert len(curve.folds) == 2
-    assert _missed(balance, found, peak + 1) < 1e-6
+    assert _missed(balance, result, peak + 1) < 1e-6
 
 
 def test_phase_resonance_of_a_duffing_oscillator_is_the_closed_form():
-    found = phase_resonance(duffing(), "mass", 150.0, 300.0, 1e-5, 2e-2)
-    a = found.parameter
+    result = phase_resonance(duffing(), "mass", 150.0, 300.0, 1e-5, 2e-2)
+    a = result.parameter
     omega = np.sqrt((STIFFNESS + KT + 0.75 * CUBIC * a**2) / MASS)
-    assert str(found.end).startswith("reached")
+    assert str(result.end).startswith("reached")
     assert omega[-1] > 2 * omega[0]
-    np.testing.assert_allclose(found.omega, omega, rtol=1e-7)
-    np.testing.assert_allclose(FORCE * found.load_factor, DASHPOT * found.omega * a, rtol=1e-6)
-    np.testing.assert_allclose(np.angle(found.fundamental("mass") * np.exp(-0.3j)), -np.pi / 2, atol=1e-6)
+    np.testing.assert_allclose(result.omega, omega, rtol=1e-7)
+    np.testing.assert_allclose(FORCE * result.load_factor, DASHPOT * result.omega * a, rtol=1e-6)
+    np.testing.assert_allclose(np.angle(result.fundamental("mass") * np.exp(-0.3j)), -np.pi / 2, atol=1e-6)
 
 
 @pytest.mark.parametrize("way", [(120.0, 420.0), (420.0, 120.0)], ids=["up", "down"])
 def test_a_stepped_sweep_jumps_where_the_closed_form_folds_on_its_way(way):
     """F^2 = ((k_A - m w^2)^2 + (c w)^2) A^2: up the larger, down the smaller frequency of the two vertical tangents."""
     force = 5.0
-    found = natural.follow(duffing().with_load(force / FORCE), *way, natural.Options(n_points=61))
+    branch = natural.follow(duffing().with_load(force / FORCE), *way, natural.Options(n_points=61))
     a = np.linspace(1e-5, 5e-3, 1_000_001)
     half = (STIFFNESS + KT + 0.75 * CUBIC * a**2 - DASHPOT**2 / (2 * MASS)) / MASS
     root = half**2 - ((STIFFNESS + KT + 0.75 * CUBIC * a**2) ** 2 - (force / a) ** 2) / MASS**2
-    behind = np.sqrt(half[root > 0] + np.sqrt(root[root > 0]))  # the resonance, by rising amplitude
-    low = int(behind.argmin())
-    expected = behind[low:].max() if way[0] < way[1] else behind[low]
-    assert found.ended is BranchEnd.JUMPED
-    jump = found.omega[list(found.folds)]
+    previous = np.sqrt(half[root > 0] + np.sqrt(root[root > 0]))  # the resonance, by rising amplitude
+    low = int(previous.argmin())
+    expected = previous[low:].max() if way[0] < way[1] else previous[low]
+    assert branch.ended is BranchEnd.JUMPED
+    jump = branch.omega[list(branch.folds)]
     assert len(jump) == 1
     np.testing.assert_allclose(jump, expected, rtol=1e-6)
 
@@ -98,38 +98,38 @@ def rubbing() -> HarmonicBalance:
 def test_constant_response_with_friction_goes_through_the_states_of_constant_force():
     balance = rubbing()
     name = balance.compliance.output_names[0]
-    held = constant_response(balance, name, 1.5e-5)
-    found = driven(held, arc_length.follow(held, 250.0, 400.0))
-    assert str(found.end).startswith("reached")
-    assert found.energy.max() > 0
-    np.testing.assert_allclose(np.abs(found.fundamental(name)), 1.5e-5, rtol=1e-8)
-    assert max(_missed(balance, found, i) for i in range(0, len(found.omega), 4)) < 1e-6
+    fixed = constant_response(balance, name, 1.5e-5)
+    result = driven(fixed, arc_length.follow(fixed, 250.0, 400.0))
+    assert str(result.end).startswith("reached")
+    assert result.energy.max() > 0
+    np.testing.assert_allclose(np.abs(result.fundamental(name)), 1.5e-5, rtol=1e-8)
+    assert max(_missed(balance, result, i) for i in range(0, len(result.omega), 4)) < 1e-6
 
 
 def test_phase_resonance_with_friction_goes_through_the_states_of_constant_force():
     balance = rubbing()
     name = balance.compliance.output_names[0]
-    found = phase_resonance(balance, name, 950.0, 1200.0, 1e-9, 1e-5, BackboneOptions(20))
-    assert str(found.end).startswith("reached")
-    assert found.energy[-1] > 0
-    turned = np.abs(np.angle(found.fundamental(name)))
+    result = phase_resonance(balance, name, 950.0, 1200.0, 1e-9, 1e-5, BackboneOptions(20))
+    assert str(result.end).startswith("reached")
+    assert result.energy[-1] > 0
+    turned = np.abs(np.angle(result.fundamental(name)))
     np.testing.assert_allclose(turned, np.pi / 2, atol=1e-6)
-    assert max(_missed(balance, found, i) for i in range(len(found.omega))) < 1e-6
+    assert max(_missed(balance, result, i) for i in range(len(result.omega))) < 1e-6
 
 
 def test_phase_resonance_goes_round_a_sharp_turn_of_its_amplitude():
     """Where a pair begins to slip the curve leaves backwards, and ends in small amplitudes of another mode."""
     balance = rubbing()
     name = balance.compliance.output_names[0]
-    found = phase_resonance(balance, name, 700.0, 950.0, 1e-9, 1e-5, BackboneOptions(20))
-    assert str(found.end).startswith("turned back")
-    top = int(found.parameter.argmax())
-    assert found.parameter[[0, -1]].max() < 1e-8
-    assert found.parameter[top] > 3e-7
-    assert found.omega[-1] > 1.01 * found.omega[0]
-    assert np.abs(found.energy[: top + 1]).max() < 1e-12 < 1e-7 < found.energy[top + 1]
-    np.testing.assert_allclose(np.abs(np.angle(found.fundamental(name))), np.pi / 2, atol=1e-6)
-    assert max(_missed(balance, found, i) for i in range(len(found.omega))) < 1e-6
+    result = phase_resonance(balance, name, 700.0, 950.0, 1e-9, 1e-5, BackboneOptions(20))
+    assert str(result.end).startswith("turned back")
+    top = int(result.parameter.argmax())
+    assert result.parameter[[0, -1]].max() < 1e-8
+    assert result.parameter[top] > 3e-7
+    assert result.omega[-1] > 1.01 * result.omega[0]
+    assert np.abs(result.energy[: top + 1]).max() < 1e-12 < 1e-7 < result.energy[top + 1]
+    np.testing.assert_allclose(np.abs(np.angle(result.fundamental(name))), np.pi / 2, atol=1e-6)
+    assert max(_missed(balance, result, i) for i in range(len(result.omega))) < 1e-6
 
 
 def _missed(balance: HarmonicBalance, branch, i: int) -> float:
@@ -138,24 +138,26 @@ def _missed(balance: HarmonicBalance, branch, i: int) -> float:
     driving = balance.with_load(branch.load_factor[i])
     solved = newton.solve(driving, float(branch.omega[i]), 1.0001 * x, newton.NewtonOptions(tolerance=1e-11))
     assert solved.converged
-    same = np.linalg.norm(driving.outputs(solved.state) - branch.response[i]) / np.linalg.norm(branch.response[i])
-    return max(float(np.linalg.norm(solved.state.x - x) / np.linalg.norm(x)), float(same))
+    equal = np.linalg.norm(driving.outputs(solved.state) - branch.response[i]) / np.linalg.norm(branch.response[i])
+    return max(float(np.linalg.norm(solved.state.x - x) / np.linalg.norm(x)), float(equal))
 
 
 def test_slopes_of_the_held_structure_are_finite_differences():
-    held = constant_response(rubbing(), rubbing().compliance.output_names[0], 3e-5)
+    fixed = constant_response(rubbing(), rubbing().compliance.output_names[0], 3e-5)
     rng, omega, step = np.random.default_rng(2), 331.0, 1e-3
-    x = held.stuck(omega) + 1e-5 * rng.standard_normal(held.stuck(omega).shape)
-    state = held.evaluate(omega, x)
-    high, low = (held.evaluate(omega + s, x) for s in (step, -step))
-    for at, slope in zip((0, 1), held.frequency_slope(state), strict=True):
-        ends = [(s.residual, held.outputs(s))[at] for s in (high, low)]
+    x = fixed.stuck(omega) + 1e-5 * rng.standard_normal(fixed.stuck(omega).shape)
+    state = fixed.evaluate(omega, x)
+    high, low = (fixed.evaluate(omega + s, x) for s in (step, -step))
+    for at, slope in zip((0, 1), fixed.frequency_slope(state), strict=True):
+        ends = [(s.residual, fixed.outputs(s))[at] for s in (high, low)]
         np.testing.assert_allclose(slope, (ends[0] - ends[1]) / (2 * step), atol=1e-6 * np.abs(slope).max())
-    linear, d = held.linearise(state), 1e-9 * rng.standard_normal(x.shape)
-    moved = (held.evaluate(omega, x + d).residual - held.evaluate(omega, x - d).residual) / 2
-    np.testing.assert_allclose(linear.dense() @ d.ravel(), moved.ravel(), atol=1e-5 * np.abs(moved).max())
+    linear, d = fixed.linearise(state), 1e-9 * rng.standard_normal(x.shape)
+    shifted = (fixed.evaluate(omega, x + d).residual - fixed.evaluate(omega, x - d).residual) / 2
+    np.testing.assert_allclose(linear.dense() @ d.ravel(), shifted.ravel(), atol=1e-5 * np.abs(shifted).max())
     flat = d.reshape(state.flat.shape)
-    np.testing.assert_allclose(linear.product(flat[linear.rows]), moved[linear.rows], atol=1e-4 * np.abs(moved).max())
+    np.testing.assert_allclose(
+        linear.product(flat[linear.rows]), shifted[linear.rows], atol=1e-4 * np.abs(shifted).max()
+    )
 
 
 def test_slopes_of_the_phase_resonance_are_finite_differences():
@@ -175,9 +177,9 @@ def test_slopes_of_the_phase_resonance_are_finite_differences():
 
 def test_control_refuses_what_one_force_cannot_be_found_for():
     balance = duffing((1, 3))
-    two = replace(balance, excitation=Excitation.of({}, {1: {"force": 1.0}, 3: {"force": 1.0}}))
+    pair = replace(balance, excitation=Excitation.of({}, {1: {"force": 1.0}, 3: {"force": 1.0}}))
     none = replace(balance, excitation=Excitation())
-    for other in (two, none):
+    for other in (pair, none):
         with pytest.raises(ValueError, match="harmonic 1"):
             constant_response(other, "mass", 1e-3)
     with pytest.raises(ValueError, match="no mode"):

@@ -74,23 +74,23 @@ def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again
     ]
 
     def loaded(name, factor):
-        given = balance.excitation
+        inputs = balance.excitation
         if name == "base":
-            return replace(given, base=factor * given.base)
-        return replace(given, loads={of: factor * value for of, value in given.loads.items()})
+            return replace(inputs, base=factor * inputs.base)
+        return replace(inputs, loads={of: factor * value for of, value in inputs.loads.items()})
 
     def reloaded(name, factor):
-        made = HarmonicBalance.of(balance.model, balance.contact.joints, balance.basis, loaded(name, factor), 2e3)
-        return replace(made, memory=balance.memory)
+        built = HarmonicBalance.of(balance.model, balance.contact.joints, balance.basis, loaded(name, factor), 2e3)
+        return replace(built, memory=balance.memory)
 
     driven = ["loads", "base"]
     changes += [
         ParameterChange(p, step, *(replace(posed, excitation=loaded(p, 1 + s)) for s in (step, -step))) for p in driven
     ]
-    found = at_frequency(balance, solved.state, "tip", changes)
+    result = at_frequency(balance, solved.state, "tip", changes)
 
     def again(other):
-        state = newton.solve(other, OMEGA, found.state.x, EXACT).state
+        state = newton.solve(other, OMEGA, result.state.x, EXACT).state
         return np.array([q.value for q in cycle_numbers(other, state, "tip") if q.moves_with_state])
 
     for i, p in enumerate([*names, *driven]):
@@ -100,14 +100,14 @@ def test_derivatives_by_every_number_of_a_law_are_those_of_balances_solved_again
         else:
             pair = [balance.with_contact(with_number(balance, p, 1 + s)) for s in (h, -h)]
         difference = (again(pair[0]) - again(pair[1])) / (2 * h)
-        size = np.maximum(np.abs(difference), 1e-2 * np.abs(found.slopes).max(axis=1))
-        assert (np.abs(found.slopes[:, i] - difference) <= 1e-5 * size).all(), (p, found.slopes[:, i], difference)
+        size = np.maximum(np.abs(difference), 1e-2 * np.abs(result.slopes).max(axis=1))
+        assert (np.abs(result.slopes[:, i] - difference) <= 1e-5 * size).all(), (p, result.slopes[:, i], difference)
     gap = balance.contact.gap
     for pair in range(PAIRS if "n" in components else 0):
         d = 1e-10 * (np.arange(PAIRS) == pair)
         difference = (again(balance.with_gap(gap + d)) - again(balance.with_gap(gap - d))) / 2e-10
-        size = np.maximum(np.abs(difference), 1e-2 * np.abs(found.by_gap).max(axis=1))
-        assert (np.abs(found.by_gap[:, pair] - difference) <= 1e-4 * size).all()
+        size = np.maximum(np.abs(difference), 1e-2 * np.abs(result.by_gap).max(axis=1))
+        assert (np.abs(result.by_gap[:, pair] - difference) <= 1e-4 * size).all()
 
 
 def slider_behind_a_mass(friction):
@@ -136,11 +136,11 @@ def test_a_peak_that_is_a_corner_follows_first_slip():
     state = newton.solve_from_rest(balance, omega * (1 + 1e-4), EXACT).state
     posed, h = BalanceInputs.of(balance), 1e-6
     sides = (replace(posed, contact=with_number(balance, "friction", 1 + s)) for s in (h, -h))
-    found = at_peak(balance, state, "tip", [ParameterChange("friction", h * friction, *sides)])
-    assert found.follows_corner
-    assert found.names[:2] == ("peak_frequency", "amplitude")
-    np.testing.assert_allclose(found.values[:2], [omega / (2 * np.pi), stuck(omega)[0]], rtol=1e-6)
-    np.testing.assert_allclose(found.slopes[:2, 0], np.array([1 / (2 * np.pi), tip]) / slider / 0.2, rtol=5e-6)
+    result = at_peak(balance, state, "tip", [ParameterChange("friction", h * friction, *sides)])
+    assert result.follows_corner
+    assert result.names[:2] == ("peak_frequency", "amplitude")
+    np.testing.assert_allclose(result.values[:2], [omega / (2 * np.pi), stuck(omega)[0]], rtol=1e-6)
+    np.testing.assert_allclose(result.slopes[:2, 0], np.array([1 / (2 * np.pi), tip]) / slider / 0.2, rtol=5e-6)
     with pytest.raises(NoDerivative, match="peak is a corner of the curve"):
         peak_moves(balance, state, "tip", ())
 
@@ -155,12 +155,12 @@ def test_a_fold_moves_as_folds_found_anew_and_tells_both_sides_of_a_corner():
         return tuple(replace(posed, contact=balance.contact.with_gap(balance.contact.gap + s)) for s in (above, below))
 
     changes = [ParameterChange("gap", h, *sides(h, -h)), ParameterChange("twice above zero", h, *sides(2 * h, -h))]
-    found = at_fold(balance, state, changes)
-    there, here = (at_fold(balance.with_gap(balance.contact.gap + s), state, ()).values[0] for s in (1e-4, -1e-4))
-    slope = (there - here) / 2e-4
-    np.testing.assert_allclose([found.slopes[0, 0], found.by_gap[0, 0]], slope, rtol=1e-6)
-    assert found.corner.tolist() == [False, True]
-    np.testing.assert_allclose([found.above[0, 1], found.below[0, 1]], [2 * slope, slope], rtol=2e-4)
+    result = at_fold(balance, state, changes)
+    refined, current = (at_fold(balance.with_gap(balance.contact.gap + s), state, ()).values[0] for s in (1e-4, -1e-4))
+    slope = (refined - current) / 2e-4
+    np.testing.assert_allclose([result.slopes[0, 0], result.by_gap[0, 0]], slope, rtol=1e-6)
+    assert result.corner.tolist() == [False, True]
+    np.testing.assert_allclose([result.above[0, 1], result.below[0, 1]], [2 * slope, slope], rtol=2e-4)
 
 
 def test_an_adjoint_that_is_no_solution_is_refused(monkeypatch):

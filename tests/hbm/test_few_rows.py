@@ -30,5 +30,5 @@ def test_a_direction_in_pieces_is_the_product(n: int, n_coeff: int) -> None:
     none = np.zeros((0, 9, 9))
     core = np.zeros(n_coeff // 2), True, none, none, np.zeros((0, 9), np.int32), static
     found = all_harmonics.nearly_displaced(force, w0, b, np.ascontiguousarray(b.T), *core)
-    wanted = w0.T @ force + b @ ((b.T @ force) / static[:, None])
-    assert np.abs(found - wanted).max() < 1e-4 * np.abs(wanted).max()
+    expected = w0.T @ force + b @ ((b.T @ force) / static[:, None])
+    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()

@@ -60,9 +60,9 @@ def wheel_with_flow(reduced: ReducedSector, wheel: ReducedModel, springs: np.nda
     for index in range(n):
         system, B = wave_system(sector, index)
         _, omega, shape = family(system, np.asarray(B), springs, flow.mode)
-        there = own @ (seam_map(sector, index) @ shape)
+        refined = own @ (seam_map(sector, index) @ shape)
         turns = np.exp(-2j * np.pi * (index * np.arange(n) % n) / n) / np.sqrt(n)
-        force = np.asarray(wheel.system.mass) @ np.kron(turns, there)
+        force = np.asarray(wheel.system.mass) @ np.kron(turns, refined)
         for matrix, part in zip(total, parts_of(flow, index, n, omega), strict=True):
             matrix += part * np.outer(force, force.conj())
     return replace(wheel, system=added(wheel.system, *(matrix.real for matrix in total)))
@@ -75,25 +75,25 @@ def whole(stiffness=None):
 
 
 def test_eigenvalues_of_nodal_diameters_are_those_of_the_whole_wheel():
-    one = damped(travelling_wave(tiny.sector(("t1", "n"), TURNING), ORDER))
-    found = aeroelastic(one, SPRINGS, FLOW)
-    assert sorted(found) == [-2, -1, 0, 1, 2]
-    assert found[1].real > 0 > found[-1].real  # the wave with the rotation flutters
+    item = damped(travelling_wave(tiny.sector(("t1", "n"), TURNING), ORDER))
+    result = aeroelastic(item, SPRINGS, FLOW)
+    assert sorted(result) == [-2, -1, 0, 1, 2]
+    assert result[1].real > 0 > result[-1].real  # the wave with the rotation flutters
     model = whole()
     system, B = model.system, np.asarray(model.interface.B)
     K = system.stiffness + B.T @ (np.tile(SPRINGS.ravel(), tiny.N)[:, None] * B) + system.circulatory
     n = len(K)
-    every = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-K, -system.velocity_matrix]]))
-    for value in found.values():
-        assert np.abs(every - value).min() < 1e-9 * abs(value)
+    complete = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-K, -system.velocity_matrix]]))
+    for value in result.values():
+        assert np.abs(complete - value).min() < 1e-9 * abs(value)
 
 
 def test_damping_and_frequency_of_a_wave_are_what_the_coefficients_say():
     """Without other damping: Im c / 2 of critical, the frequency shifted by Re c / 2, to first order."""
-    one = travelling_wave(tiny.sector(("t1", "n")), ORDER)
+    item = travelling_wave(tiny.sector(("t1", "n")), ORDER)
     small = FLOW.scaled(1e-3)
-    still = aeroelastic(one, SPRINGS, small.scaled(1e-9))
-    for index, value in aeroelastic(one, SPRINGS, small).items():
+    still = aeroelastic(item, SPRINGS, small.scaled(1e-9))
+    for index, value in aeroelastic(item, SPRINGS, small).items():
         c = small.of_index(index, tiny.N)
         omega = still[index].imag
         assert -value.real / omega == pytest.approx(c.imag / 2, abs=1e-8)
@@ -102,10 +102,10 @@ def test_damping_and_frequency_of_a_wave_are_what_the_coefficients_say():
 
 @pytest.fixture(scope="module")
 def cycle():
-    found, why = limit_cycles(wave(), 1e-5, 2e-2, output="tip", options=BackboneOptions(n_points=30))
-    assert not why
-    assert found
-    return found[0]
+    result, reason = limit_cycles(wave(), 1e-5, 2e-2, output="tip", options=BackboneOptions(n_points=30))
+    assert not reason
+    assert result
+    return result[0]
 
 
 def test_the_limit_cycle_of_a_tuned_wheel_is_what_time_integration_comes_to(cycle):
@@ -114,30 +114,30 @@ def test_the_limit_cycle_of_a_tuned_wheel_is_what_time_integration_comes_to(cycl
     begin = cycle.state.x.copy()
     begin[..., 1:] *= 0.75
     start = problem.evaluate(cycle.omega, begin)
-    alone = leave_alone(problem, cycle.omega, start, 160, Options(steps=128))
-    wanted = np.sqrt((cycle.response[0, 1:] ** 2).sum())
-    assert np.sqrt((problem.outputs(start)[0, 1:] ** 2).sum()) < 0.8 * wanted
-    assert alone.amplitude[0] == pytest.approx(wanted, rel=0.01)
-    assert alone.drift < 0.05
+    single = leave_alone(problem, cycle.omega, start, 160, Options(steps=128))
+    expected = np.sqrt((cycle.response[0, 1:] ** 2).sum())
+    assert np.sqrt((problem.outputs(start)[0, 1:] ** 2).sum()) < 0.8 * expected
+    assert single.amplitude[0] == pytest.approx(expected, rel=0.01)
+    assert single.drift < 0.05
 
 
 def test_the_coordinates_of_a_limit_cycle_are_those_of_its_contact(cycle):
     """With the circulatory forces: without them they miss the contact by as much as these do."""
     problem = replace(wave(), load_factor=0.0)
     x = cycle.state.flat
-    found = coordinates(problem, x, cycle.state.cycle.force.reshape(x.shape), cycle.omega)
+    result = coordinates(problem, x, cycle.state.cycle.force.reshape(x.shape), cycle.omega)
     expected = problem.basis.to_complex(x)
     for position, h in enumerate(problem.basis.harmonics):
         _, B = problem.model.at_harmonic(h)
-        np.testing.assert_allclose(B @ found[position], expected[:, position], atol=1e-7 * np.abs(expected).max())
+        np.testing.assert_allclose(B @ result[position], expected[:, position], atol=1e-7 * np.abs(expected).max())
 
 
 def test_a_limit_cycle_has_a_neutral_exponent_and_leaves_its_own_wave_stable(cycle):
-    found = stability(wave(), cycle.state, top=9)
-    own = found.exponents[found.diameters == 0]
-    neutral = np.argmin(np.abs(own))
-    assert abs(own[neutral]) < 2e-3 * cycle.omega
-    assert np.delete(own, neutral).real.max() < 0
+    result = stability(wave(), cycle.state, top=9)
+    base = result.exponents[result.diameters == 0]
+    neutral = np.argmin(np.abs(base))
+    assert abs(base[neutral]) < 2e-3 * cycle.omega
+    assert np.delete(base, neutral).real.max() < 0
 
 
 def test_the_limit_cycle_of_a_mistuned_wheel_is_what_time_integration_comes_to():
@@ -145,13 +145,13 @@ def test_the_limit_cycle_of_a_mistuned_wheel_is_what_time_integration_comes_to()
     model = whole([1.02, 0.985, 1.0, 0.99, 1.005])
     problem = balance_of(model, tiny.N)
     names = problem.compliance.output_names
-    found, _ = limit_cycles(problem, 1e-5, 2e-2, output="tip@0", options=BackboneOptions(n_points=30))
-    assert found
+    result, _ = limit_cycles(problem, 1e-5, 2e-2, output="tip@0", options=BackboneOptions(n_points=30))
+    assert result
     rows = [names.index(f"tip@{n}") for n in range(tiny.N)]
-    wanted = np.linalg.norm(found[0].response[rows, 1:], axis=1)
-    assert np.ptp(wanted) > 0.03 * wanted.max()
-    begin = found[0].state.x.copy()
+    expected = np.linalg.norm(result[0].response[rows, 1:], axis=1)
+    assert np.ptp(expected) > 0.03 * expected.max()
+    begin = result[0].state.x.copy()
     begin[..., 1:] *= 0.9
-    start = problem.evaluate(found[0].omega, begin)
-    alone = leave_alone(problem, found[0].omega, start, 240, Options(steps=128))
-    np.testing.assert_allclose(alone.amplitude[rows], wanted, rtol=0.01)
+    start = problem.evaluate(result[0].omega, begin)
+    single = leave_alone(problem, result[0].omega, start, 240, Options(steps=128))
+    np.testing.assert_allclose(single.amplitude[rows], expected, rtol=0.01)

@@ -29,12 +29,12 @@ def test_a_fold_in_time_is_where_several_harmonics_have_it(which: int) -> None:
     for harmonics in ((1,), (1, 3, 5)):
         branch = branch_of(harmonics)
         fold = branch.folds[which]
-        found = fold_in_time(DUFFING.balance(harmonics, 128), branch, fold, "mass", QUICK, bracket=0.04)
-        assert found.outcome == CONVERGED
-        assert found.resolution == pytest.approx(0.08 / 256)
-        assert found.amplitude == pytest.approx(branch.amplitude("mass")[fold], rel=0.15)
-        off.append(abs(found.omega / found.in_time - 1))
-    assert off[1] < 3 * found.resolution
+        result = fold_in_time(DUFFING.balance(harmonics, 128), branch, fold, "mass", QUICK, bracket=0.04)
+        assert result.outcome == CONVERGED
+        assert result.resolution == pytest.approx(0.08 / 256)
+        assert result.amplitude == pytest.approx(branch.amplitude("mass")[fold], rel=0.15)
+        off.append(abs(result.omega / result.in_time - 1))
+    assert off[1] < 3 * result.resolution
     assert off[1] <= off[0]
 
 
@@ -42,10 +42,10 @@ def test_the_upper_branch_ends_there_for_another_integrator() -> None:
     """Runge-Kutta of the equation itself: swept slowly to just below the fold it stays up, just above it falls."""
     branch = branch_of((1, 3, 5))
     fold = max(branch.folds, key=lambda i: branch.omega[i])
-    found = fold_in_time(DUFFING.balance((1, 3, 5)), branch, fold, "mass", QUICK, bracket=0.04)
-    settled = []
-    for omega in (found.in_time * 0.995, found.in_time * 1.01):
-        state = solutions_at(DUFFING.balance((1, 3, 5)), branch, found.in_time * 0.995)
+    result = fold_in_time(DUFFING.balance((1, 3, 5)), branch, fold, "mass", QUICK, bracket=0.04)
+    stationary = []
+    for omega in (result.in_time * 0.995, result.in_time * 1.01):
+        state = solutions_at(DUFFING.balance((1, 3, 5)), branch, result.in_time * 0.995)
         a, b = max((s.x[0, 0, :2] for s in state), key=np.linalg.norm)
 
         def motion(t: float, y: np.ndarray, w: float = omega) -> list[float]:
@@ -54,9 +54,9 @@ def test_the_upper_branch_ends_there_for_another_integrator() -> None:
 
         period = 2 * np.pi / omega
         end = solve_ivp(motion, (0, 150 * period), [a, omega * b], rtol=1e-8, t_eval=np.linspace(149, 150, 65) * period)
-        settled.append(float(np.ptp(end.y[0]) / 2))
-    assert settled[0] > 0.9 * found.amplitude
-    assert settled[1] < 0.5 * found.amplitude
+        stationary.append(float(np.ptp(end.y[0]) / 2))
+    assert stationary[0] > 0.9 * result.amplitude
+    assert stationary[1] < 0.5 * result.amplitude
 
 
 def test_of_three_solutions_the_middle_one_is_left_in_time() -> None:
@@ -64,8 +64,8 @@ def test_of_three_solutions_the_middle_one_is_left_in_time() -> None:
     low, high = sorted(branch.omega[list(branch.folds)])
     omega, three = coexisting(balance, branch, low, high, "mass", 5)
     assert low < omega < high
-    assert [one.stable for one in three] == [True, False, True]
-    assert [one.stays for one in three] == [True, False, True]
+    assert [item.stable for item in three] == [True, False, True]
+    assert [item.stays for item in three] == [True, False, True]
     assert three[1].growth > 0 > max(three[0].growth, three[2].growth)
 
 
@@ -77,5 +77,5 @@ def test_what_is_no_fold_is_refused() -> None:
 def test_a_bracket_that_ends_before_the_fold_in_time_says_so() -> None:
     branch = branch_of((1,))
     fold = max(branch.folds, key=lambda i: branch.omega[i])
-    found = fold_in_time(DUFFING.balance((1,)), branch, fold, "mass", QUICK, bracket=1e-5, bisections=2)
-    assert str(found.outcome).startswith(("no motion stays", "the motion stays"))
+    result = fold_in_time(DUFFING.balance((1,)), branch, fold, "mass", QUICK, bracket=1e-5, bisections=2)
+    assert str(result.outcome).startswith(("no motion stays", "the motion stays"))

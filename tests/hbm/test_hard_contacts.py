@@ -37,22 +37,22 @@ def test_a_hard_stop_is_followed_past_grazing_from_both_ends():
     assert abs(up.amplitude("mass").max() - limit) < 0.1 * abs(softer.amplitude("mass").max() - limit)
     for omega, contact in list(zip(up.omega, up.contact, strict=True))[::20]:
         balance = stopped(hardness)
-        found = balance.evaluate(omega, contact.reshape(1, 1, -1), jacobian=False)
+        state = balance.evaluate(omega, contact.reshape(1, 1, -1), jacobian=False)
         motion = contact.ravel() @ HarmonicBasis((0, 1, 2, 3, 4, 5), 20_000).synthesis.T
         pushed = hardness * np.maximum(motion - 1.0, 0.0)  # sampled closely: the force is that of the law
-        assert found.cycle.force[0, 0, 0] == pytest.approx(pushed.mean(), rel=0.05, abs=1e-6)
+        assert state.cycle.force[0, 0, 0] == pytest.approx(pushed.mean(), rel=0.05, abs=1e-6)
 
 
 def on_friction(
     stiffness: float, spring: float, force: float, harmonics: tuple[int, ...], damping: float
 ) -> own.Balance:
-    given = own.from_arrays(np.eye(1), np.array([[stiffness]]), np.array([[damping]]))
+    inputs = own.from_arrays(np.eye(1), np.array([[stiffness]]), np.array([[damping]]))
     numbers = {"friction": 0.5, "normal_load": 2.0}
     rub = own.Contact(
-        "rub", given.contact([[0]], components=("t1",), area=1.0), "jenkins_constant", spring, numbers=numbers
+        "rub", inputs.contact([[0]], components=("t1",), area=1.0), "jenkins_constant", spring, numbers=numbers
     )
-    made = own.reduce(given, rub, loads={"f": 0}, outputs={"x": 0})
-    return made.balance(harmonics, up_to=3.0, harmonic={1: {"f": force}})
+    reduced = own.reduce(inputs, rub, loads={"f": 0}, outputs={"x": 0})
+    return reduced.balance(harmonics, up_to=3.0, harmonic={1: {"f": force}})
 
 
 @pytest.mark.parametrize(
@@ -65,17 +65,17 @@ def test_an_oscillator_on_friction_is_solved_from_rest_where_newton_and_its_ramp
     balance = on_friction(1.0, spring, force, harmonics, damping)
     omega = 2 * np.pi * frequency
     assert not newton.solve_from_rest(balance.problem, omega).converged, "an easier problem: take another"
-    found = balance.solve(frequency)
-    assert found.converged
-    assert newton.relative_residual(found.state, balance.problem.x_lin(omega)) < 1e-8
+    solution = balance.solve(frequency)
+    assert solution.converged
+    assert newton.relative_residual(solution.state, balance.problem.x_lin(omega)) < 1e-8
 
 
 def test_a_mass_that_friction_alone_holds_is_the_closed_form():
     """M x'' + c x' + Jenkins(x) = F, one harmonic: its complex stiffness is known."""
     spring, force, frequency = 1.0, 2.0, 0.2
     balance = on_friction(0.0, spring, force, (1,), 0.1)
-    found = balance.solve(frequency)
-    size, slip, omega = found.amplitude("x"), 1.0 / spring, 2 * np.pi * frequency
+    solution = balance.solve(frequency)
+    size, slip, omega = solution.amplitude("x"), 1.0 / spring, 2 * np.pi * frequency
     theta = np.arccos(1 - 2 * slip / size)
     complex_spring = spring / np.pi * (theta - np.sin(theta) * np.cos(theta)) + 4j * (size - slip) / (np.pi * size**2)
     assert size > 1.2 * slip
@@ -84,10 +84,10 @@ def test_a_mass_that_friction_alone_holds_is_the_closed_form():
 
 @pytest.mark.parametrize("stiffness", [0.0, 1e-9])
 def test_a_pure_cubic_spring_has_a_first_point_and_a_whole_curve(stiffness):
-    given = own.from_arrays(np.eye(1), np.array([[stiffness]]), np.array([[0.05]]))
-    spring = own.Contact("spring", given.contact([[0]], area=1.0), "cubic_spring", 0.0, 0.0, numbers={"cubic": 1.0})
-    made = own.reduce(given, spring, loads={"f": 0}, outputs={"x": 0})
-    balance = made.balance((1,), up_to=1.0, harmonic={1: {"f": 0.1}})
+    inputs = own.from_arrays(np.eye(1), np.array([[stiffness]]), np.array([[0.05]]))
+    spring = own.Contact("spring", inputs.contact([[0]], area=1.0), "cubic_spring", 0.0, 0.0, numbers={"cubic": 1.0})
+    reduced = own.reduce(inputs, spring, loads={"f": 0}, outputs={"x": 0})
+    balance = reduced.balance((1,), up_to=1.0, harmonic={1: {"f": 0.1}})
     for ends in ((0.02, 0.4), (0.4, 0.02)):
         branch: Branch = balance.response(*ends, method="arc_length")
         assert branch.frequency[-1] == pytest.approx(ends[1])

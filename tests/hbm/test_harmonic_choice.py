@@ -60,11 +60,11 @@ def test_the_set_is_the_smallest_that_brute_force_finds():
     enough = []
     for n in range(len(choice.harmonics)):
         for extra in combinations(candidates, n):
-            kept = (0, 1, *extra)
-            narrow = full.with_harmonics(kept)
+            saved = (0, 1, *extra)
+            narrow = full.with_harmonics(saved)
             x = [newton.solve_from_rest(narrow, w).state.x for w in omega]
-            if true_error(balance, kept, omega, x, 7) < tolerance:
-                enough.append(kept)
+            if true_error(balance, saved, omega, x, 7) < tolerance:
+                enough.append(saved)
         if enough:
             break
     assert choice.harmonics in enough
@@ -80,23 +80,23 @@ def test_a_symmetric_problem_needs_odd_harmonics_only():
 def test_shares_add_up_to_the_estimate_and_are_cheap_to_leave_out():
     balance, omega = friction()
     wide = widened(balance, 9)
-    kept = (0, 1, 3)
-    x = newton.solve_from_rest(wide.with_harmonics(kept), omega[0]).state.x
-    split = harmonic_choice.estimate(wide, kept, omega[0], x)
-    whole = harmonic_choice.estimate(wide, kept, omega[0], x, split=False)
-    np.testing.assert_allclose(split.error, whole.error, rtol=1e-2)
+    saved = (0, 1, 3)
+    x = newton.solve_from_rest(wide.with_harmonics(saved), omega[0]).state.x
+    split = harmonic_choice.estimate(wide, saved, omega[0], x)
+    full = harmonic_choice.estimate(wide, saved, omega[0], x, split=False)
+    np.testing.assert_allclose(split.error, full.error, rtol=1e-2)
     assert split.error <= sum(split.shares.values()) * 1.01
-    assert set(split.shares) == set(range(15)) - set(kept)
+    assert set(split.shares) == set(range(15)) - set(saved)
 
 
 def test_fewer_harmonics_share_the_linear_side():
     balance, omega = pairs()
     wide = widened(balance, 4)
     narrow = wide.with_harmonics((0, 1, 3))
-    made = HarmonicBalance.of(
+    built = HarmonicBalance.of(
         balance.model, balance.contact.joints, narrow.basis, balance.excitation, balance.omega_max
     )
-    a, b = newton.solve_from_rest(narrow, omega[0]), newton.solve_from_rest(made, omega[0])
+    a, b = newton.solve_from_rest(narrow, omega[0]), newton.solve_from_rest(built, omega[0])
     np.testing.assert_allclose(a.state.x, b.state.x, atol=1e-7 * np.abs(b.state.x).max())
     with pytest.raises(ValueError, match="not among those"):
         wide.with_harmonics((0, 1, 99))

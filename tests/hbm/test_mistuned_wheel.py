@@ -65,8 +65,8 @@ def on_sector(reduced, families=None, left_out=1e-6):
 
 def whole(reduced, deviation, friction=0.3, gap=0.0):
     """All sectors as one dense model, its damping that of sectors alike."""
-    alike, model = damped(wheel_model(reduced)), wheel_model(reduced, 1 + deviation)
-    model = replace(model, system=replace(model.system, damping=alike.system.damping))
+    equal, model = damped(wheel_model(reduced)), wheel_model(reduced, 1 + deviation)
+    model = replace(model, system=replace(model.system, damping=equal.system.damping))
     k = np.tile(springs(reduced), (small.N, 1))
     load = waves.on_wheel(small.excitation(), ORDER, small.N)
     return HarmonicBalance.of(model, joint(k, friction, gap), BASIS, load, HIGHEST)
@@ -84,14 +84,14 @@ def apart(a, b):
 def test_the_linear_wheel_is_the_dense_one(reduced):
     """Responses, compliance of the contacts and slopes over frequency, every shape kept."""
     ours, dense = on_sector(reduced).balance(DIFFERENT), whole(reduced, DIFFERENT)
-    here, there = ours.at(2 * np.pi * 310), dense.at(2 * np.pi * 310)
-    g = np.random.default_rng(0).normal(size=here.x_lin.shape)
-    assert apart(here.x_lin, there.x_lin) < 1e-9
-    assert apart(tips(ours, here.outputs_lin), tips(dense, there.outputs_lin)) < 1e-9
-    assert apart(here.apply(g), there.apply(g)) < 1e-9
-    assert apart(here.jacobian_product(np.arange(len(g)))(g), there.apply(g)) < 1e-4  # single precision
+    point, refined = ours.at(2 * np.pi * 310), dense.at(2 * np.pi * 310)
+    g = np.random.default_rng(0).normal(size=point.x_lin.shape)
+    assert apart(point.x_lin, refined.x_lin) < 1e-9
+    assert apart(tips(ours, point.outputs_lin), tips(dense, refined.outputs_lin)) < 1e-9
+    assert apart(point.apply(g), refined.apply(g)) < 1e-9
+    assert apart(point.jacobian_product(np.arange(len(g)))(g), refined.apply(g)) < 1e-4  # single precision
     for part, factor in ((1.0, 0.0), (0.0, 1.0), (1.0, 0.7)):
-        mine, theirs = here.slope(part * g, factor), there.slope(part * g, factor)
+        mine, theirs = point.slope(part * g, factor), refined.slope(part * g, factor)
         assert apart(mine[0], theirs[0]) < 1e-7
         assert apart(tips(ours, mine[1]), tips(dense, theirs[1])) < 1e-7
 
@@ -105,8 +105,8 @@ def test_few_nominal_shapes_carry_the_linear_wheel(flexible):
     for families, left_out, within in ((3, 1e-6, 1e-6), (1, 1e-2, 1e-3)):
         wheel = on_sector(flexible, families, left_out)
         ours = wheel.balance(deviation)
-        found = np.array([amplitude(tips(ours, ours.at(2 * np.pi * f).outputs_lin)) for f in hertz])
-        assert apart(found, expected) < within
+        values = np.array([amplitude(tips(ours, ours.at(2 * np.pi * f).outputs_lin)) for f in hertz])
+        assert apart(values, expected) < within
         assert len(wheel.ports) < 0.25 * len(flexible.sector.system.stiffness)
 
 
@@ -120,34 +120,34 @@ def test_friction_and_gap_that_differ_by_blade_are_the_dense_wheel(reduced):
         return replace(joint, parameters=opened).with_friction_scaled(factor[sector])
 
     dense = whole(reduced, deviation, np.repeat(0.3 * factor, n_pair), np.repeat(gap, n_pair))
-    there = newton.solve_from_rest(dense, 2 * np.pi * 250, EXACT)
-    assert there.converged
-    assert (there.state.cycle.status & SLIPS).any()
+    refined = newton.solve_from_rest(dense, 2 * np.pi * 250, EXACT)
+    assert refined.converged
+    assert (refined.state.cycle.status & SLIPS).any()
     for families, left_out, within in ((None, 0.0, 1e-6), (2, 1e-3, 1e-3)):
         ours = on_sector(reduced, families, left_out).balance(deviation, change)
-        here = newton.solve(ours, 2 * np.pi * 250, there.state.x, EXACT)
-        assert here.converged
-        assert apart(tips(ours, ours.outputs(here.state)), tips(dense, dense.outputs(there.state))) < within
-        linear = ours.linearise(here.state)
-        d = np.random.default_rng(0).normal(size=here.state.flat.shape)
-        moved = d - ours.at(here.state.omega).apply(linear.departure_slope(d))
-        assert apart(linear.dense() @ d.ravel(), moved.ravel()) < 1e-10
+        solution = newton.solve(ours, 2 * np.pi * 250, refined.state.x, EXACT)
+        assert solution.converged
+        assert apart(tips(ours, ours.outputs(solution.state)), tips(dense, dense.outputs(refined.state))) < within
+        linear = ours.linearise(solution.state)
+        d = np.random.default_rng(0).normal(size=solution.state.flat.shape)
+        shifted = d - ours.at(solution.state.omega).apply(linear.departure_slope(d))
+        assert apart(linear.dense() @ d.ravel(), shifted.ravel()) < 1e-10
 
 
 def test_every_node_moves_as_on_the_dense_wheel(reduced):
     """The field of the full sector, static and vibrating, of all sectors, slipping."""
     deviation, n_pair = 0.5 * DIFFERENT, len(springs(reduced))
     dense = whole(reduced, deviation, np.full(8 * n_pair, 0.3))
-    there = newton.solve_from_rest(dense, 2 * np.pi * 250, EXACT)
+    refined = newton.solve_from_rest(dense, 2 * np.pi * 250, EXACT)
     wheel = on_sector(reduced)
     ours = wheel.balance(deviation)
-    here = newton.solve(ours, 2 * np.pi * 250, there.state.x, EXACT).state
-    assert (here.cycle.status & SLIPS).any()
-    flat = here.cycle.force.reshape(here.flat.shape)
+    current = newton.solve(ours, 2 * np.pi * 250, refined.state.x, EXACT).state
+    assert (current.cycle.status & SLIPS).any()
+    flat = current.cycle.force.reshape(current.flat.shape)
     K = np.asarray(reduced.sector.system.stiffness)
     made_of = nominal_modes.with_ports(reduced, K, nominal_modes.orthonormal(K, np.eye(len(K)), 1e-13))
-    found = wheel.full_displacement(made_of, ours, here.flat, flat, here.omega)
-    state = there.state
+    found = wheel.full_displacement(made_of, ours, current.flat, flat, current.omega)
+    state = refined.state
     q = recovery.coordinates(dense, state.flat, state.cycle.force.reshape(state.flat.shape), state.omega)
     maps = sector_maps(reduced.sector)
     basis = reduced.origin.basis
@@ -161,11 +161,11 @@ def test_sectors_alike_are_the_wave(reduced):
     """Without deviation every blade moves as the travelling wave says, slipping, to 1e-8."""
     wheel = on_sector(reduced, 1, 1e-2)
     ours = wheel.balance(np.zeros(small.N))
-    found = [newton.solve_from_rest(balance, 2 * np.pi * 250, EXACT) for balance in (ours, wheel.wave)]
-    assert all(one.converged for one in found)
-    tip = wheel.wave.outputs(found[1].state)[wheel.wave.compliance.output_names.index("tip")]
+    rows = [newton.solve_from_rest(balance, 2 * np.pi * 250, EXACT) for balance in (ours, wheel.wave)]
+    assert all(item.converged for item in rows)
+    tip = wheel.wave.outputs(rows[1].state)[wheel.wave.compliance.output_names.index("tip")]
     expected = np.array([waves.at_sector(BASIS, tip, ORDER, small.N, n) for n in range(small.N)])
-    assert apart(tips(ours, ours.outputs(found[0].state)), expected) < 1e-8
+    assert apart(tips(ours, ours.outputs(rows[0].state)), expected) < 1e-8
 
 
 def test_what_cannot_be_is_one_sentence(reduced):

@@ -134,8 +134,8 @@ def test_moving_ground_equals_the_motion_relative_to_it(samples):
     assert theirs.converged
     assert len(set(ours.state.cycle.status.tolist())) > 1
     np.testing.assert_allclose(ours.state.x, theirs.state.x, atol=1e-9 * np.abs(theirs.state.x).max())
-    there = basis.to_real(ground[-1:])
-    np.testing.assert_allclose(moving.outputs(ours.state), relative.outputs(theirs.state) + there, atol=1e-11)
+    refined = basis.to_real(ground[-1:])
+    np.testing.assert_allclose(moving.outputs(ours.state), relative.outputs(theirs.state) + refined, atol=1e-11)
     slope = moving.frequency_slope(ours.state)[0]
     step = 1e-5
     before, after = (moving.evaluate(OMEGA + d, ours.state.x).residual for d in (-step, step))
@@ -162,16 +162,16 @@ def test_sign_changes_of_a_cosine_are_its_roots():
     assert len(sign_changes(basis, np.array([1.5, 1.0, 0.0]), 0.0)) == 0
     assert len(sign_changes(basis, np.array([1.0, 1.0, 0.0]), 0.0)) == 0  # grazing
     assert len(sign_changes(basis, np.zeros(3), 0.0)) == 0
-    many = HarmonicBasis(tuple(range(8)), 32)
+    large = HarmonicBasis(tuple(range(8)), 32)
     rng = np.random.default_rng(0)
     for _ in range(20):
-        c = rng.normal(size=many.n_coeff)
+        c = rng.normal(size=large.n_coeff)
         angle = np.linspace(0, 2 * np.pi, 20001)
-        value = many.functions(angle) @ c - 0.3
+        value = large.functions(angle) @ c - 0.3
         rough = angle[:-1][np.sign(value[1:]) != np.sign(value[:-1])]
-        found = sign_changes(many, c, 0.3)
-        assert len(found) == len(rough)
-        np.testing.assert_allclose(found, rough, atol=4e-4)
+        result = sign_changes(large, c, 0.3)
+        assert len(result) == len(rough)
+        np.testing.assert_allclose(result, rough, atol=4e-4)
 
 
 def test_chatter_of_a_cycle_that_is_known():
@@ -180,14 +180,14 @@ def test_chatter_of_a_cycle_that_is_known():
     x[0, 0] = [1.0, 0.5, 0.0]  # always closed
     x[1, 0] = [-1.0, 0.5, 0.0]  # never
     x[2, 0] = [0.5, 0.0, 1.0]  # 0.5 + sin: closed for 2/3 of the cycle
-    found = chatter(balance, balance.evaluate(OMEGA, x))
+    result = chatter(balance, balance.evaluate(OMEGA, x))
     period = 2 * np.pi / OMEGA
-    np.testing.assert_allclose(found.touching[:3], [1.0, 0.0, 2 / 3])
-    np.testing.assert_allclose(found.contact_duration[:3], period * found.touching[:3])
-    assert found.impacts[:3].tolist() == [0, 0, 1]
-    np.testing.assert_allclose(found.opening[2] / period, [7 / 12])
-    np.testing.assert_allclose(found.closing[2] / period, [11 / 12])
-    np.testing.assert_allclose(found.impact_velocity[:3], [0, 0, OMEGA * np.sqrt(0.75)])
+    np.testing.assert_allclose(result.touching[:3], [1.0, 0.0, 2 / 3])
+    np.testing.assert_allclose(result.contact_duration[:3], period * result.touching[:3])
+    assert result.impacts[:3].tolist() == [0, 0, 1]
+    np.testing.assert_allclose(result.opening[2] / period, [7 / 12])
+    np.testing.assert_allclose(result.closing[2] / period, [11 / 12])
+    np.testing.assert_allclose(result.impact_velocity[:3], [0, 0, OMEGA * np.sqrt(0.75)])
     with_gap = chatter(balance.with_gap(np.full(9, 0.5)), balance.evaluate(OMEGA, x))
     assert with_gap.touching[2] == pytest.approx(0.5)
 
@@ -199,8 +199,8 @@ def test_impact_work_is_that_of_the_deepest_compression():
     x[1, 0] = [-1.0, 0.5, 0.0]
     x[2, 0] = [0.5, 0.0, 1.0]
     k = balance.contact.stiffness[0, 0]
-    own = {"coefficient": np.full(9, 3e-12)}
-    exposure = Exposure(balance, balance.evaluate(OMEGA, x), np.full(9, 2e-4), own, np.zeros(9), 0.0)
+    base = {"coefficient": np.full(9, 3e-12)}
+    exposure = Exposure(balance, balance.evaluate(OMEGA, x), np.full(9, 2e-4), base, np.zeros(9), 0.0)
     np.testing.assert_allclose(impact_work(exposure)[:3], [0.0, 0.0, k * 1.5**2 / 2], rtol=1e-5)
     angle = 2 * np.pi * np.arange(400) / 400
     spring = 0.2 + 0.1 * np.cos(angle)

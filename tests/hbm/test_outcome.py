@@ -9,10 +9,10 @@ from tribodyn.hbm.outcome import BranchEnd, End, WearEnd
 
 @pytest.mark.parametrize("member", [*BranchEnd, *WearEnd], ids=str)
 def test_an_outcome_is_its_member_and_reads_as_a_sentence(member: End) -> None:
-    told = member.say(" 0.001 of its first value")
-    assert told.kind is member
-    assert str(told) == f"{member.value} 0.001 of its first value"
-    assert told != member.say()
+    messages = member.say(" 0.001 of its first value")
+    assert messages.kind is member
+    assert str(messages) == f"{member.value} 0.001 of its first value"
+    assert messages != member.say()
 
 
 def test_which_ends_are_losses() -> None:

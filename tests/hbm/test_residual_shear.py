@@ -21,10 +21,10 @@ TIGHT = NewtonOptions(tolerance=1e-11)
 
 def stuck_oscillator(transitions):
     """m = 1, k = 3, c = 0.2 on a Jenkins element k_t = 2, mu N = 1.5 that sticks; static load 0.4, harmonic 0.5."""
-    one = np.eye(1)
-    system = SecondOrderSystem(one, 3 * one, 0.2 * one, {"force": np.ones(1)}, {"mass": np.ones(1)})
+    item = np.eye(1)
+    system = SecondOrderSystem(item, 3 * item, 0.2 * item, {"force": np.ones(1)}, {"mass": np.ones(1)})
     return HarmonicBalance.of(
-        ReducedModel(system, interface(one, ("t1",))),
+        ReducedModel(system, interface(item, ("t1",))),
         Joint("contact", "jenkins_constant", ContactParameters.of(("t1",), [[2.0]], friction=0.5, normal_load=3.0)),
         HarmonicBasis((0, 1), 4096, transitions),
         Excitation.of({"force": 0.4}, {1: {"force": 0.5}}),
@@ -86,16 +86,16 @@ def test_the_unloaded_start_and_any_other_lie_between_the_extremes(mixed):
     assert high > 1.002 * low
     rng = np.random.default_rng(0)
     x = bounds.solutions[0].state.x
-    seen = []
+    observed = []
     for _ in range(12):
         memory = rng.normal(size=balance.memory.shape) * np.abs(x).max()
         other = newton.solve(balance.with_memory(memory), omega, x, TIGHT)
         assert other.converged
-        seen.append(float(amplitude(balance.outputs(other.state))[0]))
+        observed.append(float(amplitude(balance.outputs(other.state))[0]))
     spread = high - low
-    assert low - 0.1 * spread < min(seen)  # the extremes are found to first order
-    assert max(seen) < high + 0.1 * spread
-    assert max(seen) - min(seen) > 0.1 * spread
+    assert low - 0.1 * spread < min(observed)  # the extremes are found to first order
+    assert max(observed) < high + 0.1 * spread
+    assert max(observed) - min(observed) > 0.1 * spread
     energy_low, energy_high = bounds.energy_range()
     assert 0 < energy_low < energy_high
 
@@ -132,9 +132,9 @@ def test_planar_friction_has_bounds_too():
 
 
 def test_refusals():
-    one = np.eye(1)
-    system = SecondOrderSystem(one, one, one, {"force": np.ones(1)}, {"mass": np.ones(1)})
-    model = ReducedModel(system, interface(one, ("n",)))
+    item = np.eye(1)
+    system = SecondOrderSystem(item, item, item, {"force": np.ones(1)}, {"mass": np.ones(1)})
+    model = ReducedModel(system, interface(item, ("n",)))
     basis = HarmonicBasis((0, 1), 16)
     parameters = ContactParameters.of(("n",), [[1.0]])
     balance = HarmonicBalance.of(
@@ -142,7 +142,7 @@ def test_refusals():
     )
     with pytest.raises(ValueError, match="'unilateral' keeps no slider"):
         response_bounds(balance, 1.0)
-    model = ReducedModel(system, interface(one, ("t1",)))
+    model = ReducedModel(system, interface(item, ("t1",)))
     parameters = ContactParameters.of(("t1",), [[1.0]], friction=0.5, normal_load=1.0)
     basis = HarmonicBasis((1,), 16)
     balance = HarmonicBalance.of(

@@ -33,10 +33,10 @@ def amplitude(spring: float, highest: int, omega: float) -> float:
         damping=0.0, harmonics=(0, *range(1, highest + 1, 2)),
     )  # fmt: skip
     balance = body.balance(setting)
-    near = arc_length.solve_along_load(balance, omega)
+    nearby = arc_length.solve_along_load(balance, omega)
     # what Newton leaves of the residual counts up to 1e5 times beside springs as stiff as that
-    solution = newton.solve(balance, omega, near.state.x, NewtonOptions(tolerance=1e-12))
-    assert near.converged
+    solution = newton.solve(balance, omega, nearby.state.x, NewtonOptions(tolerance=1e-12))
+    assert nearby.converged
     assert solution.converged
     angle = np.linspace(0, 2 * np.pi, 20_001)
     return float(np.abs(balance.basis.functions(angle) @ balance.outputs(solution.state)[0]).max())
@@ -47,11 +47,11 @@ def test_stiff_springs_tend_to_rigid_friction(omega: float) -> None:
     """Ten times stiffer springs leave a third of the error: a turning slider sticks for a time as the root of 1/k."""
     limits = []
     for highest in (15, 31):
-        found = [amplitude(spring, highest, omega) for spring in (1e9, 1e10, 1e11)]
-        first, second = (b - a for a, b in pairwise(found))
+        rows = [amplitude(spring, highest, omega) for spring in (1e9, 1e10, 1e11)]
+        first, second = (b - a for a, b in pairwise(rows))
         assert second / first == pytest.approx(10**-0.5, rel=0.05)
-        limits.append(found[-1] + second * (second / first) / (1 - second / first))
-        assert abs(found[-1] / limits[-1] - 1) < 1e-3  # at 1e5 times the stiffness of the body
+        limits.append(rows[-1] + second * (second / first) / (1 - second / first))
+        assert abs(rows[-1] / limits[-1] - 1) < 1e-3  # at 1e5 times the stiffness of the body
     exact = den_hartog(omega / 1000)
     coarse, fine = (abs(limit / exact - 1) for limit in limits)
     assert fine < 0.6 * coarse < 0.003  # the kinks of the motion fall with the highest harmonic

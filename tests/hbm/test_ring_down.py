@@ -26,10 +26,10 @@ def test_a_linear_decay_gives_its_frequency_and_damping():
     clean = 3e-6 + 2e-4 * np.exp(-zeta * omega * t) * np.cos(damped * t)
     ringing = clean + 2e-7 * np.cos(6.93 * omega * t)  # another mode, a thousandth as large
     for y, exact in ((clean, 1e-6), (ringing, 1e-3)):
-        found = from_decay(t, y, 1.03 * omega)
-        np.testing.assert_allclose(found.omega, damped, rtol=exact)
-        np.testing.assert_allclose(found.damping, zeta / np.sqrt(1 - zeta**2), rtol=3 * exact)
-        assert found.amplitude[0] > found.amplitude[-1]
+        result = from_decay(t, y, 1.03 * omega)
+        np.testing.assert_allclose(result.omega, damped, rtol=exact)
+        np.testing.assert_allclose(result.damping, zeta / np.sqrt(1 - zeta**2), rtol=3 * exact)
+        assert result.amplitude[0] > result.amplitude[-1]
     middle = t[2 * 256]  # of the first window
     assert from_decay(t, clean, omega).amplitude[0] == pytest.approx(2e-4 * np.exp(-zeta * omega * middle), rel=1e-3)
     with pytest.raises(ValueError, match="too short"):

@@ -81,10 +81,10 @@ def test_time_integration_and_stability_do_not_see_the_units(length, force):
     plain, other = scaled(1.0, 1.0), scaled(length, force)
     a, b = solved(plain), solved(other)
     options = Options(steps=256)
-    one = time_integration.integrate(plain, OMEGA, a.state, options)
-    two = time_integration.integrate(other, OMEGA, b.state, options)
-    assert one.outcome == two.outcome == CONVERGED
-    assert abs(one.periods - two.periods) <= 3
-    np.testing.assert_allclose(two.x / length, one.x, atol=1e-6 * np.abs(one.x).max())
+    item = time_integration.integrate(plain, OMEGA, a.state, options)
+    pair = time_integration.integrate(other, OMEGA, b.state, options)
+    assert item.outcome == pair.outcome == CONVERGED
+    assert abs(item.periods - pair.periods) <= 3
+    np.testing.assert_allclose(pair.x / length, item.x, atol=1e-6 * np.abs(item.x).max())
     leading_one, leading_two = stability(plain, a.state).exponents[0], stability(other, b.state).exponents[0]
     assert leading_two.real == pytest.approx(leading_one.real, rel=1e-5)

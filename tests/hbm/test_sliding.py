@@ -42,16 +42,16 @@ def test_a_wedge_slides_to_where_friction_holds_it(degrees: float) -> None:
     """Both faces slip: load = 2 N (sin a + mu cos a)."""
     angle = np.radians(degrees)
     balance = wedge(angle)
-    found = solve_along_friction(balance, OMEGA, NewtonOptions())
-    assert found is not None
-    assert found.converged
-    tangential, normal = found.state.cycle.force[:, :, 0].T
+    result = solve_along_friction(balance, OMEGA, NewtonOptions())
+    assert result is not None
+    assert result.converged
+    tangential, normal = result.state.cycle.force[:, :, 0].T
     expected = LOAD / 2 / (np.sin(angle) + FRICTION * np.cos(angle))
     assert normal == pytest.approx([expected] * 2, rel=1e-6)
     assert tangential == pytest.approx([FRICTION * expected] * 2, rel=1e-6)
-    again = newton.solve(balance, OMEGA, found.state.x)
-    assert again.converged
-    assert again.steps == 0
+    solution = newton.solve(balance, OMEGA, result.state.x)
+    assert solution.converged
+    assert solution.steps == 0
 
 
 def test_a_law_without_friction_has_no_such_way() -> None:
@@ -73,10 +73,10 @@ def shaken(force: float, stop: float = 0.0) -> HarmonicBalance:
 
 def test_a_wedge_that_walks_along_its_edge_is_refused_by_name() -> None:
     """In time it stays at 400 N and walks by 4 mm a period at 500 N."""
-    held = arc_length.solve_along_load(shaken(400.0), OMEGA)
-    assert held.converged
-    assert np.hypot(*held.state.x[0, 1, 1:]) == pytest.approx(400 / (2 * STIFFNESS), rel=1e-4)
-    assert np.abs(held.state.x[:, 1, 0]).max() < 1e-12
+    fixed = arc_length.solve_along_load(shaken(400.0), OMEGA)
+    assert fixed.converged
+    assert np.hypot(*fixed.state.x[0, 1, 1:]) == pytest.approx(400 / (2 * STIFFNESS), rel=1e-4)
+    assert np.abs(fixed.state.x[:, 1, 0]).max() < 1e-12
     for force, share in ((500.0, "86%"), (1500.0, "29%")):  # both are 430 N
         walks = arc_length.solve_along_load(shaken(force), OMEGA)
         assert walks.outcome.kind is SolveEnd.NOT_HELD

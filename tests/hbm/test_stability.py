@@ -51,9 +51,9 @@ def test_exponents_of_a_stuck_contact_are_eigenvalues(in_time, smallest, error):
 def test_modes_left_out_of_hill_follow_statically():
     balance = three_pairs(friction=0.3, static=30.0, shaker=60.0, top=5)
     state = newton.solve_from_rest(balance, FLIPS_AT).state
-    few, all_modes = stability(balance, state, n_modes=8), stability(balance, state, n_modes=13)
-    assert len(few.exponents) == 16
-    assert few.exponents[0].real == pytest.approx(all_modes.exponents[0].real, rel=0.01)
+    small, all_modes = stability(balance, state, n_modes=8), stability(balance, state, n_modes=13)
+    assert len(small.exponents) == 16
+    assert small.exponents[0].real == pytest.approx(all_modes.exponents[0].real, rel=0.01)
 
 
 def test_monodromy_with_friction_is_the_finite_difference_of_the_period_map():
@@ -73,8 +73,8 @@ def test_monodromy_with_friction_is_the_finite_difference_of_the_period_map():
     def end_of(change: np.ndarray) -> np.ndarray:
         z, memory = np.split(unit * change, [2 * n])
         shape = start.memory.shape
-        moved = stepper.moving(start.z + z, start.memory + memory.reshape(shape), start.x, start.f, start.hold)
-        end, *_ = stepper.period(moved)
+        shifted = stepper.moving(start.z + z, start.memory + memory.reshape(shape), start.x, start.f, start.hold)
+        end, *_ = stepper.period(shifted)
         return np.concatenate([end.z, end.memory.ravel()]) / unit
 
     step = 1e-6 * np.abs(start.z[n:]).max() / stepper.h * np.eye(len(unit))
@@ -117,9 +117,9 @@ def test_folds_of_a_lifting_mass_are_marked_where_the_branch_turns():
     assert len(branch.folds) == 2
     marks = mark(balance, branch)
     assert [m.kind for m in marks.bifurcations] == ["fold", "fold"]
-    for found, turn in zip(marks.bifurcations, branch.folds, strict=True):
-        assert found.position == pytest.approx(turn, abs=1.0)
-        assert found.value == pytest.approx(branch.omega[turn], rel=1e-3)
+    for bifurcation, turn in zip(marks.bifurcations, branch.folds, strict=True):
+        assert bifurcation.position == pytest.approx(turn, abs=1.0)
+        assert bifurcation.value == pytest.approx(branch.omega[turn], rel=1e-3)
     first, second = branch.folds
     assert np.all(marks.stable[: first - 1])
     assert not np.any(marks.stable[first + 2 : second - 1])
@@ -176,8 +176,8 @@ def test_growth_that_friction_limits_is_that_of_the_motion_in_time(ratio, force,
     """The answer to a steady vibration has no friction for the perturbation: by it every such motion grows."""
     balance = self_excited(ratio, force)
     state = newton.solve_from_rest(balance, omega).state
-    found, reference = (way(balance, state) for way in (stability, stability_in_time))
-    assert found.stable == reference.stable == stable
-    assert np.abs(multipliers(found)).max() == pytest.approx(np.abs(multipliers(reference)).max(), rel=0.02)
+    result, reference = (way(balance, state) for way in (stability, stability_in_time))
+    assert result.stable == reference.stable == stable
+    assert np.abs(multipliers(result)).max() == pytest.approx(np.abs(multipliers(reference)).max(), rel=0.02)
     monkeypatch.setattr(exponents, "_answer", lambda *of: None)
     assert not exponents.stability(balance, state).stable

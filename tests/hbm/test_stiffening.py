@@ -53,21 +53,23 @@ def _holds(balance: HarmonicBalance, setting: Setting, solution: Solution) -> No
         dynamic = system.stiffness + s * system.damping + s * s * system.mass
         expected = b @ np.linalg.solve(dynamic, loads[h] - b.T @ force[:, h])
         np.testing.assert_allclose(x[:, h], expected, atol=1e-6 * np.abs(expected).max())
-    assert [one.name for one in march_checks(balance, state) if one.off > one.allowed] == []
+    assert [
+        march_check.name for march_check in march_checks(balance, state) if march_check.off > march_check.allowed
+    ] == []
 
 
 def test_the_limit_of_stiff_springs_is_come_to() -> None:
     """A contact ten times stiffer moves the forces by a third less: its touch is shorter by the third root."""
     body = lattice(2, 2)
-    found = []
+    rows = []
     for stiffness in (1e10, 1e11, 1e12):
         setting = replace(body.ordinary, tangential=stiffness, normal=stiffness)
         solution = solve_along_stiffness(body.balance(setting), setting.omega, NewtonOptions())
         assert solution is not None
-        found.append(solution.state.cycle.force[:, 2])
-    steps = [np.linalg.norm(b - a) for a, b in pairwise(found)]
+        rows.append(solution.state.cycle.force[:, 2])
+    steps = [np.linalg.norm(b - a) for a, b in pairwise(rows)]
     assert steps[1] < 0.7 * steps[0]
-    assert steps[1] < 0.05 * np.linalg.norm(found[-1])
+    assert steps[1] < 0.05 * np.linalg.norm(rows[-1])
 
 
 def test_too_many_unknowns_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -80,11 +80,11 @@ def test_gapped_oscillator_departs_from_the_linear_one_where_it_grazes_by_the_th
         assert branch.amplitude("mass").max() > 1.3 * GAP
     ratios = []
     for step in (1e-5, 1e-4, 1e-3):
-        near = arc_length.follow(balance, 0.9 * grazing[0], grazing[0] * (1 + step))
-        x = near.contact[-1, 0]
+        nearby = arc_length.follow(balance, 0.9 * grazing[0], grazing[0] * (1 + step))
+        x = nearby.contact[-1, 0]
         depth = float((basis.functions(np.linspace(0, 2 * np.pi, 100_001)) @ x).max()) - GAP
         law = 4 * np.sqrt(2) / (3 * np.pi) * KN * depth * np.sqrt(depth / GAP)
-        ratios.append(float(np.hypot(*_force(balance, near, -1)[1:3])) / law)
+        ratios.append(float(np.hypot(*_force(balance, nearby, -1)[1:3])) / law)
     assert np.abs(np.array(ratios) - 1).max() < 0.03
     assert abs(ratios[0] - 1) < 0.002
 
@@ -103,8 +103,8 @@ def test_impact_oscillator_doubles_its_period_where_its_exact_flow_says():
     model = oscillator(1.0, 1.0, zeta, "n")
     balance = HarmonicBalance.of(model, joint, basis, Excitation.of({}, {1: {"force": 1.0}}), 5.0)
     branch = arc_length.follow(balance, 1.9, 4.5)
-    found = mark(balance, branch)
-    assert [b.kind for b in found.bifurcations] == ["flip", "flip"]
+    result = mark(balance, branch)
+    assert [b.kind for b in result.bifurcations] == ["flip", "flip"]
 
     def flow(k, omega, time):
         return expm(time * np.array([[0, 1, 0, 0], [-k, -2 * zeta, 1, 0], [0, 0, 0, -omega], [0, 0, omega, 0.0]]))
@@ -134,9 +134,9 @@ def test_impact_oscillator_doubles_its_period_where_its_exact_flow_says():
         return 1 + np.trace(product) + np.linalg.det(product)
 
     exact = [brentq(doubling, 2.1, 2.5, xtol=1e-10), brentq(doubling, 3.5, 4.0, xtol=1e-10)]
-    np.testing.assert_allclose([b.value for b in found.bifurcations], exact, rtol=3e-6)
-    assert not found.stable[(branch.omega > exact[0]) & (branch.omega < exact[1])].any()
-    assert found.stable[(branch.omega < exact[0]) | (branch.omega > exact[1])].all()
+    np.testing.assert_allclose([b.value for b in result.bifurcations], exact, rtol=3e-6)
+    assert not result.stable[(branch.omega > exact[0]) & (branch.omega < exact[1])].any()
+    assert result.stable[(branch.omega < exact[0]) | (branch.omega > exact[1])].all()
 
 
 def test_a_nonlinear_energy_sink_loses_its_period_where_a_complex_pair_of_multipliers_leaves_the_unit_circle():
@@ -152,22 +152,22 @@ def test_a_nonlinear_energy_sink_loses_its_period_where_a_complex_pair_of_multip
     basis, loads = HarmonicBasis((1, 3, 5), 32), Excitation.of(harmonic={1: {"force": force}})
     balance = HarmonicBalance.of(model, joint, basis, loads, 1.5)
     branch = arc_length.follow(balance, 0.9, 1.02)
-    found = mark(balance, branch)
-    assert [b.kind for b in found.bifurcations] == ["Neimark-Sacker"]
+    result = mark(balance, branch)
+    assert [b.kind for b in result.bifurcations] == ["Neimark-Sacker"]
 
     inverse = np.diag([1.0, 1.0 / light])
 
     def rates(omega, varied=True):
         def rate(t, y):
-            q, v, moved = y[:2], y[2:4], y[4:].reshape(4, -1)
+            q, v, shifted = y[:2], y[2:4], y[4:].reshape(4, -1)
             stretch = q[1] - q[0]
             slope = spring + 3 * cubic * stretch**2
             push = (spring * stretch + cubic * stretch**3) * np.array([-1.0, 1.0])
             acceleration = inverse @ (force * np.cos(omega * t) * first - dashpots @ v - stiffness @ q - push)
             if not varied:
                 return np.concatenate([v, acceleration])
-            change = -inverse @ (dashpots @ moved[2:] + (stiffness + slope * pull) @ moved[:2])
-            return np.concatenate([v, acceleration, np.vstack([moved[2:], change]).ravel()])
+            change = -inverse @ (dashpots @ shifted[2:] + (stiffness + slope * pull) @ shifted[:2])
+            return np.concatenate([v, acceleration, np.vstack([shifted[2:], change]).ravel()])
 
         return rate
 
@@ -187,20 +187,20 @@ def test_a_nonlinear_energy_sink_loses_its_period_where_a_complex_pair_of_multip
         multipliers = np.linalg.eigvals(end[4:].reshape(4, 4))
         return multipliers[np.argmax(np.abs(multipliers))]
 
-    place = found.bifurcations[0]
+    place = result.bifurcations[0]
     before = int(place.position)
     low, high = (abs(leading(branch.omega[i], i)) - 1 for i in (before, before + 1))
     assert low < 0 < high
-    there = leading(place.value, before)
-    assert abs(abs(there) - 1) < 1e-3 * (high - low)
-    assert abs(there.imag) > 0.01  # a pair, neither at +1 nor at -1
+    refined = leading(place.value, before)
+    assert abs(abs(refined) - 1) < 1e-3 * (high - low)
+    assert abs(refined.imag) > 0.01  # a pair, neither at +1 nor at -1
 
-    beyond = int(np.argmin(np.abs(branch.omega - 1.0)))
-    assert not found.stable[beyond]
-    omega, periods = branch.omega[beyond], 200
+    outside = int(np.argmin(np.abs(branch.omega - 1.0)))
+    assert not result.stable[outside]
+    omega, periods = branch.omega[outside], 200
     times = np.linspace(0, 2 * np.pi * periods / omega, 40 * periods)
     march = solve_ivp(
-        rates(omega, False), (0, times[-1]), 1.02 * start(omega, beyond), t_eval=times, rtol=1e-7, atol=1e-10
+        rates(omega, False), (0, times[-1]), 1.02 * start(omega, outside), t_eval=times, rtol=1e-7, atol=1e-10
     )
     peaks = np.abs(march.y[0].reshape(periods, 40)).max(axis=1)[periods // 2 :]
     assert peaks.min() < 0.9 * peaks.max()  # strongly modulated: no periodic motion is left

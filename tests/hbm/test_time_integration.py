@@ -249,9 +249,9 @@ def test_memory_of_open_pairs_is_left_where_a_touch_forgets_it() -> None:
     stepper = TimeStepper(balance, OMEGA, Options(256))
     assert stepper.contact.forgets
     start = stepper.start_from(balance.evaluate(OMEGA, balance.stuck(OMEGA)))
-    here, record, *_ = stepper.period(start)
+    current, record, *_ = stepper.period(start)
     stepper.contact = stepper.contact._replace(forgets=False)
-    there, *_ = stepper.period(start)
+    refined, *_ = stepper.period(start)
     assert 0 < np.mean(record.f[..., 2] == 0) < 1
-    for one, other in zip(here, there, strict=True):
-        assert np.array_equal(one, other)
+    for item, other in zip(current, refined, strict=True):
+        assert np.array_equal(item, other)

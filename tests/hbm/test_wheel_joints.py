@@ -42,12 +42,12 @@ def outputs(mesh, node_sets, faces, order):
     ]
     assert len(joints) == len(faces)
     balance = HarmonicBalance.of(model, joints, HarmonicBasis((0, 1, 2, 3), 128), small.excitation(), 2 * np.pi * 1000)
-    found = newton.solve_from_rest(balance, 2 * np.pi * 310, EXACT)
-    assert found.converged
+    result = newton.solve_from_rest(balance, 2 * np.pi * 310, EXACT)
+    assert result.converged
     B = np.asarray(model.interface.B)
     stuck = linear.stuck_stiffness(np.asarray(model.system.stiffness), B, k)
     lam = eigvalsh(stuck, np.asarray(model.system.mass))
-    return balance.outputs(found.state), found.state.cycle.status, lam[-1] / lam[0]
+    return balance.outputs(result.state), result.state.cycle.status, lam[-1] / lam[0]
 
 
 @pytest.mark.parametrize("order", [0, 1, 3])
@@ -67,13 +67,13 @@ def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_
         groups |= {f"{side}_{i}": facets[np.argsort(x)[i : i + 1]] for i in range(len(facets))}
         groups[f"{side}_whole"] = facets
     cut = mesh.with_boundaries(groups)
-    one, status, condition = outputs(cut, node_sets, ["whole"], order)
+    item, status, condition = outputs(cut, node_sets, ["whole"], order)
     assert (status & SLIPS).any()
     split, _, _ = outputs(cut, node_sets, range(len(facets)), order)
     assert len(facets) > 1
     within = max(1e-12, np.finfo(float).eps * condition)
     assert within < 2e-10
-    assert np.abs(split - one).max() < within * np.abs(one).max()
+    assert np.abs(split - item).max() < within * np.abs(item).max()
 
 
 SPEED = 900.0  # rad/s: enough to move a response by per cents
@@ -100,10 +100,10 @@ def test_linear_waves_with_coriolis_forces_are_the_whole_wheel(turning):
     """Contacts stuck, to 1e-8; waves along and against the rotation differ."""
     heights = []
     for order in (2, -2):
-        one, wheel = small.wave_and_wheel(turning, order)
-        found = [balance.at(2 * np.pi * 310).outputs_lin for balance in (one, wheel)]
-        expected, there = tips(one, wheel, *found, order)
-        assert np.abs(there - expected).max() < 1e-8 * np.abs(expected[:, 1:3]).max()
+        item, wheel = small.wave_and_wheel(turning, order)
+        rows = [balance.at(2 * np.pi * 310).outputs_lin for balance in (item, wheel)]
+        expected, refined = tips(item, wheel, *rows, order)
+        assert np.abs(refined - expected).max() < 1e-8 * np.abs(expected[:, 1:3]).max()
         heights.append(np.hypot(*expected[0, 1:3]))
     assert abs(heights[1] / heights[0] - 1) > 1e-2
 
@@ -118,10 +118,10 @@ def slipping(balance):
 
 def test_friction_with_coriolis_forces_is_the_whole_wheel(turning):
     """Slipping and separating, to 1e-6, in every sector."""
-    one, wheel = small.wave_and_wheel(turning, 1)
-    here, everywhere = slipping(one), slipping(wheel)
-    expected, there = tips(one, wheel, one.outputs(here), wheel.outputs(everywhere), 1)
-    assert np.abs(there - expected).max() < 1e-6 * np.abs(expected).max()
+    item, wheel = small.wave_and_wheel(turning, 1)
+    current, everywhere = slipping(item), slipping(wheel)
+    expected, refined = tips(item, wheel, item.outputs(current), wheel.outputs(everywhere), 1)
+    assert np.abs(refined - expected).max() < 1e-6 * np.abs(expected).max()
 
 
 def test_unequal_blades_with_coriolis_forces_solve_the_equations_of_the_whole_wheel(turning):

@@ -88,8 +88,8 @@ def clicked_zoomed_and_turned(
     from selenium.webdriver.common.keys import Keys
     from selenium.webdriver.support.select import Select
 
-    monkeypatch.setattr(page, "_renders", lambda found: {})
-    monkeypatch.setattr(plots, "figures", lambda found: {"frf": response_plots.response})
+    monkeypatch.setattr(page, "_renders", lambda outcome: {})
+    monkeypatch.setattr(plots, "figures", lambda outcome: {"frf": response_plots.response})
     path = page.write([(name, result, None)], folder / f"{name}.html")
     assert path.stat().st_size < page.LARGEST
     opened(driver, path)
@@ -105,9 +105,9 @@ def clicked_zoomed_and_turned(
     entries = charts[0].find_elements("css selector", ".legendtoggle")
     if entries:  # a single curve has none
         visible = "return arguments[0].data.map(t => String(t.visible))"
-        seen = driver.execute_script(visible, charts[0])
+        observed = driver.execute_script(visible, charts[0])
         entries[0].click()
-        assert becomes(driver, visible, charts[0], lambda now: now != seen)
+        assert becomes(driver, visible, charts[0], lambda now: now != observed)
     solid = driver.find_element("css selector", "#part-0 .solid")
     driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", solid)
     eye = "return Object.values(arguments[0]._fullLayout.scene._scene.getCamera().eye)"
@@ -127,8 +127,8 @@ def clicked_zoomed_and_turned(
         together = driver.execute_script(places, solid)
         opener[0].click()
         until(driver, "return document.querySelector('#part-0 .open').checked", 20)
-        apart = driver.execute_script(places, solid)
-        assert np.ptp(np.subtract(apart, together), axis=1).max() > 1.0  # mm
+        distance = driver.execute_script(places, solid)
+        assert np.ptp(np.subtract(distance, together), axis=1).max() > 1.0  # mm
     assert not [entry for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
     for width in (PHONE, DESK):
         of_width(driver, width)

@@ -54,8 +54,8 @@ def deck(
         E, nu, rho = materials[name]
         lines += [f"*MATERIAL, NAME={name.upper()}", "*ELASTIC", f"{E:.12e}, {nu}", "*DENSITY", f"{rho}"]
         lines.append(f"*SOLID SECTION, ELSET={name.upper()}, MATERIAL={name.upper()}")
-    held = sorted({int(n) for group in fixed for n in assembly.node_sets[group]} & used)
-    lines += ["*BOUNDARY", *(f"{n + 1}, 1, 3" for n in held)]
+    constrained = sorted({int(n) for group in fixed for n in assembly.node_sets[group]} & used)
+    lines += ["*BOUNDARY", *(f"{n + 1}, 1, 3" for n in constrained)]
     for i, pair in enumerate(pairs):
         for side, group in (("S", pair.slave), ("M", pair.master)):
             lines.append(f"*SURFACE, NAME={side}{i}, TYPE=ELEMENT")
@@ -85,11 +85,11 @@ def _order(mesh: Any) -> np.ndarray:
 def _faces(assembly: Any, elements: list[tuple[str, int, np.ndarray]], group: str) -> list[tuple[int, int]]:
     """Elements and faces (from 0) whose four corners are nodes of a group."""
     nodes = set(assembly.node_sets[group].tolist())
-    found = []
+    rows = []
     for _, first, cells in elements:
         for e, cell in enumerate(cells):
-            found += [(first + e, f) for f, corners in enumerate(FACES) if nodes.issuperset(cell[list(corners)])]
-    return found
+            rows += [(first + e, f) for f, corners in enumerate(FACES) if nodes.issuperset(cell[list(corners)])]
+    return rows
 
 
 def run(text: str, folder: Path) -> tuple[list[np.ndarray], np.ndarray]:

@@ -23,5 +23,5 @@ def digest(folder: Path) -> str:
         "wear=",
     )
     system = modelling.build(read("beam", small), Progress()).reduced.system
-    both = np.ascontiguousarray(np.concatenate([np.asarray(system.stiffness), np.asarray(system.mass)]))
-    return hashlib.sha256(both.tobytes()).hexdigest()
+    two_results = np.ascontiguousarray(np.concatenate([np.asarray(system.stiffness), np.asarray(system.mass)]))
+    return hashlib.sha256(two_results.tobytes()).hexdigest()

@@ -42,7 +42,7 @@ def root(mesh: meshio.Mesh) -> np.ndarray:
 
 def write(mesh: meshio.Mesh, path: Path, kind: str) -> Path:
     """Write the mesh with the node set ROOT where the format has sets; kind tells the two versions of MSH apart."""
-    nodes, points, held = mesh.cells_dict["hexahedron20"] + 1, mesh.points, root(mesh).tolist()
+    nodes, points, fixed = mesh.cells_dict["hexahedron20"] + 1, mesh.points, root(mesh).tolist()
     if path.suffix == ".msh":
         with session() as gmsh:
             gmsh.option.setNumber("Mesh.MshFileVersion", float(kind))
@@ -55,7 +55,7 @@ def write(mesh: meshio.Mesh, path: Path, kind: str) -> Path:
             gmsh.write(str(path))
         return path
     if path.suffix in (".vtk", ".vtu", ".med"):
-        flags = np.isin(np.arange(1, len(points) + 1), held).astype(np.int32)
+        flags = np.isin(np.arange(1, len(points) + 1), fixed).astype(np.int32)
         data = {} if path.suffix == ".med" else {"ROOT": flags}
         meshio.write(path, meshio.Mesh(points, mesh.cells, point_data=data))
         return path
@@ -66,9 +66,9 @@ def write(mesh: meshio.Mesh, path: Path, kind: str) -> Path:
         lines.append("*ELEMENT, TYPE=C3D20R, ELSET=BAR")
         for i, e in enumerate(nodes.tolist(), 1):
             lines += [f"{i}, " + ", ".join(map(str, e[:10])) + ",", ", ".join(map(str, e[10:]))]
-        lines += ["*NSET, NSET=ROOT", *(f"{label}," for label in held)]
+        lines += ["*NSET, NSET=ROOT", *(f"{label}," for label in fixed)]
     elif path.suffix == ".bdf":
-        lines += ["SOL 103", "CEND", "SET 7 = " + ",\n".join(map(str, held)), "BEGIN BULK"]
+        lines += ["SOL 103", "CEND", "SET 7 = " + ",\n".join(map(str, fixed)), "BEGIN BULK"]
         lines += [
             f"GRID*   {i:16d}{'':16}{x:16.9e}{y:16.9e}*\n*       {z:16.9e}" for i, (x, y, z) in enumerate(points, 1)
         ]
@@ -85,8 +85,8 @@ def write(mesh: meshio.Mesh, path: Path, kind: str) -> Path:
         for i, e in enumerate(nodes.tolist(), 1):
             head = [1, 1, 1, 1, 0, 0, 0, 0, 20, 0, i]
             lines += ["".join(f"{n:9d}" for n in [*head, *e[:8]]), "".join(f"{n:9d}" for n in e[8:])]
-        lines += ["       -1", f"CMBLOCK,ROOT,NODE,{len(held):8d}", "(8i10)"]
-        lines += ["".join(f"{n:10d}" for n in held[k : k + 8]) for k in range(0, len(held), 8)]
+        lines += ["       -1", f"CMBLOCK,ROOT,NODE,{len(fixed):8d}", "(8i10)"]
+        lines += ["".join(f"{n:10d}" for n in fixed[k : k + 8]) for k in range(0, len(fixed), 8)]
         lines += ["MPDATA,R5.0, 1,EX  ,  1, 1,  2.1E+11,", "FINISH"]
     path.write_text("\n".join(lines) + "\n")
     return path

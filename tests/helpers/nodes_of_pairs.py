@@ -11,6 +11,6 @@ def node_of_pair(face: Face) -> np.ndarray:
     """(n_pair,) node of the mesh that stands where the pair does, -1 where none does."""
     found = np.full(len(face.points), -1)
     at = face.weights.tocoo()
-    here = at.data > 1 - 1e-4
-    found[at.col[here]] = face.nodes[at.row[here]]
+    current = at.data > 1 - 1e-4
+    found[at.col[current]] = face.nodes[at.row[current]]
     return found

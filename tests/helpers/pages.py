@@ -65,9 +65,9 @@ def name(page: Path) -> str:
 
 def environment(folder: Path) -> dict[str, str]:
     """What a user has: the folder with the start script, and no Python of ours on the path."""
-    wanted = ("HOME", "LANG", "NUMBA_CACHE_DIR", "TMPDIR", "TRIBODYN_CACHE")
-    kept = {key: os.environ[key] for key in wanted if key in os.environ}
-    return kept | {"PATH": f"{folder}:/usr/bin:/bin", "MPLBACKEND": "agg"}
+    expected = ("HOME", "LANG", "NUMBA_CACHE_DIR", "TMPDIR", "TRIBODYN_CACHE")
+    saved = {key: os.environ[key] for key in expected if key in os.environ}
+    return saved | {"PATH": f"{folder}:/usr/bin:/bin", "MPLBACKEND": "agg"}
 
 
 def prepare(folder: Path, program: str = PROGRAM) -> Path:

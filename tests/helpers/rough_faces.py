@@ -12,8 +12,8 @@ def caps(radius: float, heights: np.ndarray, apart: float, step: float) -> Heigh
     """Spheres of one radius on a square lattice, cut by a plane; heights : (n, n) of their summits above it."""
     per_cell = round(apart / step)
     cell = (np.arange(per_cell) - per_cell // 2) * step
-    below = np.hypot(cell[:, None], cell) ** 2
-    drop = radius - np.sqrt(np.maximum(radius**2 - below, 0.0))
+    lower = np.hypot(cell[:, None], cell) ** 2
+    drop = radius - np.sqrt(np.maximum(radius**2 - lower, 0.0))
     z = np.maximum(heights[:, None, :, None] - drop[None, :, None, :], 0.0).reshape(2 * (len(heights) * per_cell,))
     axis = np.arange(len(z)) * step
     return HeightMap(axis, axis, z, "caps")

@@ -43,7 +43,7 @@ def tell(scene: str, overrides: list[str]) -> None:
         with h5py.File(Path(folder) / "result.h5") as file:
             file.visititems(lambda name, item: arrays.update({name: getattr(item, "shape", None)}) and None)
     balance = models[0].balance
-    told = {
+    messages = {
         "state": result.state,
         "imported": [name for name in OPTIONAL if name in sys.modules],
         "factorised": factorised,
@@ -61,7 +61,7 @@ def tell(scene: str, overrides: list[str]) -> None:
         "modes": balance.model.origin.n_modes,
         "delta_max": result.facts.delta_max,
     }
-    print(json.dumps(told), flush=True)
+    print(json.dumps(messages), flush=True)
 
 
 if __name__ == "__main__":

@@ -94,9 +94,9 @@ def wave_and_wheel(reduced, engine_order, harmonics=(0, 1, 2, 3), damping=0.01, 
     """The same problem twice: one sector under a travelling wave, and the whole wheel."""
     basis = HarmonicBasis(harmonics, 128)
     load = load or excitation()
-    one, wheel = travelling_wave(reduced, engine_order), wheel_model(reduced, stiffness)
+    item, wheel = travelling_wave(reduced, engine_order), wheel_model(reduced, stiffness)
     if damping:
-        one, wheel = (model.with_damping(lambda system, B: modal_damping(system, damping)) for model in (one, wheel))
+        item, wheel = (model.with_damping(lambda system, B: modal_damping(system, damping)) for model in (item, wheel))
     k = reduced.sector.interface.stiffness(*STIFFNESS)
     highest = 2 * np.pi * 1000
 
@@ -104,4 +104,4 @@ def wave_and_wheel(reduced, engine_order, harmonics=(0, 1, 2, 3), damping=0.01, 
         contact = ContactParameters.of(model.interface.components, np.tile(k, (copies, 1)), friction=0.3)
         return HarmonicBalance.of(model, Joint("contact", "jenkins", contact), basis, loads, highest)
 
-    return balance(one, 1, load), balance(wheel, N, waves.on_wheel(load, engine_order, N))
+    return balance(item, 1, load), balance(wheel, N, waves.on_wheel(load, engine_order, N))

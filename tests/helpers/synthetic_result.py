@@ -30,8 +30,8 @@ def block(nx: int = 8, ny: int = 2, nz: int = 2) -> PartMesh:
     points = np.stack(np.meshgrid(x, y, z, indexing="ij"), -1).reshape(-1, 3)
     node = np.arange(len(points)).reshape(nx + 1, ny + 1, nz + 1)
     low, high = slice(None, -1), slice(1, None)
-    around = [(low, low), (high, low), (high, high), (low, high)]
-    cells = [node[i, j, k].ravel() for k in (low, high) for i, j in around]
+    neighbourhood = [(low, low), (high, low), (high, high), (low, high)]
+    cells = [node[i, j, k].ravel() for k in (low, high) for i, j in neighbourhood]
     return PartMesh("hexahedron", points, np.stack(cells, 1))
 
 

@@ -35,14 +35,14 @@ def sector(components: tuple[str, ...], turning: float = 0.0, n_sectors: int = N
     swirl = np.kron(np.eye(2), np.array([[0.0, -turning], [turning, 0.0]]))
     system = SecondOrderSystem(np.eye(4), stiffness, None, loads, outputs, swirl if turning else None)
     columns = [("t1", "n").index(name) for name in components]
-    right, left = np.eye(4)[columns], np.eye(4)[[2 + column for column in columns]]
+    right, remaining = np.eye(4)[columns], np.eye(4)[[2 + column for column in columns]]
     interface = ContactInterface(
         points=np.zeros((1, 3)), frames=np.eye(3)[None], area=np.ones(1), gap=np.zeros(1), B=right,
         components=components, faces=np.zeros((1, 1), int),
     )  # fmt: skip
     turn = rotation((1, 0, 0), 2 * np.pi / n_sectors)
-    whole = Sector(system, interface, left, NONE, NONE, turn, n_sectors, {"contact": slice(0, 1)})
-    return ReducedSector(whole, Reduction(np.eye(4), np.zeros(0, int), 0, "", np.inf))
+    full = Sector(system, interface, remaining, NONE, NONE, turn, n_sectors, {"contact": slice(0, 1)})
+    return ReducedSector(full, Reduction(np.eye(4), np.zeros(0, int), 0, "", np.inf))
 
 
 def wave_and_wheel(
@@ -58,8 +58,8 @@ def wave_and_wheel(
 ) -> tuple[HarmonicBalance, HarmonicBalance]:
     """One problem twice: a sector under a travelling wave, and the whole wheel; contact pressed by interference."""
     load = Excitation.of({}, {1: {"shaker": force}})
-    one, wheel = travelling_wave(reduced, order), wheel_model(reduced)
-    one, wheel = (model.with_damping(lambda system, B: modal_damping(system, damping)) for model in (one, wheel))
+    item, wheel = travelling_wave(reduced, order), wheel_model(reduced)
+    item, wheel = (model.with_damping(lambda system, B: modal_damping(system, damping)) for model in (item, wheel))
     basis = HarmonicBasis(harmonics, samples, "located")
     components = reduced.sector.interface.components
     k = [4e3 if name == "t1" else 6e3 for name in components]
@@ -69,7 +69,7 @@ def wave_and_wheel(
         return HarmonicBalance.of(model, Joint("contact", law, contact), basis, loads, 400.0)
 
     n = reduced.sector.n_sectors
-    return balance(one, 1, load), balance(wheel, n, on_wheel(load, order, n))
+    return balance(item, 1, load), balance(wheel, n, on_wheel(load, order, n))
 
 
 def spread(one: HarmonicBalance, coefficients: np.ndarray, order: int, n_sectors: int = N) -> np.ndarray:

@@ -107,15 +107,15 @@ def load() -> None:
 def answer(asks: socket.socket) -> None:
     """Run what is asked in a child of this process and tell its exit code; does not return."""
     size, files, _, _ = socket.recv_fds(asks, 8, 3)
-    told = b""
-    while len(told) < int.from_bytes(size, "big"):
-        told += asks.recv(1 << 16)
+    messages = b""
+    while len(messages) < int.from_bytes(size, "big"):
+        messages += asks.recv(1 << 16)
     pid = os.fork()
     if pid == 0:
         asks.close()
         code = 1
         try:
-            code = child(files, *json.loads(told))
+            code = child(files, *json.loads(messages))
         finally:
             os._exit(code)
     for file in files:
@@ -130,9 +130,9 @@ def child(files: list[int], arguments: list[str], folder: str, environment: dict
     for place, file in enumerate(files):
         os.dup2(file, place)
     os.chdir(folder)
-    kept = {name: os.environ[name] for name in (*THREADS, "PYTHONPATH", "VTK_DEFAULT_OPENGL_WINDOW", "MPLBACKEND")}
+    saved = {name: os.environ[name] for name in (*THREADS, "PYTHONPATH", "VTK_DEFAULT_OPENGL_WINDOW", "MPLBACKEND")}
     os.environ.clear()
-    os.environ.update(environment | kept)
+    os.environ.update(environment | saved)
     sys.modules["__main__"] = main = types.ModuleType("__main__")
     signal.signal(signal.SIGINT, signal.default_int_handler)
     code: object = 0

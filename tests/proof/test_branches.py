@@ -42,25 +42,25 @@ def test_twenty_problems_are_followed_with_the_same_folds_both_ways() -> None:
 
 
 def test_two_folds_close_together_are_not_stepped_over() -> None:
-    given = branches.problem(18)
-    down = arc_length.follow(given.balance, given.high, given.low)
+    inputs = branches.problem(18)
+    down = arc_length.follow(inputs.balance, inputs.high, inputs.low)
     assert np.sort(down.omega[list(down.folds)]) == pytest.approx(FOLDS_OF_18, rel=1e-8)
 
 
 def test_two_folds_within_one_step_are_both_found() -> None:
-    given = branches.problem(168)
-    up = arc_length.follow(given.balance, given.low, given.high)
+    inputs = branches.problem(168)
+    up = arc_length.follow(inputs.balance, inputs.low, inputs.high)
     assert np.sort(up.omega[list(up.folds)]) == pytest.approx(FOLDS_OF_168, rel=1e-8)
 
 
 def test_the_judge_sees_points_off_the_curve_lost_folds_and_gaps() -> None:
-    given = branches.problem(7)
-    up = arc_length.follow(given.balance, given.low, given.high)
-    good = branches.checked(given.balance, up)
+    inputs = branches.problem(7)
+    up = arc_length.follow(inputs.balance, inputs.low, inputs.high)
+    good = branches.checked(inputs.balance, up)
     assert good < branches.DEFECT
     assert branches.verdict(up, replace(up, **_backwards(up)), good)[0] == branches.FOLLOWED
     off = replace(up, contact=up.contact * 1.01)
-    assert branches.checked(given.balance, off) > branches.DEFECT
+    assert branches.checked(inputs.balance, off) > branches.DEFECT
     outcome, reason = branches.verdict(up, replace(up, **_backwards(up) | {"folds": ()}), good)
     assert outcome == branches.WRONG
     assert reason == "2 folds upwards and 0 downwards, or not the same"

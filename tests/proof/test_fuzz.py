@@ -24,22 +24,22 @@ TINY = (
 
 
 def test_every_run_ends_as_a_run_may(tmp_path: Path) -> None:
-    tried = fuzz.fuzz("beam", TINY, values=150, runs=3, seed=1, folder=tmp_path, command=cli.main)
-    assert [one for one in tried if not one.good] == []
+    attempts = fuzz.fuzz("beam", TINY, values=150, runs=3, seed=1, folder=tmp_path, command=cli.main)
+    assert [item for item in attempts if not item.good] == []
     again = fuzz.cases("beam", TINY, 150, seed=1)
-    assert {(one.key, one.value) for one in tried} == set(again)
-    of = fuzz.counts(tried)["beam"]
+    assert {(item.key, item.value) for item in attempts} == set(again)
+    of = fuzz.counts(attempts)["beam"]
     assert (of["values"], of["runs"], sum(of["ends"].values())) == (150, 3, 3)
     assert of[fuzz.REFUSED] + of["scenes"] <= 150
     assert of["scenes"] > 3
-    assert f"beam: {of['keys']} keys, 150 values: {of[fuzz.REFUSED]} refused when read" in fuzz.as_text(tried)
+    assert f"beam: {of['keys']} keys, 150 values: {of[fuzz.REFUSED]} refused when read" in fuzz.as_text(attempts)
 
     def never(words: list[str]) -> None:
         raise AssertionError(words)
 
-    kept = fuzz.fuzz("beam", TINY, values=150, runs=3, seed=1, folder=tmp_path, command=never)
-    assert [(one.key, one.value, one.end, one.output) for one in kept] == [
-        (one.key, one.value, one.end, one.output) for one in tried
+    saved = fuzz.fuzz("beam", TINY, values=150, runs=3, seed=1, folder=tmp_path, command=never)
+    assert [(item.key, item.value, item.end, item.output) for item in saved] == [
+        (item.key, item.value, item.end, item.output) for item in attempts
     ]
     with pytest.raises(ValueError, match="keeps runs of beam with other changes"):
         fuzz.fuzz("beam", TINY[1:], values=1, folder=tmp_path, command=never)
@@ -75,8 +75,8 @@ def test_a_wrong_end_is_seen(does: str, end: str, monkeypatch: pytest.MonkeyPatc
             raise SystemExit(2)
         exec(does, {})
 
-    (tried,) = fuzz.fuzz("beam", TINY, seconds=1.0, command=instead)
-    assert tried.end == end
+    (attempts,) = fuzz.fuzz("beam", TINY, seconds=1.0, command=instead)
+    assert attempts.end == end
 
 
 def test_a_scene_that_does_not_end_well_as_it_is_is_no_scene_to_fuzz() -> None:
@@ -91,14 +91,14 @@ def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.
     result = front_door.run("beam", overrides=TINY)
     wear = result.wear
     assert wear is not None
-    told = {"depth": Statement(1.0, 0.1, "mesh and contact grid", "reported", "measured")}
+    messages = {"depth": Statement(1.0, 0.1, "mesh and contact grid", "reported", "measured")}
 
     def end(**changes: object) -> str:
         store.save(tmp_path / "changed.h5", replace(result, **changes))
         return fuzz_result.wrong(tmp_path / "changed.h5")
 
     def verdict(**changes: object) -> str:
-        return end(verdict=Verdict({"depth": replace(told["depth"], **changes)}, (), 2.0, 0.0))
+        return end(verdict=Verdict({"depth": replace(messages["depth"], **changes)}, (), 2.0, 0.0))
 
     assert end() == verdict() == ""
     assert verdict(error=None) == "verdict: depth is stated without an error"
@@ -112,10 +112,10 @@ def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_damage_of_several_kinds_at_once_ends_as_it_may() -> None:
-    tried = fuzz_mixed.tries(12, seed=3, only="run K.mtx", command=cli.main)
-    assert [one for one in tried if not one.good] == []
-    assert {"success", "refused"} <= {one.end for one in tried}
-    table = fuzz_mixed.as_table(tried)
+    attempts = fuzz_mixed.tries(12, seed=3, only="run K.mtx", command=cli.main)
+    assert [item for item in attempts if not item.good] == []
+    assert {"success", "refused"} <= {item.end for item in attempts}
+    table = fuzz_mixed.as_table(attempts)
     assert "| all | 12 |" in table
 
 
@@ -134,6 +134,6 @@ def test_a_wrong_end_of_a_damaged_file_is_seen(monkeypatch: pytest.MonkeyPatch) 
                 print("some more", flush=True)
                 last = time.process_time()
 
-    tried = fuzz_mixed.tries(3, seconds=0.2, command=instead)
-    assert {one.end for one in tried} == {"traceback", fuzz_runs.SILENT, fuzz_runs.GOING}
-    assert all(one.good == (one.end == fuzz_runs.GOING) for one in tried)
+    attempts = fuzz_mixed.tries(3, seconds=0.2, command=instead)
+    assert {item.end for item in attempts} == {"traceback", fuzz_runs.SILENT, fuzz_runs.GOING}
+    assert all(item.good == (item.end == fuzz_runs.GOING) for item in attempts)

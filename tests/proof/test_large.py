@@ -22,9 +22,9 @@ def test_a_reduction_is_measured_in_four_ways(monkeypatch: pytest.MonkeyPatch) -
     text = large_fe.as_text(rows)
     assert "by hand: seconds grow with the power" in text
     with pytest.raises(ValueError, match='no way "by foot": there are product, flexibility'):
-        large_fe.run(["30k"], lambda said: None, ["by foot"])
+        large_fe.run(["30k"], lambda message: None, ["by foot"])
     with pytest.raises(ValueError, match='no size "30": there are 30k'):
-        large_fe.run(["30"], lambda said: None)
+        large_fe.run(["30"], lambda message: None)
 
 
 def test_an_assembly_is_measured_from_its_files_to_its_reduced_model(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,4 +52,4 @@ def test_both_ways_of_a_large_contact_are_measured_and_agree() -> None:
     text = large_contact.as_text([dense, ours, twice])
     assert "residual_flexibility: powers of the contact DOFs: set-up 1.00" in text
     with pytest.raises(ValueError, match='no size "5k": there are 500, 1500, 3k, 12k, 48k'):
-        large_contact.run(["5k"], lambda said: None)
+        large_contact.run(["5k"], lambda message: None)

@@ -17,9 +17,9 @@ def test_a_pattern_of_each_damping_is_solved_as_on_the_dense_wheel(
 ) -> None:
     """Of linear states at the least damping alone."""
     monkeypatch.setattr(mistuned, "DAMPING", damping)
-    found = mistuned.run(1, 1, lambda sentence: None, (state,))
-    assert [group.damping for group in found] == list(damping)
-    for group in found:
+    result = mistuned.run(1, 1, lambda sentence: None, (state,))
+    assert [group.damping for group in result] == list(damping)
+    for group in result:
         assert not group.wrong(1), group.line()
         assert (group.slipping > 0) == (state == "slipping"), group.line()
 
@@ -40,8 +40,8 @@ def test_what_is_not_solved_or_not_compared_does_not_pass(kind: str) -> None:
 
 
 def test_slipping_contacts_slip_and_stuck_ones_stick() -> None:
-    alike = {"open": SEPARATES, "slipping": STICKS | SLIPS, "stuck": STICKS}
+    equal = {"open": SEPARATES, "slipping": STICKS | SLIPS, "stuck": STICKS}
     for state in mistuned.STATES:
-        assert [other for other, status in alike.items() if mistuned.is_in(state, np.full(3, status))] == [state]
+        assert [other for other, status in equal.items() if mistuned.is_in(state, np.full(3, status))] == [state]
     assert not mistuned.is_in("stuck", np.array([STICKS, SLIPS]))
     assert not mistuned.is_in("open", np.array([SEPARATES, STICKS]))

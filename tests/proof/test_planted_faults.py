@@ -76,7 +76,7 @@ def test_a_rule_rewrites_one_place(place: str, rule: str, line: str) -> None:
     module = rewritten(SOURCE, place, Rule.parse(rule))
     compile(module, "source", "exec")
     before, after = ast.unparse(ast.parse(SOURCE)).splitlines(), ast.unparse(module).splitlines()
-    assert [new.strip() for old, new in zip(before, after, strict=True) if old != new] == [line]
+    assert [updated.strip() for previous, updated in zip(before, after, strict=True) if previous != updated] == [line]
 
 
 def test_a_rule_without_its_one_place_is_refused() -> None:

@@ -25,11 +25,11 @@ def test_what_is_stated_of_untuned_scenes_holds(rows: list[Row]) -> None:
     """But for the amplitude of the second, off by a fifth where a sixth is stated: the rule holds in 98 % of all."""
     for row in rows:
         assert row.outcome == "measured"
-        assert {one.quantity for one in row.judged if one.counted} >= {"peak_frequency", "amplitude"}
-        assert {one["refinement"] for one in row.changes} >= {"harmonics", "mesh and contact grid", "combined"}
-    violated = [one for row in rows for one in row.judged if one.violated]
-    assert {one.quantity for one in violated} <= {"amplitude"}
-    assert all((one.true or 0.0) < 1.35 * (one.error or 0.0) for one in violated)
+        assert {item.quantity for item in row.judged if item.counted} >= {"peak_frequency", "amplitude"}
+        assert {item["refinement"] for item in row.changes} >= {"harmonics", "mesh and contact grid", "combined"}
+    violated = [item for row in rows for item in row.judged if item.violated]
+    assert {item.quantity for item in violated} <= {"amplitude"}
+    assert all((item.true or 0.0) < 1.35 * (item.error or 0.0) for item in violated)
 
 
 def test_the_reference_is_finer_in_every_setting(tmp_path: Path) -> None:
@@ -65,14 +65,16 @@ def test_rows_are_kept_and_taken_up_again(rows: list[Row], tmp_path: Path, monke
         return replace(rows[0], number=number, seed=seed, wearing=wearing)
 
     monkeypatch.setattr(scoreboard, "measured", measured)
-    assert scoreboard.run(2, SEED, tmp_path, 1.0, lambda said: None) == [replace(rows[0], number=n) for n in range(2)]
+    assert scoreboard.run(2, SEED, tmp_path, 1.0, lambda message: None) == [
+        replace(rows[0], number=n) for n in range(2)
+    ]
     scoreboard_table.write(rows, tmp_path)
     assert (tmp_path / "scoreboard.png").exists()
     with (tmp_path / scoreboard.ROWS).open("a") as file:
         file.write('{"number": 7, "se')  # killed while it wrote
-    again = scoreboard.run(3, SEED, tmp_path, 1.0, lambda sentence: None)
+    result = scoreboard.run(3, SEED, tmp_path, 1.0, lambda sentence: None)
     assert calls == [0, 1, 2]
-    assert again[0] == replace(rows[0], number=0)
+    assert result[0] == replace(rows[0], number=0)
     worn = scoreboard.run(1, SEED, tmp_path, 1.0, lambda sentence: None, wearing=True)  # other scenes of the same seed
     assert (worn, calls) == ([replace(rows[0], number=0, wearing=True)], [0, 1, 2, 0])
 
@@ -97,9 +99,9 @@ def test_a_violated_error_is_reported(tmp_path: Path) -> None:
 def test_the_page_says_what_the_kept_rows_say(tmp_path: Path) -> None:
     """The rows of the campaign are kept beside its page, whose counts, ratios and figure come from them."""
     (tmp_path / scoreboard.ROWS).write_text(KEPT.read_text(encoding="utf-8"), encoding="utf-8")
-    kept = scoreboard.rows_in(tmp_path)
-    assert len({row.seed for row in kept}) == 1
+    saved = scoreboard.rows_in(tmp_path)
+    assert len({row.seed for row in saved}) == 1
     page = KEPT.with_name("scoreboard.md").read_text(encoding="utf-8")
-    for line in scoreboard_table.summary(kept).splitlines():
+    for line in scoreboard_table.summary(saved).splitlines():
         assert line.rstrip() in page, line
-    assert scoreboard.run(0, kept[0].seed, tmp_path, 1.0, lambda sentence: None) == kept  # nothing is run again
+    assert scoreboard.run(0, saved[0].seed, tmp_path, 1.0, lambda sentence: None) == saved  # nothing is run again

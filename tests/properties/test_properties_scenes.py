@@ -37,12 +37,12 @@ WORDS = ("x", "material", "contact", "n", "law", "0", "frequency", "harmonics.ke
 
 def entries(table: dict[str, Any], before: str = "") -> list[tuple[str, Any]]:
     """Dotted keys of everything in a scene with their values, tables included."""
-    found: list[tuple[str, Any]] = []
+    rows: list[tuple[str, Any]] = []
     for name, value in table.items():
-        found.append((f"{before}{name}", value))
+        rows.append((f"{before}{name}", value))
         if isinstance(value, dict):
-            found += entries(value, f"{before}{name}.")
-    return found
+            rows += entries(value, f"{before}{name}.")
+    return rows
 
 
 def measures(found: list[tuple[str, Any]]) -> list[tuple[str, str]]:

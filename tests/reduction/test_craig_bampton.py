@@ -36,8 +36,8 @@ def test_masters(part, model):
     q = np.zeros(model.system.n_dof)
     q[3] = 1.0
     assert model.reconstruct(q)[masters] == pytest.approx(q[: len(masters)], abs=1e-14)
-    more = craig_bampton(part.system, part.interface, n_modes=0, extra_masters=[0, 1, 2])
-    assert more.system.n_dof == len(masters) + 3
+    extra = craig_bampton(part.system, part.interface, n_modes=0, extra_masters=[0, 1, 2])
+    assert extra.system.n_dof == len(masters) + 3
     with pytest.raises(ValueError, match="a master lies outside"):
         craig_bampton(part.system, part.interface, n_modes=0, extra_masters=[part.system.n_dof])
 
@@ -83,12 +83,12 @@ def test_few_modes_are_enough(part, model):
     finer = craig_bampton(part.system, part.interface, n_modes=30)
     for stiffness in (None, k):
         full, _ = linear_modes(part, stiffness)
-        few, _ = linear_modes(model, stiffness)
-        more, _ = linear_modes(finer, stiffness)
-        assert (few - full > -1e-8 * full).all()
-        assert (more <= few * (1 + 1e-9)).all()
-        assert few[0] / full[0] - 1 < 5e-4
-    assert (more / full - 1)[:9].max() < 3e-3
+        small, _ = linear_modes(model, stiffness)
+        extra, _ = linear_modes(finer, stiffness)
+        assert (small - full > -1e-8 * full).all()
+        assert (extra <= small * (1 + 1e-9)).all()
+        assert small[0] / full[0] - 1 < 5e-4
+    assert (extra / full - 1)[:9].max() < 3e-3
     full, _ = linear_modes(part)
     assert (linear_modes(finer)[0] / full - 1).max() < 3e-3
 
@@ -116,9 +116,9 @@ def test_cutoff_keeps_the_modes_below_it(part, model):
         craig_bampton(part.system, part.interface, cutoff=1e9)
     with pytest.raises(ValueError, match=r"beyond what the mesh resolves: \d+ of its \d+ modes lie below it"):
         craig_bampton(part.system, part.interface, cutoff=60 * omitted)
-    for both in ({}, {"n_modes": 3, "cutoff": 1e3}):
+    for two_results in ({}, {"n_modes": 3, "cutoff": 1e3}):
         with pytest.raises(ValueError, match="one of the two"):
-            craig_bampton(part.system, part.interface, **both)
+            craig_bampton(part.system, part.interface, **two_results)
     with pytest.raises(ValueError, match="not masters"):
         craig_bampton(part.system, part.interface, n_modes=part.system.n_dof)
 

@@ -172,17 +172,17 @@ def test_every_format_gives_the_same_structure(reader, tmp_path):
 def test_op4_is_read_and_written_as_another_program_does_bit_for_bit(tmp_path):
     rng = np.random.default_rng(1)
     sparse = rng.normal(size=(7, 7)) * (rng.random((7, 7)) < 0.4)
-    wanted = {"A": sparse + sparse.T, "B": rng.normal(size=(7, 3)), "Z": np.zeros((3, 3)), "C": sparse * (1 - 2j)}
+    expected = {"A": sparse + sparse.T, "B": rng.normal(size=(7, 3)), "Z": np.zeros((3, 3)), "C": sparse * (1 - 2j)}
     for binary, kind, order in itertools.product((True, False), ("dense", "bigmat", "nonbigmat"), "<>"):
-        op4.write(str(tmp_path / "a.op4"), wanted, binary=binary, endian=order, sparse=kind, digits=16)
+        op4.write(str(tmp_path / "a.op4"), expected, binary=binary, endian=order, sparse=kind, digits=16)
         read = read_op4(tmp_path / "a.op4")
-        assert all(np.array_equal(read[name].toarray(), matrix) for name, matrix in wanted.items()), (binary, kind)
-    write_op4(tmp_path / "b.op4", wanted)
+        assert all(np.array_equal(read[name].toarray(), matrix) for name, matrix in expected.items()), (binary, kind)
+    write_op4(tmp_path / "b.op4", expected)
     for read in (
         op4.read(str(tmp_path / "b.op4")),
         {n.lower(): m.toarray() for n, m in read_op4(tmp_path / "b.op4").items()},
     ):
-        assert all(np.array_equal(read[name.lower()], matrix) for name, matrix in wanted.items())
+        assert all(np.array_equal(read[name.lower()], matrix) for name, matrix in expected.items())
     assert read_array(tmp_path / "b.op4", "B").shape == (7, 3)
 
 
@@ -202,19 +202,19 @@ def test_dmig_keeps_grid_points_components_and_scalar_points(tmp_path):
         + "DMIG    M              2       3               2       3      3.\n"
     )
     (tmp_path / "two.bdf").write_text("$ a comment\n" + free + small + "ENDDATA\n")
-    again = read_matrices(tmp_path / "two.bdf")
-    assert again.labels == ((1, 1), (2, 3))
-    assert again.stiffness.toarray().tolist() == [[4, -1.5], [-1.5, 2]]
-    assert again.mass.diagonal().tolist() == [2, 3]
+    repeated = read_matrices(tmp_path / "two.bdf")
+    assert repeated.labels == ((1, 1), (2, 3))
+    assert repeated.stiffness.toarray().tolist() == [[4, -1.5], [-1.5, 2]]
+    assert repeated.mass.diagonal().tolist() == [2, 3]
 
 
 def test_a_model_of_another_program_runs_to_its_response(tmp_path):
     """Written by pyYeti: the response with an open contact is the linear one by hand."""
     matrices = from_op4_text(tmp_path)
     pad = own.Contact("pad", matrices.contact([[(7, "x")]], area=1.0, gap=1.0), "unilateral", 0.0, 1e7)
-    made = own.reduce(matrices, pad, loads={"shaker": (47, 1)}, outputs={"tip": (47, "z")}, damping_ratio=0.02)
-    balance = made.balance((0, 1), up_to=400.0, harmonic={1: {"shaker": 2.0}})
-    system = made.model.system
+    reduced = own.reduce(matrices, pad, loads={"shaker": (47, 1)}, outputs={"tip": (47, "z")}, damping_ratio=0.02)
+    balance = reduced.balance((0, 1), up_to=400.0, harmonic={1: {"shaker": 2.0}})
+    system = reduced.model.system
     for frequency in (100.0, 350.0):
         omega = 2 * np.pi * frequency
         Z = STIFFNESS - omega**2 * MASS + 1j * omega * np.asarray(system.damping)
@@ -260,10 +260,10 @@ def test_fortran_numbers_without_exponent_letter(tmp_path):
 def test_damping_scale_and_massless_dofs(tmp_path):
     """Abaqus in N-mm-t-s: a mass file without some DOFs, and constrained ones with 1e36 on the diagonal."""
     massless = LABELS[4]
-    kept = [k for k, label in enumerate(LABELS) if label != massless]
-    write_abaqus(tmp_path / "m", MASS[np.ix_(kept, kept)] / 1e3, [LABELS[k] for k in kept])
-    held = ("999,1,999,1,1.0e+36",)
-    write_abaqus(tmp_path / "k", STIFFNESS / 1e3, extra=held)
+    rows = [k for k, label in enumerate(LABELS) if label != massless]
+    write_abaqus(tmp_path / "m", MASS[np.ix_(rows, rows)] / 1e3, [LABELS[k] for k in rows])
+    fixed = ("999,1,999,1,1.0e+36",)
+    write_abaqus(tmp_path / "k", STIFFNESS / 1e3, extra=fixed)
     write_abaqus(tmp_path / "c", 1e-5 * STIFFNESS / 1e3)
     matrices = read_matrices(mass=tmp_path / "m", stiffness=tmp_path / "k", damping=tmp_path / "c", scale=1e3)
     assert matrices.n_dof == 3 * N_NODE
@@ -412,10 +412,10 @@ def test_a_file_that_ends_early_is_refused_in_one_sentence(reader, tmp_path):
     """Of the formats that say how many entries there are; nobody can tell where the last number lost its end."""
     reader(tmp_path)
     for path in (path for path in tmp_path.iterdir() if path.suffix not in (".mapping", ".txt")):
-        whole = path.read_bytes()
+        full = path.read_bytes()
         names = variables(path) or [None]
         for share in np.linspace(0.01, 0.95, 40):
-            path.write_bytes(whole[: int(share * len(whole))])
+            path.write_bytes(full[: int(share * len(full))])
             with pytest.raises(ValueError, match=path.name) as refusal:
                 [read_matrix(path, name) for name in names]
             assert "\n" not in str(refusal.value), share

@@ -113,9 +113,9 @@ def test_reaction_is_the_preload_when_the_support_acts_about_the_height():
         balance = problem(model, height, force)
         solution = newton.solve_from_rest(balance, OMEGA)
         assert solution.converged
-        held = model.reaction.force(height, solution.state.cycle.force[:, :, 0])
+        fixed = model.reaction.force(height, solution.state.cycle.force[:, :, 0])
         assert balance.preload(solution.state) > 1.0
-        assert held.sum() == pytest.approx(balance.preload(solution.state), rel=1e-9)
+        assert fixed.sum() == pytest.approx(balance.preload(solution.state), rel=1e-9)
 
 
 def test_no_interference_means_no_preload_and_lost_contact_the_open_response():
@@ -132,8 +132,8 @@ def test_no_interference_means_no_preload_and_lost_contact_the_open_response():
     system = two_bodies().system
     D = system.stiffness + 1j * OMEGA * system.damping - OMEGA**2 * system.mass
     exact = np.linalg.solve(D, system.loads["shaker"].astype(complex))[10]
-    found = open_.basis.to_complex(open_.outputs(solution.state)[0])[1]
-    assert abs(found - exact) < 1e-8 * abs(exact)
+    result = open_.basis.to_complex(open_.outputs(solution.state)[0])[1]
+    assert abs(result - exact) < 1e-8 * abs(exact)
 
 
 def test_harmonics_above_zero_share_one_system():

@@ -59,10 +59,10 @@ def test_full_model_is_the_same_in_other_coordinates(part):
     system, interface, T = relative(part.system, part.interface)
     for springs in (None, CONTACT):
         expected, shapes = linear_modes(part, springs, 6)
-        found, moved = linear_modes(ReducedModel(system, interface), springs, 6)
-        np.testing.assert_allclose(found, expected, rtol=1e-8)
-        same = np.abs(np.sum((T @ moved) * (part.system.mass @ shapes), axis=0))
-        np.testing.assert_allclose(same, 1.0, atol=1e-6)
+        result, shifted = linear_modes(ReducedModel(system, interface), springs, 6)
+        np.testing.assert_allclose(result, expected, rtol=1e-8)
+        equal = np.abs(np.sum((T @ shifted) * (part.system.mass @ shapes), axis=0))
+        np.testing.assert_allclose(equal, 1.0, atol=1e-6)
     q = np.random.default_rng(0).normal(size=system.n_dof)
     np.testing.assert_allclose(interface.B @ q, part.interface.B @ (T @ q), atol=1e-12)
     np.testing.assert_allclose(system.loads["push"] @ q, part.system.loads["push"] @ (T @ q))
@@ -70,15 +70,15 @@ def test_full_model_is_the_same_in_other_coordinates(part):
 
 
 def test_reduced_model_needs_half_the_masters(part):
-    both = craig_bampton(part.system, part.interface, n_modes=25)
+    two_results = craig_bampton(part.system, part.interface, n_modes=25)
     system, interface, _ = relative(part.system, part.interface)
     half = craig_bampton(system, interface, n_modes=25)
-    assert (len(both.origin.masters), len(half.origin.masters)) == (152, 77)
+    assert (len(two_results.origin.masters), len(half.origin.masters)) == (152, 77)
     assert set(np.unique(half.interface.B)) == {0.0, 1.0}
     np.testing.assert_array_equal(half.interface.B.sum(axis=1), 1.0)
     for springs in (None, CONTACT):
         exact = linear_modes(part, springs, 6)[0]
-        np.testing.assert_allclose(linear_modes(both, springs, 6)[0], exact, rtol=2e-3)
+        np.testing.assert_allclose(linear_modes(two_results, springs, 6)[0], exact, rtol=2e-3)
         np.testing.assert_allclose(linear_modes(half, springs, 6)[0], exact, rtol=2e-3)
 
 

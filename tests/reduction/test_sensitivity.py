@@ -32,14 +32,14 @@ def chain(soft: float, heavy: float) -> SecondOrderSystem:
 @pytest.mark.parametrize("key", ["soft", "heavy", "both"])
 def test_the_reduced_model_follows_as_one_that_is_reduced_anew(key: str) -> None:
     """Compared by what needs no common coordinates: motion of contact and output under contact forces and the load."""
-    own = {"soft": 0.7, "heavy": 1.6}
+    base = {"soft": 0.7, "heavy": 1.6}
     rows = np.zeros((3, N))
     rows[range(3), [5, 18, 31]] = 1.0
     faces = interface(rows, ("t1", "t2", "n"))
-    changed = {name: 1.0 if key in (name, "both") else 0.0 for name in own}
+    changed = {name: 1.0 if key in (name, "both") else 0.0 for name in base}
 
     def system(share: float) -> SecondOrderSystem:
-        return chain(**{name: value * (1 + share * changed[name]) for name, value in own.items()})
+        return chain(**{name: value * (1 + share * changed[name]) for name, value in base.items()})
 
     def reduced(share: float):
         return craig_bampton(system(share), faces, n_modes=6)
@@ -47,8 +47,8 @@ def test_the_reduced_model_follows_as_one_that_is_reduced_anew(key: str) -> None
     def motions(model) -> np.ndarray:
         s, B = model.system, np.asarray(model.interface.B)
         pushes = np.column_stack([B.T, s.loads["weight"]])
-        moved = np.linalg.solve(s.stiffness - OMEGA**2 * s.mass, pushes)
-        return np.vstack([B, s.outputs["mean"]]) @ moved
+        shifted = np.linalg.solve(s.stiffness - OMEGA**2 * s.mass, pushes)
+        return np.vstack([B, s.outputs["mean"]]) @ shifted
 
     model = reduced(0.0)
     following = Sensitivity(system(0.0), model, model.origin.basis)
@@ -57,11 +57,11 @@ def test_the_reduced_model_follows_as_one_that_is_reduced_anew(key: str) -> None
     def difference(at) -> np.ndarray:
         return (8 * (at(1) - at(-1)) - (at(2) - at(-2))) / 12
 
-    anew = difference(lambda share: motions(reduced(STEP * share)))
-    found = difference(lambda share: motions(following.moved([(way, share)])))
-    assert np.abs(found - anew).max() < 1e-6 * np.abs(anew).max()
+    repeated = difference(lambda share: motions(reduced(STEP * share)))
+    result = difference(lambda share: motions(following.moved([(way, share)])))
+    assert np.abs(result - repeated).max() < 1e-6 * np.abs(repeated).max()
     fixed = difference(lambda share: motions(_projected(system(STEP * share), model)))
-    assert np.abs(fixed - anew).max() > 1e-3 * np.abs(anew).max()  # shapes that stay would not do
+    assert np.abs(fixed - repeated).max() > 1e-3 * np.abs(repeated).max()  # shapes that stay would not do
 
 
 def _less(new: SecondOrderSystem, old: SecondOrderSystem) -> SecondOrderSystem:
@@ -70,9 +70,9 @@ def _less(new: SecondOrderSystem, old: SecondOrderSystem) -> SecondOrderSystem:
 
 
 def _projected(system: SecondOrderSystem, model):
-    T, own = model.origin.basis, model.system
+    T, base = model.origin.basis, model.system
     changed = replace(
-        own, mass=T.T @ (system.mass @ T), stiffness=T.T @ (system.stiffness @ T),
+        base, mass=T.T @ (system.mass @ T), stiffness=T.T @ (system.stiffness @ T),
         loads={"weight": T.T @ system.loads["weight"]},
     )  # fmt: skip
     return replace(model, system=changed)

@@ -160,14 +160,14 @@ BROKEN: dict[str, tuple[str, tuple[Change, ...], str, str]] = {  # name : scene,
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_structure_is_one_sentence(name: str, tmp_path: Path) -> None:
-    text, changes, more, said = BROKEN[name]
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
+    text, changes, extra, message = BROKEN[name]
+    for previous, updated in changes:
+        assert previous in text
+        text = text.replace(previous, updated, 1)
     (tmp_path / "text.msh").write_text("hello\n")
     (tmp_path / "empty.inp").write_text("*Heading\n")
     (tmp_path / "map.csv").write_text("1, 2, 3\n")
-    with pytest.raises(ValueError, match=said) as raised:
-        built(text + more, tmp_path)
+    with pytest.raises(ValueError, match=message) as raised:
+        built(text + extra, tmp_path)
     assert "\n" not in str(raised.value)
     assert "function-" not in str(raised.value)

@@ -130,8 +130,8 @@ def test_show_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
     assert numbers["volume"] == pytest.approx(wear.depth[-1] @ patch.area)
     assert numbers["wear_steps"] == 8
     assert numbers["solves"] == 36
-    assert [numbers["peak_frequency"][when] for when in ("first", "last")] == pytest.approx([500, 415])
-    assert [numbers["amplitude"][when] for when in ("first", "last")] == [wear.amplitude[0], wear.amplitude[-1]]
+    assert [numbers["peak_frequency"][instant] for instant in ("first", "last")] == pytest.approx([500, 415])
+    assert [numbers["amplitude"][instant] for instant in ("first", "last")] == [wear.amplitude[0], wear.amplitude[-1]]
     assert numbers["preload"] == {"first": 6e3, "last": 0.0}
     assert numbers["seconds"] == 12.5
 
@@ -142,10 +142,10 @@ def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     assert code == 0
     assert out.count("\n") <= 25
     assert [line.split()[0] for line in out.splitlines()[1:] if line[0] != " "] == ["model", "response", "wear"]
-    _, more, _ = leave(["show", str(tmp_path / "result.h5"), "--verbose"], capsys)
-    assert more.startswith(out)
+    _, extra, _ = leave(["show", str(tmp_path / "result.h5"), "--verbose"], capsys)
+    assert extra.startswith(out)
     for words in ("contact lost", "mean_depth / m", "solves"):
-        assert words in more
+        assert words in extra
 
 
 @pytest.mark.parametrize(
@@ -179,12 +179,12 @@ def test_a_sparkline_has_its_highest_block_at_the_resonance():
 
 
 def test_what_is_beyond_the_linear_model_is_warned_of() -> None:
-    made = result()
-    assert made.wear is not None
+    built = result()
+    assert built.wear is not None
     bent = replace(
-        made, wear=replace(made.wear, periods=None, amplitude=np.geomspace(1e-3, 0.15, len(made.wear.amplitude)))
+        built, wear=replace(built.wear, periods=None, amplitude=np.geomspace(1e-3, 0.15, len(built.wear.amplitude)))
     )
-    assert not any("linear" in line for line in text.warnings(made))
+    assert not any("linear" in line for line in text.warnings(built))
     assert ["150 mm" in line for line in text.warnings(bent) if "linear" in line] == [True]
     assert any(line.startswith("warning") and "linear" in line for line in text.brief(bent))
 
@@ -242,14 +242,14 @@ def test_a_full_disk_is_told_by_name(capsys: pytest.CaptureFixture[str], tmp_pat
 
 def curve(peak: int, unstable: range | None = None):
     """A made-up result without wear, its response highest at one of its points, unstable at some."""
-    made = result()
-    assert made.response is not None
-    assert made.stability is not None
-    response = made.response.response.copy()
+    built = result()
+    assert built.response is not None
+    assert built.stability is not None
+    response = built.response.response.copy()
     response[peak, 0, 1] = 10 * np.abs(response).max()
     marks = None if unstable is None else ~np.isin(np.arange(61), unstable)
-    stability = None if marks is None else replace(made.stability, stable=marks)
-    return replace(made, wear=None, response=replace(made.response, response=response), stability=stability)
+    stability = None if marks is None else replace(built.stability, stable=marks)
+    return replace(built, wear=None, response=replace(built.response, response=response), stability=stability)
 
 
 def test_an_unstable_peak_is_reported_with_the_highest_stable_point() -> None:
@@ -270,28 +270,28 @@ def test_an_unstable_peak_is_reported_with_the_highest_stable_point() -> None:
 
 def test_the_end_of_the_range_is_no_peak() -> None:
     for point, at_end in ((0, True), (30, False), (60, True)):
-        made = curve(point)
-        assert summary.summary(made)["peak_at_end"] is at_end
-        assert any("no peak: " in line for line in text.warnings(made)) is at_end
+        built = curve(point)
+        assert summary.summary(built)["peak_at_end"] is at_end
+        assert any("no peak: " in line for line in text.warnings(built)) is at_end
 
 
 def test_a_point_beside_a_peak_that_was_not_found_is_no_peak() -> None:
-    made = curve(30)
-    assert made.response is not None
-    outcome = tuple(SolveEnd.BESIDE_PEAK.say() if i == 30 else one for i, one in enumerate(made.response.outcome))
-    lost = replace(made, response=replace(made.response, outcome=outcome))
+    built = curve(30)
+    assert built.response is not None
+    outcome = tuple(SolveEnd.BESIDE_PEAK.say() if i == 30 else item for i, item in enumerate(built.response.outcome))
+    lost = replace(built, response=replace(built.response, outcome=outcome))
     assert summary.summary(lost)["peak_at_end"] is True
     assert "amplitude_first" not in numbers_of(lost)
     assert any("none was found beside the point at" in line for line in text.warnings(lost))
 
 
 def test_separation_is_reported_only_where_contact_was_lost() -> None:
-    made = result()
-    assert made.wear is not None
-    unfinished = replace(made, wear=replace(made.wear, end=WearEnd.STEPS_DONE.say(" 8 wear steps")))
+    built = result()
+    assert built.wear is not None
+    unfinished = replace(built, wear=replace(built.wear, end=WearEnd.STEPS_DONE.say(" 8 wear steps")))
     numbers = summary.summary(unfinished)
     assert numbers["separated_cycles"] is None
-    assert numbers["cycles"] == made.wear.cycles[-1]
+    assert numbers["cycles"] == built.wear.cycles[-1]
 
 
 def test_a_result_before_any_solve_has_a_summary() -> None:

@@ -37,12 +37,12 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize("ending", [".csv", ".mat", ".uff"])
 def test_a_response_of_our_own_is_read_again_without_a_difference(ending: str, exported: dict) -> None:
-    found = td.studies.compare("beam_thesis", exported[ending], overrides=exported["overrides"])
-    off = found.largest()
+    comparison = td.studies.compare("beam_thesis", exported[ending], overrides=exported["overrides"])
+    off = comparison.largest()
     assert off["amplitude_m_difference"] < 1e-10
     assert off["phase_deg_difference"] < 1e-8
-    assert len(found.rows()) >= 16
-    assert not found.record()["outside"]
+    assert len(comparison.rows()) >= 16
+    assert not comparison.record()["outside"]
     other = td.studies.compare("beam_thesis", exported[ending], overrides=(*SMALL, "contact.friction=0.3"))
     assert other.largest()["amplitude_m_difference"] > 0.05  # of another scene it differs
 
@@ -81,12 +81,12 @@ def test_units_directions_and_the_phase_are_those_of_the_file(reference: str, tm
     path = tmp_path / "sweep.csv"
     write_columns(columns, path)
     path.write_text(f"# direction = -y\n# phase = {reference}\n# a remark\n" + path.read_text(), encoding="utf-8")
-    found = reading.read(path)
-    assert (found.order, found.direction, found.phased) == (2, (-0.0, -1.0, -0.0), True)
+    content = reading.read(path)
+    assert (content.order, content.direction, content.phased) == (2, (-0.0, -1.0, -0.0), True)
     file = td.read_scene("beam_thesis", SMALL)
-    np.testing.assert_allclose(found.runs[0].displacement, -x, rtol=1e-12)
-    np.testing.assert_allclose(found.on(file.scene).runs[0].displacement, x, rtol=1e-12)
-    point = measurement.resonance(found.on(file.scene).runs[0])
+    np.testing.assert_allclose(content.runs[0].displacement, -x, rtol=1e-12)
+    np.testing.assert_allclose(content.on(file.scene).runs[0].displacement, x, rtol=1e-12)
+    point = measurement.resonance(content.on(file.scene).runs[0])
     assert [point.frequency[0], point.damping[0]] == pytest.approx([80.0, 3e-3], rel=1e-9)
     assert point.force[0] == pytest.approx(0.4, rel=0.01)  # 80 Hz is one of the points
 
@@ -112,10 +112,10 @@ def test_a_decay_is_read_as_the_backbone_that_it_follows(tmp_path: Path) -> None
     rate, w = 2.0, 2 * np.pi * 80
     a = -(w**2) * 1e-4 * np.exp(-rate * time) * np.cos(w * time)
     savemat(tmp_path / "decay.mat", {"time_s": time, "acceleration_m_s2": a})
-    found = reading.read(tmp_path / "decay.mat")
-    (run,) = found.runs
-    assert found.decay
-    assert found.kind == "backbone"
+    content = reading.read(tmp_path / "decay.mat")
+    (run,) = content.runs
+    assert content.decay
+    assert content.kind == "backbone"
     np.testing.assert_allclose(run.frequency, 80.0, rtol=1e-6)
     np.testing.assert_allclose(run.damping, rate / w, rtol=1e-3)
     assert run.amplitude.max() == pytest.approx(1e-4, rel=0.06)
@@ -162,10 +162,10 @@ def test_a_universal_file_says_node_and_direction(tmp_path: Path) -> None:
     path = universal(tmp_path / "hammer.uff", (4, 7))
     with pytest.raises(ValueError, match=r"hammer\.uff: it has 2 measured places.*4, 7.*give node = NUMBER"):
         reading.read(path)
-    found = reading.read(path, {"node": "7"})
-    assert found.per_force
-    assert (found.direction, found.force_direction) == ((-0.0, -0.0, -1.0), (0.0, 0.0, 1.0))
-    run = found.runs[0]
+    content = reading.read(path, {"node": "7"})
+    assert content.per_force
+    assert (content.direction, content.force_direction) == ((-0.0, -0.0, -1.0), (0.0, 0.0, 1.0))
+    run = content.runs[0]
     np.testing.assert_allclose(run.displacement, -7 * (1 + 1j) * run.frequency / (2 * np.pi * run.frequency) ** 2)
 
 
@@ -178,8 +178,8 @@ def test_modes_of_a_universal_file_stand_beside_those_at_rest(tmp_path: Path) ->
         mode_n=1, modal_m=0, freq=1500.0, modal_damp_vis=0.02, modal_damp_his=0.0,
     )  # fmt: skip
     file.write_sets(mode, "add")
-    found = td.studies.compare("beam_thesis", tmp_path / "modes.uff", overrides=SMALL)
-    (row,) = found.rows()
+    comparison = td.studies.compare("beam_thesis", tmp_path / "modes.uff", overrides=SMALL)
+    (row,) = comparison.rows()
     at_rest = td.studies.backbone("beam_thesis", 1e-8, 2e-8, points=2, overrides=SMALL).record()["reference_hz"]
     assert row["computed_frequency_hz"] == pytest.approx(at_rest, rel=1e-9)
     assert row["damping"] == pytest.approx(0.02)
@@ -208,7 +208,7 @@ SWEEP = "frequency_Hz,displacement_um,force_N,phase_deg\n" + "".join(f"{f},1,1,0
 def test_what_does_not_fit_is_one_sentence_and_exit_code_2(text: str, words: str, tmp_path: Path, capsys) -> None:
     path = tmp_path / "sweep.csv"
     path.write_text(text, encoding="utf-8")
-    sets = [word for one in SMALL for word in ("--set", one)]
+    sets = [word for item in SMALL for word in ("--set", item)]
     with pytest.raises(SystemExit) as stop:
         cli.main(["study", "compare", "beam_thesis", str(path), *sets, "--quiet"])
     assert stop.value.code == 2

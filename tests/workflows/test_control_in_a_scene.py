@@ -20,8 +20,8 @@ PLAIN = ("wear.max_steps=0", "verdict.enabled=false", "harmonics.kept=[0, 1]", "
 
 def test_the_amplitude_is_held_and_the_force_is_stored_point_by_point(tmp_path: Path):
     scene = matrix_folder(tmp_path) / "own.toml"
-    held = (*PLAIN, "response.control=amplitude", "response.amplitude=3 um")
-    result = td.run(scene, tmp_path / "out", overrides=held)
+    fixed = (*PLAIN, "response.control=amplitude", "response.amplitude=3 um")
+    result = td.run(scene, tmp_path / "out", overrides=fixed)
     loaded = td.load(tmp_path / "out")
     assert loaded.response is not None
     np.testing.assert_array_equal(loaded.response.load_factor, result.response.load_factor)
@@ -39,8 +39,8 @@ def test_the_amplitude_is_held_and_the_force_is_stored_point_by_point(tmp_path: 
     assert result.summary()["peak_frequency"]["first"] == pytest.approx(table["frequency_Hz"][i])
     at = f"['{table['frequency_Hz'][i]:.12g} Hz', '121 Hz']"  # constant force of this size has the same amplitude there
     value = f"loads.harmonic.shaker.value={table['force_N'][i]:.12g} N"
-    given = td.run(scene, None, overrides=(*PLAIN, value, f"response.frequency={at}"))
-    assert abs(given.response.fundamental("response")[0]) == pytest.approx(3e-6, rel=1e-6)
+    inputs = td.run(scene, None, overrides=(*PLAIN, value, f"response.frequency={at}"))
+    assert abs(inputs.response.fundamental("response")[0]) == pytest.approx(3e-6, rel=1e-6)
 
 
 def test_a_phase_resonance_from_a_scene_lags_by_a_quarter_and_is_drawn(tmp_path: Path):
@@ -98,5 +98,5 @@ def test_a_scene_without_a_frequency_is_inspected_and_does_not_run(tmp_path: Pat
     assert 'response.frequency is missing: give its range, such as ["100 Hz", "200 Hz"]' in err
     text = (Path(cases.__path__[0]) / "beam" / "beam.toml").read_text()
     path.write_text(text.replace('frequency = ["380 Hz", "1200 Hz"]', ""))
-    found = td.inspect(path, overrides=["geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1"])
-    assert found.record()["mass_kg"] == pytest.approx(0.2 * 0.02**2 * 7860)
+    inspected = td.inspect(path, overrides=["geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1"])
+    assert inspected.record()["mass_kg"] == pytest.approx(0.2 * 0.02**2 * 7860)

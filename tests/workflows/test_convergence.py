@@ -35,9 +35,9 @@ def found() -> Convergence:
 
 
 def test_each_setting_is_held_against_where_it_tends_to(found: Convergence) -> None:
-    for one in found.table.ladders:
-        assert all(row.solved.outcome == "converged" and row.solved.memory > 1e7 for row in one.rows)
-        bounds = [one.bound(row, "amplitude") for row in one.rows]
+    for ladder in found.table.ladders:
+        assert all(row.solved.outcome == "converged" and row.solved.memory > 1e7 for row in ladder.rows)
+        bounds = [ladder.bound(row, "amplitude") for row in ladder.rows]
         assert bounds[-1] == min(bounds) < 5e-3
     exact = found.table.ladders[-1].rows[-1]
     assert np.isnan(exact.setting.size)
@@ -50,10 +50,10 @@ def test_each_setting_is_held_against_where_it_tends_to(found: Convergence) -> N
 def test_where_values_tend_to() -> None:
     for order in (1.0, 2.0, 3.0):
         sizes = [2.0, 4.0, 6.0, 8.0]
-        found = limit_of(sizes, [5 + 3 * size**-order for size in sizes])
-        assert found.value == pytest.approx(5, rel=1e-9)
-        assert found.order == pytest.approx(order, rel=1e-6)
-        assert found.doubt == pytest.approx(0.25 * 3 * 8**-order / 5, rel=1e-6)
+        result = limit_of(sizes, [5 + 3 * size**-order for size in sizes])
+        assert result.value == pytest.approx(5, rel=1e-9)
+        assert result.order == pytest.approx(order, rel=1e-6)
+        assert result.doubt == pytest.approx(0.25 * 3 * 8**-order / 5, rel=1e-6)
     alternating = limit_of([1, 2, 4], [1.1, 0.97, 1.01])
     assert (alternating.value, alternating.doubt) == (1.01, pytest.approx(0.04 / 1.01))
     unsettled = limit_of([1, 2, 4], [1.0, 1.1, 1.3])
@@ -62,9 +62,9 @@ def test_where_values_tend_to() -> None:
     assert limit_of([1], [1.3]).doubt == np.inf
     exact = limit_of([1, 2, np.nan], [1.04, 1.01, 1.0])
     assert (exact.value, exact.doubt) == (1.0, 0.0)
-    placed = limit_of([4, 4, 8, 8, 16], [1.04, 1.06, 1.02, 0.97, 1.01])  # settles by less than the scatter
-    assert np.isnan(placed.order)
-    assert (placed.value, placed.doubt) == (1.01, pytest.approx(0.09 / 1.01))
+    positioned = limit_of([4, 4, 8, 8, 16], [1.04, 1.06, 1.02, 0.97, 1.01])  # settles by less than the scatter
+    assert np.isnan(positioned.order)
+    assert (positioned.value, positioned.doubt) == (1.01, pytest.approx(0.09 / 1.01))
     assert limit_of([2, 4, 4, 8], [1.04, 1.02, 1.019, 1.01]).order == pytest.approx(1.0, abs=0.02)
     assert limit_of([1e4, 1e6, 1e8], [1.0, 1.0, 1.0]).doubt == 0.0
 
@@ -72,23 +72,23 @@ def test_where_values_tend_to() -> None:
 def test_the_life_is_that_of_the_run_and_falls_within_its_doubt() -> None:
     worn = ("wear.at=peak", "wear.motion=machine", 'wear.rule="error_controlled"', "harmonics.samples=32")
     overrides = (*SMALL, *worn, "response.points=10", "geometry.n_length=3", "reduction.modes=2")
-    (one,) = convergence.converge("beam", settings=["wear"], most=3, overrides=overrides).table.ladders
-    coarse, _, fine = one.rows
+    (item,) = convergence.converge("beam", settings=["wear"], most=3, overrides=overrides).table.ladders
+    coarse, _, fine = item.rows
     life = fine.solved.values["life"]
     assert life is not None
     assert coarse.solved.values["life"] == pytest.approx(life, rel=0.5)
-    assert one.bound(fine, "life") < one.bound(coarse, "life")
+    assert item.bound(fine, "life") < item.bound(coarse, "life")
     assert fine.solved.seconds > fine.solved.wear_seconds > 0
 
 
 def test_a_setting_that_the_scene_has_not_is_refused() -> None:
     with pytest.raises(ValueError, match="the scene has fe_mesh, contact_grid, placed_grid, modes"):
         convergence.converge("beam", settings=["wheels"])
-    known = {name: ladders_of(name) for name in ("beam", "blade", "leaf_seal", "rig")}
-    has = {scene: {one.name for one in found} for scene, found in known.items()}
+    reference = {name: ladders_of(name) for name in ("beam", "blade", "leaf_seal", "rig")}
+    has = {scene: {item.name for item in result} for scene, result in reference.items()}
     assert {"wear", "interface_rank"} <= has["beam"]
     assert "wear" not in has["leaf_seal"]
-    assert all({"fe_mesh", "contact_grid", "harmonics", "samples", "newton"} <= found for found in has.values())
+    assert all({"fe_mesh", "contact_grid", "harmonics", "samples", "newton"} <= result for result in has.values())
     assert "interface_rank" not in has["blade"]
 
 
@@ -101,10 +101,10 @@ def ladders_of(scene: str) -> tuple[Ladder, ...]:
 def test_every_setting_of_every_ladder_is_a_scene() -> None:
     for scene in scene_file.names():
         base = ladders.study_of(scene_file.read(scene)).base
-        for one in ladders_of(scene):
-            for setting in one.settings:
-                given = base if one.base is None else one.base
-                file = scene_file.read(scene, (*given, *setting.overrides))
+        for item in ladders_of(scene):
+            for setting in item.settings:
+                inputs = base if item.base is None else item.base
+                file = scene_file.read(scene, (*inputs, *setting.overrides))
                 assert file.name == scene
 
 
@@ -127,27 +127,27 @@ def test_the_cheapest_combination_is_found() -> None:
     draw = np.random.default_rng(2)
     costs = draw.uniform(1, 9, (3, 4))
     errors = np.concatenate([draw.uniform(0.001, 0.02, (3, 3)), np.zeros((3, 1))], axis=1)
-    found = [made_up(name, list(c), list(e)) for name, c, e in zip("abc", costs, errors, strict=True)]
-    table = LadderTables("made up", (), 4.0, tuple(found))
-    for wanted in (0.002, 0.01, 0.03):
+    results = [made_up(name, list(c), list(e)) for name, c, e in zip("abc", costs, errors, strict=True)]
+    table = LadderTables("made up", (), 4.0, tuple(results))
+    for expected in (0.002, 0.01, 0.03):
         places = itertools.product(range(4), repeat=3)
-        allowed = [p for p in places if sum(errors[i, k] for i, k in enumerate(p)) <= wanted]
+        allowed = [p for p in places if sum(errors[i, k] for i, k in enumerate(p)) <= expected]
         best = min(np.prod([costs[i, k] / 4 for i, k in enumerate(p)]) for p in allowed)
-        rows, error, seconds = table.choose(wanted, "amplitude")
+        rows, error, seconds = table.choose(expected, "amplitude")
         assert [row.setting.label[0] for row in rows] == ["a", "b", "c"]
         assert seconds == pytest.approx(4 * best)
-        assert error <= wanted * (1 + 1e-9)
+        assert error <= expected * (1 + 1e-9)
     with pytest.raises(ValueError, match="no setting of made up changes life"):
         table.choose(0.01, "life")
 
 
 def test_the_setting_that_is_needed_is_the_first_from_which_all_are_good() -> None:
-    one = made_up("n", [1, 2, 3, 4], [0.004, 0.02, 0.008, 0.0])
-    needed = one.coarsest("amplitude", 0.01)
+    item = made_up("n", [1, 2, 3, 4], [0.004, 0.02, 0.008, 0.0])
+    needed = item.coarsest("amplitude", 0.01)
     assert needed is not None
     assert needed.setting.label == "n=3"
     assert made_up("n", [1, 2], [0.004, 0.0]).coarsest("amplitude", 0.001).setting.label == "n=2"
-    text = str(Convergence(LadderTables("made up", (), 4.0, (one,))))
+    text = str(Convergence(LadderTables("made up", (), 4.0, (item,))))
     assert "1% on amplitude needs n=3 or finer" in text
     assert "the setting of the scene, n=1, is good for 1% on all: amplitude 0.004" in text
     assert "for 1% on amplitude use n=1: 0.4%, 1 s" in text
@@ -158,8 +158,8 @@ def test_a_linear_field_is_carried_to_a_millionth_of_the_patch() -> None:
     coarse = np.array([[0.0, 0.0], [0.31, 1.3], [1.0, 2.0]])
     plane = np.array([2.0, -3.0])
     assert convergence.on_grid(fine, fine @ plane + 1, coarse) == pytest.approx(coarse @ plane + 1, abs=1e-5)
-    beyond = coarse * (1 + 1e-15) + 1e-16  # the rim of a coarser grid, by rounding outside of the finer one
-    assert convergence.on_grid(fine, fine @ plane + 1, beyond) == pytest.approx(coarse @ plane + 1, abs=1e-5)
+    outside = coarse * (1 + 1e-15) + 1e-16  # the rim of a coarser grid, by rounding outside of the finer one
+    assert convergence.on_grid(fine, fine @ plane + 1, outside) == pytest.approx(coarse @ plane + 1, abs=1e-5)
 
 
 def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

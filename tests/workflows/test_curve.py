@@ -63,8 +63,8 @@ def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: py
     assert marks is not None
     assert bounds is not None
     file = read(str(folder / "own.toml"), [*QUICK, "loads.harmonic.shaker.value=12 N"])
-    again = mark(modelling.build(file, Progress()).balance, frf)
-    assert np.array_equal(marks.stable, again.stable)
+    repeated = mark(modelling.build(file, Progress()).balance, frf)
+    assert np.array_equal(marks.stable, repeated.stable)
     height = frf.amplitude("response")
     assert np.all(bounds.amplitude_low <= height * (1 + 1e-9))
     assert np.all(bounds.amplitude_high >= height * (1 - 1e-9))

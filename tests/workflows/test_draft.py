@@ -58,9 +58,9 @@ def step(path: Path) -> Path:
 
 def deck(path: Path) -> Path:
     page = (ROOT / "docs/howto/deck.md").read_text(encoding="utf-8")
-    found = re.search(r"```text lap.inp\n(.*?)```", page, re.S)
-    assert found is not None
-    path.write_text(found.group(1))
+    match = re.search(r"```text lap.inp\n(.*?)```", page, re.S)
+    assert match is not None
+    path.write_text(match.group(1))
     return path
 
 
@@ -72,25 +72,25 @@ def test_a_scene_is_begun_from_a_file_and_is_one(
     make, name: str, pair: tuple[str, str], apart: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = make(tmp_path / name)
-    code, said, _ = leave(["new", str(file)], capsys)
+    code, message, _ = leave(["new", str(file)], capsys)
     assert code == 0
-    assert "unit      mm: guessed" in said
+    assert "unit      mm: guessed" in message
     written = file.with_suffix(".toml")
     scene = scene_file.read(str(written)).scene
     (joint,) = scene.joints.values()
     assert (joint.group, joint.opposite) == pair
-    assert f"{1e3 * apart:.3g} mm apart" in said
+    assert f"{1e3 * apart:.3g} mm apart" in message
     assert len(td.build(written).part.interface.area) > 4
     assert json.loads((tmp_path / "scene.schema.json").read_text())["$defs"]
     before, mark, wear = written.read_text().partition("# [wear]")
     marks_off = re.sub("^# ", "", mark + wear, flags=re.MULTILINE)
-    wanted = scene_file.parse(before + marks_off, "worn.toml", (), tmp_path).scene.wear
-    assert wanted is not None
-    assert wanted.step is not None
-    assert wanted.step.depth == 1e-6  # a share of delta_max needs a body that is held without its contact
-    code, _, why = leave(["new", str(file)], capsys)
+    expected = scene_file.parse(before + marks_off, "worn.toml", (), tmp_path).scene.wear
+    assert expected is not None
+    assert expected.step is not None
+    assert expected.step.depth == 1e-6  # a share of delta_max needs a body that is held without its contact
+    code, _, reason = leave(["new", str(file)], capsys)
     assert code == 2
-    assert "is there already" in why
+    assert "is there already" in reason
     shutil.copy(file, tmp_path / f"far{file.suffix}")
     assert draft(tmp_path / f"far{file.suffix}", unit="m").unit == "m"
 
@@ -107,9 +107,9 @@ def test_contact_pairs_of_a_deck_come_first_under_the_names_that_it_has(tmp_path
         pair += f"*{card}\n*Friction\n {0.23 if card.endswith('name=Dry') else 0.4},\n"
     pair += "*Boundary"
     file.write_text(file.read_text().replace("*End Part", faces).replace("*Boundary", pair))
-    code, said, _ = leave(["new", str(file), "--out", str(tmp_path / "begun")], capsys)
+    code, message, _ = leave(["new", str(file), "--out", str(tmp_path / "begun")], capsys)
     assert code == 0
-    assert "Lower.Over and Upper.Under: 0 mm apart" in said
+    assert "Lower.Over and Upper.Under: 0 mm apart" in message
     (joint,) = scene_file.read(str(tmp_path / "begun/lap.toml")).scene.joints.values()
     assert (joint.group, joint.opposite, joint.friction) == ("Lower.Over", "Upper.Under", 0.23)
     assert "friction = 0.23  # of the deck" in (tmp_path / "begun/lap.toml").read_text()
@@ -124,30 +124,30 @@ def test_a_group_that_bears_the_name_of_its_body_keeps_it_unless_another_has_it(
 
 
 def test_what_is_no_file_of_a_mesh_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    code, _, why = leave(["new", "beam"], capsys)
+    code, _, reason = leave(["new", "beam"], capsys)
     assert code == 2
-    assert "no mesh, deck or CAD file" in why
+    assert "no mesh, deck or CAD file" in reason
 
 
 def test_the_smallest_scene_has_at_most_fifteen_lines() -> None:
     assert len([line for line in SMALLEST.splitlines() if line]) <= 15
     scene = scene_file.parse(SMALLEST, "small.toml", (), Path()).mesh_scene
     assert (scene.response.group, scene.response.direction) == ("shaker", (0.0, 1.0, 0.0))
-    whole = f'{SMALLEST}group = "response"\ndirection = "x"\n'
-    assert scene_file.parse(whole, "small.toml", (), Path()).mesh_scene.response.group == "response"
+    full = f'{SMALLEST}group = "response"\ndirection = "x"\n'
+    assert scene_file.parse(full, "small.toml", (), Path()).mesh_scene.response.group == "response"
 
 
 @pytest.mark.parametrize(("direction", "loose"), [("[0, 0, 1]", True), ("[0, 0, -1]", False)])
 def test_a_contact_that_nothing_presses_is_said(direction: str, loose: bool) -> None:
     press = f'static = {{ press = {{ group = "contact", direction = {direction}, value = "1 kN" }} }}\n'
     coarse = ("geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=2")
-    for text, said in (
+    for text, message in (
         (SMALLEST, True),
         (SMALLEST.replace("[loads.harmonic]", f"[loads]\n{press}[loads.harmonic]"), loose),
     ):
         file = scene_file.parse(text, "small.toml", coarse, Path())
-        found = list(sanity_checks.lines(file, modelling.build(file, Progress())))
-        assert any("nothing presses" in line for line in found) == said
+        items = list(sanity_checks.lines(file, modelling.build(file, Progress())))
+        assert any("nothing presses" in line for line in items) == message
 
 
 def test_a_plan_draws_the_scene_with_its_contact_supports_and_loads(
@@ -158,11 +158,11 @@ def test_a_plan_draws_the_scene_with_its_contact_supports_and_loads(
     except offscreen.RenderingUnavailable:
         pytest.skip("nothing can be rendered here")
     coarse = [word for key in ("n_patch=3", "n_length=3", "n_height=1") for word in ("--set", f"geometry.{key}")]
-    code, said, _ = leave(["plan", "beam", *coarse, "--picture", str(tmp_path / "beam.png")], capsys)
+    code, message, _ = leave(["plan", "beam", *coarse, "--picture", str(tmp_path / "beam.png")], capsys)
     assert code == 0
-    assert "beam.png" in said
+    assert "beam.png" in message
     with Image.open(tmp_path / "beam.png") as image:
         colours = np.asarray(image.convert("RGB"), int).reshape(-1, 3)
     for colour in (BLUE, RED):  # the contact and the harmonic load
-        wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
-        assert (np.abs(colours / 255 - np.array(wanted) / 255).max(axis=1) < 0.25).sum() > 100
+        expected = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+        assert (np.abs(colours / 255 - np.array(expected) / 255).max(axis=1) < 0.25).sum() > 100

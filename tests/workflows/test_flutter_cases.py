@@ -51,31 +51,31 @@ KEPT = {  # waves with a limit cycle that time integration keeps
 @pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.slow) for c in CASES])
 def test_every_wave_that_flutters_has_a_limit_cycle_or_a_reason(case: str) -> None:
     """A cycle said to be kept is what time integration comes to from 0.95 of its amplitude in the reference mode."""
-    kept = ("harmonics.kept=[0, 1, 2, 3]", *CASES[case])
-    file = scene_file.parse(SCENE, "wheel.toml", kept, Path())
-    found = flutter.of_scene(file, 1e-8, 1e-3, 30)
-    assert set(found.cycles) == {index for index, ratio in found.damping.items() if ratio < 0}
+    saved = ("harmonics.kept=[0, 1, 2, 3]", *CASES[case])
+    file = scene_file.parse(SCENE, "wheel.toml", saved, Path())
+    result = flutter.of_scene(file, 1e-8, 1e-3, 30)
+    assert set(result.cycles) == {index for index, ratio in result.damping.items() if ratio < 0}
     wheel = wheels.build(file)
     kept_waves = set()
-    for index, (cycles, why) in found.cycles.items():
-        assert cycles or why
-        assert all(one.stays is not None and one.moved is not None for one in cycles)
+    for index, (cycles, reason) in result.cycles.items():
+        assert cycles or reason
+        assert all(item.stays is not None and item.moved is not None for item in cycles)
         balance = replace(flutter.in_flow(wheel, index), load_factor=0.0)
         problem = FreeVibration(balance, None, "response")
         row = balance.compliance.output_names.index("response")
-        for cycle in (one for one in cycles if one.stays and abs(one.moved or 0.0) < WITHIN):
+        for cycle in (item for item in cycles if item.stays and abs(item.moved or 0.0) < WITHIN):
             kept_waves.add(index)
             coordinates = cycle.point.coordinates.copy()
             coordinates[-1] += np.log(0.95)
-            held = np.zeros(len(coordinates))
-            held[-1] = 1.0
-            begin, outcome, _ = newton_on(problem, problem.evaluate(coordinates), held, NewtonOptions())
+            fixed = np.zeros(len(coordinates))
+            fixed[-1] = 1.0
+            begin, outcome, _ = newton_on(problem, problem.evaluate(coordinates), fixed, NewtonOptions())
             assert outcome == CONVERGED
             assert begin.zeta < 0  # it grows
             start = balance.evaluate(begin.omega, begin.x)
-            alone = leave_alone(balance, cycle.omega, start, PERIODS, Options(steps=128), begin.zeta)
-            wanted = np.sqrt((cycle.response[row, 1:] ** 2).sum())
-            assert np.sqrt((problem.outputs(begin)[row, 1:] ** 2).sum()) < 0.97 * wanted
-            print(f"{case}: wave {index}, {wanted:.4g} m, time {alone.amplitude[row] / wanted - 1:+.2%}")
-            assert alone.amplitude[row] == pytest.approx(wanted, rel=WITHIN)
+            single = leave_alone(balance, cycle.omega, start, PERIODS, Options(steps=128), begin.zeta)
+            expected = np.sqrt((cycle.response[row, 1:] ** 2).sum())
+            assert np.sqrt((problem.outputs(begin)[row, 1:] ** 2).sum()) < 0.97 * expected
+            print(f"{case}: wave {index}, {expected:.4g} m, time {single.amplitude[row] / expected - 1:+.2%}")
+            assert single.amplitude[row] == pytest.approx(expected, rel=WITHIN)
     assert kept_waves == KEPT[case]

@@ -38,32 +38,32 @@ def test_waves_of_a_scene_have_the_eigenvalues_of_its_coefficients(scene: Path) 
     assert found == pytest.approx(expected, rel=1e-9)
     assert min(value.real for value in found.values()) < 0 < max(value.real for value in found.values())
     waves = [[j, (c := Flow(COEFFICIENTS).of_index(j, 6)).real, c.imag] for j in range(-2, 4)]
-    again = flutter.flutter(file.changed("flow.influence=", f"flow.by_diameter={waves}")).eigenvalues
-    assert again == pytest.approx(found, rel=1e-9)
+    repeated = flutter.flutter(file.changed("flow.influence=", f"flow.by_diameter={waves}")).eigenvalues
+    assert repeated == pytest.approx(found, rel=1e-9)
 
 
 def test_a_limit_cycle_needs_no_load(scene: Path) -> None:
     """Time keeps it, and the balance in the flow holds there without harmonic loads and without added damping."""
-    found = flutter.flutter(scene, 1e-6, 1e-3, points=20)
-    flutters = {index for index, ratio in found.damping.items() if ratio < 0}
-    assert set(found.cycles) == flutters
-    cycles = [one for cycles, _ in found.cycles.values() for one in cycles]
-    assert any(one.stays for one in cycles)
-    for one in cycles:
-        assert 1e-6 < one.amplitude < 1e-3
-        moving = np.linalg.norm(one.state.flat[:, 1:])
-        assert np.linalg.norm(one.state.residual) < 1e-4 * moving
-    for cycles_of_wave, why in found.cycles.values():
-        assert cycles_of_wave or "the motion decays at all of them" in why
-    assert sum("limit cycle of wave" in line for line in found.lines()) == len(cycles)
-    assert len(found.record()["limit_cycles"]) == len(cycles)
+    result = flutter.flutter(scene, 1e-6, 1e-3, points=20)
+    flutters = {index for index, ratio in result.damping.items() if ratio < 0}
+    assert set(result.cycles) == flutters
+    cycles = [cycle for cycles, _ in result.cycles.values() for cycle in cycles]
+    assert any(cycle.stays for cycle in cycles)
+    for cycle in cycles:
+        assert 1e-6 < cycle.amplitude < 1e-3
+        moving = np.linalg.norm(cycle.state.flat[:, 1:])
+        assert np.linalg.norm(cycle.state.residual) < 1e-4 * moving
+    for cycles_of_wave, reason in result.cycles.values():
+        assert cycles_of_wave or "the motion decays at all of them" in reason
+    assert sum("limit cycle of wave" in line for line in result.lines()) == len(cycles)
+    assert len(result.record()["limit_cycles"]) == len(cycles)
 
 
 def test_the_command_tells_which_waves_flutter(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cli.app(["wheel", "flutter", str(scene), "--out", str(tmp_path), "--json"], result_action="return_value")
-    said = json.loads(capsys.readouterr().out)
-    assert {wave["index"] for wave in said["waves"]} == set(range(-2, 4))
-    assert any(wave["damping"] < 0 for wave in said["waves"])
+    record = json.loads(capsys.readouterr().out)
+    assert {wave["index"] for wave in record["waves"]} == set(range(-2, 4))
+    assert any(wave["damping"] < 0 for wave in record["waves"])
     assert (tmp_path / "flutter.png").stat().st_size > 5000
     assert (tmp_path / "flutter.csv").read_text(encoding="utf-8").startswith("index,frequency_Hz,damping")
     with pytest.raises(ValueError, match="give both amplitudes"):

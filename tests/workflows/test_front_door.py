@@ -65,9 +65,9 @@ def test_a_scene_is_a_name_a_path_or_a_dict(tmp_path: Path) -> None:
     tables["wear"]["step"] = "4 %"
     by_dict = td.read_scene(tables, folder=tmp_path)
     assert by_name.scene == by_path.scene == by_dict.scene
-    again = td.read_scene(by_dict, {"wear": None})
-    assert again.scene.wear is None
-    assert again.folder == tmp_path.resolve()
+    repeated = td.read_scene(by_dict, {"wear": None})
+    assert repeated.scene.wear is None
+    assert repeated.folder == tmp_path.resolve()
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_every_plot_is_a_figure(worn: td.Result, tmp_path: Path) -> None:
     courses = ("depth", "peak", "preload", "energy", "cycles_per_step")
     figures = [td.plot.response(worn), td.plot.hysteresis(worn), td.plot.patch(worn), td.plot.patch(worn, [0])]
     figures += [td.plot.motion(worn), td.plot.motion(worn, [0])]
-    figures += [td.plot.wear(worn, what) for what in courses]
+    figures += [td.plot.wear(worn, course) for course in courses]
     assert all(figure.axes for figure in figures)
     with pytest.raises(ValueError, match='no wear plot "life"'):
         td.plot.wear(worn, "life")

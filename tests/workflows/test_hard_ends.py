@@ -29,10 +29,10 @@ TINY = ("harmonics.kept=[0, 1]",
 def test_every_flipped_byte_is_told(tmp_path: Path) -> None:
     path = tmp_path / "result.h5"
     store.save(path, synthetic_result.result())
-    whole = path.read_bytes()
+    full = path.read_bytes()
     assert store.load(path).state
-    for place in np.random.default_rng(0).integers(0, len(whole), 60):
-        damaged = bytearray(whole)
+    for place in np.random.default_rng(0).integers(0, len(full), 60):
+        damaged = bytearray(full)
         damaged[place] ^= 0x10
         path.write_bytes(damaged)
         if len(store.MARK) + 65 <= place < store.USER_BLOCK:
@@ -44,9 +44,9 @@ def test_every_flipped_byte_is_told(tmp_path: Path) -> None:
 def test_a_result_cut_short_is_told(tmp_path: Path) -> None:
     path = tmp_path / "result.h5"
     store.save(path, synthetic_result.result())
-    whole = path.read_bytes()
+    full = path.read_bytes()
     for share in (0.0, 0.001, 0.3, 0.999):
-        path.write_bytes(whole[: int(share * len(whole))])
+        path.write_bytes(full[: int(share * len(full))])
         with pytest.raises(store.ResultError):
             store.load(path)
 
@@ -113,7 +113,7 @@ def test_one_run_through_all_of_it_ends_as_if_nothing_had_happened(tmp_path: Pat
     )
     root, folder, path = Path(__file__).parents[2], tmp_path / "run", tmp_path / "run" / "result.h5"
     folder.mkdir()
-    whole = td.run("beam", tmp_path / "whole", overrides=overrides)
+    total = td.run("beam", tmp_path / "whole", overrides=overrides)
     command = [sys.executable, "-c", GOES_ON, str(folder), *overrides]
     process = subprocess.Popen(command, cwd=root)
     began = time.monotonic()
@@ -136,10 +136,10 @@ def test_one_run_through_all_of_it_ends_as_if_nothing_had_happened(tmp_path: Pat
     assert store.load(path).state  # what was there is there
     assert subprocess.run(command, cwd=root, check=False).returncode == 0
     resumed = store.load(path)
-    assert whole.wear is not None
+    assert total.wear is not None
     assert resumed.wear is not None
-    assert np.array_equal(resumed.wear.depth, whole.wear.depth)
-    assert np.array_equal(resumed.wear.cycles, whole.wear.cycles)
+    assert np.array_equal(resumed.wear.depth, total.wear.depth)
+    assert np.array_equal(resumed.wear.cycles, total.wear.cycles)
 
 
 @pytest.mark.parametrize(

@@ -72,22 +72,22 @@ def graded(start: float, first: float, end: float, growth: float = 1.7) -> np.nd
 
 def write(path: Path, n: int, reach: float, size: float, up: bool, point: bool) -> None:
     """Half a cylinder or a quarter of a sphere over z = 0, or a flat body below, n elements over the patch."""
-    near = np.linspace(0, reach, n + 1)
-    far, height = graded(reach, near[1], size), graded(0, near[1], size)
+    nearby = np.linspace(0, reach, n + 1)
+    far, height = graded(reach, nearby[1], size), graded(0, nearby[1], size)
     height = height if up else -height[::-1]
     patch, back = ("w-", "w+") if up else ("w+", "w-")
 
     def curved(p: np.ndarray) -> np.ndarray:
-        away = p[:, 0] ** 2 + point * p[:, 1] ** 2
-        return np.column_stack([p[:, :2], p[:, 2] + up * away / (2 * RADIUS) * (1 - p[:, 2] / size)])
+        distant = p[:, 0] ** 2 + point * p[:, 1] ** 2
+        return np.column_stack([p[:, :2], p[:, 2] + up * distant / (2 * RADIUS) * (1 - p[:, 2] / size)])
 
-    across = (near, far) if point else (np.array([0, THICK]),)
+    across = (nearby, far) if point else (np.array([0, THICK]),)
     parts = []
-    for u in (near, far):
+    for u in (nearby, far):
         for v in across:
-            touches = u is near and v is across[0]
+            touches = u is nearby and v is across[0]
             sides = {patch: "patch" if touches else "rest", back: "back"}
-            sides |= {"u-": "middle"} if u is near else {}
+            sides |= {"u-": "middle"} if u is nearby else {}
             sides |= {"v-": "side"} if v is across[0] else {}
             sides |= {} if point else {"v+": "side"}
             parts.append(blocks.Block(u, v, height, path.stem, sides, curved))
@@ -101,9 +101,9 @@ def pressed(folder: Path, load: float, n: tuple[int, int], size: float, point: b
     file = scene_file.parse(SCENE.replace("LOAD", repr(load)), "hertz.toml", (), folder)
     balance = modelling.build(file, Progress()).balance.with_load(0.0)
     omega = 2 * np.pi * 100
-    found = newton.solve(balance, omega, balance.stuck(omega))
-    assert found.converged
-    force, interface = found.state.cycle.force[:, 0, 0], balance.model.interface
+    solution = newton.solve(balance, omega, balance.stuck(omega))
+    assert solution.converged
+    force, interface = solution.state.cycle.force[:, 0, 0], balance.model.interface
     assert force.sum() == pytest.approx(load, rel=2e-4)  # pairs are tilted by up to 0.02
     return interface.points, force, interface.area
 

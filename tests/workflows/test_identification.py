@@ -27,46 +27,46 @@ def numbers(values):
 
 
 def test_known_parameters_are_found_from_exact_numbers():
-    found = fit(PAIR, numbers(TRUE), springs_in_a_row)
+    result = fit(PAIR, numbers(TRUE), springs_in_a_row)
     # a = 18, b = 20 has the same two frequencies: either may be found
-    np.testing.assert_allclose(springs_in_a_row(found.named()), TRUE, rtol=1e-6)
-    np.testing.assert_allclose(found.before, springs_in_a_row({"a": 10.0, "b": 10.0}))
-    assert found.rms < 1e-6
-    assert "as many numbers as parameters" in found.report()
+    np.testing.assert_allclose(springs_in_a_row(result.named()), TRUE, rtol=1e-6)
+    np.testing.assert_allclose(result.before, springs_in_a_row({"a": 10.0, "b": 10.0}))
+    assert result.rms < 1e-6
+    assert "as many numbers as parameters" in result.report()
 
 
 def test_columns_of_long_names_do_not_run_together():
     long = "contacts.shroud_of_the_next_blade.tangential_stiffness"
-    found = fit(
+    result = fit(
         [FitParameter(long, 1.0, 1e3, (10.0,))], [MeasuredNumber(long, 4.0, "N/um")], lambda v: np.array([v[long]])
     )
-    rows = [line.split() for line in found.report().splitlines() if line.startswith(long)]
+    rows = [line.split() for line in result.report().splitlines() if line.startswith(long)]
     assert [row[0] for row in rows] == [long, long]
     assert float(rows[0][1]) == 10.0
     assert [float(value) for value in rows[1][2:5]] == [4.0, 10.0, pytest.approx(4.0)]
 
 
 def test_sensitivities_are_those_of_the_closed_form():
-    found = fit(
+    result = fit(
         [FitParameter("k", 1.0, 1e3, (10.0,)), FitParameter("m", 0.1, 10.0, (3.0,))],
         [MeasuredNumber("omega", 4.0), MeasuredNumber("force", 48.0)],
         lambda v: np.array([np.sqrt(v["k"] / v["m"]), v["k"] * v["m"] ** 2]),
     )
-    np.testing.assert_allclose(found.sensitivity, [[0.5, -0.5], [1.0, 2.0]], atol=1e-6)
-    assert found.named() == pytest.approx({"k": 48 ** (1 / 3) * 16 ** (2 / 3), "m": (48 / 16) ** (1 / 3)}, rel=1e-6)
+    np.testing.assert_allclose(result.sensitivity, [[0.5, -0.5], [1.0, 2.0]], atol=1e-6)
+    assert result.named() == pytest.approx({"k": 48 ** (1 / 3) * 16 ** (2 / 3), "m": (48 / 16) ** (1 / 3)}, rel=1e-6)
 
 
 def test_standard_error_is_that_of_the_mean():
     """Scatter about one constant: the logarithm's standard error is s / sqrt(n)."""
     scatter = 0.05 * np.random.default_rng(2).standard_normal(40)
-    found = fit(
+    result = fit(
         [FitParameter("level", 0.1, 10.0, (1.0,))],
         numbers(3.0 * np.exp(scatter)),
         lambda v: np.full(40, v["level"]),
     )
-    assert found.values[0] == pytest.approx(3.0 * np.exp(scatter.mean()), rel=1e-6)
-    assert found.deviation[0] == pytest.approx(scatter.std(ddof=1) / np.sqrt(40), rel=1e-6)
-    assert found.verdict(0).startswith("+- ")
+    assert result.values[0] == pytest.approx(3.0 * np.exp(scatter.mean()), rel=1e-6)
+    assert result.deviation[0] == pytest.approx(scatter.std(ddof=1) / np.sqrt(40), rel=1e-6)
+    assert result.verdict(0).startswith("+- ")
 
 
 def test_weights_pull_towards_the_number_that_counts_more():
@@ -79,19 +79,19 @@ def test_weights_pull_towards_the_number_that_counts_more():
 
 
 def test_bounds_hold_and_are_told():
-    found = fit([FitParameter("x", 1.0, 3.0, (2.0,))], numbers([5.0, 5.0]), lambda v: np.full(2, v["x"]))
-    assert found.values[0] == pytest.approx(3.0)
-    assert found.values[0] <= 3.0
-    assert found.verdict(0) == "at its upper bound"
+    result = fit([FitParameter("x", 1.0, 3.0, (2.0,))], numbers([5.0, 5.0]), lambda v: np.full(2, v["x"]))
+    assert result.values[0] == pytest.approx(3.0)
+    assert result.values[0] <= 3.0
+    assert result.verdict(0) == "at its upper bound"
 
 
 def test_what_the_numbers_do_not_determine_is_said():
     """Only the product counts: both are open; a parameter without any influence is open too."""
     three = [FitParameter(name, 0.1, 10.0, (1.0,)) for name in ("p", "q", "idle")]
-    found = fit(three, numbers([2.0, 2.1, 1.9]), lambda v: np.full(3, v["p"] * v["q"]))
-    assert np.isinf(found.deviation).all()
-    assert found.report().count("not determined by these numbers") == 3
-    record = json.loads(json.dumps(found.record()))
+    result = fit(three, numbers([2.0, 2.1, 1.9]), lambda v: np.full(3, v["p"] * v["q"]))
+    assert np.isinf(result.deviation).all()
+    assert result.report().count("not determined by these numbers") == 3
+    record = json.loads(json.dumps(result.record()))
     assert [p["deviation"] for p in record["parameters"]] == [None] * 3
 
 
@@ -102,9 +102,9 @@ def test_the_best_of_several_starts_is_kept():
         x = values["x"]
         return np.array([2.0 + (x - 1) ** 2 * (x - 4) ** 2 + 0.3 * (4 - x)])
 
-    found = fit([FitParameter("x", 0.5, 5.0, (1.0, 4.5), ratio=False)], [MeasuredNumber("y", 1.9)], folded)
-    assert found.values[0] == pytest.approx(4.0, abs=0.2)
-    assert found.before[0] == pytest.approx(folded({"x": 1.0})[0])
+    result = fit([FitParameter("x", 0.5, 5.0, (1.0, 4.5), ratio=False)], [MeasuredNumber("y", 1.9)], folded)
+    assert result.values[0] == pytest.approx(4.0, abs=0.2)
+    assert result.before[0] == pytest.approx(folded({"x": 1.0})[0])
 
 
 @pytest.mark.parametrize(

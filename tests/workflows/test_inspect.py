@@ -23,19 +23,19 @@ def said(capsys, *words):
 def test_a_deck_for_machines(capsys):
     code, out, _ = said(capsys, LAP, "--unit", "mm", "--modes", "14", "--free", "--json")
     assert not code
-    found = json.loads(out)
-    assert found["mass_kg"] == pytest.approx(2 * 2e-6 * 7850)
-    assert found["volume_m3"] == pytest.approx(4e-6)
-    np.testing.assert_allclose(found["size_m"], [0.03, 0.02, 0.02])
-    np.testing.assert_allclose(found["centre_m"], [0.0025, 0.0075, 0.01], atol=1e-9)
-    assert set(found["bodies"]) == {"Block-1", "Block-2"}
-    assert found["groups"]["Upper"] == {"area_m2": pytest.approx(2e-4), "nodes": 15}
-    assert found["worst_element"]["scaled_jacobian"] == pytest.approx(1.0)
-    assert any("*PLASTIC" in clause for clause in found["unused"])
-    assert found["gaps"] == {}
-    assert found["frequencies_hz"][:12] == [0.0] * 12
-    assert found["frequencies_hz"][12] == pytest.approx(found["frequencies_hz"][13], rel=1e-6)  # equal blocks
-    assert found["remarks"] == []
+    record = json.loads(out)
+    assert record["mass_kg"] == pytest.approx(2 * 2e-6 * 7850)
+    assert record["volume_m3"] == pytest.approx(4e-6)
+    np.testing.assert_allclose(record["size_m"], [0.03, 0.02, 0.02])
+    np.testing.assert_allclose(record["centre_m"], [0.0025, 0.0075, 0.01], atol=1e-9)
+    assert set(record["bodies"]) == {"Block-1", "Block-2"}
+    assert record["groups"]["Upper"] == {"area_m2": pytest.approx(2e-4), "nodes": 15}
+    assert record["worst_element"]["scaled_jacobian"] == pytest.approx(1.0)
+    assert any("*PLASTIC" in clause for clause in record["unused"])
+    assert record["gaps"] == {}
+    assert record["frequencies_hz"][:12] == [0.0] * 12
+    assert record["frequencies_hz"][12] == pytest.approx(record["frequencies_hz"][13], rel=1e-6)  # equal blocks
+    assert record["remarks"] == []
 
 
 def test_units_that_slipped_are_remarked(capsys, tmp_path):
@@ -54,11 +54,11 @@ def test_a_scene_with_the_deflection_that_deserves_a_remark(capsys):
     words = [word for text in coarse for word in ("--set", text)]
     code, out, _ = said(capsys, "beam", *words, "--modes", "2", "--json")
     assert not code
-    found = json.loads(out)
-    assert found["mass_kg"] == pytest.approx(0.6288)
-    assert found["gaps"] == {"contact": {"least_m": 0.0, "largest_m": 0.0}}
-    assert found["frequencies_hz"] == pytest.approx([416.5, 416.5], rel=2e-2)
-    assert "more than a linear model describes" in found["remarks"][0]
+    record = json.loads(out)
+    assert record["mass_kg"] == pytest.approx(0.6288)
+    assert record["gaps"] == {"contact": {"least_m": 0.0, "largest_m": 0.0}}
+    assert record["frequencies_hz"] == pytest.approx([416.5, 416.5], rel=2e-2)
+    assert "more than a linear model describes" in record["remarks"][0]
 
 
 @pytest.mark.parametrize(
@@ -87,15 +87,15 @@ def test_how_the_faces_of_a_tie_meet_is_told(tmp_path, off, remarked):
     path.write_text(
         LAP.read_text().replace(place, f"0., -10., {10.0 + off}\n 0.,").replace("tolerance=0.5", "tolerance=2")
     )
-    found = inspection.inspect(path, unit="mm")
-    (pair,) = found.pairs.values()
+    inspected = inspection.inspect(path, unit="mm")
+    (pair,) = inspected.pairs.values()
     assert pair["area_m2"] == pytest.approx(2e-4)
     assert pair["shared_m2"] == pytest.approx(1e-4, rel=1e-6)
     assert pair["least_m"] == pytest.approx(1e-3 * off, abs=1e-9)
     assert pair["largest_m"] == pytest.approx(1e-3 * off, abs=1e-9)
     assert pair["angle_deg"] == pytest.approx(0.0, abs=1e-5)
-    assert any("the faces of tie" in remark for remark in found.remarks) is remarked
-    assert not found.refused
+    assert any("the faces of tie" in remark for remark in inspected.remarks) is remarked
+    assert not inspected.refused
 
 
 def test_a_tie_that_shares_nothing_is_refused(tmp_path):
@@ -103,6 +103,6 @@ def test_a_tie_that_shares_nothing_is_refused(tmp_path):
     path.write_text(
         LAP.read_text().replace("*Instance, name=Block-2, part=Block\n", "*Instance, name=Block-2, part=Block\n5., ")
     )
-    found = inspection.inspect(path, unit="mm")
-    assert not found.pairs
-    assert any("glue" in sentence for sentence in found.refused)
+    inspected = inspection.inspect(path, unit="mm")
+    assert not inspected.pairs
+    assert any("glue" in sentence for sentence in inspected.refused)

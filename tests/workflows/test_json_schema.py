@@ -21,9 +21,9 @@ NAMED |= {"prescribed", "springs", "motion", "patterns", "decks", "by_temperatur
 
 @pytest.fixture(scope="module")
 def schema() -> jsonschema.Draft7Validator:
-    found = json_schema()
-    jsonschema.Draft7Validator.check_schema(found)
-    return jsonschema.Draft7Validator(found)
+    result = json_schema()
+    jsonschema.Draft7Validator.check_schema(result)
+    return jsonschema.Draft7Validator(result)
 
 
 def tables(name: str) -> dict[str, Any]:
@@ -36,8 +36,8 @@ def test_the_schema_accepts_every_scene_that_comes_along(name: str, schema: json
 
 
 def test_every_key_of_the_schema_says_what_it_means() -> None:
-    found = json_schema()
-    for name, table in found["$defs"].items():
+    result = json_schema()
+    for name, table in result["$defs"].items():
         for key, value in table["properties"].items():
             assert value.get("description") or value.get("$ref"), f"{name}.{key}"
 
@@ -62,16 +62,16 @@ def misspelt(word: str, draw: random.Random) -> str:
 def test_a_hundred_misspelt_keys_are_refused_with_the_right_one(schema: jsonschema.Draft7Validator) -> None:
     draw, right, refused = random.Random(1), 0, 0
     scenes = {name: tables(name) for name in ("beam", "blade", "leaf_seal", "rig", "turbine")}
-    every = sorted((name, path) for name, scene in scenes.items() for path in keys(scene) if len(path[-1]) > 3)
-    for name, path in draw.sample(every, 100):
+    complete = sorted((name, path) for name, scene in scenes.items() for path in keys(scene) if len(path[-1]) > 3)
+    for name, path in draw.sample(complete, 100):
         scene = copy.deepcopy(scenes[name])
         table = scene
         for key in path[:-1]:
             table = table[key]
         table[misspelt(path[-1], draw)] = table.pop(path[-1])
         refused += not schema.is_valid(scene)
-        with pytest.raises(scene_file.SceneError) as said:
+        with pytest.raises(scene_file.SceneError) as message:
             scene_file.parse(tomli_w.dumps(scene), f"{name}.toml", (), scene_file.find(name).parent)
-        right += f"did you mean {path[-1]}?" in str(said.value)
+        right += f"did you mean {path[-1]}?" in str(message.value)
     assert refused == 100
     assert right >= 90

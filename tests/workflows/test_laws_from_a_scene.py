@@ -64,15 +64,15 @@ def response(law: str, changed: str = "") -> np.ndarray:
 def test_every_number_of_a_contact_law_changes_the_response(law: str) -> None:
     first = response(law)
     for number in declarations.read(contact_law.file_of(law)):
-        again = response(law, number.name)
-        assert np.abs(again - first).max() > 1e-3 * np.abs(first).max(), number.name
+        repeated = response(law, number.name)
+        assert np.abs(repeated - first).max() > 1e-3 * np.abs(first).max(), number.name
 
 
 def test_the_contact_laws_with_friction_give_different_responses() -> None:
-    found = [response(law)[:, -2:] for law in PLAIN if "t1" in contact_law.load(law).COMPONENTS[0]]
-    for i, one in enumerate(found):
-        for other in found[i + 1 :]:
-            assert np.abs(one - other).max() > 1e-3 * np.abs(one).max()
+    rows = [response(law)[:, -2:] for law in PLAIN if "t1" in contact_law.load(law).COMPONENTS[0]]
+    for i, item in enumerate(rows):
+        for other in rows[i + 1 :]:
+            assert np.abs(item - other).max() > 1e-3 * np.abs(item).max()
 
 
 @pytest.mark.parametrize("law", wear_law.names())
@@ -91,7 +91,7 @@ def test_every_number_of_a_wear_law_changes_the_wear_per_cycle(law: str) -> None
     first = rate()
     assert first.max() > 0
     for number in declared:
-        again = rate(number.name)
-        assert np.abs(again - first).max() > 1e-3 * first.max(), number.name
+        repeated = rate(number.name)
+        assert np.abs(repeated - first).max() > 1e-3 * first.max(), number.name
         if number.name == "coefficient":
-            assert np.allclose(again, 2 * first, rtol=1e-12)
+            assert np.allclose(repeated, 2 * first, rtol=1e-12)

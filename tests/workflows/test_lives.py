@@ -38,7 +38,7 @@ MEDIAN = 1e8
 def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """They take longer than all the rest."""
     if "command" not in request.node.name:
-        monkeypatch.setattr(study_pictures, "shown", lambda found: ())
+        monkeypatch.setattr(study_pictures, "shown", lambda result: ())
         monkeypatch.setattr(td.studies.LifeDistribution, "plot", lambda self: Figure())
 
 
@@ -73,8 +73,8 @@ def engine(life: Callable[[dict[str, float], StudyRun], dict[str, float] | None]
 
     def finished(tasks: Sequence[StudyRun], workers: int, solve: Any) -> Iterator[RunRow]:
         for task in tasks:
-            said = dict(text.split("=", 1) for text in task.overrides)
-            numbers = life({key: float(said[key]) for key in VARY}, task)
+            message = dict(text.split("=", 1) for text in task.overrides)
+            numbers = life({key: float(message[key]) for key in VARY}, task)
             done = numbers is not None
             yield RunRow(task.number, task.key, "complete" if done else "failed", "told", numbers or {})
 
@@ -104,8 +104,8 @@ def covered(seeds: range, runs: int) -> tuple[float, float]:
         points = of.values(qmc.Sobol(4, seed=np.random.default_rng(seed)).random(runs))
         surrogate = Surrogate.fitted(of.coordinates(points), log_life(points))
         sample = Sample.of(of, surrogate)
-        many, _ = of.draw(17, seed=99)
-        truth = float(np.quantile(log_life(many), 0.1))
+        large, _ = of.draw(17, seed=99)
+        truth = float(np.quantile(log_life(large), 0.1))
         low, high = np.quantile(quantiles.drawn(sample, surrogate, 0.1), [0.05, 0.95])
         inside.append(low <= truth <= high)
         errors.append(abs(sample.quantile(0.1) - truth))
@@ -146,46 +146,46 @@ def test_the_claimed_confidence_is_kept_on_fifty_planted_problems() -> None:
 
 def test_quantiles_and_indices_are_those_of_the_closed_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life": lasts(values)}))
-    found = td.studies.lives(study(lives={"model_error": 0.1}), tmp_path)
-    for q, name in zip(found.quantiles, ("P10", "P50", "P90"), strict=True):
+    result = td.studies.lives(study(lives={"model_error": 0.1}), tmp_path)
+    for q, name in zip(result.quantiles, ("P10", "P50", "P90"), strict=True):
         assert q.name == name
         assert q.value == pytest.approx(exact(q.share), rel=2e-3)
         assert q.low <= q.value <= q.high
         assert q.low_in_all == pytest.approx(0.91 * q.value, rel=0.01)  # the 5 % quantile of a factor in 0.9 .. 1.1
         assert q.high_in_all == pytest.approx(1.09 * q.value, rel=0.01)
         assert not q.at_least
-    assert found.scatter == pytest.approx(SCATTER, rel=2e-3)
-    assert [one.key for one in found.influences] == sorted(VARY, key=width, reverse=True)
-    for one in found.influences:
-        assert one.first == pytest.approx((width(one.key) / SCATTER) ** 2, abs=0.01)
-        assert one.total == pytest.approx(one.first, abs=0.01)
+    assert result.scatter == pytest.approx(SCATTER, rel=2e-3)
+    assert [influence.key for influence in result.influences] == sorted(VARY, key=width, reverse=True)
+    for influence in result.influences:
+        assert influence.first == pytest.approx((width(influence.key) / SCATTER) ** 2, abs=0.01)
+        assert influence.total == pytest.approx(influence.first, abs=0.01)
     record = json.loads((tmp_path / "lives.json").read_text())
-    assert record["quantiles"][0]["value"] == found.quantiles[0].value
+    assert record["quantiles"][0]["value"] == result.quantiles[0].value
 
 
 def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
+    requested: list[int] = []
 
     def life(values: dict[str, float], task: StudyRun) -> dict[str, float]:
-        asked.append(task.number)
-        whole = lasts(values)
-        return {"life": whole * math.exp(0.2 * math.sin(6 * math.log(whole / MEDIAN)))}
+        requested.append(task.number)
+        full = lasts(values)
+        return {"life": full * math.exp(0.2 * math.sin(6 * math.log(full / MEDIAN)))}
 
     monkeypatch.setattr(pool, "finished", engine(life))
     tables = study(runs=16, lives={"model_error": 0, "within": "4 %", "most": 48})
-    found = td.studies.lives(tables, tmp_path, rare=1e-4)
+    result = td.studies.lives(tables, tmp_path, rare=1e-4)
     rare = exact(1e-4)
     truth = rare * math.exp(0.2 * math.sin(6 * math.log(rare / MEDIAN)))
-    assert found.quantiles[0].share == 1e-4
-    assert found.quantiles[0].value == pytest.approx(truth, rel=0.05)
-    assert found.quantiles[0].low <= truth * 1.02
-    assert found.quantiles[0].high >= truth * 0.98
-    assert 16 < found.runs <= 48
-    count = len(asked)
-    assert count == found.runs
-    again = td.studies.lives(tables, tmp_path, rare=1e-4, resume=True)
-    assert len(asked) == count
-    assert again.quantiles[0] == found.quantiles[0]
+    assert result.quantiles[0].share == 1e-4
+    assert result.quantiles[0].value == pytest.approx(truth, rel=0.05)
+    assert result.quantiles[0].low <= truth * 1.02
+    assert result.quantiles[0].high >= truth * 0.98
+    assert 16 < result.runs <= 48
+    count = len(requested)
+    assert count == result.runs
+    repeated = td.studies.lives(tables, tmp_path, rare=1e-4, resume=True)
+    assert len(requested) == count
+    assert repeated.quantiles[0] == result.quantiles[0]
 
 
 def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
@@ -201,14 +201,14 @@ def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
     def life(x: dict[str, float], powers: tuple[float, float]) -> float:
         ratio = math.log(x[shake] / x[PRESS] * 2)
         jump = 1.5 * (math.log(x[FRICTION] / 0.5) - ratio > 0.05)
-        whole = MEDIAN * math.exp(jump - 3 * ratio) * (2e-15 / x[wear]) ** powers[0]
-        return whole * (20e3 / x[PRESS]) ** powers[1]
+        full = MEDIAN * math.exp(jump - 3 * ratio) * (2e-15 / x[wear]) ** powers[0]
+        return full * (20e3 / x[PRESS]) ** powers[1]
 
     def runs(powers: tuple[float, float]) -> Any:
         def finished(tasks: Sequence[StudyRun], workers: int, solve: Any) -> Iterator[RunRow]:
             for task in tasks:
-                said = dict(text.split("=", 1) for text in task.overrides)
-                numbers = {"life": life({key: float(said[key]) for key in vary}, powers)}
+                message = dict(text.split("=", 1) for text in task.overrides)
+                numbers = {"life": life({key: float(message[key]) for key in vary}, powers)}
                 yield RunRow(task.number, task.key, "complete", "told", numbers)
 
         return finished
@@ -217,13 +217,13 @@ def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
     tables = study(vary, runs=45, lives={"model_error": 0})
     for powers, scaled in (((1.0, 1.0), 2), ((1.0, 1.2), 1)):
         monkeypatch.setattr(pool, "finished", runs(powers))
-        found = td.studies.lives(tables, tmp_path / str(scaled))
-        assert len(found.scaled) == scaled
-        assert found.runs == 48
+        result = td.studies.lives(tables, tmp_path / str(scaled))
+        assert len(result.scaled) == scaled
+        assert result.runs == 48
         if scaled == 2:
-            assert found.scaled == ((wear,), (PRESS, shake))
+            assert result.scaled == ((wear,), (PRESS, shake))
             truth = float(np.quantile([life(of.run_of(x), powers) for x in of.draw(14, seed=99)[0]], 0.1))
-            assert found.quantiles[0].value == pytest.approx(truth, rel=0.05)
+            assert result.quantiles[0].value == pytest.approx(truth, rel=0.05)
 
 
 def test_missing_runs_widen_what_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -231,9 +231,9 @@ def test_missing_runs_widen_what_is_told(tmp_path: Path, monkeypatch: pytest.Mon
         return None if task.number % 16 == 0 else {"life": lasts(values)}
 
     monkeypatch.setattr(pool, "finished", engine(life))
-    found = td.studies.lives(study(lives={"model_error": 0}), tmp_path)
-    assert found.missing == 2
-    ten = found.quantiles[0]
+    result = td.studies.lives(study(lives={"model_error": 0}), tmp_path)
+    assert result.missing == 2
+    ten = result.quantiles[0]
     lost = 2 / 32
     assert ten.low == pytest.approx(exact((0.1 - lost) / (1 - lost)), rel=0.02)
     assert ten.high == pytest.approx(exact(0.1 / (1 - lost)), rel=0.02)
@@ -243,27 +243,27 @@ def test_lives_that_did_not_end_are_lower_bounds(tmp_path: Path, monkeypatch: py
     limit = 1.2 * MEDIAN
 
     def life(values: dict[str, float], task: StudyRun) -> dict[str, float]:
-        own = lasts(values)
-        return {"cycles": limit} if own > limit else {"cycles": own, "life": own}
+        base = lasts(values)
+        return {"cycles": limit} if base > limit else {"cycles": base, "life": base}
 
     monkeypatch.setattr(pool, "finished", engine(life))
-    found = td.studies.lives(study(runs=64, lives={"model_error": 0}), tmp_path)
-    assert [q.at_least for q in found.quantiles] == [False, False, True]
-    assert found.quantiles[0].value == pytest.approx(exact(0.1), rel=0.05)
-    assert "at least" in found.lines()[-len(VARY) - 2]
-    few = td.studies.lives(study(runs=64, lives={"model_error": 0, "shares": [0.8]}), tmp_path / "few")
-    assert few.quantiles[0].at_least  # below the lowest bound, but as many as that may survive
+    result = td.studies.lives(study(runs=64, lives={"model_error": 0}), tmp_path)
+    assert [q.at_least for q in result.quantiles] == [False, False, True]
+    assert result.quantiles[0].value == pytest.approx(exact(0.1), rel=0.05)
+    assert "at least" in result.lines()[-len(VARY) - 2]
+    small = td.studies.lives(study(runs=64, lives={"model_error": 0, "shares": [0.8]}), tmp_path / "few")
+    assert small.quantiles[0].at_least  # below the lowest bound, but as many as that may survive
 
 
 def test_indices_of_correlated_variables_are_those_of_a_linear_function() -> None:
     vary = {key: {"distribution": "normal", "mean": 0, "std": 1} for key in ("a", "b")}
     of = space(study(vary, correlations=[{"keys": ["a", "b"], "value": 0.6}]))
-    found = {one.key: one for one in influences(of, lambda z: 2 * z[:, 0] + z[:, 1])}
+    result = {influence.key: influence for influence in influences(of, lambda z: 2 * z[:, 0] + z[:, 1])}
     variance = 4 + 1 + 2 * 2 * 0.6
-    assert found["a"].first == pytest.approx((2 + 0.6) ** 2 / variance, abs=0.01)  # E[y | a] = (2 + 0.6) a
-    assert found["b"].first == pytest.approx((1 + 2 * 0.6) ** 2 / variance, abs=0.01)
-    assert found["a"].total == pytest.approx(4 * (1 - 0.36) / variance, abs=0.01)
-    assert found["b"].total == pytest.approx((1 - 0.36) / variance, abs=0.01)
+    assert result["a"].first == pytest.approx((2 + 0.6) ** 2 / variance, abs=0.01)  # E[y | a] = (2 + 0.6) a
+    assert result["b"].first == pytest.approx((1 + 2 * 0.6) ** 2 / variance, abs=0.01)
+    assert result["a"].total == pytest.approx(4 * (1 - 0.36) / variance, abs=0.01)
+    assert result["b"].total == pytest.approx((1 - 0.36) / variance, abs=0.01)
 
 
 def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:
@@ -272,13 +272,15 @@ def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:
     coordinates, values = of.coordinates(points), log_life(points)
     slopes = np.full(coordinates.shape, np.nan)
     slopes[::3, 1] = 0.3  # of some runs, by one coordinate
-    for given in (None, slopes):
-        level = Surrogate.fitted(coordinates, values, given)
+    for inputs in (None, slopes):
+        level = Surrogate.fitted(coordinates, values, inputs)
         missed = []
         for i in range(len(values)):
-            rest = np.arange(len(values)) != i
-            others = replace(level, points=coordinates[rest], values=values[rest], slopes=level.slopes[rest])
-            missed.append(values[i] - others.mean(coordinates[[i]])[0])
+            remainder = np.arange(len(values)) != i
+            remaining = replace(
+                level, points=coordinates[remainder], values=values[remainder], slopes=level.slopes[remainder]
+            )
+            missed.append(values[i] - remaining.mean(coordinates[[i]])[0])
         np.testing.assert_allclose(values - level.left_out, missed, atol=1e-6)
 
 
@@ -307,7 +309,7 @@ def test_covariances_of_derivatives_are_derivatives_of_covariances() -> None:
 
 def test_runs_with_derivatives_say_as_much_as_three_times_as_many() -> None:
     of, log_life = planted(2)
-    many = of.draw(10, seed=9)[0]
+    large = of.draw(10, seed=9)[0]
 
     def error(runs: int, slopes: bool) -> float:
         points = of.coordinates(of.draw(6)[0][:runs])
@@ -315,7 +317,7 @@ def test_runs_with_derivatives_say_as_much_as_three_times_as_many() -> None:
         step = 1e-6 * np.eye(4)
         by = np.stack([(log_life(back(points + s)) - log_life(back(points - s))) / 2e-6 for s in step], axis=1)
         found = Surrogate.fitted(points, log_life(back(points)), by if slopes else None)
-        return float(np.std(found.mean(of.coordinates(many)) - log_life(many)))
+        return float(np.std(found.mean(of.coordinates(large)) - log_life(large)))
 
     assert error(16, True) < error(48, False)
 

@@ -59,10 +59,10 @@ def sampled(points: np.ndarray, surrogate: Surrogate) -> Sample:
 @pytest.mark.slow
 def test_ends_of_the_beams_lives_hold_as_often_as_they_say(population: tuple[np.ndarray, np.ndarray]) -> None:
     points, lives = population
-    draw, held = np.random.default_rng(5), {share: 0 for share in SHARES}
+    draw, fixed = np.random.default_rng(5), {share: 0 for share in SHARES}
     for _ in range(SETS):
-        own = draw.choice(len(lives), RUNS, replace=False)
-        surrogate = Surrogate.fitted(points[own], lives[own])
+        base = draw.choice(len(lives), RUNS, replace=False)
+        surrogate = Surrogate.fitted(points[base], lives[base])
         sample = sampled(points, surrogate)
         for share in SHARES:
             by_surrogate = np.quantile(quantiles.drawn(sample, surrogate, share), [0.05, 0.95])
@@ -70,30 +70,30 @@ def test_ends_of_the_beams_lives_hold_as_often_as_they_say(population: tuple[np.
                 sample, surrogate.values[:, None], surrogate.left_out[:, None], share, CONFIDENCE
             )
             low, high = min(by_surrogate[0], by_count[0]), max(by_surrogate[1], by_count[1])
-            held[share] += bool(low <= np.quantile(lives, share) <= high)
-    print({f"P{100 * share:g}": f"{count} of {SETS}" for share, count in held.items()})
-    assert min(held.values()) >= 0.8 * SETS
+            fixed[share] += bool(low <= np.quantile(lives, share) <= high)
+    print({f"P{100 * share:g}": f"{count} of {SETS}" for share, count in fixed.items()})
+    assert min(fixed.values()) >= 0.8 * SETS
 
 
 @pytest.mark.slow
 def test_added_runs_tell_p10_within_five_percent(population: tuple[np.ndarray, np.ndarray]) -> None:
     points, lives = population
-    truth, draw, held, errors, runs = np.quantile(lives, 0.1), np.random.default_rng(6), 0, [], []
+    truth, draw, fixed, errors, runs = np.quantile(lives, 0.1), np.random.default_rng(6), 0, [], []
     for _ in range(SETS):
-        own = list(draw.choice(len(lives), RUNS, replace=False))
+        items = list(draw.choice(len(lives), RUNS, replace=False))
         while True:
-            surrogate = Surrogate.fitted(points[own], lives[own])
+            surrogate = Surrogate.fitted(points[items], lives[items])
             draws = quantiles.drawn(sampled(points, surrogate), surrogate, 0.1)
             low, high = np.quantile(draws, [0.05, 0.95])
-            if (len(own) > RUNS and high - low <= 2 * np.log1p(0.05)) or len(own) >= 200:
+            if (len(items) > RUNS and high - low <= 2 * np.log1p(0.05)) or len(items) >= 200:
                 break
-            others = np.setdiff1d(np.arange(len(lives)), own)
-            more = quantiles.next_runs(sampled(points[others], surrogate), surrogate, 0.1, 8)
-            own += [int(others[np.argmin(((points[others] - point) ** 2).sum(1))]) for point in more]
-        held += bool(low <= truth <= high)
+            remaining = np.setdiff1d(np.arange(len(lives)), items)
+            extra = quantiles.next_runs(sampled(points[remaining], surrogate), surrogate, 0.1, 8)
+            items += [int(remaining[np.argmin(((points[remaining] - point) ** 2).sum(1))]) for point in extra]
+        fixed += bool(low <= truth <= high)
         errors.append(np.median(draws) - truth)
-        runs.append(len(own))
+        runs.append(len(items))
     off = np.sqrt(np.mean(np.square(errors)))
-    print(f"held in {held} of {SETS}, off by {off:.3f} r.m.s., {min(runs)} to {max(runs)} runs")
-    assert held >= 0.8 * SETS
+    print(f"held in {fixed} of {SETS}, off by {off:.3f} r.m.s., {min(runs)} to {max(runs)} runs")
+    assert fixed >= 0.8 * SETS
     assert max(runs) < 200

@@ -51,19 +51,19 @@ def test_wear_adds_over_the_speeds(scene: Path) -> None:
     fast = rate(worn(scene, "wear.at=805 Hz", "wear.max_steps=1", "wheel.speed=7000 rpm"))
     assert np.abs(fast - slow).max() > 0.05 * slow.max() > 0
     mission = 'wear.mission=[{at="810 Hz", share="30 %"}, {at="805 Hz", share="70 %", speed="7000 rpm"}]'
-    both = rate(worn(scene, mission, "wear.max_steps=1"))
-    np.testing.assert_allclose(both, 0.3 * slow + 0.7 * fast, rtol=1e-6)
+    two_results = rate(worn(scene, mission, "wear.max_steps=1"))
+    np.testing.assert_allclose(two_results, 0.3 * slow + 0.7 * fast, rtol=1e-6)
 
 
 @pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
 def test_a_mission_of_two_equal_points_is_one(scene: Path, rule: str) -> None:
     changes = (f"wear.rule={rule}", 'wear.tolerance="5 %"')
-    one = worn(scene, "wear.at=810 Hz", *changes)
+    item = worn(scene, "wear.at=810 Hz", *changes)
     mission = 'wear.mission=[{at="810 Hz", share=0.5}, {at="810 Hz", share=0.5, speed="6000 rpm"}]'
-    two = worn(scene, mission, *changes)
-    assert len(one.cycles) == len(two.cycles) == 2
-    np.testing.assert_allclose(two.depth, one.depth, rtol=1e-6, atol=1e-15)
-    np.testing.assert_allclose(two.cycles, one.cycles, rtol=1e-6)
+    pair = worn(scene, mission, *changes)
+    assert len(item.cycles) == len(pair.cycles) == 2
+    np.testing.assert_allclose(pair.depth, item.depth, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(pair.cycles, item.cycles, rtol=1e-6)
 
 
 def test_a_speed_needs_a_wheel_that_turns(scene: Path) -> None:

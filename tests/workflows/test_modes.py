@@ -35,15 +35,15 @@ def test_the_backbone_goes_from_the_stuck_to_the_free_mode(capsys: pytest.Captur
         capsys,
     )
     assert code == 0, err
-    found = json.loads(out)
-    assert found["end"] == "reached the amplitude asked for"
-    assert found["frequency_hz"][0] == pytest.approx(found["reference_hz"], rel=1e-4)
-    assert found["frequency_hz"][-1] == pytest.approx(free, rel=2e-3)
-    assert max(found["damping"]) > 10 * found["damping"][0]  # friction peaks where the contact begins to slide
-    assert found["damping"][-1] < 0.1 * max(found["damping"])
+    record = json.loads(out)
+    assert record["end"] == "reached the amplitude asked for"
+    assert record["frequency_hz"][0] == pytest.approx(record["reference_hz"], rel=1e-4)
+    assert record["frequency_hz"][-1] == pytest.approx(free, rel=2e-3)
+    assert max(record["damping"]) > 10 * record["damping"][0]  # friction peaks where the contact begins to slide
+    assert record["damping"][-1] < 0.1 * max(record["damping"])
     with (tmp_path / "backbone.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    assert np.array([float(row["frequency_hz"]) for row in rows]) == pytest.approx(np.array(found["frequency_hz"]))
+    assert np.array([float(row["frequency_hz"]) for row in rows]) == pytest.approx(np.array(record["frequency_hz"]))
     assert (tmp_path / "backbone.png").is_file()
     assert (tmp_path / "backbone_maps.png").stat().st_size > 10_000
     code, out, _ = leave(
@@ -62,10 +62,10 @@ def test_maps_along_the_backbone_hold_its_friction_work_and_its_motion() -> None
         assert work @ balance.model.interface.area == pytest.approx(found.energy[at], rel=1e-12)
         x = found.contact[at].reshape(len(gap), 3, -1)
         phase = np.linspace(0, 2 * np.pi, 721)
-        moved = x[:, :, 1, None] * np.cos(phase) + x[:, :, 2, None] * np.sin(phase)  # harmonics 0 and 1
-        np.testing.assert_allclose(slide, np.hypot(moved[:, 0], moved[:, 1]).max(axis=1), rtol=5e-3)
-        widest = balance.contact.gap - x[:, 2, 0] - moved[:, 2].min(axis=1)
-        np.testing.assert_allclose(gap, widest, atol=5e-3 * np.abs(moved).max())
+        shifted = x[:, :, 1, None] * np.cos(phase) + x[:, :, 2, None] * np.sin(phase)  # harmonics 0 and 1
+        np.testing.assert_allclose(slide, np.hypot(shifted[:, 0], shifted[:, 1]).max(axis=1), rtol=5e-3)
+        widest = balance.contact.gap - x[:, 2, 0] - shifted[:, 2].min(axis=1)
+        np.testing.assert_allclose(gap, widest, atol=5e-3 * np.abs(shifted).max())
         slides.append(slide.max())
     assert slides[-1] > 100 * slides[0]
 

@@ -69,10 +69,10 @@ def on_a_mesh_file(name: str, overrides: tuple[str, ...], folder: Path) -> list[
     geometry = [text for text in overrides if text.startswith("geometry.")]
     file = scene_file.read(name, geometry)
     modelling.make_mesh(file, folder)
-    given = file.mesh_scene.geometry
-    axes = ", ".join(f"{group} = {json.dumps(letters)}" for group, letters in given.fixed_axes.items())
-    turning = "" if given.no_turning is None else f", no_turning = {json.dumps(given.no_turning)}"
-    mesh = f"mesh = {json.dumps(str(folder / 'mesh.msh'))}, fixed = {json.dumps(list(given.fixed))}"
+    inputs = file.mesh_scene.geometry
+    axes = ", ".join(f"{group} = {json.dumps(letters)}" for group, letters in inputs.fixed_axes.items())
+    turning = "" if inputs.no_turning is None else f", no_turning = {json.dumps(inputs.no_turning)}"
+    mesh = f"mesh = {json.dumps(str(folder / 'mesh.msh'))}, fixed = {json.dumps(list(inputs.fixed))}"
     return [f"geometry={{{mesh}, fixed_axes = {{{axes}}}{turning}}}", *(t for t in overrides if t not in geometry)]
 
 
@@ -99,27 +99,27 @@ def run(
 
 
 def test_a_run_models_and_keeps_what_its_scene_asks_for(run: tuple[dict[str, Any], dict]) -> None:
-    told, expected = run
-    assert told["state"].startswith("complete")
+    messages, expected = run
+    assert messages["state"].startswith("complete")
     # no pictures where none are asked for
-    assert set(told["imported"]) <= {"gmsh"}  # which reads its own files
+    assert set(messages["imported"]) <= {"gmsh"}  # which reads its own files
     # one model, one factorisation: modes, static shapes and error estimates share it
-    assert (told["models"], len(told["factorised"])) == (1, 1)
-    assert told["systems"] == expected["systems"]
+    assert (messages["models"], len(messages["factorised"])) == (1, 1)
+    assert messages["systems"] == expected["systems"]
     pairs, components, coefficients = (expected[name] for name in ("pairs", "components", "coefficients"))
-    assert (told["pairs"], told["components"], told["coefficients"]) == (pairs, components, coefficients)
-    assert told["unknowns"] == pairs * components * coefficients
+    assert (messages["pairs"], messages["components"], messages["coefficients"]) == (pairs, components, coefficients)
+    assert messages["unknowns"] == pairs * components * coefficients
     # a slider for each tangential component, none where contact is normal alone
-    assert told["memory"] == pairs * (components - 1)
-    assert told["arrays"]["frf/contact"][1:] == [pairs * components, coefficients]
-    assert set(told["groups"]) == expected["groups"]
+    assert messages["memory"] == pairs * (components - 1)
+    assert messages["arrays"]["frf/contact"][1:] == [pairs * components, coefficients]
+    assert set(messages["groups"]) == expected["groups"]
 
 
 def test_arrays_of_a_run_are_as_large_as_what_they_hold(run: tuple[dict[str, Any], dict]) -> None:
-    told, expected = run
-    arrays, pairs = told["arrays"], expected["pairs"]
+    messages, expected = run
+    arrays, pairs = messages["arrays"], expected["pairs"]
     wears = "wear" in expected["groups"]
-    assert (told["delta_max"] is not None) == wears
+    assert (messages["delta_max"] is not None) == wears
     # nothing is stored twice: contact displacement once for each duty, force and work once
     large = {name for name, shape in arrays.items() if name.startswith("wear/") and len(shape) > 2}
     assert large == ({"wear/duty_displacement", "wear/force", "wear/response"} if wears else set())

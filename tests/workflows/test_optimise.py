@@ -58,8 +58,8 @@ def test_a_promise_is_the_improvement_expected() -> None:
     for value, deviation in ((1.0, 0.5), (0.2, 0.3), (-0.4, 0.1), (3.0, 0.5)):
         z = np.linspace(-12, 12, 200001)
         gained = np.maximum(0.3 - value - deviation * z, 0) * np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi)
-        found = promised(0.3, np.array([value]), np.array([deviation]))[0]
-        assert found == pytest.approx(np.log(np.trapezoid(gained, z)), abs=1e-4)
+        result = promised(0.3, np.array([value]), np.array([deviation]))[0]
+        assert result == pytest.approx(np.log(np.trapezoid(gained, z)), abs=1e-4)
     far = promised(0.0, np.array([1.0, 2.0]), np.array([1e-3, 1e-3]))
     assert far[0] - far[1] == pytest.approx(1.5e6, rel=1e-4)
     assert promised(np.inf, np.array([1.0, 2.0]), np.ones(2)).tolist() == [-1.0, -2.0]
@@ -74,9 +74,9 @@ def test_the_search_goes_on_where_the_process_is_unsure(seed: int) -> None:
         bent = y - 5.1 / (4 * np.pi**2) * x**2 + 5 / np.pi * x - 6
         return bent**2 + 10 * (1 - 1 / (8 * np.pi)) * np.cos(x) + 10
 
-    found = searched(branin, lambda s: np.zeros((len(s), 0)), 3, 24, seed=seed)
-    assert found.aims.min() < 0.41
-    assert len(found.share) < 18
+    result = searched(branin, lambda s: np.zeros((len(s), 0)), 3, 24, seed=seed)
+    assert result.aims.min() < 0.41
+    assert len(result.share) < 18
 
 
 def test_two_aims_come_to_their_known_trade() -> None:
@@ -94,12 +94,12 @@ def test_two_aims_come_to_their_known_trade() -> None:
         f = rows[best_trades(rows, (rows < 1.2).all(axis=1))]
         return float(np.sum((np.append(f[1:, 0], 1.2) - f[:, 0]) * (1.2 - f[:, 1])))
 
-    whole = 1.2 * 1.2 - 1 / 6
+    full = 1.2 * 1.2 - 1 / 6
     none = lambda s: np.zeros((len(s), 0))  # noqa: E731
     by_values, by_slopes = searched(aims, none, 8, 16, slopes=False), searched(aims, none, 3, 12)
-    assert dominated(by_values.aims[:8]) < 0.75 * whole
-    assert 0.85 * whole < dominated(by_values.aims) < whole
-    assert 0.9 * whole < dominated(by_slopes.aims) < whole
+    assert dominated(by_values.aims[:8]) < 0.75 * full
+    assert 0.85 * full < dominated(by_values.aims) < full
+    assert 0.9 * full < dominated(by_slopes.aims) < full
     assert np.sort(np.abs(by_slopes.share[3:, 1] - 0.3))[4] < 0.02
 
 
@@ -109,22 +109,22 @@ def test_a_limit_is_kept_and_failed_runs_are_not_followed() -> None:
     def aims(s):
         return np.where(s[:, :1] > 0.8, np.nan, s.sum(axis=1, keepdims=True))
 
-    for first, slopes, most in ((8, False, 18), (4, True, 9)):
-        found = searched(aims, lambda s: 0.25 - s.prod(axis=1, keepdims=True), first, 18, slopes)
-        best = found.front[0]
-        assert found.excess[best] <= 0
-        assert found.aims[best, 0] == pytest.approx(1.0, abs=2e-3)
-        np.testing.assert_allclose(found.share[best], 0.5, atol=0.05)
-        assert len(found.share) <= most
+    for first, slopes, largest in ((8, False, 18), (4, True, 9)):
+        result = searched(aims, lambda s: 0.25 - s.prod(axis=1, keepdims=True), first, 18, slopes)
+        best = result.front[0]
+        assert result.excess[best] <= 0
+        assert result.aims[best, 0] == pytest.approx(1.0, abs=2e-3)
+        np.testing.assert_allclose(result.share[best], 0.5, atol=0.05)
+        assert len(result.share) <= largest
 
 
 def test_few_runs_with_derivatives_of_one_aim_say_where_the_next_goes() -> None:
     """Of two aims the other is known by its values alone, which are the same."""
     share, slopes = np.array([[0.5, 0.5], [0.55, 0.5]]), np.full((2, 2, 2), np.nan)
     slopes[:, 0] = [1.0, -1.0]
-    known = EvaluatedRuns(share, np.array([[0.0, 0.0], [0.2, 0.0]]), np.zeros((2, 0)), slopes)
+    evaluated_runs = EvaluatedRuns(share, np.array([[0.0, 0.0], [0.2, 0.0]]), np.zeros((2, 0)), slopes)
     for seed in range(5):
-        place, _ = propose(known, lambda s: 4 * (s - 0.5), seed)
+        place, _ = propose(evaluated_runs, lambda s: 4 * (s - 0.5), seed)
         np.testing.assert_allclose(place, [0.0, 1.0], atol=1e-3)
 
 
@@ -145,19 +145,19 @@ def test_the_linear_scene_comes_to_its_corner_and_resumes(tmp_path: Path, capsys
     said, rows = json.loads(capsys.readouterr().out), (folder / "rows.jsonl").read_text(encoding="utf-8")
     assert len(said.pop("files")) == 2
     assert (folder / "optimum.png").stat().st_size > 5000
-    found = td.studies.optimise(file, folder, workers=1, resume=True)
-    assert found.record() == said == json.loads((folder / "optimum.json").read_text(encoding="utf-8"))
+    optimum = td.studies.optimise(file, folder, workers=1, resume=True)
+    assert optimum.record() == said == json.loads((folder / "optimum.json").read_text(encoding="utf-8"))
     assert (folder / "rows.jsonl").read_text(encoding="utf-8") == rows
-    keys, amplitude = found.keys(found.best), found.values(found.best)["peak_m_first"]
+    keys, amplitude = optimum.keys(optimum.best), optimum.values(optimum.best)["peak_m_first"]
     assert keys[FORCE] == pytest.approx(10.0, rel=1e-3)
     assert keys[DAMPING] == pytest.approx(0.02, rel=1e-3)
-    assert amplitude == found.table.columns["peak_m_first"].min()
-    assert len(found.table.columns["run"]) <= 6  # each with its derivatives
+    assert amplitude == optimum.table.columns["peak_m_first"].min()
+    assert len(optimum.table.columns["run"]) <= 6  # each with its derivatives
 
 
 def test_a_response_that_is_highest_at_its_end_has_no_peak_to_win_with() -> None:
-    below = ["response.frequency=['300 Hz', '350 Hz']"]
-    numbers = numbers_of(td.run("beam", overrides=[*LINEAR["set"], "verdict.enabled=false", *below]))
+    lower = ["response.frequency=['300 Hz', '350 Hz']"]
+    numbers = numbers_of(td.run("beam", overrides=[*LINEAR["set"], "verdict.enabled=false", *lower]))
     assert numbers["peak_at_end"] == 1.0
     assert not {"peak_frequency_first", "amplitude_first", "amplitude_last"} & set(numbers)
 

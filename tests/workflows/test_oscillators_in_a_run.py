@@ -47,9 +47,9 @@ def marched(damping, force, hertz, stop, gap, spring, limit, x, v, periods, step
     w, w0 = 2 * np.pi * hertz, 2 * np.pi * 10
     h, slider, total, square, count = 1 / hertz / steps, x, 0.0, 0.0, 0
     for step in range(periods * steps):
-        held = min(max(spring * (x - slider), -limit), limit)
-        slider = x - (held / spring if spring > 0 else 0.0)
-        pull = force * w0**2 * np.cos(w * h * step) - w0**2 * x - 2 * damping * w0 * v - held
+        fixed = min(max(spring * (x - slider), -limit), limit)
+        slider = x - (fixed / spring if spring > 0 else 0.0)
+        pull = force * w0**2 * np.cos(w * h * step) - w0**2 * x - 2 * damping * w0 * v - fixed
         v += h * (pull - max(stop * (x - gap), 0.0))
         x += h * v
         if step >= 0.9 * periods * steps:
@@ -68,11 +68,11 @@ def in_time(result: td.Result, damping: float, force: float, **law: float) -> fl
     start, rate = x[:static].sum() + x[static::2].sum(), (order[static::2] * x[static + 1 :: 2]).sum()
     numbers = {"stop": 0.0, "gap": 0.0, "spring": 0.0, "limit": 0.0} | law
     hertz = float(curve.frequency[best])
-    found: float = marched(
+    outcome: float = marched(
         damping, force, hertz, numbers["stop"], numbers["gap"], numbers["spring"], numbers["limit"], start,
         2 * np.pi * hertz * rate, 400, 8000,
     )  # fmt: skip
-    return found
+    return outcome
 
 
 @pytest.mark.parametrize(("gap", "top"), [(0.5, 5), (0.2, 15)])
@@ -82,14 +82,14 @@ def test_an_oscillator_that_hammers_on_a_stop_is_right_or_not_reported(gap: floa
     result = ran(tmp_path, 0.05, contact, 0.1, [5.0, 25.0], list(range(top + 1)))
     said = result.verdict
     assert said is not None
-    one = said.statements["amplitude"]
+    item = said.statements["amplitude"]
     combined = [row for row in said.changes if row.refinement == Refinement.COMBINED and row.quantity == "amplitude"]
     assert [row.relative is not None for row in combined] == [True]
-    assert one.value is not None
-    assert one.error is not None
-    off = abs(one.value / in_time(result, 0.05, 0.1, stop=stop, gap=gap) - 1)
-    assert off > one.error, "an error that holds needs no flag"
-    assert one.status in (Status.CONTRADICTED, Status.UNSETTLED, Status.UNSTABLE)
+    assert item.value is not None
+    assert item.error is not None
+    off = abs(item.value / in_time(result, 0.05, 0.1, stop=stop, gap=gap) - 1)
+    assert off > item.error, "an error that holds needs no flag"
+    assert item.status in (Status.CONTRADICTED, Status.UNSETTLED, Status.UNSTABLE)
 
 
 @pytest.mark.parametrize(("force", "stable"), [(0.5, True), (1.5, False)])
@@ -100,8 +100,8 @@ def test_negative_damping_that_friction_limits_is_right_or_not_reported(
     contact += f"\nfriction = 1.0\nnormal_load = {OMEGA**2}"
     result = ran(tmp_path, -0.02, contact, force, [6.0, 30.0], [1, 3, 5, 7])
     assert result.verdict is not None
-    one = result.verdict.statements["amplitude"]
-    assert one.status in ((Status.REPORTED,) if stable else (Status.UNSTABLE, Status.UNSETTLED))
+    item = result.verdict.statements["amplitude"]
+    assert item.status in ((Status.REPORTED,) if stable else (Status.UNSTABLE, Status.UNSETTLED))
     if stable:
-        found = in_time(result, -0.02, force, spring=4 * OMEGA**2, limit=OMEGA**2)
-        assert one.value == pytest.approx(found, rel=one.error)
+        outcome = in_time(result, -0.02, force, spring=4 * OMEGA**2, limit=OMEGA**2)
+        assert item.value == pytest.approx(outcome, rel=item.error)

@@ -133,9 +133,9 @@ DROPPED = ("length =", "width =", "height =", "patch_length =", "n_patch =", "gr
 def scene(tmp_path: Path) -> Path:
     lines = (scene_file.CASES / "beam" / "beam.toml").read_text().splitlines()
     text = "\n".join(line.partition("#")[0] for line in lines if not line.startswith(DROPPED))
-    for old, new in CHANGES.items():
-        assert old in text
-        text = text.replace(old, new)
+    for previous, updated in CHANGES.items():
+        assert previous in text
+        text = text.replace(previous, updated)
     files = {"my_part": PART, "my_law": LAW, "my_wear": WEAR, "my_method": METHOD}
     for name, body in files.items():
         (tmp_path / f"{name}.py").write_text(body)
@@ -149,8 +149,8 @@ def test_a_scene_runs_with_all_its_own_files(scene: Path) -> None:
     assert result.wear is not None
     depth = result.wear.worn[0].max()
     assert depth > 0
-    more = td.run(scene, overrides={"contact.cohesion": "2 kN", "wear.max_steps": 0})
-    highest, with_more = (np.abs(r.response.response[:, 0, 1:]).max() for r in (result, more))
+    extra = td.run(scene, overrides={"contact.cohesion": "2 kN", "wear.max_steps": 0})
+    highest, with_more = (np.abs(r.response.response[:, 0, 1:]).max() for r in (result, extra))
     assert abs(with_more - highest) > 1e-3 * highest
     low, high = scene_file.read(str(scene)).scene.response.frequency
     points = np.linspace(low, high, 1 + round((high - low) / 120.0))  # solved peaks stand between them
@@ -213,12 +213,12 @@ def test_reading_and_planning_run_none_of_them(scene: Path) -> None:
 
 
 def test_a_law_of_ones_own_locates_its_transitions_unless_it_says_otherwise(scene: Path) -> None:
-    own = str(scene.parent / "my_law.py")
+    text = str(scene.parent / "my_law.py")
     basis = HarmonicBasis((0, 1), 16, "located")
     parameters = ContactParameters.of(("t1", "t2", "n"), np.ones((1, 3)), friction=0.3)
-    assert joint_transitions(Joint("contact", own, parameters)) == "located"
+    assert joint_transitions(Joint("contact", text, parameters)) == "located"
     by_samples = scene.parent / "my_samples.py"
-    by_samples.write_text(Path(own).read_text() + "\nBY_SAMPLES = True\n")
+    by_samples.write_text(Path(text).read_text() + "\nBY_SAMPLES = True\n")
     joint = Joint("contact", str(by_samples), parameters)
     assert joint_transitions(joint) == "sampled"
     with pytest.raises(ValueError, match="'my_samples' does not locate its transitions: take transitions = 'sampled'"):

@@ -43,17 +43,17 @@ def balance(made: own.Structure, force: float = 15.0) -> own.Balance:
 
 
 def test_the_linear_ends_are_those_of_the_matrices_in_hz() -> None:
-    made = structure()
+    built = structure()
     rows, springs = np.vstack([RUB, STOP]), np.diag([2e5, 1e5])
     for stuck, stiffness in ((False, STIFFNESS), (True, STIFFNESS + rows.T @ springs @ rows)):
         expected = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(MASS, stiffness)).real)) / (2 * np.pi)
-        assert np.allclose(made.frequencies(4, stuck=stuck), expected, rtol=1e-10)
+        assert np.allclose(built.frequencies(4, stuck=stuck), expected, rtol=1e-10)
 
 
 def test_two_laws_on_any_rows_fulfil_the_equation_of_motion() -> None:
     """M q'' + C q' + K q + W^T f(W q) = F in every harmonic kept, the contact forces marched here."""
-    made = structure()
-    problem = balance(made)
+    built = structure()
+    problem = balance(built)
     cycle = problem.solve(45.0)
     assert cycle.converged
     assert cycle.frequency == pytest.approx(45.0, rel=1e-14)
@@ -73,13 +73,13 @@ def test_two_laws_on_any_rows_fulfil_the_equation_of_motion() -> None:
             slider = x - shear[k] / 2e5
     pressed = 1e5 * np.maximum(stop - 1e-4, 0.0)
     contact = np.outer(RUB, shear) + np.outer(STOP[0], pressed)
-    damping = np.asarray(made.model.system.damping)
+    damping = np.asarray(built.model.system.damping)
     for h, amplitude in zip(basis.harmonics, q, strict=True):
         s = 1j * h * omega
         force = (2 if h else 1) * (contact @ np.exp(-1j * h * t)) / len(t)
         load = np.array([0, 0, 20.0 * (h == 0), 15.0 * (h == 1)])
-        left = (s**2 * MASS + s * damping + STIFFNESS) @ amplitude + force - load
-        assert np.abs(left).max() < 2e-3 * 15.0, f"harmonic {h}, {n} coefficients"
+        remaining = (s**2 * MASS + s * damping + STIFFNESS) @ amplitude + force - load
+        assert np.abs(remaining).max() < 2e-3 * 15.0, f"harmonic {h}, {n} coefficients"
     brought, damped = np.pi * 15.0 * cycle.outputs["tip"][2], 0.0
     for h, amplitude in zip(basis.harmonics, q, strict=True):
         damped += np.pi * h * omega * np.real(amplitude.conj() @ damping @ amplitude) * h
@@ -96,21 +96,21 @@ def test_one_law_on_any_rows_agrees_with_integration_in_time() -> None:
         4e5,
         numbers={"friction": 0.5, "normal_load": np.array([40.0, 15.0])},
     )
-    made = own.reduce(matrices, rub, loads=LOADS, outputs={"tip": 3}, damping_ratio=0.02)
-    problem = made.balance((1, 3, 5, 7), up_to=100.0, harmonic={1: {"shaker": 40.0}}, samples=512)
+    reduced = own.reduce(matrices, rub, loads=LOADS, outputs={"tip": 3}, damping_ratio=0.02)
+    problem = reduced.balance((1, 3, 5, 7), up_to=100.0, harmonic={1: {"shaker": 40.0}}, samples=512)
     cycle = problem.peak(30.0, 70.0)
     assert (cycle.status & 2).any()
-    found = problem.verify(cycle, steps=512)
-    assert found.outcome == CONVERGED
-    assert found.largest < 0.01
+    verification = problem.verify(cycle, steps=512)
+    assert verification.outcome == CONVERGED
+    assert verification.largest < 0.01
     assert problem.integrate(cycle.frequency, cycle, steps=256).frequency == pytest.approx(cycle.frequency)
 
 
 @pytest.mark.parametrize("damping", [None, np.zeros((4, 4))])
 def test_no_damping_at_all_is_a_structure_too(damping: np.ndarray | None) -> None:
-    made = structure(None, damping)
-    assert made.model.system.damping is None
-    cycle = balance(made).solve(45.0)
+    built = structure(None, damping)
+    assert built.model.system.damping is None
+    cycle = balance(built).solve(45.0)
     assert cycle.converged
     # with nothing else to take it, all the power goes into friction, but for what the sampled stop seems to do
     assert np.pi * 15.0 * cycle.outputs["tip"][2] == pytest.approx(cycle.energy.sum(), rel=1e-4)
@@ -139,10 +139,10 @@ def test_rows_that_pick_dofs_are_the_contact_of_those_dofs() -> None:
     matrices = own.from_arrays(MASS, STIFFNESS)
     picked = np.zeros((2, 4))
     picked[[0, 1], [0, 3]], picked[[0, 1], [1, 2]] = 1.0, -1.0
-    one = matrices.contact([[0], [3]], [[1], [2]], components=("n",), area=2.0)
+    item = matrices.contact([[0], [3]], [[1], [2]], components=("n",), area=2.0)
     other = matrices.contact_rows(picked, ("n",), area=2.0)
-    assert np.array_equal(one.B.toarray(), other.B.toarray())
-    assert np.array_equal(one.area, other.area)
+    assert np.array_equal(item.B.toarray(), other.B.toarray())
+    assert np.array_equal(item.area, other.area)
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,9 @@ PAGE = ROOT / "docs/tutorials/own_part.md"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("own")
-    follow(PAGE, made)
-    return made
+    built = tmp_path_factory.mktemp("own")
+    follow(PAGE, built)
+    return built
 
 
 def test_the_example_runs_from_its_drawing_to_its_worn_surface(folder: Path) -> None:
@@ -80,9 +80,9 @@ def test_a_study_that_is_none_is_refused(
     folder: Path, study: str, sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (folder / "arm.study.toml").write_text(study)
-    with pytest.raises(SystemExit) as left:
+    with pytest.raises(SystemExit) as remaining:
         cli.main(["study", "converge", str(folder / "arm.toml")])
-    assert left.value.code == 2
+    assert remaining.value.code == 2
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1

@@ -37,18 +37,18 @@ SMALL = [
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A wheel made from a copy of the tree, as a clean clone has it."""
-    made = tmp_path_factory.mktemp("wheel")
-    tree = made / "tree"
+    built = tmp_path_factory.mktemp("wheel")
+    tree = built / "tree"
     tree.mkdir()
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tree)
     for name in (*FOLDERS, "src"):
         hidden = shutil.ignore_patterns("__pycache__", "*.egg-info")
         shutil.copytree(ROOT / name, tree / name, symlinks=True, ignore=hidden)
-    words = ["-m", "pip", "wheel", str(tree), "--no-deps", "--no-build-isolation", "-q", "-w", str(made)]
+    words = ["-m", "pip", "wheel", str(tree), "--no-deps", "--no-build-isolation", "-q", "-w", str(built)]
     subprocess.run([sys.executable, *words], check=True, capture_output=True)
-    (found,) = made.glob("*.whl")
-    return found
+    (result,) = built.glob("*.whl")
+    return result
 
 
 def test_recipe_container_and_citation_agree_with_the_project() -> None:
@@ -77,8 +77,8 @@ def test_recipe_container_and_citation_agree_with_the_project() -> None:
 
 def test_a_wheel_holds_one_package_with_every_file(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
-        held = {name for name in archive.namelist() if not name.endswith("/")}
-    top = {name.partition("/")[0] for name in held}
+        fixed = {name for name in archive.namelist() if not name.endswith("/")}
+    top = {name.partition("/")[0] for name in fixed}
     assert {name for name in top if not name.endswith(".dist-info")} == {"tribodyn"}
     needed = {
         f"tribodyn/{path.relative_to(ROOT)}"
@@ -86,9 +86,9 @@ def test_a_wheel_holds_one_package_with_every_file(wheel: Path) -> None:
         for path in (ROOT / folder).rglob("*")
         if path.suffix in (".py", ".toml", ".json") and "__pycache__" not in path.parts
     }
-    assert sorted(needed - held) == []
-    assert "tribodyn/py.typed" in held
-    modules = {name for name in held if name.endswith(".py")}
+    assert sorted(needed - fixed) == []
+    assert "tribodyn/py.typed" in fixed
+    modules = {name for name in fixed if name.endswith(".py")}
     assert modules - needed == {f"tribodyn/{path.name}" for path in (ROOT / "src" / "tribodyn").glob("*.py")}
 
 

@@ -51,45 +51,45 @@ def drawn(figure: Figure) -> list[np.ndarray]:
 
 
 def test_curves_show_the_numbers_of_the_result() -> None:
-    given = result()
-    frf, wear, loops = given.response, given.wear, given.loops
+    inputs = result()
+    frf, wear, loops = inputs.response, inputs.wear, inputs.loops
     assert frf is not None
     assert wear is not None
     assert loops is not None
-    assert given.references is not None
+    assert inputs.references is not None
 
     def has(figure: Figure, wanted: np.ndarray) -> bool:
         return any(len(line) == len(wanted) and np.allclose(line, wanted, rtol=1e-12) for line in drawn(figure))
 
-    curve = response_plots.response(given)
-    for height in (given.references.free, given.references.stuck, wear.amplitude):
+    curve = response_plots.response(inputs)
+    for height in (inputs.references.free, inputs.references.stuck, wear.amplitude):
         assert has(curve, 1e3 * height)
     stretches = np.concatenate(drawn(curve))
     assert np.isin(1e3 * frf.amplitude("response"), stretches).all()  # stable and unstable ones, point by point
-    mean = wear.depth @ given.patch.area / given.patch.area.sum()  # type: ignore[union-attr]
+    mean = wear.depth @ inputs.patch.area / inputs.patch.area.sum()  # type: ignore[union-attr]
     for height in (wear.depth.max(axis=1), wear.depth.min(axis=1), mean):
-        assert has(wear_plots.wear(given, "depth"), 1e3 * height)
-    assert has(wear_plots.wear(given, "preload"), 1e-3 * wear.preload)
+        assert has(wear_plots.wear(inputs, "depth"), 1e3 * height)
+    assert has(wear_plots.wear(inputs, "preload"), 1e-3 * wear.preload)
     assert wear.preload_at_rest is not None
-    assert has(wear_plots.wear(given, "preload"), 1e-3 * wear.preload_at_rest)
-    assert has(wear_plots.wear(given, "peak"), wear.omega / (2 * np.pi))
-    assert has(wear_plots.wear(given, "cycles_per_step"), 1e-6 * wear.cycles_in_step[:-1])
+    assert has(wear_plots.wear(inputs, "preload"), 1e-3 * wear.preload_at_rest)
+    assert has(wear_plots.wear(inputs, "peak"), wear.omega / (2 * np.pi))
+    assert has(wear_plots.wear(inputs, "cycles_per_step"), 1e-6 * wear.cycles_in_step[:-1])
     pair = 3
-    for at, loop in enumerate(drawn(loop_plots.hysteresis(given, [pair]))):
+    for at, loop in enumerate(drawn(loop_plots.hysteresis(inputs, [pair]))):
         force = loops.force[at, pair]
-        assert any(np.allclose(loop, np.append(one, one[0])) for one in force)
+        assert any(np.allclose(loop, np.append(item, item[0])) for item in force)
 
 
 def test_maps_show_the_numbers_of_the_result() -> None:
-    given = result()
-    assert given.wear is not None
-    figure = maps.patch_maps(given, [4])
+    inputs = result()
+    assert inputs.wear is not None
+    figure = maps.patch_maps(inputs, [4])
     fields = [shown.get_array() for axes in figure.axes for shown in axes.collections if isinstance(shown, TriMesh)]
-    pressure = given.wear.normal_force[4] / given.patch.area  # type: ignore[union-attr]
-    for shown, wanted in zip(fields, (1e3 * given.wear.depth[4], 1e-6 * pressure), strict=True):
-        np.testing.assert_allclose(shown, wanted, rtol=1e-12)
+    pressure = inputs.wear.normal_force[4] / inputs.patch.area  # type: ignore[union-attr]
+    for shown, expected in zip(fields, (1e3 * inputs.wear.depth[4], 1e-6 * pressure), strict=True):
+        np.testing.assert_allclose(shown, expected, rtol=1e-12)
     (statuses,) = (shown for axes in figure.axes for shown in axes.collections if isinstance(shown, PolyCollection))
-    colors = {to_rgba(STATUS[int(bits)][1]) for bits in given.wear.status[4]}
+    colors = {to_rgba(STATUS[int(bits)][1]) for bits in inputs.wear.status[4]}
     assert {tuple(color) for color in statuses.get_facecolor()} == colors
 
 
@@ -101,18 +101,18 @@ def test_a_response_alone_is_drawn_too(tmp_path: Path) -> None:
 
 def test_renders(tmp_path: Path) -> None:
     """The part has the colours of its scale and the outline of its contact, the contact those of its statuses."""
-    given = result()
-    paths = {path.stem: path for path in render.draw(given, tmp_path, dpi=100)}
+    inputs = result()
+    paths = {path.stem: path for path in render.draw(inputs, tmp_path, dpi=100)}
     assert set(paths) == {"part", "contact"}
-    assert given.wear is not None
+    assert inputs.wear is not None
     ends = [to_rgb(mpl.colormaps[MOTION_MAP](end)) for end in (0.02, 0.5, 0.98)]
-    status = {STATUS[int(bits)][1] for state in shown_states(given) for bits in np.asarray(state.status)}
+    status = {STATUS[int(bits)][1] for state in shown_states(inputs) for bits in np.asarray(state.status)}
     for name, colors in (("part", [*ends, to_rgb(RED)]), ("contact", [to_rgb(color) for color in status])):
         with Image.open(paths[name]) as image:
             pixels = np.asarray(image.convert("RGB"), int).reshape(-1, 3)
         for color in colors:
-            near = np.abs(pixels - np.round(255 * np.array(color))).max(axis=1) < 12
-            assert near.sum() > 20, f"{name} has no {color}"
+            nearby = np.abs(pixels - np.round(255 * np.array(color))).max(axis=1) < 12
+            assert nearby.sum() > 20, f"{name} has no {color}"
 
 
 def test_missing_libraries_are_said_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,33 +191,33 @@ def test_a_film_is_written_whole(over: Literal["wear", "cycle"], tmp_path: Path)
 
 def test_colours_and_camera_of_a_film_are_those_of_its_largest_values() -> None:
     """The last depth reaches the end of the scale, and the same depth has the same colour in every image."""
-    given = result()
-    assert given.wear is not None
-    made = WearFilm(given, 2)
-    images = list(film.drawn(made))
+    inputs = result()
+    assert inputs.wear is not None
+    wear_film = WearFilm(inputs, 2)
+    images = list(film.drawn(wear_film))
     assert len({image.shape for image in images}) == 1
-    bars = [axes for axes in made.figure.findobj(Axes) if "wear depth" in axes.get_xlabel()]
-    assert bars[0].get_xlim() == (0.0, pytest.approx(1e3 * given.wear.depth.max()))
+    bars = [axes for axes in wear_film.figure.findobj(Axes) if "wear depth" in axes.get_xlabel()]
+    assert bars[0].get_xlim() == (0.0, pytest.approx(1e3 * inputs.wear.depth.max()))
     # the view of the unworn contact in the first image is what is drawn for it alone with the same camera
-    again = WearFilm(given, 3)
-    assert np.abs(images[0].astype(int) - next(iter(film.drawn(again))).astype(int)).mean() < 0.01
+    repeated = WearFilm(inputs, 3)
+    assert np.abs(images[0].astype(int) - next(iter(film.drawn(repeated))).astype(int)).mean() < 0.01
 
 
 def test_a_cycle_is_drawn_at_its_instants() -> None:
     """Mark, line of time and status belong to one instant."""
-    given = result()
-    assert given.loops is not None
-    made = CycleFilm(given, 0, 4)
-    made.show(3)
-    samples = given.loops.force.shape[-1]
-    lines = [line for axes in made.figure.findobj(Axes) for line in axes.lines]
+    inputs = result()
+    assert inputs.loops is not None
+    cycle_film = CycleFilm(inputs, 0, 4)
+    cycle_film.show(3)
+    samples = inputs.loops.force.shape[-1]
+    lines = [line for axes in cycle_film.figure.findobj(Axes) for line in axes.lines]
     loop = next(line for line in lines if len(line.get_xdata()) == samples + 1)
     mark = next(line for line in lines if line.get_marker() == "o")
     at = 3 * samples // 4
     assert (mark.get_xdata()[0], mark.get_ydata()[0]) == (loop.get_xdata()[at], loop.get_ydata()[at])
     assert [line.get_xdata()[0] for line in lines if len(line.get_xdata()) == 2] == [0.75]
     with pytest.raises(ValueError, match="no cycle of row 3: it has those of 0, 4, 8"):
-        CycleFilm(given, 3, 4)
+        CycleFilm(inputs, 3, 4)
 
 
 def test_a_result_without_wear_has_no_film_over_it() -> None:

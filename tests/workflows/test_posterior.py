@@ -100,8 +100,8 @@ AHEAD = {"amplitude": {"of": "amplitude", "at": "700 Hz", "load": 1.5}}
 
 
 def test_a_planted_truth_of_a_scene_is_in_its_interval(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    both = {name: Target.model_validate(table) for name, table in (ASKED | AHEAD).items()}
-    truth = predict(scene_file.read("beam", (*BEAM, *TRUTH)), both)
+    two_results = {name: Target.model_validate(table) for name, table in (ASKED | AHEAD).items()}
+    truth = predict(scene_file.read("beam", (*BEAM, *TRUTH)), two_results)
     off = (1 + 0.004, 1 - 0.03)  # what was measured misses the truth by some of its errors
     task = {
         "parameters": {
@@ -114,10 +114,10 @@ def test_a_planted_truth_of_a_scene_is_in_its_interval(tmp_path: Path, capsys: p
         },
         "predict": AHEAD,
     }
-    found = td.studies.posterior("beam", task, trials=48, overrides=list(BEAM))
-    for one, value in zip(found.summaries(), (300e6, 0.42, truth[2]), strict=True):
-        assert one.low < value < one.high, one.name
-    assert found.doubts == []
+    result = td.studies.posterior("beam", task, trials=48, overrides=list(BEAM))
+    for summary, value in zip(result.summaries(), (300e6, 0.42, truth[2]), strict=True):
+        assert summary.low < value < summary.high, summary.name
+    assert result.doubts == []
     # the file says the same by the command
     lines = ["[parameters.mu]", 'keys = ["contact.friction"]', "low = 0.2", "high = 0.7", "[measured.energy]"]
     lines += ['of = "energy"', 'at = "700 Hz"', "load = 2.0", f"value = {float(truth[1])}"]
@@ -130,5 +130,5 @@ def test_a_planted_truth_of_a_scene_is_in_its_interval(tmp_path: Path, capsys: p
     (tmp_path / "fit.toml").write_text("\n".join([*lines, 'error = "2 %"']))
     code, out, _ = leave([*words, "--json"], capsys)
     assert code == 0
-    said = json.loads(out)["summaries"][0]
-    assert said["low"] < 0.42 < said["high"]
+    message = json.loads(out)["summaries"][0]
+    assert message["low"] < 0.42 < message["high"]

@@ -29,8 +29,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of two results, without their figures, which other tests look at."""
     folder = tmp_path_factory.mktemp("report")
     patch = pytest.MonkeyPatch()
-    patch.setattr(page, "_renders", lambda found: {})
-    patch.setattr(plots, "figures", lambda found: {"preload": wear_plots.preload_against_cycles})
+    patch.setattr(page, "_renders", lambda outcome: {})
+    patch.setattr(plots, "figures", lambda outcome: {"preload": wear_plots.preload_against_cycles})
     first = result()
     assert first.wear is not None
     second = replace(first, wear=replace(first.wear, preload=2 * first.wear.preload))
@@ -50,8 +50,8 @@ def browser(chromium: Any, written: Path) -> Any:
 def test_the_page_needs_nothing_else(written: Path) -> None:
     text = written.read_text()
     assert written.stat().st_size < page.LARGEST
-    own = text[: text.index("<script>")]
-    assert not re.search(r'(src|href)="(?!data:|#)', own)
+    base = text[: text.index("<script>")]
+    assert not re.search(r'(src|href)="(?!data:|#)', base)
     for words in (
         "Side by side",
         "+100.00%",
@@ -60,7 +60,7 @@ def test_the_page_needs_nothing_else(written: Path) -> None:
         "tribodyn run beam",
         "contact lost",
     ):
-        assert words.lower() in own.lower()
+        assert words.lower() in base.lower()
 
 
 def test_no_error_in_the_console(browser: Any) -> None:
@@ -71,12 +71,12 @@ def test_no_error_in_the_console(browser: Any) -> None:
 def test_a_curve_tells_its_values_and_zooms(browser: Any) -> None:
     chart = browser.find_element("css selector", '[data-chart="Preload"]')
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", chart)
-    given = result().wear
-    assert given is not None
+    inputs = result().wear
+    assert inputs is not None
     drawn = browser.execute_script("return arguments[0].data.map(t => [t.name, t.x, t.y])", chart)
     assert [trace[0] for trace in drawn] == ["first", "second"]
-    np.testing.assert_allclose(drawn[0][2], given.preload, rtol=1e-6)
-    np.testing.assert_allclose(drawn[1][2], 2 * given.preload, rtol=1e-6)
+    np.testing.assert_allclose(drawn[0][2], inputs.preload, rtol=1e-6)
+    np.testing.assert_allclose(drawn[1][2], 2 * inputs.preload, rtol=1e-6)
     browser.execute_script(
         "window.told = null; arguments[0].on('plotly_hover', e => { window.told = e.points[0].y; })", chart
     )
@@ -92,7 +92,7 @@ def test_a_curve_tells_its_values_and_zooms(browser: Any) -> None:
         plot, int(x - width / 2), int(y - height / 2)
     ).move_by_offset(1, 0).perform()
     until(browser, "return window.told !== null", 20)
-    assert browser.execute_script("return window.told") == pytest.approx(given.preload[4], rel=1e-6)
+    assert browser.execute_script("return window.told") == pytest.approx(inputs.preload[4], rel=1e-6)
     before = browser.execute_script("return arguments[0]._fullLayout.xaxis.range", chart)
     selenium.ActionChains(browser).move_to_element(plot).click_and_hold().move_by_offset(90, 40).release().perform()
     until(browser, "return true", 1)
@@ -112,8 +112,8 @@ def test_the_part_turns_under_the_mouse(browser: Any) -> None:
 
 def test_the_slider_shows_the_depth_of_every_state(browser: Any) -> None:
     section = browser.find_element("css selector", "#part-0")
-    given = result()
-    assert given.wear is not None
+    inputs = result()
+    assert inputs.wear is not None
     depths = []
     for row in (0, 4, 8):
         browser.execute_script(
@@ -122,7 +122,7 @@ def test_the_slider_shows_the_depth_of_every_state(browser: Any) -> None:
         )  # fmt: skip
         face = "return arguments[0].querySelector('.solid').data.find(t => t.name === 'face 1').intensity"
         depths.append(browser.execute_script(face, section))
-    np.testing.assert_allclose(depths, 1e6 * given.wear.depth[[0, 4, 8]], rtol=1e-4)
+    np.testing.assert_allclose(depths, 1e6 * inputs.wear.depth[[0, 4, 8]], rtol=1e-4)
     browser.execute_script(
         "const s = arguments[0].querySelector('.field'); s.value = 'status'; s.dispatchEvent(new Event('change'))",
         section,
@@ -182,18 +182,18 @@ def test_it_prints(browser: Any) -> None:
 
 
 def test_worn_vertices_of_the_page_are_those_of_the_part() -> None:
-    given = result()
-    data = solid(given)
+    inputs = result()
+    data = solid(inputs)
     assert data is not None
-    assert given.part is not None
-    assert given.wear is not None
+    assert inputs.part is not None
+    assert inputs.wear is not None
     state = data["states"][-1]
-    moved = np.zeros((3, len(data["body"]["xyz"][0])))
-    moved[:] = data["body"]["xyz"]
+    shifted = np.zeros((3, len(data["body"]["xyz"][0])))
+    shifted[:] = data["body"]["xyz"]
     for n, place in zip(*state["moved"], strict=True):
-        moved[:, n] = place
-    there = given.part.points + data["factor"] * faces.worn_off(
-        faces.meetings_of(given), given.wear.depth[-1], len(given.part.points)
+        shifted[:, n] = place
+    refined = inputs.part.points + data["factor"] * faces.worn_off(
+        faces.meetings_of(inputs), inputs.wear.depth[-1], len(inputs.part.points)
     )
-    distance = np.linalg.norm(1e3 * there[:, None] - moved.T[None], axis=2).min(axis=0)
+    distance = np.linalg.norm(1e3 * refined[:, None] - shifted.T[None], axis=2).min(axis=0)
     assert distance.max() < 1e-3

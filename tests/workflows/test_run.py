@@ -108,9 +108,9 @@ def test_loops_enclose_the_energy(finished: Result, tmp_path: Path) -> None:
         following = np.roll(x, -1, -1) - np.roll(x, 1, -1)
         area = 0.5 * np.sum(force * following, axis=(1, 2))
         assert area.sum() == pytest.approx(wear.energy[row].sum(), rel=1e-3)
-    for kept, all_of_them in ((loops.displacement, fine.displacement), (loops.force, fine.force)):
-        every = all_of_them.shape[-1] // kept.shape[-1]
-        np.testing.assert_allclose(kept, all_of_them[..., ::every], atol=0.02 * np.abs(kept).max())
+    for saved, all_of_them in ((loops.displacement, fine.displacement), (loops.force, fine.force)):
+        complete = all_of_them.shape[-1] // saved.shape[-1]
+        np.testing.assert_allclose(saved, all_of_them[..., ::complete], atol=0.02 * np.abs(saved).max())
 
 
 def test_references_peak_where_the_modes_are(finished: Result) -> None:
@@ -121,8 +121,8 @@ def test_references_peak_where_the_modes_are(finished: Result) -> None:
     free = finished.facts.open_frequencies[0]
     assert hertz[np.argmax(references.free)] == pytest.approx(free, abs=2 * spacing)
     stuck = finished.facts.stuck_frequencies
-    there = stuck[(stuck > hertz[0]) & (stuck < hertz[-1])]
-    assert np.abs(hertz[np.argmax(references.stuck)] - there).min(initial=np.inf) <= 2 * spacing
+    refined = stuck[(stuck > hertz[0]) & (stuck < hertz[-1])]
+    assert np.abs(hertz[np.argmax(references.stuck)] - refined).min(initial=np.inf) <= 2 * spacing
     assert finished.wear is not None
     # without contact the peak is the free one, 1 % damping: amplitudes agree where the grid of 5 Hz allows
     assert finished.wear.amplitude[-1] >= 0.99 * references.free.max()
@@ -141,25 +141,25 @@ def test_the_highest_linear_response_is_that_of_a_fine_grid(tmp_path: Path) -> N
 
 
 def test_transitions_are_located_where_every_law_can(tmp_path: Path) -> None:
-    for law, wanted in (("jenkins", "located"), ("coulomb_planar", "sampled")):
+    for law, expected in (("jenkins", "located"), ("coulomb_planar", "sampled")):
         file = read("beam", [*SMALL, 'harmonics.transitions="auto"', f"contact.law={law}"])
-        assert modelling.build(file, Progress()).balance.basis.transitions == wanted
+        assert modelling.build(file, Progress()).balance.basis.transitions == expected
 
 
 @pytest.mark.faults
 def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:
-    whole = pipeline.run(read("beam", SMALLER), tmp_path / "whole", Progress())
-    assert whole.wear is not None
+    full = pipeline.run(read("beam", SMALLER), tmp_path / "whole", Progress())
+    assert full.wear is not None
     path = tmp_path / "result.h5"
     process = start(tmp_path)
-    wait_for_rows(process, path, len(whole.wear.cycles) // 2)
+    wait_for_rows(process, path, len(full.wear.cycles) // 2)
     process.send_signal(signal.SIGKILL)
     process.communicate()
     assert store.load(path).state.startswith(("unfinished", "complete"))
     process = start(tmp_path, "--resume")
     _, err = process.communicate()
     assert process.returncode == 0, err
-    assert_same_wear(store.load(path), whole)
+    assert_same_wear(store.load(path), full)
 
 
 @pytest.mark.faults
@@ -168,17 +168,17 @@ def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
 ) -> None:
     """Where the loss of contact is stored but not yet the sentence that says so."""
     assert finished.wear is not None
-    kept: list[Result] = []
-    monkeypatch.setattr(store, "save", lambda path, state: kept.append(state))
+    rows: list[Result] = []
+    monkeypatch.setattr(store, "save", lambda path, state: rows.append(state))
     earlier = replace(finished, stage=Stage.WEARING, wear=replace(finished.wear, end=WearEnd.UNFINISHED.say()))
     for _ in range(2):
-        kept.clear()
+        rows.clear()
         resumed = pipeline.run(read("beam", SMALL), tmp_path, Progress(), earlier)
         assert_same_wear(resumed, finished)
-        earlier = next(state for state in kept if state.stage is Stage.WEARING)
+        earlier = next(state for state in rows if state.stage is Stage.WEARING)
         assert earlier.wear is not None
-        told = replace(earlier.wear, end=finished.wear.end)
-        assert_same_wear(replace(earlier, stage=finished.stage, wear=told), finished)
+        changed = replace(earlier.wear, end=finished.wear.end)
+        assert_same_wear(replace(earlier, stage=finished.stage, wear=changed), finished)
 
 
 @pytest.mark.faults
@@ -196,8 +196,8 @@ def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) ->
         return process.exitcode
 
     assert exit_code(tmp_path) == 0
-    whole = store.load(tmp_path / "result.h5")
-    assert whole.state.startswith("complete")
+    full = store.load(tmp_path / "result.h5")
+    assert full.state.startswith("complete")
     takes = float((tmp_path / SPENT).read_text())  # of the processor: a busy machine kills at the same moments
     path, kills, rng = tmp_path / "killed" / "result.h5", 0, np.random.default_rng(7)
     path.parent.mkdir()
@@ -209,13 +209,13 @@ def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) ->
             if path.exists():
                 assert store.load(path).state.startswith(("model built", "response computed", "unfinished", "complete"))
         else:  # it came to its end: once more from the start
-            assert_same_wear(store.load(path), whole)
+            assert_same_wear(store.load(path), full)
             path.unlink()
         if kills == 10:
             break
     assert kills == 10
     assert exit_code(path.parent) == 0
-    assert_same_wear(store.load(path), whole)
+    assert_same_wear(store.load(path), full)
 
 
 def assert_same_wear(resumed: Result, whole: Result) -> None:
@@ -270,10 +270,10 @@ def test_a_mesh_file_gives_what_its_part_gives(finished: Result, tmp_path: Path)
     modelling.make_mesh(file, tmp_path)
     text = file.text
     begin, end = text.index("[geometry]"), text.index("[material]")
-    own = tmp_path / "own.toml"
-    own.write_text(text[:begin] + '[geometry]\nmesh = "mesh.msh"\nfixed = ["clamp"]\n' + text[end:])
+    base = tmp_path / "own.toml"
+    base.write_text(text[:begin] + '[geometry]\nmesh = "mesh.msh"\nfixed = ["clamp"]\n' + text[end:])
     overrides = [override for override in SMALL if not override.startswith("geometry.")]
-    result = pipeline.run(read(str(own), [*overrides, "wear="]), tmp_path, Progress())
+    result = pipeline.run(read(str(base), [*overrides, "wear="]), tmp_path, Progress())
     assert result.response is not None
     assert finished.response is not None
     assert np.array_equal(result.response.response, finished.response.response)
@@ -286,10 +286,10 @@ def test_more_steps_go_on_from_a_run_that_stopped(finished: Result, tmp_path: Pa
     assert checkpoint.is_complete(stopped, short.scene)
     assert not checkpoint.is_complete(stopped, longer.scene)
     assert checkpoint.same_problem(short.scene, longer.scene) == ""
-    more = pipeline.run(longer, tmp_path, Progress(), stopped)
-    assert more.wear is not None
+    extra = pipeline.run(longer, tmp_path, Progress(), stopped)
+    assert extra.wear is not None
     assert finished.wear is not None
-    assert np.array_equal(more.wear.depth, finished.wear.depth[:4])
+    assert np.array_equal(extra.wear.depth, finished.wear.depth[:4])
 
 
 def test_a_share_of_no_deflection_is_refused_before_long_work(tmp_path: Path) -> None:

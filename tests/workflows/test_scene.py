@@ -131,15 +131,15 @@ def test_a_sweep_takes_its_cycles_in_proportion_to_the_frequency() -> None:
     assert wear is not None
     assert [duty.at.frequency for duty in wear.duties] == [450.0, 550.0, 650.0, 750.0]
     assert [duty.share for duty in wear.duties] == pytest.approx([f / 2400 for f in (450, 550, 650, 750)])
-    same = read("beam", ['wear.at={start = "400 Hz", stop = "0.8 kHz", points = 4}']).scene.wear
-    assert same is not None
-    assert same.duties == wear.duties
-    beyond = read("beam", ["wear.at=1 kHz to 5 kHz in 4"]).scene
-    assert settings.highest_frequency(beyond) == 2 * np.pi * 4500
-    assert settings.highest_frequency(read("beam").scene) == settings.response_range(beyond)[1]
-    one = read("beam", ["wear.at=410 Hz"]).scene.wear
-    assert one is not None
-    assert [duty.share for duty in one.duties] == [1.0]
+    equal = read("beam", ['wear.at={start = "400 Hz", stop = "0.8 kHz", points = 4}']).scene.wear
+    assert equal is not None
+    assert equal.duties == wear.duties
+    outside = read("beam", ["wear.at=1 kHz to 5 kHz in 4"]).scene
+    assert settings.highest_frequency(outside) == 2 * np.pi * 4500
+    assert settings.highest_frequency(read("beam").scene) == settings.response_range(outside)[1]
+    item = read("beam", ["wear.at=410 Hz"]).scene.wear
+    assert item is not None
+    assert [duty.share for duty in item.duties] == [1.0]
     for wrong in ("800 Hz to 400 Hz", "400 Hz to much", "400 Hz to 800 Hz in few", "400 Hz to 800 Hz in 1"):
         with pytest.raises(SceneError):
             read("beam", [f"wear.at={wrong}"])
@@ -170,7 +170,7 @@ def test_what_fuzz_has_found_is_refused(scene: str, override: str, sentence: str
 
 
 def test_the_scene_of_a_result_of_another_version_is_refused_in_one_sentence() -> None:
-    kept = json.loads(read("beam").scene.model_dump_json())
-    assert scene_file.from_json(json.dumps(kept)) == read("beam").scene
+    record = json.loads(read("beam").scene.model_dump_json())
+    assert scene_file.from_json(json.dumps(record)) == read("beam").scene
     with pytest.raises(SceneError, match=r"of another version of tribodyn \(.*colour\): run it again"):
-        scene_file.from_json(json.dumps(kept | {"colour": 1}))
+        scene_file.from_json(json.dumps(record | {"colour": 1}))

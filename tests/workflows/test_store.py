@@ -103,9 +103,9 @@ def test_what_is_no_result_is_said_in_a_sentence(tmp_path: Path, content: object
 def test_stage_and_ends_of_a_run_come_back(tmp_path: Path, stage: Stage, end: Outcome[WearEnd]) -> None:
     from dataclasses import replace
 
-    made = result()
-    assert made.wear is not None
-    written = replace(made, stage=stage, wear=replace(made.wear, end=end))
+    built = result()
+    assert built.wear is not None
+    written = replace(built, stage=stage, wear=replace(built.wear, end=end))
     store.save(tmp_path / "result.h5", written)
     read = store.load(tmp_path / "result.h5")
     assert (read.stage, read.state, read.finished) == (stage, written.state, stage is Stage.COMPLETE)

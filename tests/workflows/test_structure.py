@@ -134,9 +134,9 @@ def bar(folder: Path) -> None:
     across, up = np.linspace(0, 0.02, 3), np.linspace(0, 0.02, 2)
     parts = [blocks.Block(x[:6], across, up, "bar", {"u-": "clamp"})]
     parts += [blocks.Block(x[i : i + 2], across, up, "bar", {"w-": f"patch_{i}"}) for i in (5, 6, 7)]
-    made = blocks.body(parts, points={"tip": (0.2, 0.01, 0.02)})
-    whole = np.concatenate([made.surfaces[f"patch_{i}"] for i in (5, 6, 7)])
-    blocks.write(folder / "bar.msh", replace(made, surfaces={**made.surfaces, "patch": whole}))
+    created = blocks.body(parts, points={"tip": (0.2, 0.01, 0.02)})
+    full = np.concatenate([created.surfaces[f"patch_{i}"] for i in (5, 6, 7)])
+    blocks.write(folder / "bar.msh", replace(created, surfaces={**created.surfaces, "patch": full}))
 
 
 def solved(text: str, folder: Path, *overrides: str, slips: bool = True) -> np.ndarray:
@@ -144,10 +144,10 @@ def solved(text: str, folder: Path, *overrides: str, slips: bool = True) -> np.n
     balance = built(text, folder, *overrides).balance
     omega = 2 * np.pi * 300.0
     options = newton.NewtonOptions(tolerance=1e-12, krylov=1e-6)
-    found = newton.solve(balance, omega, balance.stuck(omega), options)
-    assert found.converged
-    assert (found.state.cycle.status != contact_law.STICKS).any() == slips
-    return balance.outputs(found.state)[0]
+    solution = newton.solve(balance, omega, balance.stuck(omega), options)
+    assert solution.converged
+    assert (solution.state.cycle.status != contact_law.STICKS).any() == slips
+    return balance.outputs(solution.state)[0]
 
 
 def test_a_face_split_into_named_contacts_equals_the_one_contact(tmp_path: Path) -> None:
@@ -158,10 +158,10 @@ def test_a_face_split_into_named_contacts_equals_the_one_contact(tmp_path: Path)
         stiffness = "".join(f"{name} = {value * part}\n" for name, value in shares.items())
         return f"[{head}]\n{faces}\n{LAW}{stiffness}"
 
-    one = solved(BAR + table("contact", 'group = "patch"', 1.0), tmp_path)
+    item = solved(BAR + table("contact", 'group = "patch"', 1.0), tmp_path)
     names = [table(f"contacts.c{i}", f'first = "patch_{i}"\nsecond = "ground"', 1 / 3) for i in (5, 6, 7)]
     split = solved(BAR + "".join(names), tmp_path)
-    assert np.abs(split - one).max() < 1e-12 * np.abs(one).max()
+    assert np.abs(split - item).max() < 1e-12 * np.abs(item).max()
 
 
 def test_a_part_without_contact_has_its_linear_response(tmp_path: Path) -> None:
@@ -202,31 +202,31 @@ WEAK = "".join(
 
 def test_a_free_structure_has_nonlinear_modes_those_of_one_on_weak_springs(tmp_path: Path) -> None:
     """Backbone of its tenth mode, six of them rigid, as far as it sticks: beyond, the blocks slide on each other."""
-    found = []
+    rows = []
     for text in (FREE + BACK, FREE + BACK + WEAK):
         model = built(text, tmp_path, "damping=")
         options = nonlinear_modes.BackboneOptions(n_points=3)
-        found.append(nonlinear_modes.backbone(model.balance, 1e-8, 2e-7, 10, options=options))
-    free, held = found
+        rows.append(nonlinear_modes.backbone(model.balance, 1e-8, 2e-7, 10, options=options))
+    free, fixed = rows
     stuck, _ = linear_modes(model.reduced, model.balance.contact.stiffness, 11)
     assert free.frequency[0] == pytest.approx(stuck[10], rel=1e-6)
     assert free.end.kind is BranchEnd.REACHED
-    for one, other in ((free.omega, held.omega), (free.damping, held.damping), (free.amplitude, held.amplitude)):
-        assert one[-1] == pytest.approx(other[-1], rel=1e-4)
+    for item, other in ((free.omega, fixed.omega), (free.damping, fixed.damping), (free.amplitude, fixed.amplitude)):
+        assert item[-1] == pytest.approx(other[-1], rel=1e-4)
     assert free.omega[-1] == pytest.approx(free.omega[0], rel=1e-9)
     assert free.damping[-1] == pytest.approx(0, abs=1e-9)
 
 
 def test_a_free_structure_of_two_bodies_is_the_limit_of_one_on_weak_springs(tmp_path: Path) -> None:
-    found = []
+    rows = []
     for text in (FREE + BACK, FREE + BACK + WEAK):
         balance = built(text.replace('value = "20 N"', 'value = "450 N"'), tmp_path, "damping=").balance
         omega = 2 * np.pi * 5e3
         solved = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12, krylov=1e-6))
         assert solved.converged
         assert (solved.state.cycle.status != contact_law.STICKS).any()
-        found.append(balance.outputs(solved.state)[0, 1:])  # its static place is anywhere
-    assert np.abs(found[0] - found[1]).max() < 1e-6 * np.abs(found[1]).max()
+        rows.append(balance.outputs(solved.state)[0, 1:])  # its static place is anywhere
+    assert np.abs(rows[0] - rows[1]).max() < 1e-6 * np.abs(rows[1]).max()
 
 
 def test_a_free_part_without_contact_responds_as_its_modes_say(tmp_path: Path) -> None:
@@ -257,8 +257,8 @@ def test_static_loads_that_nothing_balances_are_refused_with_their_resultant(
 
 def test_a_free_structure_wears(tmp_path: Path) -> None:
     wear = '[wear]\ncoefficient = 1e-12\nrule = "thesis"\nstep = "0.5 um"\nmax_steps = 1\nat = "5 kHz"\n'
-    few = FREE.replace('["4.5 kHz", "7 kHz"]\npoints = 10', '["4.9 kHz", "5.1 kHz"]\npoints = 3')
-    text = few.replace('value = "20 N"', 'value = "450 N"') + BACK + wear
+    small = FREE.replace('["4.5 kHz", "7 kHz"]\npoints = 10', '["4.9 kHz", "5.1 kHz"]\npoints = 3')
+    text = small.replace('value = "20 N"', 'value = "450 N"') + BACK + wear
     result = pipeline.run(scene_file.parse(text, "scene.toml", QUIET, tmp_path), None, Progress())
     assert result.finished
     assert result.wear is not None
@@ -281,13 +281,13 @@ def test_results_are_told_by_joint(tmp_path: Path) -> None:
     wear = '[wear]\ncoefficient = 1e-12\nrule = "thesis"\nstep = "0.5 um"\nmax_steps = 1\nat = "300 Hz"\n'
     text = BAR.replace('["700 Hz", "900 Hz"]', '["290 Hz", "310 Hz"]\npoints = 3') + joints + wear
     result = pipeline.run(scene_file.parse(text, "scene.toml", QUIET, tmp_path), None, Progress())
-    found = summary.summary(result)
+    outcome = summary.summary(result)
     for name, coefficient in (("near", 1e-12), ("far", 3e-12)):
-        joint = found["joints"][name]
+        joint = outcome["joints"][name]
         assert joint["friction_work"] > 0
         assert joint["volume"] == pytest.approx(coefficient * joint["friction_work"], rel=1e-9)
     for total, part in (("friction_work", "friction_work"), ("volume", "volume")):
-        assert found[total] == pytest.approx(sum(joint[part] for joint in found["joints"].values()), rel=1e-12)
+        assert outcome[total] == pytest.approx(sum(joint[part] for joint in outcome["joints"].values()), rel=1e-12)
     assert "joints.near" in dict(in_words.lines(result))
 
 
@@ -301,12 +301,12 @@ def test_a_bolt_has_its_preload_and_the_right_stiffness_along_it(tmp_path: Path,
     for load, pulled in (("", 0.0), (PULL, 2000.0)):
         balance = built(STACK + load, tmp_path, f"bolts.m8.state={state}").balance
         omega = 2 * np.pi * 1e3
-        found = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12))
-        assert found.converged
-        elongation = balance.outputs(found.state)[balance.compliance.output_names.index("bolts.m8"), 0]
+        solution = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12))
+        assert solution.converged
+        elongation = balance.outputs(solution.state)[balance.compliance.output_names.index("bolts.m8"), 0]
         force = balance.excitation.loads[0, "m8"].real + k * elongation
         assert force == pytest.approx(5000.0 + pulled * k * CLAMPED / (1 + k * CLAMPED), rel=1e-8)
-        assert balance.preload(found.state) == pytest.approx(force - pulled, rel=1e-8)
+        assert balance.preload(solution.state) == pytest.approx(force - pulled, rel=1e-8)
 
 
 def test_a_bolt_that_crosses_nothing_is_one_sentence(tmp_path: Path) -> None:
@@ -321,8 +321,8 @@ def lap() -> str:
 
 
 def test_a_joint_that_never_slips_survives_instead_of_a_number_of_cycles(tmp_path: Path) -> None:
-    held = ('bolts.m6.preload="9 kN"', 'loads.harmonic.shake.value="1 N"', 'wear.at="3 kHz"', "response.points=3")
-    result = pipeline.run(scene_file.parse(lap(), "lap.toml", (*held, *QUIET), tmp_path), None, Progress())
+    fixed = ('bolts.m6.preload="9 kN"', 'loads.harmonic.shake.value="1 N"', 'wear.at="3 kHz"', "response.points=3")
+    result = pipeline.run(scene_file.parse(lap(), "lap.toml", (*fixed, *QUIET), tmp_path), None, Progress())
     assert result.wear is not None
     assert result.wear.end.kind is WearEnd.NEVER_SLIPS
     assert result.wear.ended.survived
@@ -333,9 +333,9 @@ def test_a_joint_that_never_slips_survives_instead_of_a_number_of_cycles(tmp_pat
 def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path) -> None:
     balance = built(lap(), tmp_path).balance.with_load(0.0)
     omega = 2 * np.pi * 4e3
-    found = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-10))
-    assert found.converged
-    assert balance.preload(found.state) == pytest.approx(3000.0, rel=1e-6)
+    solution = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-10))
+    assert solution.converged
+    assert balance.preload(solution.state) == pytest.approx(3000.0, rel=1e-6)
 
 
 def test_every_body_of_a_scene_is_refined_or_the_elements_of_all_are_halved(tmp_path: Path) -> None:
@@ -362,8 +362,8 @@ def test_every_body_of_a_scene_is_refined_or_the_elements_of_all_are_halved(tmp_
     upper = refine.mesh(drawn_file, 2.0)[0].scene.bodies["upper"]
     assert upper.size == pytest.approx(2e-3)  # half of a tenth of 40 mm
     assert upper.face_sizes == {"face 2": pytest.approx(1.5e-3)}
-    given = (own + tail).replace("box.step", "box.msh").replace('face_sizes = { "face 2" = "3 mm" }\n', "")
-    file = scene_file.parse(given, "given.toml", folder=tmp_path)
+    inputs = (own + tail).replace("box.step", "box.msh").replace('face_sizes = { "face 2" = "3 mm" }\n', "")
+    file = scene_file.parse(inputs, "given.toml", folder=tmp_path)
     finer, ratio = refine.mesh(file, 1.5)
     assert [finer.scene.bodies[name].halved for name in ("lower", "upper")] == [1, 1]
     assert ratio == refine.HALVED
@@ -378,12 +378,12 @@ def test_the_error_of_a_mesh_that_is_given_is_told_by_its_halved_elements(tmp_pa
     files = [scene_file.parse(text, "bar.toml", (f"geometry.halved={n}",), tmp_path) for n in range(2)]
     mesh, sets = modelling.make_mesh(files[1], tmp_path)
     assert (mesh.nelements, len(sets["tip"])) == (8 * 16, 1)
-    found = [
+    rows = [
         operating_states.unworn_state(file, modelling.build(file, Progress(), (0, 1))).values["peak_frequency"]
         for file in files
     ]
-    error = DEFAULT.total(abs(found[0] / found[1] - 1), refine.HALVED)
-    assert 0.3 * error < found[0] / 461.658 - 1 < error  # the peak with geometry.halved=2
+    error = DEFAULT.total(abs(rows[0] / rows[1] - 1), refine.HALVED)
+    assert 0.3 * error < rows[0] / 461.658 - 1 < error  # the peak with geometry.halved=2
 
 
 def test_a_bolt_presses_on_faces_of_a_cad_file(tmp_path: Path) -> None:
@@ -394,17 +394,17 @@ def test_a_bolt_presses_on_faces_of_a_cad_file(tmp_path: Path) -> None:
         gmsh.model.occ.synchronize()
         gmsh.write(str(tmp_path / "stack.step"))
     text = STACK[: STACK.index("[bodies.a]")]
-    for i, (name, held) in enumerate((("a", 'fixed = ["left"]\n'), ("b", "")), 1):
+    for i, (name, fixed) in enumerate((("a", 'fixed = ["left"]\n'), ("b", "")), 1):
         text += f'[bodies.{name}]\nmesh = "stack.step"\nvolume = "solid {i}"\nunit = "mm"\nsize = "9 mm"\n'
-        text += f'material = "plain"\n{held}[bodies.{name}.faces]\n'
+        text += f'material = "plain"\n{fixed}[bodies.{name}.faces]\n'
         text += 'left = { normal = "-x" }\ntop = { normal = "z" }\nfoot = { normal = "-z" }\n'
     tail = STACK[STACK.index("[contacts.joint]") :].replace("a.x_max", "b.foot").replace('"b.x_min"', '"a.top"')
     tail = tail.replace('"a.x_min"', '"b.top"').replace('second = "b.x_max"\npreload', 'second = "a.foot"\npreload')
     balance = built(text + tail.replace("b.x_max", "b.top").replace('t1 = "y"', 't1 = "x"'), tmp_path).balance
     balance = balance.with_load(0.0)
     omega = 2 * np.pi * 1e3
-    found = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12))
-    assert found.converged
-    elongation = balance.outputs(found.state)[balance.compliance.output_names.index("bolts.m8"), 0]
+    solution = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12))
+    assert solution.converged
+    elongation = balance.outputs(solution.state)[balance.compliance.output_names.index("bolts.m8"), 0]
     assert balance.excitation.loads[0, "m8"].real + 90e6 * elongation == pytest.approx(5000.0, rel=1e-8)
-    assert balance.preload(found.state) == pytest.approx(5000.0, rel=1e-6)
+    assert balance.preload(solution.state) == pytest.approx(5000.0, rel=1e-6)

@@ -32,11 +32,11 @@ def test_quiet_prints_nothing_and_the_log_has_every_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(progress, "NOTE_EVERY", 0.0)
-    told = progress.console_progress(quiet=True, log=tmp_path / "logs" / "run.log")
-    told.say("a sentence")
-    with told.stage("mesh"):
+    messages = progress.console_progress(quiet=True, log=tmp_path / "logs" / "run.log")
+    messages.say("a sentence")
+    with messages.stage("mesh"):
         pass
-    with told.track("wear") as advance:
+    with messages.track("wear") as advance:
         advance(0.5, "step 1")
     assert capsys.readouterr().out == ""
     lines = (tmp_path / "logs" / "run.log").read_text().splitlines()
@@ -65,10 +65,10 @@ def test_compiling_does_not_count_for_the_time_left(monkeypatch: pytest.MonkeyPa
         time.sleep(0.3)
         advance(0.1, "")
     assert spent > 0
-    said = console.export_text()
-    left = float(re.search(r"10%, (\d+) s left", said).group(1))  # type: ignore[union-attr]
-    assert left <= 9 * 0.3 + 2  # the kernel's seconds are not in it
-    assert ("compiled for" in said) == (spent >= 1)
+    message = console.export_text()
+    remaining = float(re.search(r"10%, (\d+) s left", message).group(1))  # type: ignore[union-attr]
+    assert remaining <= 9 * 0.3 + 2  # the kernel's seconds are not in it
+    assert ("compiled for" in message) == (spent >= 1)
 
 
 def test_a_notebook_shows_numbers_response_and_part() -> None:
@@ -88,10 +88,10 @@ def test_the_bar_of_a_terminal_counts_compiling_apart_and_shows_what_goes_on(tmp
         time.sleep(0.2)
         advance(0.25, "step 3, peak 500 Hz and 1 mm, preload 20 N, depth 0.3 mm")
         time.sleep(0.2)
-    said = console.export_text(styles=False)
-    left = re.search(r"25%.* (\d+) s left; step 3, peak 500 Hz and 1 mm, preload 20 N, depth 0.3 mm", said)
-    assert left is not None
-    assert int(left.group(1)) <= 3
+    message = console.export_text(styles=False)
+    match = re.search(r"25%.* (\d+) s left; step 3, peak 500 Hz and 1 mm, preload 20 N, depth 0.3 mm", message)
+    assert match is not None
+    assert int(match.group(1)) <= 3
     assert (tmp_path / "run.log").read_text().splitlines()[-1].split(" ", 1)[1].startswith("wear: 0.")
 
 

@@ -61,7 +61,7 @@ def test_roughness_of_a_plane_is_nothing_and_of_a_spike_is_its_share() -> None:
 
 
 def test_a_scene_without_wear_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as left:
+    with pytest.raises(SystemExit) as remaining:
         cli.main(["wear-steps", "beam", "--set", "wear="])
-    assert left.value.code == 2
+    assert remaining.value.code == 2
     assert capsys.readouterr().err.count("\n") == 1

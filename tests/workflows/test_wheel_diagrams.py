@@ -41,8 +41,8 @@ def test_orders_in_space_excite_waves_against_the_rotation_up_to_half_the_sector
     families = {"stuck": with_it, "stuck, against": against}
     found = wheel_diagrams.meetings(families, 4, 20.0, 200.0)
     assert list(found) == ["stuck"]
-    met = {m.engine_order: m.frequency for m in found["stuck"]}
-    assert met == {1: 126.0, 2: 150.0, 3: 120.0, 4: 100.0}  # none above the number of sectors
+    matched = {m.engine_order: m.frequency for m in found["stuck"]}
+    assert matched == {1: 126.0, 2: 150.0, 3: 120.0, 4: 100.0}  # none above the number of sectors
 
 
 @pytest.mark.parametrize("known", [0, 1])
@@ -73,19 +73,19 @@ def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.C
     with pytest.raises(SystemExit) as stop:
         cli.main(["wheel", "modes", "blade", *changes, *speeds, "--out", str(tmp_path), "--json"])
     assert stop.value.code == 0
-    said = json.loads(capsys.readouterr().out)
-    assert {Path(name).name for name in said["files"]} == {
+    record = json.loads(capsys.readouterr().out)
+    assert {Path(name).name for name in record["files"]} == {
         "nodal_diameters.csv", "nodal_diameters.png", "safe.png", "campbell.png",
     }  # fmt: skip
-    for name in said["files"]:
+    for name in record["files"]:
         if name.endswith(".png"):
             assert_not_blank(Path(name))
-    stuck, free = (np.array(said["families_hz"][state]) for state in ("stuck", "free"))
+    stuck, free = (np.array(record["families_hz"][state]) for state in ("stuck", "free"))
     assert stuck.shape == (5, 2)
     assert (stuck >= free * (1 - 1e-9)).all()  # springs can only stiffen
-    for met in said["met"]["stuck"]:
-        assert met["diameter"] == wheel_diagrams.diameter_of(met["engine_order"], 8)
-        assert 50.0 <= met["speed"] <= 150.0
+    for matched in record["met"]["stuck"]:
+        assert matched["diameter"] == wheel_diagrams.diameter_of(matched["engine_order"], 8)
+        assert 50.0 <= matched["speed"] <= 150.0
 
 
 def test_a_part_without_a_wheel_has_no_diagrams(capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,10 +96,10 @@ def test_a_part_without_a_wheel_has_no_diagrams(capsys: pytest.CaptureFixture[st
 
 
 def test_status_over_wear_and_loops_of_chosen_pairs() -> None:
-    given = result()
-    assert given.wear is not None
-    figure = maps.status_maps(given, 5)
+    inputs = result()
+    assert inputs.wear is not None
+    figure = maps.status_maps(inputs, 5)
     assert len([axes for axes in figure.axes if axes.collections]) == 5
-    assert len(loop_plots.hysteresis(given, [0, 2]).axes) == 6
+    assert len(loop_plots.hysteresis(inputs, [0, 2]).axes) == 6
     with pytest.raises(ValueError, match="this contact has pairs 0 to"):
-        loop_plots.hysteresis(given, [1000])
+        loop_plots.hysteresis(inputs, [1000])

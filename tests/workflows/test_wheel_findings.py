@@ -44,15 +44,15 @@ def test_a_wheel_without_damping_is_warned_of() -> None:
     without = WHEEL.replace('[damping]\nmodal = "2 %"\n', "")
     for text, warned in ((WHEEL, False), (without, True)):
         file = scene_file.parse(text, "w.toml", (), Path())
-        said = list(sanity_checks.lines(file, modelling.build(file, Progress())))
-        assert any("no damping but that of friction" in line for line in said) is warned
+        items = list(sanity_checks.lines(file, modelling.build(file, Progress())))
+        assert any("no damping but that of friction" in line for line in items) is warned
 
 
 @pytest.mark.parametrize(("law", "most"), [("jenkins", np.sqrt(2)), ("coulomb_planar", 1.0)])
 def test_the_resultant_of_friction_on_a_shroud(law: str, most: float) -> None:
     """Over mu N: uncoupled sliders come to the square root of two, planar friction to one; both near the resonance."""
-    asked = (f'contact.law="{law}"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
-    b = modelling.build(scene_file.parse(WHEEL, "w.toml", asked, Path()), Progress()).balance
+    requested = (f'contact.law="{law}"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
+    b = modelling.build(scene_file.parse(WHEEL, "w.toml", requested, Path()), Progress()).balance
     solved = arc_length.solve_along_load(b, 2 * np.pi * 640.0)
     assert solved.converged
     (joint,) = b.contact.joints
@@ -61,8 +61,8 @@ def test_the_resultant_of_friction_on_a_shroud(law: str, most: float) -> None:
 
 
 def planar() -> HarmonicBalance:
-    asked = ('contact.law="coulomb_planar"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
-    return modelling.build(scene_file.parse(WHEEL, "w.toml", asked, Path()), Progress()).balance
+    requested = ('contact.law="coulomb_planar"', *SLIPPING, "loads.harmonic.wave.value='20 N'", "harmonics.samples=128")
+    return modelling.build(scene_file.parse(WHEEL, "w.toml", requested, Path()), Progress()).balance
 
 
 @pytest.mark.slow

@@ -19,8 +19,8 @@ def read(tmp_path, **changes):
 def first_frequency(mesh) -> float:
     """Lowest natural frequency of the clamped steel beam [Hz]."""
     mass, stiffness = assemble(mesh, Material(210e9, 0.3, 7860.0))
-    held = 3 * mesh.dofs.get_facet_dofs(mesh.boundaries["clamp"]).flatten()[:, None] + np.arange(3)
-    free = np.setdiff1d(np.arange(mass.shape[0]), held)
+    fixed = 3 * mesh.dofs.get_facet_dofs(mesh.boundaries["clamp"]).flatten()[:, None] + np.arange(3)
+    free = np.setdiff1d(np.arange(mass.shape[0]), fixed)
     return float(modes(stiffness[free][:, free], mass[free][:, free], 1)[0][0] / (2 * np.pi))
 
 
@@ -29,10 +29,10 @@ def test_patch_has_the_grid_of_the_thesis(tmp_path):
     patch = mesh.doflocs[:, node_sets["contact"]]
     assert patch.shape[1] == 169
     np.testing.assert_allclose(patch[2], 0.0, atol=1e-15)
-    along, across = (np.unique(np.round(patch[i], 9)) for i in (0, 1))
-    assert len(along) == len(across) == 13
-    np.testing.assert_allclose([along[0], along[-1], across[0], across[-1]], [0.18, 0.2, 0.0, 0.02])
-    for line in (along, across):
+    path, across = (np.unique(np.round(patch[i], 9)) for i in (0, 1))
+    assert len(path) == len(across) == 13
+    np.testing.assert_allclose([path[0], path[-1], across[0], across[-1]], [0.18, 0.2, 0.0, 0.02])
+    for line in (path, across):
         steps = np.diff(line)
         np.testing.assert_allclose(steps, steps[::-1], rtol=1e-6)
         np.testing.assert_allclose(steps[::2], steps[1::2], rtol=1e-6)  # midside nodes stand in the middle

@@ -37,19 +37,19 @@ def test_contact_face_is_plane_and_as_published(sector):
 def test_left_face_is_the_right_one_turned(tmp_path, along, up):
     mesh, nodes = read(tmp_path, n_along=along, n_up=up, n_span=4)
     points = mesh.doflocs.T
-    right, left = points[nodes["shroud_right"]], points[nodes["shroud_left"]]
+    right, remaining = points[nodes["shroud_right"]], points[nodes["shroud_left"]]
     assert len(right) == (2 * along - 1) * (2 * up - 1)
     assert len(surface(mesh, mesh.boundaries["shroud_right"], vertices_only=True).nodes) == along * up
-    there = turned(right, 2 * np.pi / 40)
-    assert np.linalg.norm(there[:, None] - left, axis=2).min(axis=1).max() < 1e-12
+    refined = turned(right, 2 * np.pi / 40)
+    assert np.linalg.norm(refined[:, None] - remaining, axis=2).min(axis=1).max() < 1e-12
 
 
 def test_disk_sector_has_matching_cyclic_faces_and_touches_no_neighbour(tmp_path):
     mesh, nodes = read(tmp_path, disk_radius=0.12)
     points = mesh.doflocs.T
-    right, left = points[nodes["cyclic_right"]], points[nodes["cyclic_left"]]
-    there = turned(right, 2 * np.pi / 40)
-    assert np.linalg.norm(there[:, None] - left, axis=2).min(axis=1).max() < 1e-12
+    right, remaining = points[nodes["cyclic_right"]], points[nodes["cyclic_left"]]
+    refined = turned(right, 2 * np.pi / 40)
+    assert np.linalg.norm(refined[:, None] - remaining, axis=2).min(axis=1).max() < 1e-12
     angle = np.arctan2(-points[:, 1], points[:, 2])
     disk = np.zeros(len(points), bool)
     disk[nodes["disk"]] = True
@@ -63,9 +63,9 @@ def test_shroud_opens_beside_the_contact_face(sector):
     p = blade.Parameters()
     shroud = blade.shroud_of(p).corners
     gap = turned(shroud[:, :, 3], p.pitch) - shroud[:, :, 0]
-    apart = np.linalg.norm(gap, axis=-1)
-    assert np.abs(apart[:, 1:3]).max() < 1e-12
-    assert (apart[:, [0, 3]] > 1.9 * p.clearance).all()
+    distance = np.linalg.norm(gap, axis=-1)
+    assert np.abs(distance[:, 1:3]).max() < 1e-12
+    assert (distance[:, [0, 3]] > 1.9 * p.clearance).all()
 
 
 @pytest.mark.parametrize(

@@ -69,12 +69,12 @@ def test_field_of_the_sector_meets_its_neighbour(finished):
     """From the displacement of all nodes: what the right face sees of the left face of the blade behind is x."""
     wear, patch, part, fields = finished.wear, finished.patch, finished.part, finished.fields
     wheel = finished.facts.around
-    left = node_of_pair(meetings_of(finished)[0].faces[1])
-    assert part.points[left] == pytest.approx(wheel.sector(patch.points, 1), abs=1e-12)
+    remaining = node_of_pair(meetings_of(finished)[0].faces[1])
+    assert part.points[remaining] == pytest.approx(wheel.sector(patch.points, 1), abs=1e-12)
     basis = HarmonicBasis((0, 1))
     for row, field in zip(fields.row, fields.displacement, strict=True):
-        behind = at_sector(basis, field, 1, 40, -1)[left]
-        relative = field[patch.nodes] - np.einsum("xy,pyc->pxc", wheel.turn.T, behind)
+        previous = at_sector(basis, field, 1, 40, -1)[remaining]
+        relative = field[patch.nodes] - np.einsum("xy,pyc->pxc", wheel.turn.T, previous)
         local = np.einsum("pij,pjc->pic", patch.frames, relative)
         solved = wear.displacement[row].reshape(local.shape)
         assert np.abs(local - solved).max() < 1e-7 * np.abs(solved).max()
@@ -85,10 +85,10 @@ def test_left_and_right_face_agree(finished):
     basis = HarmonicBasis((0, 1))
     for row in range(len(finished.wear.cycles)):
         x, force = finished.wear.displacement[row], finished.wear.force[row]
-        moved, pushed = (at_sector(basis, values, 1, 40, 1) for values in (x, force))
+        shifted, pushed = (at_sector(basis, values, 1, 40, 1) for values in (x, force))
         work = basis.work_per_cycle(force, x)
         rounding = 1e-9 * np.abs(work).max() + 1e-12
-        assert basis.work_per_cycle(pushed, moved) == pytest.approx(work, rel=1e-9, abs=rounding)
+        assert basis.work_per_cycle(pushed, shifted) == pytest.approx(work, rel=1e-9, abs=rounding)
         assert pushed[:, 0] == pytest.approx(force[:, 0], abs=1e-12)
 
 
@@ -100,14 +100,14 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
     model = built(folder)
     wheel, patch, wear = finished.facts.around, finished.patch, finished.wear
     _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
-    left = node_of_pair(meetings_of(finished)[0].faces[1])
+    remaining = node_of_pair(meetings_of(finished)[0].faces[1])
     clamp = find_group(model.part.node_sets, "clamp")
     row = int(finished.fields.row[0])
     field = finished.fields.displacement[0, ..., 0]
     force = (K @ field.ravel()).reshape(field.shape)  # that acts on each node from outside
     frames = patch.frames
     on_right = np.einsum("pij,pj->pi", frames, force[patch.nodes])  # by the blade behind, in the frame of this face
-    on_left = np.einsum("pij,pj->pi", frames, force[left] @ wheel.turn)  # by the next, turned back to it
+    on_left = np.einsum("pij,pj->pi", frames, force[remaining] @ wheel.turn)  # by the next, turned back to it
     solved = wear.force[row].reshape(len(frames), 3, -1)[..., 0]
     scale = np.abs(solved).max()
     assert np.abs(on_right + solved).max() < 1e-6 * scale
@@ -119,7 +119,7 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
 
     each = np.abs(np.cross(finished.part.points[patch.nodes], force[patch.nodes])).sum()
     assert abs(torque(patch.nodes)) > 0.1 * each
-    assert abs(torque(patch.nodes) + torque(left)) < 1e-7 * each
+    assert abs(torque(patch.nodes) + torque(remaining)) < 1e-7 * each
     assert abs(torque(clamp)) < 1e-6 * each
 
 
@@ -129,11 +129,11 @@ def model_scene():
 
 def test_every_blade_has_its_phase(finished):
     wheel, field = finished.facts.around, finished.fields.displacement[0]
-    moved = np.stack(list(render_wheel.instants(wheel, (0, 1), field)))
-    assert moved.shape == (40, *field.shape[:2])
-    assert moved[0] == pytest.approx(field[..., 1])  # cos at the start of the period
-    assert moved[10] == pytest.approx(-field[..., 2], abs=1e-12)  # a quarter of the wheel on, a quarter period late
-    assert np.abs(moved.sum(axis=0)).max() < 1e-12
+    shifted = np.stack(list(render_wheel.instants(wheel, (0, 1), field)))
+    assert shifted.shape == (40, *field.shape[:2])
+    assert shifted[0] == pytest.approx(field[..., 1])  # cos at the start of the period
+    assert shifted[10] == pytest.approx(-field[..., 2], abs=1e-12)  # a quarter of the wheel on, a quarter period late
+    assert np.abs(shifted.sum(axis=0)).max() < 1e-12
 
 
 def test_pictures(finished, tmp_path):
@@ -147,12 +147,12 @@ def test_worn_face_sinks_between_its_pairs_too(finished):
     patch, part = finished.patch, finished.part
     depth = 1e-3 + 0.1 * (patch.flat[:, 0] - patch.flat[:, 0].min())
     right = meetings_of(finished)[0].faces[0]
-    moved = 2 * right.worn_off(depth, len(part.points))  # half of the depth belongs to each face
-    on_face = np.flatnonzero(moved.any(axis=1))
+    shifted = 2 * right.worn_off(depth, len(part.points))  # half of the depth belongs to each face
+    on_face = np.flatnonzero(shifted.any(axis=1))
     assert len(on_face) == (2 * 5 - 1) * (2 * 4 - 1)  # all nodes of the second-order face
     flat = (part.points[on_face] - patch.points.mean(0)) @ patch.frames[0, 0]
     expected = 1e-3 + 0.1 * (flat - patch.flat[:, 0].min())
-    assert np.linalg.norm(moved[on_face], axis=1) == pytest.approx(expected, rel=1e-6)
+    assert np.linalg.norm(shifted[on_face], axis=1) == pytest.approx(expected, rel=1e-6)
 
 
 def test_damping_of_every_harmonic(folder):
@@ -171,12 +171,12 @@ def test_damping_of_every_harmonic(folder):
 def test_a_couple_is_two_opposite_forces(folder):
     force = 'group = "couple_leading", opposite = "couple_trailing", direction = "y", value = "60 kN"'
     couple = f"loads.static={{untwist = {{{force}}}}}"
-    two, one = built(folder), built(folder, couple)
-    system, loads = two.reduced.system, two.balance.excitation.loads
+    pair, item = built(folder), built(folder, couple)
+    system, loads = pair.reduced.system, pair.balance.excitation.loads
     expected = sum(value * system.loads[name] for (h, name), value in loads.items() if h == 0)
-    assert one.balance.excitation.loads[0, "untwist"] * one.reduced.system.loads["untwist"] == pytest.approx(expected)
-    again = scene_file.from_json(scene_file.read("blade_thesis", (couple,)).scene.model_dump_json())
-    assert again.loads.static["untwist"].opposite == "couple_trailing"
+    assert item.balance.excitation.loads[0, "untwist"] * item.reduced.system.loads["untwist"] == pytest.approx(expected)
+    repeated = scene_file.from_json(scene_file.read("blade_thesis", (couple,)).scene.model_dump_json())
+    assert repeated.loads.static["untwist"].opposite == "couple_trailing"
 
 
 def test_spinning_wheel_is_stiffer_and_presses_harder(folder):

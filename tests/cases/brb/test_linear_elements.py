@@ -20,10 +20,10 @@ def test_linear_reduced_elements_have_the_published_frequencies(
 ):
     """Each row is printed: elements, DOFs, frequencies, and how far they are from the published ones."""
     counts = [f"bodies.{h}.{k}" for h in ("lower", "upper") for k in (f"n_lap={through // 2}", f"n_side={across // 2}")]
-    asked = [*counts, "materials.steel.elements=linear_reduced"]
-    hertz = np.array(td.inspect("brb", modes=10, overrides=asked).record()["frequencies_hz"])
-    found = hertz[7:10]
+    requested = [*counts, "materials.steel.elements=linear_reduced"]
+    hertz = np.array(td.inspect("brb", modes=10, overrides=requested).record()["frequencies_hz"])
+    result = hertz[7:10]
     with capsys.disabled():
-        print(f"\n{through} through the lap, {across} across: {found.round(2)} Hz, {100 * (found / PUBLISHED - 1)} %")
+        print(f"\n{through} through the lap, {across} across: {result.round(2)} Hz, {100 * (result / PUBLISHED - 1)} %")
     assert max(hertz[:7]) < 0.1
-    np.testing.assert_allclose(found, PUBLISHED, rtol=within)
+    np.testing.assert_allclose(result, PUBLISHED, rtol=within)

@@ -104,14 +104,14 @@ def test_free_leaf_has_two_rigid_modes_and_contact_alone_holds_it(tmp_path):
 
 def test_fitted_columns_stand_beside_the_published_ones():
     scene = scene_file.read("leaf_seal_thesis").scene
-    found = leaf_fit.of_scene(scene)
-    errors = found.errors[leaf_fit.COUNTED]
-    assert found.rms < 0.072
+    result = leaf_fit.of_scene(scene)
+    errors = result.errors[leaf_fit.COUNTED]
+    assert result.rms < 0.072
     assert np.median(np.abs(errors)) < 0.05
     assert np.sum(np.abs(errors) > 0.12) <= 1  # mode 3 on springs, which contradicts mode 3 alone
-    assert (found.columns[0, :2] < 1e-3 * found.unit).all()
-    assert (np.diff(found.columns, axis=0) > -1e-6 * found.unit).all()  # springs never lower a frequency
-    assert "+11.8 %" in found.table()
+    assert (result.columns[0, :2] < 1e-3 * result.unit).all()
+    assert (np.diff(result.columns, axis=0) > -1e-6 * result.unit).all()  # springs never lower a frequency
+    assert "+11.8 %" in result.table()
 
 
 def test_the_scene_has_the_stiffnesses_that_suit_its_leaf_best():
@@ -135,27 +135,27 @@ def test_the_fit_stays_at_the_leaf_of_the_scene():
 
 
 def test_a_leaf_gives_way_only_to_one_that_the_numbers_tell_apart():
-    own = leaf_fit.of_scene(scene_file.read("leaf_seal_thesis").scene)
+    base = leaf_fit.of_scene(scene_file.read("leaf_seal_thesis").scene)
     published = np.array(list(leaf_fit.PUBLISHED.values()))
 
     def with_errors(errors):
-        return replace(own, columns=own.unit * (published + errors * np.maximum(published, leaf_fit.FLOOR)))
+        return replace(base, columns=base.unit * (published + errors * np.maximum(published, leaf_fit.FLOOR)))
 
     noise = np.random.default_rng(3).normal(size=published.shape)
-    same, better = with_errors(own.errors + 1e-3 * noise), with_errors(0.5 * own.errors)
-    assert leaf_fit.doubt(own, own) == 0.0
-    assert leaf_fit.chosen(own, [better, same]) is better
+    equal, better = with_errors(base.errors + 1e-3 * noise), with_errors(0.5 * base.errors)
+    assert leaf_fit.doubt(base, base) == 0.0
+    assert leaf_fit.chosen(base, [better, equal]) is better
     # one number that happens to fit says nothing: here that of the largest error
-    lucky = own.errors.copy()
+    lucky = base.errors.copy()
     lucky.flat[np.abs(lucky).argmax()] = 0.0
-    assert with_errors(lucky).rms < 0.9 * own.rms
-    assert leaf_fit.chosen(own, [with_errors(lucky)]) is own
+    assert with_errors(lucky).rms < 0.9 * base.rms
+    assert leaf_fit.chosen(base, [with_errors(lucky)]) is base
     # the same by hand
-    errors = (own.errors[leaf_fit.COUNTED], better.errors[leaf_fit.COUNTED])
-    left = [np.sqrt(np.mean(np.delete(one, i) ** 2)) for one in errors for i in range(28)]
-    difference = np.subtract(left[:28], left[28:])
+    errors = (base.errors[leaf_fit.COUNTED], better.errors[leaf_fit.COUNTED])
+    rows = [np.sqrt(np.mean(np.delete(error, i) ** 2)) for error in errors for i in range(28)]
+    difference = np.subtract(rows[:28], rows[28:])
     by_hand = np.sqrt(27 / 28 * np.sum((difference - difference.mean()) ** 2))
-    assert leaf_fit.doubt(own, better) == pytest.approx(by_hand)
+    assert leaf_fit.doubt(base, better) == pytest.approx(by_hand)
 
 
 def test_away_from_resonance_the_leaf_answers_as_if_stuck(leaf):
@@ -189,8 +189,8 @@ def test_five_points_show_linear_and_chattering_contact(leaf):
     status = [leaf.state(point).cycle.status for point in points]
     assert (status[0] == STICKS).all()
     assert (status[4] == STICKS).all()
-    for one in status[1:4]:
-        assert (one == STICKS | SEPARATES).sum() > 60
+    for statu in status[1:4]:
+        assert (statu == STICKS | SEPARATES).sum() > 60
     chatter = leaf.chatter(points[2])
     assert chatter.impacts.max() == 1
     assert 0.2 < chatter.touching.min() < 1.0
@@ -214,9 +214,9 @@ def test_three_solutions_share_a_frequency_and_time_integration_knows_which_are_
     balance, omega = response.balance, 2 * np.pi * LOW
     assert len(response.branch.folds) == 2
     states = []
-    beyond = response.branch.omega - omega
-    for i in np.flatnonzero(beyond[:-1] * beyond[1:] < 0):
-        share = beyond[i] / (beyond[i] - beyond[i + 1])
+    outside = response.branch.omega - omega
+    for i in np.flatnonzero(outside[:-1] * outside[1:] < 0):
+        share = outside[i] / (outside[i] - outside[i + 1])
         x = (1 - share) * response.branch.contact[i] + share * response.branch.contact[i + 1]
         states.append(newton.solve(balance, omega, x.reshape(126, 1, -1)).state)
     assert [exponents.stability(balance, state).stable for state in states] == [True, False, True]
@@ -243,38 +243,38 @@ def test_inclination_leaves_the_ends_or_the_centre_in_contact(tmp_path):
         for pairs in part.pairs.values():
             share = x[pairs] / x[pairs].max()
             centre, end = closed[pairs][share < 1 / 3], closed[pairs][share > 3 / 4]
-            apart, touching = (centre, end) if ends else (end, centre)
-            assert not apart.any()
+            distance, touching = (centre, end) if ends else (end, centre)
+            assert not distance.any()
             assert touching.any()
 
 
 def test_liner_motion_enters_the_contact_and_the_linear_references():
     still = ("loads.harmonic.pulsation.pressure=0", "response.frequency=[300, 310]")
-    moved = respond(scene_file.read("leaf_seal_thesis", (*liner(0.0, 1j), *still)))
-    base = moved.balance.excitation.base
+    shifted = respond(scene_file.read("leaf_seal_thesis", (*liner(0.0, 1j), *still)))
+    base = shifted.balance.excitation.base
     assert (base[:63] == 0).all()
     np.testing.assert_allclose(base[63:, 0], 0.0)
     np.testing.assert_allclose(base[63:, 1], 0.0, atol=1e-18)
     np.testing.assert_allclose(base[63:, 2], 20e-6)  # Re(i u e^iwt) = -u sin along z, and closing is along -z
-    references = linear_references(moved.balance, "response", 2 * np.pi * 300, 2 * np.pi * 310)
-    ours = moved.branch.amplitude("response")
+    references = linear_references(shifted.balance, "response", 2 * np.pi * 300, 2 * np.pi * 310)
+    ours = shifted.branch.amplitude("response")
     np.testing.assert_allclose(references.stuck[[0, -1]], ours[[0, -1]], rtol=1e-6)
     assert np.all(references.free == 0.0)
 
 
 def test_a_smaller_load_moves_the_liner_less_in_every_answer():
     """Of a linear answer, all stuck: half of the harmonic loads is half of the motion; the static part stays."""
-    moved = respond(scene_file.read("leaf_seal_thesis", (*liner(0.0, 1.0), "response.frequency=[300, 310]")))
-    full, half = moved.balance, moved.balance.with_load(0.5)
+    shifted = respond(scene_file.read("leaf_seal_thesis", (*liner(0.0, 1.0), "response.frequency=[300, 310]")))
+    full, half = shifted.balance, shifted.balance.with_load(0.5)
     omega, answers = 2 * np.pi * 300, []
     for balance in (full, half):
         state = newton.solve_from_rest(balance, omega).state
         force = state.cycle.force.reshape(state.flat.shape)
         answers.append(np.stack(coordinates(balance, state.flat, force, omega), axis=-1))
         row = np.array([balance.model.at_harmonic(0)[0].outputs["response"]])
-        found = balance.basis.to_real(row @ answers[-1])[0]
-        told = balance.outputs(state)[balance.compliance.output_names.index("response")]
-        np.testing.assert_allclose(found, told, atol=1e-8 * np.abs(told).max())
+        result = balance.basis.to_real(row @ answers[-1])[0]
+        messages = balance.outputs(state)[balance.compliance.output_names.index("response")]
+        np.testing.assert_allclose(result, messages, atol=1e-8 * np.abs(messages).max())
     np.testing.assert_allclose(answers[1][:, 1], 0.5 * answers[0][:, 1], atol=1e-9 * np.abs(answers[0]).max())
     np.testing.assert_allclose(answers[1][:, 0], answers[0][:, 0], atol=1e-9 * np.abs(answers[0]).max())
     scaled = [linear_references(balance, "response", omega, 1.01 * omega).stuck for balance in (full, half)]
@@ -304,24 +304,28 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
     for case in every:
         scene_file.read("leaf_seal_thesis", case.overrides)
     impossible = Case("bow", "impossible", ("contact.plane=", "contact.inclination=1 deg"))
-    few = [every[0], impossible, next(case for case in every if case.label == "+4°")]
-    told = []
-    records = leaf_study.study(few, tmp_path, tell=told.append)
+    small = [every[0], impossible, next(case for case in every if case.label == "+4°")]
+    results = []
+    records = leaf_study.study(small, tmp_path, tell=results.append)
     assert [record.complete for record in records] == [True, False, True]
-    assert len(told) == 3
+    assert len(results) == 3
     with open(tmp_path / "study.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["group"] for row in rows] == ["liner", "bow", "inclination"]
     assert rows[0]["fold_hz"].split() == ["174.74", "132.24"]
     assert rows[0]["end"] == "reached 450 Hz"
     assert "give its plane" in rows[1]["end"]
-    again = leaf_study.study(few[:2], tmp_path, resume=True)
+    again = leaf_study.study(small[:2], tmp_path, resume=True)
     assert again[0].response is None
     assert again[0].numbers == records[0].numbers
     np.testing.assert_array_equal(again[0].amplitude, records[0].amplitude)
-    assert leaf_record.load(few[0], scene_file.read("leaf_seal_thesis", few[2].overrides).scene, tmp_path / "x") is None
     assert (
-        leaf_record.load(few[0], scene_file.read("leaf_seal_thesis", few[2].overrides).scene, tmp_path / KEPT) is None
+        leaf_record.load(small[0], scene_file.read("leaf_seal_thesis", small[2].overrides).scene, tmp_path / "x")
+        is None
+    )
+    assert (
+        leaf_record.load(small[0], scene_file.read("leaf_seal_thesis", small[2].overrides).scene, tmp_path / KEPT)
+        is None
     )
     paths = leaf_study.draw(records, tmp_path)
     drawn = {path.stem for path in paths}
@@ -362,6 +366,6 @@ def test_the_verdict_knows_what_a_fold_is_off_by(tmp_path):
     )  # fmt: skip
     result = pipeline.run(scene_file.read("leaf_seal_thesis", overrides), tmp_path, Progress(), judge=with_verdict)
     assert result.verdict is not None
-    found = {row.quantity: row.relative for row in result.verdict.changes if row.refinement == "harmonics"}
-    assert found["peak_frequency"] == pytest.approx(0.08, abs=0.015)
-    assert found["amplitude"] == pytest.approx(0.24, abs=0.04)
+    outcome = {row.quantity: row.relative for row in result.verdict.changes if row.refinement == "harmonics"}
+    assert outcome["peak_frequency"] == pytest.approx(0.08, abs=0.015)
+    assert outcome["amplitude"] == pytest.approx(0.24, abs=0.04)

@@ -81,13 +81,13 @@ def test_lost_contact_is_the_open_rig(rig):
 @pytest.mark.slow
 def test_the_balance_comes_closer_to_time_integration_with_more_harmonics(rig):
     errors = []
-    for kept in ((0, 1), (0, 1, 2, 3, 4, 5)):
-        more = rig.with_harmonics(kept)
-        cycle = more.cycle()
-        found = in_time(more, cycle)
-        assert found.periodic
-        assert found.preload == pytest.approx(cycle.preload, rel=0.02)
-        errors.append((abs(cycle.energy / found.energy - 1), abs(found.amplitude)))
+    for saved in ((0, 1), (0, 1, 2, 3, 4, 5)):
+        extra = rig.with_harmonics(saved)
+        cycle = extra.cycle()
+        result = in_time(extra, cycle)
+        assert result.periodic
+        assert result.preload == pytest.approx(cycle.preload, rel=0.02)
+        errors.append((abs(cycle.energy / result.energy - 1), abs(result.amplitude)))
     (energy, amplitude), (finer_energy, finer_amplitude) = errors
     assert finer_energy < min(0.5 * energy, 0.05)
     assert finer_amplitude < min(0.5 * amplitude, 0.05)
@@ -121,20 +121,20 @@ def test_known_springs_are_found_again(joints):
     true = {"base_vertical": 7e8, "base_sliding": 3e9, "seat": rig_fit.RIGID}
     numbers = joints.frequencies(rig_fit.stiffnesses(true))[:8]
     parameters = [FitParameter(name, 1e8, 1e11, (1e9,), "N/m") for name in ("base_vertical", "base_sliding")]
-    found = fit(
+    result = fit(
         parameters,
         [MeasuredNumber(str(i), value, "Hz") for i, value in enumerate(numbers)],
         lambda values: joints.frequencies(rig_fit.stiffnesses({**values, "seat": rig_fit.RIGID}))[:8],
     )
-    assert found.values[0] == pytest.approx(7e8, rel=1e-2)
-    assert found.values[1] == pytest.approx(3e9, rel=5e-2)
+    assert result.values[0] == pytest.approx(7e8, rel=1e-2)
+    assert result.values[1] == pytest.approx(3e9, rel=5e-2)
 
 
 def test_modes_are_told_apart_by_their_motion():
     frequency = np.array([90.0, 300.0, 310.0, 900.0])
     share = np.array([[0.9, 0.1, 0.0], [0.0, 1.0, 0.0], [0.8, 0.2, 0.0], [0.1, 0.0, 0.9]])
-    wanted = (("tangential", 91.0), ("tangential", 300.0), ("normal", 305.0))
-    np.testing.assert_array_equal(Modes(frequency, share).assigned(wanted), [90.0, 310.0, 300.0])
+    expected = (("tangential", 91.0), ("tangential", 300.0), ("normal", 305.0))
+    np.testing.assert_array_equal(Modes(frequency, share).assigned(expected), [90.0, 310.0, 300.0])
 
 
 def test_the_height_is_found_from_the_preload(rig):
@@ -183,8 +183,8 @@ def test_the_study_compares_every_number_and_draws(tmp_path, capsys, monkeypatch
     out, err = capsys.readouterr()
     record = json.loads(out)
     numbers = {(n["topic"], n["name"]): n for n in record["numbers"]}
-    found = sum(number["topic"] == "frequency" for number in record["numbers"])
-    assert found == len(published.OPEN) + len(published.STUCK) + 1
+    total = sum(number["topic"] == "frequency" for number in record["numbers"])
+    assert total == len(published.OPEN) + len(published.STUCK) + 1
     assert sum(topic == "energy per cycle" for topic, _ in numbers) == len(published.TABLE_5_3)
     lives = [name for topic, name in numbers if topic == "life"]
     assert sum("harmonics 0 to 2" in name for name in lives) == 1

@@ -19,32 +19,32 @@ FEW = "wear.max_steps=2"
 
 
 def words(*changes: str) -> list[str]:
-    said = ["rig", "life"]
+    rows = ["rig", "life"]
     for text in COARSE:
-        said += ["--set", text]
+        rows += ["--set", text]
     for text in changes:
-        said += ["--change", text]
-    return said
+        rows += ["--change", text]
+    return rows
 
 
 def test_life_and_work_go_with_the_inverse_of_the_coefficient(capsys: pytest.CaptureFixture[str]) -> None:
     """The wear law is linear: nothing else may differ, the platform's height included."""
     too_soft = "material.young=1 GPa; wear.max_steps=1"
     cli.app([*words(HALF_AS_FAST, FEW, too_soft), "--json"], result_action="return_value")
-    scene, half, few, soft = json.loads(capsys.readouterr().out)
+    scene, half, small, soft = json.loads(capsys.readouterr().out)
     assert scene["outcome"] == half["outcome"] == "lost"
     assert half["cycles"] == pytest.approx(2 * scene["cycles"], rel=1e-6)
     assert half["work"] == pytest.approx(2 * scene["work"], rel=1e-6)
     assert half["depth"] == pytest.approx(scene["depth"], rel=1e-6)
     assert half["height"] == scene["height"]
-    assert few["outcome"].startswith("stopped after 2 wear steps")
-    assert few["cycles"] is None
-    assert few["energy"] == scene["energy"]
+    assert small["outcome"].startswith("stopped after 2 wear steps")
+    assert small["cycles"] is None
+    assert small["energy"] == scene["energy"]
     assert f"makes {PRELOAD:.3g} N of preload" in soft["outcome"]
 
 
 def test_a_change_that_the_scene_does_not_know_stops_before_anything(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as left:
+    with pytest.raises(SystemExit) as remaining:
         cli.main(words("contact.colour=red"))
-    assert left.value.code == 2
+    assert remaining.value.code == 2
     assert "colour" in capsys.readouterr().err

@@ -60,8 +60,8 @@ def test_named_points_stand_where_they_should(tmp_path, changes):
         np.testing.assert_allclose(mesh.doflocs[:, node_sets[name]].T, [where], atol=1e-12)
     assert len(node_sets["screws"]) == 6
     assert len(node_sets["pins"]) == 2
-    below = mesh.doflocs[2, node_sets["platform"]].min()
-    np.testing.assert_allclose(mesh.doflocs[2, node_sets["screws"]], below)
+    lower = mesh.doflocs[2, node_sets["platform"]].min()
+    np.testing.assert_allclose(mesh.doflocs[2, node_sets["screws"]], lower)
     np.testing.assert_allclose(mesh.doflocs[:2, node_sets["screws"]].mean(axis=1), [p.contact_x, 0.0], atol=1e-12)
 
 
@@ -78,13 +78,13 @@ def test_clamped_beam_has_the_frequency_of_a_cantilever(tmp_path):
         {"shaker": NodalForce("shaker", (0, 1, 0))},
         {},
     )
-    found = linear_modes(part, None, 1)[0][0]
-    whole = 3.516 / (2 * np.pi) * np.sqrt(E / rho / 12) * p.thickness / p.free_length**2
+    result = linear_modes(part, None, 1)[0][0]
+    full = 3.516 / (2 * np.pi) * np.sqrt(E / rho / 12) * p.thickness / p.free_length**2
     missing = p.slot_length * p.slot_height * 0.9  # less the upper specimen
     at = 1.8751 * (1 - 0.5 * p.slot_length / p.free_length)  # the mode there: squares integrate to one over the length
     shape = np.cosh(at) - np.cos(at) - 0.7341 * (np.sinh(at) - np.sin(at))
     removed = missing * shape**2 / (p.free_length * p.height)  # of the modal mass, whose unit is the beam's mass
-    assert found == pytest.approx(whole / np.sqrt(1 - removed), rel=0.03)
+    assert result == pytest.approx(full / np.sqrt(1 - removed), rel=0.03)
 
 
 def test_impossible_shapes_are_refused_in_one_sentence():

@@ -68,9 +68,9 @@ def spikes(share):
 def test_a_measured_face_is_taken_and_each_repair_is_told(damage, repairs, tmp_path, capsys):
     code, out, err = run(write(tmp_path, damage), capsys)
     assert code == 0, err
-    told = [line for line in out.splitlines() if line.startswith("face.xyz")]
-    assert len(told) == len(repairs)
-    assert all(words in line for words, line in zip(repairs, told, strict=True))
+    rows = [line for line in out.splitlines() if line.startswith("face.xyz")]
+    assert len(rows) == len(repairs)
+    assert all(words in line for words, line in zip(repairs, rows, strict=True))
 
 
 @pytest.mark.parametrize(

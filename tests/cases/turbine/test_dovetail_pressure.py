@@ -40,7 +40,7 @@ def ours(model: modelling.Model) -> dict[str, dict[str, Any]]:
     )
     assert solved.converged
     interface, force = model.part.interface, solved.state.cycle.force[:, :, 0]
-    found = {}
+    result = {}
     for name, pairs in model.part.joints.items():
         points, area = interface.points[pairs], interface.area[pairs]
         vectors = (force[pairs][:, :, None] * interface.frames[pairs]).sum(axis=1)
@@ -48,14 +48,14 @@ def ours(model: modelling.Model) -> dict[str, dict[str, Any]]:
         line = {int(at): normal[x == at].sum() / area[x == at].sum() for at in np.unique(x)}
         weights = {int(at): area[x == at].sum() for at in np.unique(x)}
         mean = normal.sum() / area.sum()
-        found[name] = {
+        result[name] = {
             "force": vectors.sum(axis=0),
             "moment": np.cross(points, vectors).sum(axis=0),
             "line": {at: value / mean for at, value in line.items()},
             "weights": weights,
             "area": area.sum(),
         }
-    return found
+    return result
 
 
 def calculated(model: modelling.Model, ours: dict[str, dict[str, Any]], folder: Path) -> dict[str, Any]:
@@ -66,29 +66,29 @@ def calculated(model: modelling.Model, ours: dict[str, dict[str, Any]], folder: 
         calculix.Pair(
             name.replace("root", "blade.flank"),
             name.replace("root", "disk.slot"),
-            *(spring / one["area"] for spring in SPRINGS),
+            *(spring / item["area"] for spring in SPRINGS),
             FRICTION,
         )
-        for name, one in ours.items()
+        for name, item in ours.items()
     ]
     steel = (200e9, 0.3, 7850.0)
     fixed = ["disk.clamp", "disk.cyclic_right", "disk.cyclic_left"]
     text = calculix.deck(mesh, {"disk": steel, "blade": steel}, fixed, pairs, SPEED)
     printed, nodes = calculix.run(text, folder)
     points = mesh.doflocs.T[nodes[:, 0].astype(int)]
-    found = {}
-    for numbers, (name, one) in zip(printed, ours.items(), strict=True):
+    result = {}
+    for numbers, (name, item) in zip(printed, ours.items(), strict=True):
         on = np.isin(nodes[:, 0].astype(int), mesh.node_sets[name.replace("root", "blade.flank")])
         x = np.round(points[:, 0] / STATIONS).astype(int)
-        line = {at: _across(nodes[on & (x == at), 1], points[on & (x == at), 2]) for at in one["line"]}
-        weights = one["weights"]
+        line = {at: _across(nodes[on & (x == at), 1], points[on & (x == at), 2]) for at in item["line"]}
+        weights = item["weights"]
         mean = sum(line[at] * weights[at] for at in line) / sum(weights.values())
-        found[name] = {
+        result[name] = {
             "force": numbers[1:4].tolist(),
             "moment": numbers[4:7].tolist(),
             "line": {str(at): value / mean for at, value in line.items()},
         }
-    return found
+    return result
 
 
 def _across(pressure: np.ndarray, z: np.ndarray) -> float:
@@ -99,17 +99,17 @@ def _across(pressure: np.ndarray, z: np.ndarray) -> float:
 
 def compare(ours: dict[str, dict[str, Any]], other: dict[str, Any], within: float) -> None:
     """Resultants, centres of pressure over the flank's length, and pressure along the flank over its mean."""
-    for name, one in ours.items():
+    for name, item in ours.items():
         force, moment = np.array(other[name]["force"]), np.array(other[name]["moment"])
-        sign = np.sign(one["force"] @ force)
-        assert np.linalg.norm(sign * one["force"] - force) < within * np.linalg.norm(force)
+        sign = np.sign(item["force"] @ force)
+        assert np.linalg.norm(sign * item["force"] - force) < within * np.linalg.norm(force)
         z = 0.1809
         centres = [
             np.array([(z * f[0] - m[1]) / f[2], (m[0] + z * f[1]) / f[2]])
-            for f, m in ((sign * one["force"], sign * one["moment"]), (force, moment))
+            for f, m in ((sign * item["force"], sign * item["moment"]), (force, moment))
         ]
         assert np.abs(centres[0] - centres[1]).max() < within * 5e-3  # the flank is 56 mm long and 5.4 mm wide
-        for at, value in one["line"].items():
+        for at, value in item["line"].items():
             assert value == pytest.approx(other[name]["line"][str(at)], abs=within)
 
 
@@ -117,9 +117,9 @@ def test_pressure_on_the_flanks_is_that_of_calculix(ours: dict[str, dict[str, An
     """Against what CalculiX 2.20 gave for this scene, within 3 %; resultants within 0.5 %."""
     recorded = json.loads(RECORDED.read_text(encoding="utf-8"))
     compare(ours, recorded, 0.03)
-    for name, one in ours.items():
-        assert np.linalg.norm(one["force"]) == pytest.approx(np.linalg.norm(recorded[name]["force"]), rel=5e-3)
-        assert np.ptp(list(one["line"].values())) > 0.2  # the pressure is far from even
+    for name, item in ours.items():
+        assert np.linalg.norm(item["force"]) == pytest.approx(np.linalg.norm(recorded[name]["force"]), rel=5e-3)
+        assert np.ptp(list(item["line"].values())) > 0.2  # the pressure is far from even
 
 
 @pytest.mark.slow
@@ -129,7 +129,7 @@ def test_calculix_gives_what_is_recorded(
 ) -> None:
     fresh, recorded = calculated(model, ours, tmp_path), json.loads(RECORDED.read_text(encoding="utf-8"))
     compare(ours, fresh, 0.03)
-    for name, one in fresh.items():
-        np.testing.assert_allclose(one["force"], recorded[name]["force"], rtol=1e-3, atol=1.0)
-        for at, value in one["line"].items():
+    for name, item in fresh.items():
+        np.testing.assert_allclose(item["force"], recorded[name]["force"], rtol=1e-3, atol=1.0)
+        for at, value in item["line"].items():
             assert value == pytest.approx(recorded[name]["line"][at], abs=1e-3)

@@ -32,10 +32,10 @@ def found() -> dict[str, BodyForces]:
 @pytest.mark.parametrize("body", ["blade", "damper"])
 def test_contact_forces_carry_the_centrifugal_load(found: dict[str, BodyForces], body: str) -> None:
     """Forces on a body that only contact holds, to 1e-8."""
-    one = found[body]
-    assert not one.held
-    assert one.imbalance < 1e-8
-    assert set(one.joints) == (JOINTS if body == "blade" else {"damper_right", "damper_left"})
+    item = found[body]
+    assert not item.held
+    assert item.imbalance < 1e-8
+    assert set(item.joints) == (JOINTS if body == "blade" else {"damper_right", "damper_left"})
     assert found["disk"].held
 
 
