@@ -40,10 +40,10 @@ RULES: dict[str, dict[str, Any]] = {
     "continuation.resonance_peak.AtPeak": {
         "scan_miss": 0.0, "dominance": 1.0, "near_peak": NEVER, "outside_reach": 1e9, "max_refined": 1,
     },
-    "wear.error_controlled_rule.StepRules": {
+    "wear.balance_step.StepRules": {
         "error_trend_power": 0.0, "unexpected": NEVER,
     },
-    "wear.dirk_stages.StageRules": {"retreats": 0},
+    "wear.sdirk_stages.StageRules": {"retreats": 0},
     "time.period_search.SearchRules": {"thrown_off": NEVER, "lost": NEVER, "progress": 1.0},
 }  # fmt: skip
 SCENES = {

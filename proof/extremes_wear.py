@@ -11,11 +11,12 @@ from proof.extremes_judge import CONVERGED, REFUSED, WRONG, Verdict
 from proof.extremes_models import Body
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.step_control import UNKNOWN, Tolerance, step_error
+from tribodyn.hbm.wear.rules import error_controlled, thesis
+from tribodyn.hbm.wear.step_control import UNKNOWN, Tolerance, first_order_error, measured_error
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.workflows.run.references import free_deflection
 
 STEPS = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.2, 0.5, 1.0, 10.0, 1e3, 1e6)  # of delta_max
@@ -50,20 +51,20 @@ def _problem(body: Body, coefficient: float = ORDINARY) -> tuple[WearProblem, fl
 
 def _thesis(body: Body, share: float) -> Verdict:
     problem, delta = _problem(body)
-    return _judged(body, problem, thesis_rule.evolve(problem, share * delta, MOST_STEPS))
+    return _judged(body, problem, evolve(thesis.Rule(problem, share * delta), MOST_STEPS))
 
 
 def _controlled(body: Body, share: float) -> Verdict:
     problem, delta = _problem(body)
     tolerance = Tolerance(share, delta)
-    return _judged(body, problem, error_controlled_rule.evolve(problem, tolerance, MOST_STEPS), tolerance=tolerance)
+    return _judged(body, problem, evolve(error_controlled.Rule(problem, tolerance), MOST_STEPS), tolerance=tolerance)
 
 
 def _coefficient(body: Body, value: float) -> Verdict:
     """Depth against cycles x coefficient does not depend on the coefficient."""
     problem, delta = _problem(body, value)
     tolerance = Tolerance(0.03, delta)
-    worn = error_controlled_rule.evolve(problem, tolerance, MOST_STEPS)
+    worn = evolve(error_controlled.Rule(problem, tolerance), MOST_STEPS)
     return _judged(body, problem, worn, value / ORDINARY, tolerance)
 
 
@@ -83,7 +84,7 @@ def _judged(
         return Verdict(WRONG, f"volume {volume:.6e} m3 for {by_work:.6e} m3 of work")
     if faster == 0:
         return Verdict(CONVERGED if volume == 0 else WRONG, f"nothing wears: {worn.end}", 0.0)
-    estimate = step_error(worn, tolerance).cycles
+    estimate = (first_order_error(worn) if tolerance is None else measured_error(worn, tolerance)).cycles
     if estimate >= UNKNOWN:
         says = f"the error estimate of the wear steps is above {UNKNOWN:.0%}, no life is stated"
         return Verdict(REFUSED, f'{says}: take a smaller wear.step or wear.rule = "error_controlled"')
@@ -93,7 +94,7 @@ def _judged(
     expected = _cycles_for(body, float(volumes[reach]))
     off = abs(cycles[reach] / expected - 1) if expected > 0 else 0.0
     says = f"cycles are off by {off:.1e}, estimated {estimate:.1e}; {worn.end}"
-    allowed = estimate + step_error(_reference(body), Tolerance(TIGHT, np.nan)).cycles
+    allowed = estimate + measured_error(_reference(body), Tolerance(TIGHT, np.nan)).cycles
     return Verdict(CONVERGED if off <= allowed else WRONG, says, off)
 
 
@@ -106,7 +107,7 @@ def _cycles_for(body: Body, volume: float) -> float:
 def _reference(body: Body) -> WearHistory:
     if body.name not in _references:
         problem, delta = _problem(body)
-        _references[body.name] = error_controlled_rule.evolve(problem, Tolerance(TIGHT, delta))
+        _references[body.name] = evolve(error_controlled.Rule(problem, Tolerance(TIGHT, delta)))
     return _references[body.name]
 
 

@@ -17,6 +17,7 @@ from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import impact
+from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.workflows.result.result import Patch, References, Result
 from tribodyn.workflows.run import curve, references, settings, wear_run
 from tribodyn.workflows.run.description import described
@@ -89,8 +90,8 @@ def wear(file: SceneFile, balance: HarmonicBalance) -> WearHistory:
         raise ValueError(f"{file.name} has no [wear]: say how it wears")
     at_rest = wanted.end_at == "at_rest"
     problem = wear_run.wear_problem(file.scene, file.folder, balance, wanted.lost_below, at_rest)
-    limit = settings.step_limit(file.scene, references.free_deflection(balance), problem.area)
-    return wear_run.evolve(problem, wanted, limit, wanted.max_steps)
+    scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)
+    return evolve(wear_run.rule_of(file.scene, problem, scale), wanted.max_steps)
 
 
 def impact_work(balance: HarmonicBalance, state: State) -> np.ndarray:

@@ -25,11 +25,12 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_share
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.linear_damping import modal_damping
 from tribodyn.workflows.errors.extrapolation import limit_of
@@ -268,8 +269,8 @@ def wear() -> Numbers:
         problem = WearProblem(balance, (duty,), wears, body.model.interface.area, lost_below=0.5)
         tolerance = Tolerance(0.05, delta)
         histories = {
-            "thesis": thesis_rule.evolve(problem, 0.05 * delta, 6),
-            "error-controlled": error_controlled_rule.evolve(problem, tolerance, 6),
+            "thesis": evolve(thesis.Rule(problem, 0.05 * delta), 6),
+            "error-controlled": evolve(error_controlled.Rule(problem, tolerance), 6),
         }
         for rule, history in histories.items():
             found |= {f"{name}, {law}, {rule}": value for name, value in _worn(history).items()}

@@ -13,10 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import WearProblem
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE, STYLE
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
@@ -119,9 +120,9 @@ def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
 def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Callable[[str], None]) -> WearStepRow:
     clock = process_time()
     if rule == "thesis":
-        worn = thesis_rule.evolve(problem, step * delta)
+        worn = evolve(thesis.Rule(problem, step * delta))
     else:
-        worn = error_controlled_rule.evolve(problem, Tolerance(step, delta))
+        worn = evolve(error_controlled.Rule(problem, Tolerance(step, delta)))
     seconds = process_time() - clock
     life = cycles_to_preload(worn)
     say(f"{rule} {step:g}: {len(worn.cycles)} wear steps, {seconds:.1f} s, {worn.end}")

@@ -13,13 +13,14 @@
     print(response.frequency, response.amplitude("tip"))
     law = JointWear.of("energy", coefficient=2e-15)
     wear = WearProblem(balance, (Duty(AtPeak("tip", 200.0, 800.0)),), law, contact.area)
-    history = thesis_rule.evolve(wear, 1e-6, max_steps=5)
+    history = evolve(thesis.Rule(wear, 1e-6), max_steps=5)
     print(history.cycles, history.depth.max(axis=1))
 
 with `ContactParameters` from hbm.contact.contact_law, `Joint` from hbm.contact.joint, `HarmonicBalance` from
 hbm.balance, `HarmonicBasis` from hbm.harmonics, `Excitation` from hbm.excitation, `natural` from
 hbm.continuation.methods, `AtPeak` from hbm.continuation.operating_point, `Duty` and `WearProblem` from
-hbm.wear.evolution, `JointWear` from hbm.wear.law and `thesis_rule` from hbm.wear. The names of `import tribodyn` are a
+hbm.wear.wear_problem, `JointWear` from hbm.wear.law, `thesis` from hbm.wear.rules and `evolve` from
+hbm.wear.wear_loop. The names of `import tribodyn` are a
 shorter way to the same; a scene with [model] does the same without Python.
 
 Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,

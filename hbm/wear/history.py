@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from enum import StrEnum
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -13,6 +15,16 @@ from tribodyn.hbm.outcome import Outcome, WearEnd
 LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
 LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends unless a scene says where
 OF_MOTION = ("spread", "mean_error", "settled", "periods", "moving")  # of a row whose motion was marched in time
+
+
+class StepScheme(StrEnum):
+    """Numerical scheme of the steps of a wear rule."""
+
+    EXPLICIT = "explicit"
+    """At the rate of their beginning."""
+    IMPLICIT = "implicit"
+    """Two implicit stages, see `hbm.wear.sdirk_stages`."""
+    UNKNOWN = "unknown"
 
 
 Number = TypeVar("Number")
@@ -37,7 +49,6 @@ class _State(Generic[Number, Count]):
     response: np.ndarray
     solves: Count
     step_error: Number
-    plan: np.ndarray
     work: np.ndarray
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
@@ -57,6 +68,7 @@ class WearRow(_State[float, int]):
     settled: bool = True
     periods: int = 0
     moving: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    memory: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def displacement(self) -> np.ndarray:
@@ -82,8 +94,6 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
     response : (n_row, n_output, n_coeff) Fourier coefficients of the outputs [m]
     solves : (n_row,) harmonic balance solves spent on the row
     step_error : (n_row,) estimated local error of the step over its tolerance; 0 where the rule has no estimate
-    plan : (n_row, n_plan) what the rule tries next: cycles, d (distance to the site) / d omega of every duty, and the
-        share of the first preload at which higher peaks are looked for; n_plan is 0 where a rule does not plan
     work : (n_row, n_pair) friction work from this row to the next [J]
     duty_omega, duty_displacement : (n_row, n_duty) [rad/s], (n_row, n_duty, n_contact, n_coeff) [m]: every duty of a
         mission; the fields above show the first
@@ -100,6 +110,8 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
         that mean, relative; settled : (n_row,) whether the means came to rest
     moving : (n_row, n) what moved before the row's periods, see hbm.time.mean_motion.Follower; zeros where they began
         in the balance
+    memory : what the rule remembers from step to step, arrays (n_row, ...) by name, see the rule; empty where nothing
+    scheme : of the steps, a `StepScheme`
     """
 
     end: Outcome[WearEnd]
@@ -110,6 +122,8 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
     settled: np.ndarray | None = None
     periods: np.ndarray | None = None
     moving: np.ndarray | None = None
+    memory: Mapping[str, np.ndarray] = field(default_factory=dict)
+    scheme: str = StepScheme.UNKNOWN.value
 
     @property
     def in_time(self) -> np.ndarray:
@@ -159,8 +173,14 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
 
     def rows(self) -> list[WearRow]:
         """The rows one by one."""
-        names = [f.name for f in fields(WearRow) if getattr(self, f.name) is not None]
-        return [WearRow(**{name: getattr(self, name)[i] for name in names}) for i in range(len(self.cycles))]
+        names = [f.name for f in fields(WearRow) if f.name != "memory" and getattr(self, f.name) is not None]
+        return [
+            WearRow(
+                **{name: getattr(self, name)[i] for name in names},
+                memory={name: values[i] for name, values in self.memory.items()},
+            )
+            for i in range(len(self.cycles))
+        ]
 
 
 def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float | None:
@@ -199,10 +219,10 @@ def rows_to_resume(interrupted: WearHistory | None) -> list[WearRow]:
     return [row for row in rows if row.cycles_in_step > 0]
 
 
-def history(rows: list[WearRow], end: Outcome[WearEnd]) -> WearHistory:
+def history(rows: list[WearRow], end: Outcome[WearEnd], scheme: StepScheme = StepScheme.UNKNOWN) -> WearHistory:
     """Rows put together."""
     marched = any(row.periods for row in rows)
-    names = [f.name for f in fields(WearRow) if marched or f.name not in OF_MOTION]
+    names = [f.name for f in fields(WearRow) if f.name != "memory" and (marched or f.name not in OF_MOTION)]
     if marched:
         width = max(len(row.moving) for row in rows)
         rows = [replace(row, moving=np.pad(row.moving, (0, width - len(row.moving)))) for row in rows]
@@ -210,7 +230,8 @@ def history(rows: list[WearRow], end: Outcome[WearEnd]) -> WearHistory:
     for name in ("preload_at_rest", "growth"):
         if np.isnan(columns[name]).all():
             del columns[name]
-    return WearHistory(**columns, end=end)
+    memory = {name: np.array([row.memory[name] for row in rows]) for name in (rows[0].memory if rows else ())}
+    return WearHistory(**columns, end=end, memory=memory, scheme=scheme.value)
 
 
 def events(

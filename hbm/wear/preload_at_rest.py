@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency
-from tribodyn.hbm.wear.evolution import WearProblem, WearState, assess
+from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_state import WearState, assess
 
 
 class PreloadAtRest:

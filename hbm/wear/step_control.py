@@ -1,4 +1,4 @@
-"""The error of a wear step, which its length follows from, and that of a whole run, from its own history."""
+"""The error of a wear step, from which its length follows, and that of a whole run, from its history."""
 
 from __future__ import annotations
 
@@ -31,12 +31,13 @@ def local_error(
     area : (n_pair,) [m2]; stride : cycles of the step; cycles : that its error is held to
     """
     on_depth = np.abs(deviation).max() / tolerance.scale
-    wrong, left = float(area @ np.abs(deviation)), float(area @ rate)
-    on_life = (wrong / left if wrong < stride * left else stride * (wrong > 0)) / cycles
+    volume_error, volume_rate = float(area @ np.abs(deviation)), float(area @ rate)
+    is_short = volume_error < stride * volume_rate
+    on_life = (volume_error / volume_rate if is_short else stride * (volume_error > 0)) / cycles
     return float(max(on_depth, on_life) / tolerance.share)
 
 
-def expected(tolerance: Tolerance, cycles: float | np.ndarray, depth: np.ndarray) -> np.ndarray:
+def expected_life(tolerance: Tolerance, cycles: float | np.ndarray, depth: np.ndarray) -> np.ndarray:
     """Cycles of a whole life that has come to depths (..., n_pair) [m] after `cycles`, at the mean rate so far.
 
     At a depth of the scale a contact is lost, or nearly so; as wear fades most lives are longer.
@@ -57,32 +58,40 @@ class StepError:
     depth: float
 
 
-def step_error(history: WearHistory, tolerance: Tolerance | None = None) -> StepError:
-    """Estimate for a whole run, up to where LIFE_SHARE of the preload is left.
-
-    tolerance : of the error-controlled rule; None for steps at the rate of their beginning, as the thesis takes them
-
-    A step of Z cycles at the rate of its beginning is off by half the change of the rate over the step. The changes of
-    all pairs count without their sign: rates that go back and forth between neighbours are a sign of steps too long.
-    The error-controlled rule has measured its own, see `local_error`: the root of the sum of squares, of depth too.
-    """
+def accepted_steps(history: WearHistory) -> np.ndarray:
+    """Rows whose steps count in the error of a run: those that wear, up to where LIFE_SHARE of the preload is left."""
     lost = np.flatnonzero(history.preload < LIFE_SHARE * history.preload[0])
     last = int(lost[0]) if len(lost) else len(history.cycles) - 1  # row where the counted steps end
     total = history.energy.sum(axis=1)
-    taken = np.flatnonzero((history.cycles_in_step[:last] > 0) & (total[:last] > 0))
-    if not len(taken):
+    return np.flatnonzero((history.cycles_in_step[:last] > 0) & (total[:last] > 0))
+
+
+def first_order_error(history: WearHistory) -> StepError:
+    """Estimate for a run of explicit steps.
+
+    A step of Z cycles at the rate of its beginning is off by half the change of the rate over the step. The changes of
+    all pairs count without their sign: rates that oscillate between neighbours are a sign of steps too long.
+    """
+    steps = accepted_steps(history)
+    if not len(steps):
         return StepError(0.0, 0.0)
-    cycles = history.cycles_in_step[taken]
-    if tolerance is not None:
-        passed = history.cycles[taken] + cycles
-        of = np.where(history.in_time[taken], expected(tolerance, passed, history.depth[taken + 1]), passed)
-        off = float(tolerance.share * np.linalg.norm(history.step_error[taken] * of) / passed[-1])
-        return StepError(off, off)
-    before, after = history.energy[taken], history.energy[taken + 1]
-    change = np.abs(after - before).sum(axis=1) / (total[taken] + total[taken + 1])
-    share = before / total[taken, None]
-    share_after = after / np.maximum(total[taken + 1, None], np.finfo(float).tiny)  # no work is shared behind the last
-    work = history.work[taken].sum(axis=1)
+    total, cycles = history.energy.sum(axis=1), history.cycles_in_step[steps]
+    energy, energy_after = history.energy[steps], history.energy[steps + 1]
+    change = np.abs(energy_after - energy).sum(axis=1) / (total[steps] + total[steps + 1])
+    share = energy / total[steps, None]
+    share_after = energy_after / np.maximum(total[steps + 1, None], np.finfo(float).tiny)  # the last one has no work
+    work = history.work[steps].sum(axis=1)
     worn = work @ share
     shift = np.abs(work @ (share_after - share)) / 2
     return StepError(float(cycles @ change / cycles.sum()), float(shift.max() / worn.max()))
+
+
+def measured_error(history: WearHistory, tolerance: Tolerance) -> StepError:
+    """Estimate for a run whose steps measured their errors, see `local_error`: the root of the sum of squares."""
+    steps = accepted_steps(history)
+    if not len(steps):
+        return StepError(0.0, 0.0)
+    cycles = history.cycles[steps] + history.cycles_in_step[steps]
+    reference = np.where(history.in_time[steps], expected_life(tolerance, cycles, history.depth[steps + 1]), cycles)
+    error = float(tolerance.share * np.linalg.norm(history.step_error[steps] * reference) / cycles[-1])
+    return StepError(error, error)

@@ -16,7 +16,7 @@ would:
 
 A jump to another resonance, a motion in time, a step over the end of a branch, or a wear law whose rate jumps as a pair
 begins to lift has no derivative.
-Source  ours; of the step Alexander 1977, see dirk_stages
+Source  ours; of the step Alexander 1977, see sdirk_stages
 """
 
 from __future__ import annotations
@@ -40,12 +40,15 @@ from tribodyn.hbm.derivatives.parameter_effects import ParameterEffects
 from tribodyn.hbm.linearisation import Linearisation
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
-from tribodyn.hbm.wear.dirk_stages import GAMMA, Search, begun, depth_per_work, first_stage
-from tribodyn.hbm.wear.evolution import Duty, WearProblem, WearState, assess, state_of, wear_of
-from tribodyn.hbm.wear.fewer_harmonics import top_harmonic
-from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, cycles_to_preload
+from tribodyn.hbm.wear.harmonic_fallback import top_harmonic
+from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, StepScheme, WearHistory, WearRow, cycles_to_preload
 from tribodyn.hbm.wear.implicit_stage import WearingBalance, work_slope
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
+from tribodyn.hbm.wear.sdirk_stages import GAMMA, FrequencySearch, depth_per_work, initial_guess, solve_first_stage
+from tribodyn.hbm.wear.step_memory import StepMemory
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
+from tribodyn.hbm.wear.wear_rows import state_of
+from tribodyn.hbm.wear.wear_state import WearState, assess, wear_of
 
 
 @single
@@ -71,7 +74,7 @@ def of_life(
     if end == 0:
         raise NoDerivative("the first step of wear parts the contact")
     rows = worn.rows()[: end + 1]
-    _check(problem, rows)
+    _check(problem, rows, worn.scheme)
     changes = tuple(changes)  # all at once: each state asks for all of them
     joints, by_law = problem.balance.contact.joints, _by_numbers(problem, numbers)
     last, n = len(changes) + len(by_law), len(changes) + len(by_law) + 1 + len(joints)
@@ -82,7 +85,7 @@ def of_life(
     opens = np.zeros((len(area), n))
     for i, joint in enumerate(joints, last + 1):
         opens[joint.rows, i] = 1.0
-    tangent, depth = _Tangent(problem, changes, by_law, opens), np.zeros_like(opens)
+    tangent, depth = _Tangent(problem, changes, by_law, opens, worn.scheme), np.zeros_like(opens)
     after = first = state_of(problem, rows[0])
     for i, row in enumerate(rows[:-1]):
         before, after = after, state_of(problem, rows[i + 1])
@@ -109,9 +112,11 @@ def of_life(
     )  # fmt: skip
 
 
-def _check(problem: WearProblem, rows: Sequence[WearRow]) -> None:
+def _check(problem: WearProblem, rows: Sequence[WearRow], scheme: str) -> None:
     """Raise NoDerivative where there is none along the rows of a run."""
     basis = problem.balance.basis
+    if scheme == StepScheme.UNKNOWN:
+        raise NoDerivative("the steps of the wear rule have no tangent")
     if problem.any_joint or any(duty.balance is not None for duty in problem.mission):
         raise NoDerivative("cycles at several speeds, or until any joint is lost")
     for row, following in pairwise(rows):
@@ -122,7 +127,7 @@ def _check(problem: WearProblem, rows: Sequence[WearRow]) -> None:
             i = int(np.abs(moved).argmax())
             jump = f"from {row.duty_omega[i] / (2 * np.pi):.5g} to {following.duty_omega[i] / (2 * np.pi):.5g} Hz"
             raise NoDerivative(f"{where} the response jumps {jump}")
-        if len(row.plan) and not row.plan[0] > 0:
+        if scheme == StepScheme.IMPLICIT and not StepMemory.of_row(row).next_cycles > 0:
             raise NoDerivative(f"{where} the run stepped over the end of a branch of solutions, or to another peak")
         if top_harmonic(basis, list(following.duty_displacement)) < basis.harmonics[-1]:
             raise NoDerivative(f"{where} no motion with all harmonics follows")
@@ -133,7 +138,7 @@ class _Tangent:
     """The columns of a tangent, the changes first.
 
     by_law : the problem a step above and a step below each number of a wear law, and the step; one column follows, of
-        all steps longer together; opens : (n_pair, n) d gap besides the wear
+        all steps longer together; opens : (n_pair, n) d gap besides the wear; scheme : of the steps
     corners : cycles of the states where a pair is at a corner of its force, and the tangent that of one side
     """
 
@@ -141,6 +146,7 @@ class _Tangent:
     changes: tuple[ParameterChange, ...]
     by_law: tuple[tuple[WearProblem, WearProblem, float], ...]
     opens: np.ndarray
+    scheme: str
     corners: list[float] = field(default_factory=list)
 
     def along(
@@ -149,11 +155,13 @@ class _Tangent:
         """Derivatives of the depth (n_pair, n) behind a step from those before it; past : the rows before."""
         self._check_status(before, after)
         stride = row.cycles_in_step
-        if not len(row.plan):  # of the thesis's rule
+        if self.scheme == StepScheme.EXPLICIT:
             return depth + stride * self.moved(before, depth, 0.0)[1]
-        drift, slopes = begun(self.problem, before, past, self.problem)  # the first stage again, as the run came to it
-        searches = [Search(float(slope)) for slope in slopes]
-        reach, middle = GAMMA * stride, first_stage(self.problem, before, stride, drift, searches)
+        drift, slopes = initial_guess(
+            self.problem, before, past, self.problem
+        )  # the first stage again, as the run came to it
+        searches = [FrequencySearch(float(slope)) for slope in slopes]
+        reach, middle = GAMMA * stride, solve_first_stage(self.problem, before, stride, drift, searches)
         rate = (row.worn / stride - GAMMA * after.rate) / (1 - GAMMA)
         if middle.failure or np.abs(middle.rate - rate).max() > 1e-2 * rate.max():
             raise NoDerivative(f"at {middle.cycles:.4g} cycles the response passes to another motion within a step")

@@ -46,6 +46,8 @@ class Role(StrEnum):
     """Radius of asperities [m]; a scene fills in that of its measured faces."""
     WEAR_COEFFICIENT = auto()
     """Factor of proportion of a wear law: the depth is proportional to it."""
+    ACCURACY = auto()
+    """How fine the steps of a wear rule are: a refined run has a smaller one."""
 
 
 SLIP_LIMITS = (Role.FRICTION, Role.SLIP_FORCE)  # a pair slips later in proportion to these

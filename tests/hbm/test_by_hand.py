@@ -22,8 +22,9 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import Expansion
 from tribodyn.hbm.time import time_integration, verify
 from tribodyn.hbm.time.stepper import Options
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
 
 
 @pytest.mark.parametrize("way", ["located", "sampled"])
@@ -135,7 +136,7 @@ def test_the_modes_left_out_follow_as_their_own_series_says() -> None:
 
 
 def test_cycles_and_depths_of_the_thesis_rule_are_sums_of_its_steps() -> None:
-    history = thesis_rule.evolve(wear_problem(), 2e-7, 4)
+    history = evolve(thesis.Rule(wear_problem(), 2e-7), 4)
     assert len(history.cycles) == 4
     np.testing.assert_allclose(np.diff(history.cycles), history.cycles_in_step[:-1], rtol=1e-12)
     np.testing.assert_allclose(np.diff(history.depth, axis=0), history.worn[:-1], rtol=1e-9)
@@ -146,7 +147,7 @@ def test_the_error_of_a_wear_step_is_its_distance_from_an_implicit_euler_step() 
     """depth + h rate(after) is of first order: from the step of second order it is off by the first one's error."""
     share, scale = 0.01, 1e-5
     problem = wear_problem()
-    history = error_controlled_rule.evolve(problem, Tolerance(share, scale), 4)
+    history = evolve(error_controlled.Rule(problem, Tolerance(share, scale)), 4)
     rate = 1e-9 * history.energy / problem.area
     for now in range(3):
         off = history.worn[now] - history.cycles_in_step[now] * rate[now + 1]

@@ -17,11 +17,14 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
-from tribodyn.hbm.wear import error_controlled_rule, tangent, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
+from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
+from tribodyn.hbm.wear.wear_state import assess
 
 SHARE, STEP, LOADS = 0.2, 1e-6, ("press", "shake")
 AT = AtFrequency("tip", 420.0, EXACT)
@@ -80,9 +83,9 @@ def found_of(problem, worn, site, names, share=SHARE, numbers=None):
 def test_derivatives_of_a_life_are_those_of_its_steps_taken_again(rule, site, names):
     problem = problem_of(site)
     if rule == "thesis":
-        worn = thesis_rule.evolve(problem, 1e-5)
+        worn = evolve(thesis.Rule(problem, 1e-5))
     else:
-        worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+        worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
     found = found_of(problem, worn, site, [name for name in names if name != "gap"])
     for name in names:
         slope = found.by_gap.sum(axis=1) * 1e-4 if name == "gap" else found.slopes[:, found.parameters.index(name)]
@@ -137,9 +140,9 @@ def test_other_laws_and_missions_have_the_derivatives_of_their_steps_taken_again
 
     problem = posed()
     if mission is TWO and law == "energy":
-        worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+        worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
     else:
-        worn = thesis_rule.evolve(problem, 1e-5)
+        worn = evolve(thesis.Rule(problem, 1e-5))
     own = {name: (name, ["contact"]) for name in wear.numbers}
     found = found_of(problem, worn, AT, [name for name in names if name not in (*own, "gap")], numbers=own)
     assert (found.corner.any(), law) in ((False, "energy"), (False, "own"), (True, "archard"), (True, "impact"))
@@ -153,7 +156,7 @@ def test_other_laws_and_missions_have_the_derivatives_of_their_steps_taken_again
 
 def test_a_wear_law_that_jumps_as_a_pair_lifts_is_told():
     problem = problem_of(AT, wear=JointWear.of("impact", coefficient=1e-9))
-    worn = thesis_rule.evolve(problem, 1e-5)
+    worn = evolve(thesis.Rule(problem, 1e-5))
     closed = replace(worn, duty_displacement=worn.duty_displacement.copy())
     closed.duty_displacement[0, 0, 2::3, 0] += 1e-2  # pressed, so that no pair lifts
     with pytest.raises(NoDerivative, match="cycles a wear law jumps as a pair lifts"):
@@ -165,7 +168,7 @@ def test_all_loads_times_c_wear_c_times_as_deep_in_a_life_over_c(at_rest):
     """Contacts without gap are homogeneous: displacements go with c, work with its square."""
     ends = {"lost_below": 0.0, "lost_below_at_rest": SHARE} if at_rest else {}
     problem = problem_of(AT, **ends)
-    worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+    worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
     assert (worn.preload_at_rest is not None) == at_rest
     found = found_of(problem, worn, AT, LOADS)
     total = found.slopes[:, :2].sum(axis=1) / found.values
@@ -187,23 +190,27 @@ def test_a_pair_that_just_touches_marks_the_derivatives():
     touching = brentq(pressed, 0.0, 1e-2, xtol=1e-16)
     for gap, marked in ((touching, True), (0.5 * touching, False)):
         problem = opened(gap)
-        worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
+        worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
         found = found_of(problem, worn, AT, ("press",))
         assert found.corner.tolist() == 2 * [marked]
 
 
 def test_where_a_life_has_no_derivative_is_a_sentence():
     problem = problem_of(AT)
-    worn = error_controlled_rule.evolve(problem, Tolerance(0.3, 2e-4))
-    jumped, marched, stepped = worn.duty_omega.copy(), np.zeros(len(worn.cycles), int), worn.plan.copy()
+    worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
+    jumped, marched, stepped = (
+        worn.duty_omega.copy(),
+        np.zeros(len(worn.cycles), int),
+        worn.memory["next_cycles"].copy(),
+    )
     jumped[2:] *= 1.5
-    marched[1], stepped[1, 0] = 3, 0.0
+    marched[1], stepped[1] = 3, 0.0
     moving = np.zeros((len(marched), 1))
     in_time = {"periods": marched, "moving": moving, "spread": 0.0 * marched, "mean_error": 0.0 * marched}
     for told, run in (
         ("the response jumps from 66.8", replace(worn, duty_omega=jumped)),
         ("the motion is followed in time", replace(worn, settled=marched == 0, **in_time)),
-        ("stepped over the end of a branch", replace(worn, plan=stepped)),
+        ("stepped over the end of a branch", replace(worn, memory={**worn.memory, "next_cycles": stepped})),
     ):
         with pytest.raises(NoDerivative, match=f"cycles.* {told}"):
             found_of(problem, run, AT, ())

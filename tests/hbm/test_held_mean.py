@@ -20,11 +20,12 @@ from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.verify import verify
-from tribodyn.hbm.wear import error_controlled_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import cycles_to_preload
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.rules import error_controlled
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.reduction.prescribed import PrescribedModel, prescribe
 
 HEIGHT = 1.5e-4
@@ -158,8 +159,8 @@ def test_life_in_time_is_that_of_many_harmonics() -> None:
         lost_below=0.5,
     )
     with growth_by_few_modes():
-        run = error_controlled_rule.evolve(problem, Tolerance(0.01, 1e-4))
-    found = error_controlled_rule.evolve(problem, Tolerance(0.02, 1e-4), motion="time")
+        run = evolve(error_controlled.Rule(problem, Tolerance(0.01, 1e-4)))
+    found = evolve(error_controlled.Rule(problem, Tolerance(0.02, 1e-4), motion="time"))
     assert found.ended is run.ended is WearEnd.PRELOAD_LOST
     assert found.in_time.all()
     assert found.settled.all()

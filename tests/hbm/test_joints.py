@@ -21,10 +21,11 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.stability import exponents
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty
 from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 420.0
@@ -208,8 +209,8 @@ def test_joints_wear_by_their_own_laws(rule: str) -> None:
 
     def worn(problem: object) -> np.ndarray:
         if rule == "thesis":
-            return thesis_rule.evolve(problem, 5e-7, max_steps=6).depth[-1]
-        return error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), max_steps=4).depth[-1]
+            return evolve(thesis.Rule(problem, 5e-7), max_steps=6).depth[-1]
+        return evolve(error_controlled.Rule(problem, Tolerance(0.05, 2e-4)), max_steps=4).depth[-1]
 
     one = worn(whole)
     assert np.all(one > 0)
@@ -237,7 +238,7 @@ def test_only_the_preload_of_wearing_joints_counts() -> None:
         mission=(Duty(AtFrequency("tip", OMEGA)),),
         wear={"part 1": JointWear.of("energy", coefficient=1e-9)},
     )
-    history = thesis_rule.evolve(problem, 2e-5, max_steps=40)
+    history = evolve(thesis.Rule(problem, 2e-5), max_steps=40)
     state = newton.solve_from_rest(cut, OMEGA).state
     assert history.preload[0] == pytest.approx(cut.preload_by_joint(state)["part 1"], rel=1e-6)
     assert str(history.end).startswith("preload fell below 0.5")

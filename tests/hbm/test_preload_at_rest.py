@@ -11,16 +11,17 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import WearProblem
 
 
 def worn(problem: WearProblem, rule: str, max_steps: int = 10_000, resume: WearHistory | None = None) -> WearHistory:
     if rule == "thesis":
-        return thesis_rule.evolve(problem, 2e-6, max_steps, None, resume)
-    return error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-5), max_steps, None, resume)
+        return evolve(thesis.Rule(problem, 2e-6), max_steps, None, resume)
+    return evolve(error_controlled.Rule(problem, Tolerance(0.05, 1e-5)), max_steps, None, resume)
 
 
 @pytest.fixture(scope="module")

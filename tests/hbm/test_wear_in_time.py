@@ -23,12 +23,14 @@ from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.period_search import Period, PeriodSearch, Pushed, push
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
-from tribodyn.hbm.wear import error_controlled_rule, evolution, law as wear_law
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear import law as wear_law, wear_state
 from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.machine_motion import left_aside
-from tribodyn.hbm.wear.step_control import Tolerance, step_error
+from tribodyn.hbm.wear.rules import error_controlled
+from tribodyn.hbm.wear.steady_motion import left_aside
+from tribodyn.hbm.wear.step_control import Tolerance, measured_error
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 
 LEFT = 0.5  # share of the preload
 
@@ -49,11 +51,11 @@ def flipping() -> WearProblem:
 @pytest.fixture(scope="module")
 def run(problem: WearProblem) -> WearHistory:
     with growth_by_few_modes():  # none of which grows
-        return error_controlled_rule.evolve(problem, Tolerance(0.02, 2e-4))
+        return evolve(error_controlled.Rule(problem, Tolerance(0.02, 2e-4)))
 
 
 def test_life_in_time_is_that_of_many_harmonics(problem: WearProblem, run: WearHistory) -> None:
-    found = error_controlled_rule.evolve(problem, Tolerance(0.02, 2e-4), motion="time")
+    found = evolve(error_controlled.Rule(problem, Tolerance(0.02, 2e-4), motion="time"))
     assert found.end.kind is WearEnd.PRELOAD_LOST
     assert found.in_time[:-1].all()
     assert found.scatter == 0.0
@@ -65,14 +67,14 @@ def test_life_in_time_is_that_of_many_harmonics(problem: WearProblem, run: WearH
 def test_wear_in_time_goes_on_where_the_balance_has_no_solution(
     problem: WearProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), 4, motion="time")
+    whole = evolve(error_controlled.Rule(problem, Tolerance(0.05, 2e-4), motion="time"), 4)
     lost = SolveEnd.NO_DESCENT.say(" here")
     monkeypatch.setattr(
-        evolution,
+        wear_state,
         "newton",
         SimpleNamespace(Solution=newton.Solution, solve=lambda *of: replace(newton.solve(*of), outcome=lost)),
     )
-    found = error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), 4, motion="time")
+    found = evolve(error_controlled.Rule(problem, Tolerance(0.05, 2e-4), motion="time"), 4)
     assert len(found.cycles) == 4
     np.testing.assert_array_equal(found.depth, whole.depth)
     np.testing.assert_array_equal(found.displacement[1:], found.displacement[:1].repeat(3, axis=0))  # that of the first
@@ -84,23 +86,23 @@ def test_a_motion_that_is_the_balances_is_not_followed(
     problem: WearProblem, run: WearHistory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever Hill's method says of it."""
-    monkeypatch.setattr(error_controlled_rule, "with_growth", lambda _, state, always: replace(state, growth=1.0))
-    found = error_controlled_rule.evolve(problem, Tolerance(0.02, 2e-4), max_steps=3, motion="machine")
+    monkeypatch.setattr(error_controlled, "with_growth", lambda _, state, always: replace(state, growth=1.0))
+    found = evolve(error_controlled.Rule(problem, Tolerance(0.02, 2e-4), motion="machine"), max_steps=3)
     assert not found.in_time.any()
     np.testing.assert_array_equal(found.depth, run.depth[:3])
 
 
 def test_a_balance_that_is_stable_again_is_taken_again(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = flipping()
-    first = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 3, motion="machine")
+    first = evolve(error_controlled.Rule(problem, Tolerance(0.05, 1e-6), motion="machine"), 3)
     assert first.in_time.all()
     until = first.cycles[1]
     monkeypatch.setattr(
-        error_controlled_rule,
+        error_controlled,
         "with_growth",
         lambda _, state, always: replace(state, growth=1.0 if state.cycles <= until else -1.0),
     )
-    found = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 4, motion="machine")
+    found = evolve(error_controlled.Rule(problem, Tolerance(0.05, 1e-6), motion="machine"), 4)
     assert found.in_time.tolist() == [True, True, False, False]
     assert "from 0 cycles on" in str(found.end)
 
@@ -112,17 +114,17 @@ def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit(
     problem = flipping()
     flips = problem.balance
     rows: list[WearRow] = []
-    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 4, rows.append, motion=motion)
+    whole = evolve(error_controlled.Rule(problem, Tolerance(0.05, 1e-6), motion=motion), 4, rows.append)
     assert whole.in_time.all()
     assert "followed in time for 100% of the cycles" in str(whole.end)
     follower = Follower(MeanOptions(128))
     follower.start(flips, newton.solve(flips, FLIPS_AT, whole.displacement[0].reshape(3, 3, -1)).state)
     alone = follower.mean(flips, FLIPS_AT, lambda period: period.energy)
     assert whole.energy[0].sum() == pytest.approx(alone.energy.sum(), rel=0.01)
-    along_balance = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 1).energy[0].sum()
+    along_balance = evolve(error_controlled.Rule(problem, Tolerance(0.05, 1e-6)), 1).energy[0].sum()
     assert abs(whole.energy[0].sum() / along_balance - 1) > 0.04
     begun = history(rows[:3], WearEnd.UNFINISHED.say())
-    resumed = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 4, resume=begun, motion=motion)
+    resumed = evolve(error_controlled.Rule(problem, Tolerance(0.05, 1e-6), motion=motion), 4, resume=begun)
     for name in ("cycles", "depth", "energy", "moving", "spread"):
         np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name))
 
@@ -238,14 +240,14 @@ def test_periods_go_to_states_by_the_cycles_that_they_stand_for(monkeypatch: pyt
         return MeanMotion(rate, force, rate, np.zeros(1), scatter, error, settled=True, periods=periods)
 
     monkeypatch.setattr(Follower, "mean", mean)
-    found = error_controlled_rule.evolve(problem, Tolerance(0.02, scale), motion="time")
+    found = evolve(error_controlled.Rule(problem, Tolerance(0.02, scale), motion="time"))
     life = found.cycles[-1]
     assert life == pytest.approx(LEFT * scale / 1e-14, rel=0.05)
     early = found.cycles < 0.01 * life
     assert early.sum() < 0.25 * len(early)
     assert (found.cycles_in_step * found.mean_error).max() < 0.02 * life
     assert min(all_asked) * found.cycles_in_step.max() == pytest.approx(0.02 * life, rel=1.5)  # of the longest step
-    assert found.scatter < step_error(found, Tolerance(0.02, scale)).cycles < 0.1
+    assert found.scatter < measured_error(found, Tolerance(0.02, scale)).cycles < 0.1
 
 
 def test_the_standard_error_of_a_mean_covers_its_deviation() -> None:
@@ -262,11 +264,13 @@ def test_the_standard_error_of_a_mean_covers_its_deviation() -> None:
 
 def test_a_periodic_motion_that_a_run_passed_by_is_told(problem: WearProblem, run: WearHistory) -> None:
     """The work of a run halved, as if a transient had been followed; and one whose balance's motion does not stay."""
-    assert left_aside(problem, error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), 3, motion="time"), 3) == 0.0
+    assert (
+        left_aside(problem, evolve(error_controlled.Rule(problem, Tolerance(0.05, 2e-4), motion="time"), 3), 3) == 0.0
+    )
     half = replace(run, energy=0.5 * run.energy, spread=np.full(len(run.cycles), 0.3))
     assert left_aside(problem, half, 3) == pytest.approx(-0.5, rel=0.02)
     flips = flipping()
-    passed = error_controlled_rule.evolve(flips, Tolerance(0.05, 1e-6), 3, motion="machine")
+    passed = evolve(error_controlled.Rule(flips, Tolerance(0.05, 1e-6), motion="machine"), 3)
     assert passed.spread is not None
     assert passed.spread.min() > 0.05
     assert left_aside(flips, passed, 3) == 0.0
@@ -296,6 +300,6 @@ def test_life_is_as_exact_where_little_is_left_to_wear(monkeypatch: pytest.Monke
         return MeanMotion(left, left, 1e-14 * left, np.zeros(1), 0.0, 0.0, settled=True, periods=8)
 
     monkeypatch.setattr(Follower, "mean", mean)
-    found = error_controlled_rule.evolve(problem, Tolerance(0.05, scale), motion="time")
+    found = evolve(error_controlled.Rule(problem, Tolerance(0.05, scale), motion="time"))
     for share in (0.1, 0.01, 1e-3):
         assert cycles_to_preload(found, share) == pytest.approx(np.log(1 / share) * scale / 1e-14, rel=0.01)

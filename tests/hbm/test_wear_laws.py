@@ -9,10 +9,12 @@ import pytest
 
 from tests.helpers.pressed_body import N_PAIR, life, wear_problem
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.wear import error_controlled_rule, law as wear_law, thesis_rule
-from tribodyn.hbm.wear.evolution import WearProblem
+from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import WearProblem
 from tribodyn.workflows.scene import scene_file
 
 
@@ -37,19 +39,19 @@ def test_archard_and_energy_law_agree_up_to_the_uncoupled_directions(problem: We
 @pytest.mark.parametrize("law", ["archard"])
 def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str) -> None:
     other = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
-    fine = thesis_rule.evolve(other, 1.5e-6)
-    worn = error_controlled_rule.evolve(other, Tolerance(0.02, 2e-4))
+    fine = evolve(thesis.Rule(other, 1.5e-6))
+    worn = evolve(error_controlled.Rule(other, Tolerance(0.02, 2e-4)))
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
 
 
 def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
     law = str(scene_file.CASES / "beam" / "running_in.py")
     own = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
-    fine = thesis_rule.evolve(own, 1.5e-6)
-    worn = error_controlled_rule.evolve(own, Tolerance(0.02, 2e-4))
+    fine = evolve(thesis.Rule(own, 1.5e-6))
+    worn = evolve(error_controlled.Rule(own, Tolerance(0.02, 2e-4)))
     assert life(worn) == pytest.approx(life(fine), rel=0.015)
     plain_problem = wear_problem(wear=JointWear.of("energy", coefficient=4e-10))
-    plain = error_controlled_rule.evolve(plain_problem, Tolerance(0.02, 2e-4))
+    plain = evolve(error_controlled.Rule(plain_problem, Tolerance(0.02, 2e-4)))
     assert 0.25 * life(plain) < life(worn) < life(plain)  # a fresh face wears four times as fast
 
 
@@ -74,9 +76,9 @@ def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, say
     path = tmp_path / "law.py"
     path.write_text(f"def depth_rate(exposure):\n    {body}\n")
     with pytest.raises(ValueError, match=says):
-        thesis_rule.evolve(wear_problem(wear=JointWear.of(str(path))), 5e-7, max_steps=1)
+        evolve(thesis.Rule(wear_problem(wear=JointWear.of(str(path))), 5e-7), max_steps=1)
 
 
 def test_a_law_that_takes_nothing_off_is_not_called_a_contact_at_rest() -> None:
-    worn = thesis_rule.evolve(wear_problem(wear=JointWear.of("energy", coefficient=0.0)), 5e-7)
+    worn = evolve(thesis.Rule(wear_problem(wear=JointWear.of("energy", coefficient=0.0)), 5e-7))
     assert worn.ended is WearEnd.NO_LOSS

@@ -19,10 +19,11 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.wear import error_controlled_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.rules import error_controlled
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.reduction.model import ReducedModel
 
 YOUNG, POISSON, RADIUS, MU, YIELD, TANGENT = 192.31e9, 0.3, 1.36493e-3, 0.3, 331.7e6, 620e6
@@ -61,7 +62,7 @@ def test_a_sliding_block_wears_as_its_differential_equation_says() -> None:
     preloaded = np.maximum(balance.at_rest[:, 1] - GAP, 0.0)
     duty, law = Duty(AtFrequency("tip", 1000.0)), JointWear.of("archard", coefficient=WEAR)
     problem = WearProblem(balance, (duty,), law, np.full(len(GAP), AREA))
-    worn = error_controlled_rule.evolve(problem, Tolerance(0.02, 1e-6), 14)
+    worn = evolve(error_controlled.Rule(problem, Tolerance(0.02, 1e-6)), 14)
     swing = worn.amplitude[0]
     assert worn.amplitude == pytest.approx(swing, rel=1e-3)  # the friction of all faces together does not change
 

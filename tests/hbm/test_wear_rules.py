@@ -18,12 +18,15 @@ from tribodyn.hbm.continuation.peak_refinement import NoPeak
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
-from tribodyn.hbm.wear import dirk_stages, error_controlled_rule, machine_motion, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
+from tribodyn.hbm.wear import balance_step, sdirk_stages, steady_motion
 from tribodyn.hbm.wear.history import WearHistory, events, first
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.step_control import Tolerance, local_error, step_error
+from tribodyn.hbm.wear.rules import error_controlled, thesis
+from tribodyn.hbm.wear.step_control import Tolerance, local_error, measured_error
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
+from tribodyn.hbm.wear.wear_state import assess
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -40,12 +43,12 @@ def problem() -> WearProblem:
 
 @pytest.fixture(scope="module")
 def fine(problem: WearProblem) -> WearHistory:
-    return thesis_rule.evolve(problem, 2e-7)
+    return evolve(thesis.Rule(problem, 2e-7))
 
 
 def test_thesis_rule_wears_what_it_dissipates(problem: WearProblem) -> None:
     first = assess(problem, np.zeros(N_PAIR), 0.0, None)
-    worn = thesis_rule.evolve(problem, 2e-6)
+    worn = evolve(thesis.Rule(problem, 2e-6))
     assert str(worn.end).startswith(("preload fell", "contact lost"))
     assert worn.worn[0].max() <= 2e-6  # eq. 3.30: Z is rounded down
     assert worn.cycles_in_step[0] == np.floor(2e-6 / first.rate.max())
@@ -83,7 +86,7 @@ def test_wear_inside_the_balance_has_the_derivative_of_finite_differences(proble
 def test_error_controlled_rule_converges_with_its_tolerance(problem: WearProblem, fine: WearHistory) -> None:
     errors = []
     for share in (0.1, 0.01):
-        worn = error_controlled_rule.evolve(problem, Tolerance(share, 2e-4))
+        worn = evolve(error_controlled.Rule(problem, Tolerance(share, 2e-4)))
         assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
         errors.append(abs(life(worn) / life(fine) - 1))
         assert np.all(np.diff(worn.depth, axis=0) >= 0)
@@ -96,9 +99,9 @@ def test_error_controlled_rule_converges_with_its_tolerance(problem: WearProblem
 def test_a_resumed_run_ends_in_the_same_bits(problem: WearProblem, kind: str) -> None:
     def run(resume=None, max_steps=10000):
         if kind == "thesis":
-            return thesis_rule.evolve(problem, 2e-6, max_steps, None, resume)
+            return evolve(thesis.Rule(problem, 2e-6), max_steps, None, resume)
         tolerance = Tolerance(0.05, 1e-5)
-        return error_controlled_rule.evolve(problem, tolerance, max_steps, None, resume)
+        return evolve(error_controlled.Rule(problem, tolerance), max_steps, None, resume)
 
     whole = run()
     parts = run(run(None, 3))
@@ -129,8 +132,8 @@ def test_missions_average_their_duties(problem: WearProblem) -> None:
 def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProblem) -> None:
     mission = (Duty(AtFrequency("tip", 420.0), 0.4), Duty(AtPeak("tip", 250.0, 1200.0), 0.6, load=0.7))
     mixed = wear_problem(mission=mission, lost_below=0.02)
-    fine = thesis_rule.evolve(mixed, 1.5e-6)
-    worn = error_controlled_rule.evolve(mixed, Tolerance(0.02, 2e-4))
+    fine = evolve(thesis.Rule(mixed, 1.5e-6))
+    worn = evolve(error_controlled.Rule(mixed, Tolerance(0.02, 2e-4)))
     assert str(worn.end).startswith("preload fell")
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
     assert len(worn.cycles) < len(fine.cycles) / 3  # on four pairs a search for a higher peak outweighs twenty steps
@@ -148,7 +151,7 @@ def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: We
             assert lost[0] == pytest.approx(k, abs=1)
         elif not np.isfinite(found[i]):
             assert touching[-1] == len(fine.cycles) - 1
-    coarse = error_controlled_rule.evolve(problem, Tolerance(0.01, 2e-4))
+    coarse = evolve(error_controlled.Rule(problem, Tolerance(0.01, 2e-4)))
     _, rough = events(coarse, ("t1", "t2", "n"), gap, basis)
     assert first(found) is not None
     assert first(rough) == pytest.approx(first(found), rel=0.05)
@@ -186,8 +189,8 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
             ended = not over and (balance.contact.gap - gap).max() > end
             return FrequencyCorrection(state.omega if ended else 0.0, 0)
 
-    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Ending("tip", 420.0)),)), tolerance)
-    leaps = np.flatnonzero(worn.plan[:-1, 0] == 0.0)
+    worn = evolve(error_controlled.Rule(replace(problem, mission=(Duty(Ending("tip", 420.0)),)), tolerance))
+    leaps = np.flatnonzero(worn.memory["next_cycles"][:-1] == 0.0)
     assert 1 < len(leaps) <= 6
     assert leaps[-1] == leaps[-2] + 1
     assert worn.worn[leaps[-1]].max() > 2 * worn.worn[leaps[-2]].max()  # a second one in a row is longer
@@ -195,7 +198,7 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
     assert worn.depth[leaps[-1] + 1].max() > end + 2e-6
     assert str(worn.end).startswith("preload fell")
     assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
-    plain = error_controlled_rule.evolve(problem, tolerance)
+    plain = evolve(error_controlled.Rule(problem, tolerance))
     assert life(worn) == pytest.approx(life(plain), rel=0.02)
 
 
@@ -217,18 +220,18 @@ def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None
             return FrequencyCorrection(state.omega if gone(balance) else 0.0, 0)
 
     lacking = replace(whole, mission=(Duty(Missing("tip", 420.0)),))
-    worn = error_controlled_rule.evolve(lacking, tolerance)
+    worn = evolve(error_controlled.Rule(lacking, tolerance))
     moves = np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2))
     deepest = worn.depth.max(axis=1)
     few = np.flatnonzero(~moves)
     assert np.all(few == np.arange(few[0], few[-1] + 1))
     assert deepest[few[0]] <= 1e-5 < deepest[few[0] + 1]
     assert deepest[few[-1]] < 6e-5 <= deepest[few[-1] + 1]
-    assert np.all(worn.plan[:-1, 0] > 0)  # implicit steps throughout
+    assert np.all(worn.memory["next_cycles"][:-1] > 0)  # implicit steps throughout
     assert "with harmonics up to 3" in str(worn.end)
-    assert life(worn) == pytest.approx(life(error_controlled_rule.evolve(whole, tolerance)), rel=0.02)
-    begun = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 2)
-    again = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 3, resume=begun)
+    assert life(worn) == pytest.approx(life(evolve(error_controlled.Rule(whole, tolerance))), rel=0.02)
+    begun = evolve(error_controlled.Rule(lacking, tolerance), int(few[0]) + 2)
+    again = evolve(error_controlled.Rule(lacking, tolerance), int(few[0]) + 3, resume=begun)
     assert np.array_equal(again.depth, worn.depth[: len(again.depth)])
     assert len(again.depth) > len(begun.depth)
 
@@ -252,14 +255,14 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
             ended = not over and (balance.contact.gap - gap).max() > end
             return FrequencyCorrection(state.omega if ended else 0.0, 0)
 
-    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Blind("tip", 420.0)),)), tolerance)
+    worn = evolve(error_controlled.Rule(replace(problem, mission=(Duty(Blind("tip", 420.0)),)), tolerance))
     assert missed
     assert str(worn.end).startswith("preload fell")
     leap = int(np.flatnonzero(worn.depth.max(axis=1) == over[0])[0]) - 1
-    assert worn.plan[leap, 0] == 0.0
+    assert worn.memory["next_cycles"][leap] == 0.0
     assert worn.solves[leap] > len(missed)  # what was looked for in vain is counted
     assert worn.worn[leap].max() <= 1e-5
-    assert life(worn) == pytest.approx(life(error_controlled_rule.evolve(problem, tolerance)), rel=0.02)
+    assert life(worn) == pytest.approx(life(evolve(error_controlled.Rule(problem, tolerance))), rel=0.02)
 
 
 def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(problem: WearProblem) -> None:
@@ -268,8 +271,8 @@ def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(proble
             return FrequencyCorrection(state.omega, 0)
 
     tolerance = Tolerance(0.1, 2e-4)
-    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance)
-    explicit = thesis_rule.evolve(problem, error_controlled_rule.EXPLICIT_STEPS[-1] * 0.1 * 2e-4)
+    worn = evolve(error_controlled.Rule(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance))
+    explicit = evolve(thesis.Rule(problem, balance_step.EXPLICIT_STEPS[-1] * 0.1 * 2e-4))
     assert worn.end == explicit.end
     assert np.all(worn.step_error[:-1] == 1.0)
     assert worn.worn.max() <= 2e-5
@@ -291,7 +294,7 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
 
     tolerance = Tolerance(0.1, 2e-4)
     never = replace(whole, mission=(Duty(Never("tip", 420.0)),))
-    worn = error_controlled_rule.evolve(never, tolerance, max_steps=2)
+    worn = evolve(error_controlled.Rule(never, tolerance), max_steps=2)
     assert seen == [8, 8, 8]  # at the start and behind both steps
     assert np.all(worn.step_error == 1.0)
     assert np.all(np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2)))  # the step wears with all of them
@@ -304,16 +307,16 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
 
     seen.clear()
     ends = replace(whole, mission=(Duty(Ends("tip", 420.0)),))
-    error_controlled_rule.evolve(ends, tolerance, max_steps=1)
+    evolve(error_controlled.Rule(ends, tolerance), max_steps=1)
     assert seen == [8, 4]
 
 
 @pytest.mark.parametrize("steepness", [0.5, 1.0, 10.0, 30.0])
 def test_the_frequency_of_a_peak_is_found_where_its_distance_is_taken_for_far_too_large(steepness: float) -> None:
     """The frequencies that are tried stay beside the peak: further off there may be no solution."""
-    search, peak = dirk_stages.Search(dirk_stages.RULES.unknown_slope), 1.002
+    search, peak = sdirk_stages.FrequencySearch(sdirk_stages.RULES.unknown_slope), 1.002
     tried = [1.0]
-    while abs(tried[-1] - peak) > 1e-5 and len(tried) <= dirk_stages.RULES.max_corrections:
+    while abs(tried[-1] - peak) > 1e-5 and len(tried) <= sdirk_stages.RULES.max_corrections:
         tried.append(search.next(tried[-1], steepness * (peak - tried[-1])))
     assert abs(tried[-1] - peak) <= 1e-5
     assert max(tried) < peak + 0.002
@@ -341,8 +344,8 @@ def test_a_contact_that_outlives_its_wear_is_told_with_what_is_left() -> None:
     """Pressed hard and shaken so little that slip shakes down: wear ends by itself, or fades, while preload remains."""
     problem = wear_problem(mission=(Duty(AtFrequency("tip", 420.0), load=0.2),))
     for worn in (
-        thesis_rule.evolve(problem, 1e-6, max_steps=400),
-        error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), max_steps=200),
+        evolve(thesis.Rule(problem, 1e-6), max_steps=400),
+        evolve(error_controlled.Rule(problem, Tolerance(0.05, 2e-4)), max_steps=200),
     ):
         assert worn.ended.survived, worn.end
         assert "N of preload left" in str(worn.end)
@@ -435,10 +438,10 @@ class TwoPlaces(AtFrequency):
 
 def test_the_jump_to_a_peak_that_overtakes_is_located_and_said(problem: WearProblem) -> None:
     tolerance = Tolerance(0.02, 1e-4)
-    worn = error_controlled_rule.evolve(wear_problem(mission=(Duty(TwoPlaces("tip", 420.0)),)), tolerance)
+    worn = evolve(error_controlled.Rule(wear_problem(mission=(Duty(TwoPlaces("tip", 420.0)),)), tolerance))
     after = int(np.flatnonzero(worn.omega == SECOND)[0])
     assert np.all(worn.omega[after:] == SECOND)
-    stays = error_controlled_rule.evolve(problem, tolerance)
+    stays = evolve(error_controlled.Rule(problem, tolerance))
     exact = float(np.interp(LEAP_DEPTH, stays.depth.max(axis=1), stays.cycles))
     assert worn.cycles[after] == pytest.approx(exact, rel=0.03)
     assert worn.depth[after].max() >= LEAP_DEPTH
@@ -454,8 +457,8 @@ def test_a_step_is_held_to_the_cycles_that_its_error_takes_behind_it() -> None:
     assert local_error(tolerance, area, np.array([1.0, -1.0]), 0.0 * area, 10.0, 20.0) == 0.5  # its own cycles at most
     assert local_error(tolerance, area, 0.0 * area, 0.0 * area, 10.0, 10.0) == 0.0
     for length in (0.2, 1.0, 2.0, 4.0):  # cycles over those in which the rate falls to 1/e
-        first = 1 / (1 + machine_motion.GAMMA * length)
-        second = (max(1 - length * first, 0.0) - 2 * first) / (1 + machine_motion.GAMMA * length)
+        first = 1 / (1 + steady_motion.GAMMA * length)
+        second = (max(1 - length * first, 0.0) - 2 * first) / (1 + steady_motion.GAMMA * length)
         worn, deviation = length * (1.5 * first + 0.5 * second), 0.5 * length * (first + second)
         off = abs(worn - (1 - np.exp(-length))) / np.exp(-length)  # cycles by which the rate is reached early or late
         told = local_error(tolerance, area[:1], np.array([deviation]), np.array([1 - worn]), length, length) * length
@@ -463,9 +466,9 @@ def test_a_step_is_held_to_the_cycles_that_its_error_takes_behind_it() -> None:
 
 
 def test_the_steps_of_a_run_add_up_in_its_estimate(problem: WearProblem, fine: WearHistory) -> None:
-    run = error_controlled_rule.evolve(problem, Tolerance(0.1, 2e-4))
-    estimate = step_error(run, Tolerance(0.1, 2e-4)).cycles
+    run = evolve(error_controlled.Rule(problem, Tolerance(0.1, 2e-4)))
+    estimate = measured_error(run, Tolerance(0.1, 2e-4)).cycles
     assert 0.0 < abs(life(run) / life(fine) - 1) < estimate < 0.2
     begun = replace(run, step_error=np.where(run.cycles == 0, 10.0, run.step_error))
     # a first step that is far off is so by its own few cycles
-    assert step_error(begun, Tolerance(0.1, 2e-4)).cycles < 0.2
+    assert measured_error(begun, Tolerance(0.1, 2e-4)).cycles < 0.2

@@ -20,9 +20,9 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.stability import exponents
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.reduction.model import ReducedModel
 
 N_PAIR = 4

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.wear.dirk_stages import Search, begun, stages
-from tribodyn.hbm.wear.evolution import assess, state_of
+from tribodyn.hbm.wear.history import StepScheme
+from tribodyn.hbm.wear.sdirk_stages import FrequencySearch, initial_guess, solve_stages
+from tribodyn.hbm.wear.wear_rows import state_of
+from tribodyn.hbm.wear.wear_state import assess
 
 EXACT = NewtonOptions(tolerance=1e-12)
 
@@ -29,9 +31,11 @@ def again(problem, worn, end, longer):
     first = problem.preload_of(state)
     for i, row in enumerate(rows[:end]):
         stride = longer * row.cycles_in_step
-        if len(row.plan):
-            drift, slopes = begun(problem, state_of(problem, row), rows[:i], problem)
-            state = stages(problem, state, stride, drift / longer, [Search(float(slope)) for slope in slopes])[1]
+        if worn.scheme == StepScheme.IMPLICIT:
+            drift, slopes = initial_guess(problem, state_of(problem, row), rows[:i], problem)
+            state = solve_stages(
+                problem, state, stride, drift / longer, [FrequencySearch(float(slope)) for slope in slopes]
+            )[1]
         else:
             state = assess(problem, state.depth + stride * state.rate, state.cycles + stride, state)
         assert not state.failure

@@ -92,7 +92,6 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         response=row_response,
         solves=np.full(n_row, 4),
         step_error=np.zeros(n_row),
-        plan=np.zeros((n_row, 0)),
         work=cycles_in_step[:, None] * energy,
         duty_omega=omega_row[:, None],
         duty_displacement=displacement[:, None],

@@ -15,7 +15,9 @@ from proof.extremes_march import march_checks
 from proof.extremes_models import lattice, rigid
 from tests.helpers.pressed_body import growth_by_few_modes
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.wear.step_control import step_error
+from tribodyn.hbm.wear.rules import thesis
+from tribodyn.hbm.wear.step_control import first_order_error
+from tribodyn.hbm.wear.wear_loop import evolve
 
 
 def test_no_cell_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,5 +140,6 @@ def test_a_contact_that_sticks_does_not_wear() -> None:
 
 def test_the_error_of_wear_steps_falls_with_the_step() -> None:
     problem, delta = extremes_wear._problem(rigid(4))
-    estimates = [step_error(extremes_wear.thesis_rule.evolve(problem, s * delta)).cycles for s in (0.2, 0.05, 0.0125)]
+    runs = [evolve(thesis.Rule(problem, share * delta)) for share in (0.2, 0.05, 0.0125)]
+    estimates = [first_order_error(run).cycles for run in runs]
     assert estimates == sorted(estimates, reverse=True)

@@ -34,11 +34,12 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.linear.expansion import SingularStuckSystem, UndampedResonance
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 
 DECLARED = (SingularStuckSystem, UndampedResonance, CycleNotPeriodic)
 TOLERANCE = NewtonOptions().tolerance
@@ -151,9 +152,9 @@ def test_wear_only_grows(d: Drawn, law: str, rule: str, share: float) -> None:
         problem = WearProblem(balance, (Duty(site),), JointWear.of(law, coefficient=coefficient), area)
         depth = share * max(np.abs(first.state.x[:, -1, 0]).max(), 1e-12)
         if rule == "thesis":
-            history = thesis_rule.evolve(problem, depth, max_steps=3)
+            history = evolve(thesis.Rule(problem, depth), max_steps=3)
         else:
-            history = error_controlled_rule.evolve(problem, Tolerance(0.1, depth), max_steps=2)
+            history = evolve(error_controlled.Rule(problem, Tolerance(0.1, depth)), max_steps=2)
     except DECLARED:
         return
     except ValueError as refused:

@@ -15,6 +15,7 @@ from tribodyn.hbm.derivatives import cycle_derivatives, fold_derivatives
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
+from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import references, settings, varying, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
@@ -312,8 +313,8 @@ def test_derivatives_of_the_blades_life_are_those_of_its_steps_taken_again(site,
 
     with limited(1):
         own, problem = varying(), problem_of(1.0)
-        limit = settings.step_limit(file.scene, references.free_deflection(own.model.balance), problem.area)
-        worn = wear_run.evolve(problem, file.scene.wear, limit, file.scene.wear.max_steps)
+        scale = settings.depth_scale(file.scene, references.free_deflection(own.model.balance), problem.area)
+        worn = evolve(wear_run.rule_of(file.scene, problem, scale), file.scene.wear.max_steps)
         found = tangent.of_life(problem, worn, [own.change(key, 0.5)], {}, share)
         elasticity = found.slopes[:, 0] * 0.5 / found.values
         difference = elasticity_anew(worn, share, problem_of, elasticity[0])

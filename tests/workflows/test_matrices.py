@@ -20,9 +20,10 @@ from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear import thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.rules import thesis
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.reduction import foreign as reduction_foreign
 from tribodyn.reduction.foreign import read_matrices, reduced_model
 from tribodyn.workflows.result import store
@@ -75,7 +76,7 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
         kind.__name__.rpartition(".")[2]: kind
         for kind in (
             ContactParameters, HarmonicBalance, HarmonicBasis, Excitation, natural, AtPeak, Duty, WearProblem,
-            Joint, JointWear, thesis_rule, read_matrices, reduced_model,
+            Joint, JointWear, thesis, evolve, read_matrices, reduced_model,
         )
     }  # fmt: skip
     exec(example, names)

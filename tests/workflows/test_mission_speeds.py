@@ -9,6 +9,7 @@ import pytest
 
 from tests.helpers.wheel_scene import WHEEL
 from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -37,7 +38,7 @@ def worn(scene: Path, *changes: str) -> WearHistory:
     wear = file.scene.wear
     assert wear is not None
     problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
-    return wear_run.evolve(problem, wear, 2e-6, wear.max_steps)
+    return evolve(wear_run.rule_of(file.scene, problem, 2e-6), wear.max_steps)
 
 
 def rate(history: WearHistory) -> np.ndarray:

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, StatedQuantity, WearQuantity, with_error
-from tribodyn.hbm.wear.machine_motion import left_aside
-from tribodyn.hbm.wear.step_control import Tolerance, step_error
+from tribodyn.hbm.wear import wear_rule
+from tribodyn.hbm.wear.steady_motion import left_aside
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import operating_states, refine, wear_values
 from tribodyn.workflows.errors.operating_states import OperatingState, Values, relative_change
@@ -196,8 +196,8 @@ def _add_estimates(
     wear = file.scene.wear
     if wear is None or result.wear is None or not result.wear_steps:
         return
-    tolerance = Tolerance(wear.tolerance, result.facts.delta_max or np.nan)  # of error-controlled steps
-    steps = step_error(result.wear, tolerance if wear.rule == "error_controlled" else None)
+    rule = wear_rule.load(wear.rule_name).Rule
+    steps = rule.error(result.wear, wear_run.rule_settings(file.scene, result.facts.delta_max or np.nan))
     durations = [q for q in with_error(WearQuantity) if q.error is ErrorKind.DURATION]
     for quantity in with_error(WearQuantity):
         relative = steps.cycles if quantity in durations else steps.depth

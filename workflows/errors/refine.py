@@ -13,7 +13,7 @@ from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.structure import BodyTable, DeckTable
-from tribodyn.workflows.scene.wear import WearStep
+from tribodyn.workflows.scene.wear import Wear, WearStep
 
 HALVED = 2.0  # ratio of element sizes where every element of a given mesh is cut into eight
 
@@ -65,14 +65,17 @@ def wear(file: SceneFile, factor: float) -> SceneFile:
     table = file.scene.wear
     if table is None:
         return file
-    step = table.step or WearStep()
-    if table.rule == "error_controlled":
-        finer = f"wear.tolerance={table.tolerance / factor!r}"
-    elif step.share is not None:
-        finer = f"wear.step={step.share / factor!r}"
-    else:
-        finer = f"wear.step={(step.depth or 0.0) / factor!r} m"
-    return file.changed(f"wear.max_steps={round(2 * factor * table.max_steps)}", finer)
+    finer = [_finer(table, key, factor) for key in table.accuracy_keys]
+    return file.changed(f"wear.max_steps={round(2 * factor * table.max_steps)}", *finer)
+
+
+def _finer(table: Wear, key: str, factor: float) -> str:
+    """Override that divides a key of the accuracy of wear steps by a factor."""
+    value, unit = table.parameters.get(key, table.tolerance), ""
+    if key == "step":
+        step = table.step or WearStep()
+        value, unit = (step.depth or 0.0, " m") if step.share is None else (step.share, "")
+    return f"wear.{key}={value / factor!r}{unit}"
 
 
 def _meshed(file: SceneFile) -> dict[str, Mesh]:

@@ -47,6 +47,7 @@ FIELD = {"frf": "response"}  # groups of the file that have another name than th
 Ended = TypeVar("Ended", bound=End)
 KIND = "end_kind"  # attribute with the name of the member whose sentence stands in "end"
 ENDS: dict[type, type[End]] = {Branch: BranchEnd, WearHistory: WearEnd}
+MEMORY = "memory"  # group with the arrays that a wear rule remembers from step to step
 KINDS = "outcome_kind"  # attribute with the names of the members whose sentences stand in "outcome"
 
 Arrays = Mapping[str, tuple[tuple[str, ...], str]]
@@ -94,7 +95,7 @@ SCHEMA: dict[str, tuple[type, Arrays]] = {
         ("wear", WearHistory, {
             "row": "cycles cycles_in_step preload:N omega:rad/s amplitude:m solves step_error preload_at_rest:N growth "
                    "spread mean_error settled periods",
-            "row pair": "depth:m worn:m energy:J normal_force:N status work:J", "row plan": "plan",
+            "row pair": "depth:m worn:m energy:J normal_force:N status work:J",
             "row contact coefficient": "force:N", "row output coefficient": "response:m", "row moving": "moving",
             "row duty": "duty_omega:rad/s", "row duty contact coefficient": "duty_displacement:m",
         }),
@@ -158,6 +159,10 @@ def _write(file: h5py.File, result: Result) -> None:
                 _write_array(file, scales, group, item.name, np.asarray(value, dtype), *arrays[item.name])
             elif isinstance(value, Outcome):
                 group.attrs[item.name], group.attrs[KIND] = str(value), value.kind.name
+            elif isinstance(value, Mapping):  # arrays of a wear rule, which alone knows their names
+                for name, array in value.items():
+                    axes = (f"{name}_{i}" for i in range(1, array.ndim))
+                    _write_array(file, scales, group.require_group(item.name), name, array, ("row", *axes), "")
             elif item.name == "outcome":
                 group.attrs[item.name] = _strings(str(outcome) for outcome in value)
                 group.attrs[KINDS] = _strings(outcome.kind.name for outcome in value)
@@ -266,6 +271,8 @@ def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
                 continue
             value = group[item.name][()]
             values[item.name] = tuple(value.tolist()) if str(item.type).startswith("tuple") else value
+        elif item.name == MEMORY:
+            values[item.name] = {name: array[()] for name, array in group.get(item.name, {}).items()}
         elif item.name == "end":
             values[item.name] = _outcome(ENDS[kind], str(group.attrs[KIND]), str(group.attrs[item.name]))
         elif item.name == "outcome":

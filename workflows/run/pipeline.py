@@ -55,7 +55,7 @@ def run(
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears:
             # raises before anything long is begun
-            settings.step_limit(scene, result.patch.free_deflection, result.patch.area)
+            settings.depth_scale(scene, result.patch.free_deflection, result.patch.area)
         previous = None if earlier or keep.path is None else store.set_aside(keep.path)
         if previous:
             progress.say(f"the result that was here is now {previous}")

@@ -6,16 +6,17 @@ The costs are rules of thumb, good to a factor of about three: they distinguish 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from tribodyn.fem.constraints import find_group, free_dofs
 from tribodyn.fem.couplings import Tie
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.wear import wear_rule
+from tribodyn.hbm.wear.wear_rule import StepCost
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.relative import body_1_dofs
 from tribodyn.refusal import Refusal
@@ -28,6 +29,7 @@ from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, Scene
+from tribodyn.workflows.scene.wear import Wear
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,7 @@ class Costs:
     dense : seconds for each cubed coordinate of the reduced model, all eigenvalue problems together
     solve : seconds of a balance solve for each squared contact coordinate and harmonic coefficient
     sparse : the same with residual flexibility, for each DOF and harmonic coefficient
-    at_peak : solves of a wear step at a peak, by rule; the error-controlled one looks for higher peaks
     harmonics : where a scene leaves the choice
-    controlled : wear steps at a tolerance of 5 %, and the power of the tolerance that they go with
-    thesis : wear steps of 1 % of delta_max to loss of contact, and the power of the step (Tamatam 2021, table 4.2)
     """
 
     factor: float = 2e-7
@@ -49,10 +48,7 @@ class Costs:
     dense: float = 3e-9
     solve: float = 6e-8
     sparse: float = 1.7e-6
-    at_peak: Mapping[str, int] = field(default_factory=lambda: {"error_controlled": 40, "thesis": 3})
     harmonics: tuple[int, ...] = tuple(range(8))
-    controlled: tuple[float, float] = (23, -0.4)
-    thesis: tuple[float, float] = (411, -0.5)
 
 
 COSTS = Costs()
@@ -214,17 +210,19 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
     """Wear steps and balance solves to expect."""
     if scene.wear is None or scene.wear.max_steps == 0:
         return 0, 0
-    most, share = scene.wear.max_steps, None if scene.wear.step is None else scene.wear.step.share
-    if scene.wear.rule == "error_controlled":
-        share = scene.wear.tolerance
-        likely = round(COSTS.controlled[0] * (share / 0.05) ** COSTS.controlled[1])
-    else:
-        likely = most if share is None else round(COSTS.thesis[0] * (100 * share) ** COSTS.thesis[1])
+    most, cost = scene.wear.max_steps, _step_cost(scene.wear)
+    share = scene.wear.accuracy_share
+    likely = most if share is None or cost is None else round(cost.steps * (share / cost.accuracy) ** cost.power)
     steps = min(most, likely)
     solves = 0
     for place in (duty.at for duty in scene.wear.duties):
-        solves += steps if place.peak is None else steps * COSTS.at_peak[scene.wear.rule] + scene.response.points
+        solves += steps if place.peak is None else steps * (cost.at_peak if cost else 1) + scene.response.points
     return (None if share is None else steps), solves
+
+
+def _step_cost(wear: Wear) -> StepCost | None:
+    """What its rule states of its cost; a file beside the scene, which a plan does not run, states nothing."""
+    return None if is_file(wear.rule) else cast("StepCost | None", wear_rule.load(wear.rule_name).Rule.COST)
 
 
 def _time(seconds: float) -> str:

@@ -13,8 +13,8 @@ from tribodyn.hbm.continuation.operating_condition import AtPeakRatio
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.wear import law as wear_law
-from tribodyn.hbm.wear.evolution import Duty
+from tribodyn.hbm.wear import law as wear_law, wear_rule
+from tribodyn.hbm.wear.wear_problem import Duty
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import references
 from tribodyn.workflows.scene.own import is_file
@@ -36,6 +36,8 @@ def check_names(scene: Scene, own_files: bool = True) -> None:
         response_options(scene)
     if scene.wear is not None and (own_files or not is_file(scene.wear.law)):
         wear_law.load(scene.wear.law_name)
+    if scene.wear is not None and (own_files or not is_file(scene.wear.rule)):
+        wear_rule.load(scene.wear.rule_name)
 
 
 def response_options(scene: Scene) -> Any:
@@ -86,21 +88,19 @@ def site_of(scene: Scene, place: Place, highest: float = np.inf) -> AtFrequency 
     return peak if place.peak == 1.0 else AtPeakRatio(peak, place.peak)
 
 
-def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
-    """Largest depth of one wear step by the thesis's rule, or delta_max that the other rule measures errors by [m].
+def depth_scale(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
+    """Depth that errors of wear are measured by and steps are a share of, delta_max [m]; nan where none is needed.
 
     approach : (n_pair,) by which the static loads press the faces into each other without contact [m]; area : [m2]
-    Raises  ValueError where delta_max is needed and the scene has none
+    Raises  Refusal where delta_max is needed and the scene has none
     """
     assert scene.wear is not None
-    step = scene.wear.step
-    if scene.wear.rule == "thesis" and step is not None and step.depth is not None:
-        return step.depth
+    if not scene.wear.needs_depth_scale:
+        return float("nan")
     delta_max = references.delta_max(scene, approach, area)
     if not (np.isfinite(delta_max) and delta_max > 0):
         raise Refusal(
             "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
             'give a depth such as "50 um" and rule = "thesis"'
         )
-    share = step.share if scene.wear.rule == "thesis" and step is not None else None
-    return delta_max if share is None else share * delta_max
+    return delta_max

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
@@ -12,11 +11,12 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear import wear_rule
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
+from tribodyn.hbm.wear.wear_rule import RuleSettings, WearRule
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import references, settings
@@ -28,7 +28,7 @@ from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.structure import NamedContact
-from tribodyn.workflows.scene.wear import JointWearTable, Wear
+from tribodyn.workflows.scene.wear import JointWearTable
 
 KEEPING = 0.01  # share of the time that goes into writing steps: a kill loses as many as take 100 times one writing
 
@@ -44,7 +44,7 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
     due = 0.0
 
     def keep_rows() -> None:
-        keep(replace(result, wear=history(rows, WearEnd.UNFINISHED.say()), stage=Stage.WEARING))
+        keep(replace(result, wear=history(rows, WearEnd.UNFINISHED.say(), rule.SCHEME), stage=Stage.WEARING))
 
     def on_row(row: WearRow) -> None:
         nonlocal due
@@ -62,9 +62,10 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
     found = result.response
     if found is not None and (peak := found.peak(settings.OUTPUT)) is not None:
         problem = _begun(problem, (float(found.omega[peak]), model.balance.shaped(found.contact[peak])))
-    limit = settings.step_limit(scene, patch.free_deflection, patch.area)
+    scale = settings.depth_scale(scene, patch.free_deflection, patch.area)
+    rule = rule_of(scene, problem, scale)
     try:
-        worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
+        worn = evolve(rule, wear.max_steps, on_row, result.wear)
     finally:
         if rows:
             keep_rows()
@@ -93,8 +94,8 @@ def worn_out(
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
     problem = _begun(wear_problem(file.scene, file.folder, balance, left, wanted.end_at == "at_rest"), start)
-    limit = settings.step_limit(file.scene, references.free_deflection(balance), problem.area)
-    return evolve(problem, wanted, limit, wanted.max_steps, watched=False)
+    scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)
+    return evolve(rule_of(file.scene, problem, scale, with_growth=False), wanted.max_steps)
 
 
 def wear_problem(
@@ -156,17 +157,13 @@ def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
     return tuple(found)
 
 
-def evolve(
-    problem: WearProblem,
-    wear: Wear,
-    limit: float,
-    max_steps: int,
-    on_row: Callable[[WearRow], None] | None = None,
-    resume: WearHistory | None = None,
-    watched: bool = True,
-) -> WearHistory:
-    """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for that rule."""
-    if wear.rule == "thesis":
-        return thesis_rule.evolve(problem, limit, max_steps, on_row, resume)
-    tolerance = Tolerance(wear.tolerance, limit)
-    return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume, wear.motion, watched)
+def rule_of(scene: Scene, problem: WearProblem, scale: float, with_growth: bool = True) -> WearRule:
+    """The wear rule of a scene, at work on a problem; scale : of `settings.depth_scale` [m]."""
+    assert scene.wear is not None
+    return wear_rule.build(scene.wear.rule_name, problem, rule_settings(scene, scale, with_growth))
+
+
+def rule_settings(scene: Scene, scale: float, with_growth: bool = True) -> RuleSettings:
+    """What the wear rule of a scene is built from; scale : delta_max [m], nan where unknown."""
+    assert scene.wear is not None
+    return RuleSettings(scene.wear.rule_numbers(scale), scale, scene.wear.motion, with_growth)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import ModuleType
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BeforeValidator, Field, StrictInt, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationInfo, model_validator
 
-from tribodyn.hbm.wear import law as wear_law
+from tribodyn.declarations import Role, read
+from tribodyn.hbm.wear import law as wear_law, wear_rule
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Frequency, Number, Table
-from tribodyn.workflows.scene.own import LawTable
+from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file, numbers, own_file
 from tribodyn.workflows.scene.stages import DRAW, RESUMABLE, WEAR, SceneStage
 from tribodyn.workflows.scene.units import to_si
 
@@ -137,8 +139,11 @@ class Wear(JointWearTable, stage=WEAR):
     """Share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one."""
     responses: Annotated[StrictInt, Field(ge=0, le=100), RESUMABLE] = 0
     """Number of response curves of the worn contact, evenly spread over the worn depth."""
-    rule: Literal["thesis", "error_controlled"] = "thesis"
-    """How the steps are chosen: "thesis" takes `step`, "error_controlled" takes `tolerance`."""
+    rule: str = "thesis"
+    """How the steps are chosen: "thesis" takes `step`, "error_controlled" takes `tolerance`; or a file my_rule.py
+    beside the scene, whose own numbers are further keys of this table."""
+    parameters: dict[str, float] = Field(default_factory=dict)
+    """Numbers that the rule alone declares."""
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.01
     """Error that one wear step of the error-controlled rule may make, relative."""
     motion: Literal["balance", "machine", "time"] = "balance"
@@ -159,6 +164,7 @@ class Wear(JointWearTable, stage=WEAR):
     """List of duties that share the cycles, instead of `at`."""
     max_steps: Annotated[StrictInt, Field(ge=0), RESUMABLE] = 10_000
     """Largest number of wear steps."""
+    _rule_file: Path | None = PrivateAttr(None)
 
     @property
     def duties(self) -> tuple[MissionDuty, ...]:
@@ -167,10 +173,65 @@ class Wear(JointWearTable, stage=WEAR):
             return self.mission
         return self.at.duties() if isinstance(self.at, Sweep) else (MissionDuty(at=self.at, share=1.0),)
 
+    @property
+    def rule_name(self) -> str:
+        """Name of the rule for hbm: that of the package, or the path of the file beside the scene."""
+        return self.rule if self._rule_file is None else str(self._rule_file)
+
+    @property
+    def accuracy_keys(self) -> tuple[str, ...]:
+        """Keys that say how fine the steps of its rule are."""
+        return tuple(n.name for n in wear_rule.declared(self.rule_name) if n.role == Role.ACCURACY)
+
+    @property
+    def needs_depth_scale(self) -> bool:
+        """Whether its steps depend on delta_max."""
+        return self.accuracy_share is not None
+
+    @property
+    def accuracy_share(self) -> float | None:
+        """Tolerance of its steps, or their share of delta_max; None where its rule counts in another way."""
+        if "tolerance" in self.accuracy_keys:
+            return self.tolerance
+        return self.step.share if "step" in self.accuracy_keys and self.step is not None else None
+
+    def rule_numbers(self, scale: float) -> dict[str, float]:
+        """Numbers of its rule by name, in SI units; scale : delta_max [m], for a step that is a share of it."""
+        names = {number.name for number in wear_rule.declared(self.rule_name)}
+        values = dict(self.parameters)
+        if "tolerance" in names:
+            values["tolerance"] = self.tolerance
+        if "step" in names and self.step is not None:
+            values["step"] = self.step.depth if self.step.depth is not None else (self.step.share or 0.0) * scale
+        return values
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gather_numbers_of_rule(cls, table: Any, info: ValidationInfo) -> Any:
+        """Move the keys that the rule alone declares into `parameters`."""
+        folder = folder_of(info)
+        rule = table.get("rule", cls.model_fields["rule"].default) if isinstance(table, dict) else None
+        if folder is None or not isinstance(rule, str):
+            return table
+        if not is_file(rule) and rule not in wear_rule.names():
+            known = ", ".join(repr(name) for name in wear_rule.names())
+            raise Refusal(f"wear.rule: expected {known} or a file my_rule.py, got {rule!r}")
+        path = beside(folder, rule, "wear.rule") if is_file(rule) else wear_rule.file_of(rule)
+        if table.get("step") is None and any(number.name == "step" for number in read(path)):
+            raise Refusal(f'expected step, such as "5 %" of delta_max, for rule = "{rule}"')
+        declared = [number for number in read(path) if number.name not in cls.model_fields]
+        inputs = {number.name: table[number.name] for number in declared if number.name in table}
+        others = {name: value for name, value in table.items() if name not in inputs}
+        values = numbers("wear.", declared, inputs, cls.model_fields)
+        return {**others, "parameters": values} if values else others
+
     @model_validator(mode="after")
-    def _whole(self) -> Wear:
-        if self.rule == "thesis" and self.step is None:
-            raise Refusal('expected step, such as "5 %" of delta_max, for rule = "thesis"')
+    def _find_rule_file(self, info: ValidationInfo) -> Self:
+        self._rule_file = own_file(folder_of(info), self.rule, "wear.rule")
+        return self
+
+    @model_validator(mode="after")
+    def _check(self) -> Wear:
         total = sum(duty.share for duty in self.mission)
         if self.mission and abs(total - 1) > 1e-9:
             raise Refusal(f"expected shares of the mission that sum to 1, got {total:g}")

@@ -30,11 +30,12 @@ from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.stability import exponents as floquet
 from tribodyn.hbm.time import time_integration as time, verify
 from tribodyn.hbm.time.stepper import Options
-from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.reduction import foreign, linear_damping as damping
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.foreign import ForeignMatrices, Terms
@@ -315,11 +316,11 @@ class HertzBalance:
         if (step is None) == (tolerance is None) or (tolerance is None) != (scale is None):
             raise Refusal("wear needs either step, or tolerance with the depth scale that it is a share of")
         if step is not None:
-            return thesis_rule.evolve(problem, step, max_steps, on_row, resume)
+            return evolve(thesis.Rule(problem, step), max_steps, on_row, resume)
         assert tolerance is not None
         assert scale is not None
         share = Tolerance(tolerance, scale)
-        return error_controlled_rule.evolve(problem, share, max_steps, on_row, resume)
+        return evolve(error_controlled.Rule(problem, share), max_steps, on_row, resume)
 
     def _output(self, output: str | None) -> str:
         names = self.problem.compliance.output_names

@@ -13,8 +13,9 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.continuation.operating_condition import AtPeakRatio, OperatingCondition
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow
+from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.hbm.wear.wear_problem import WearProblem
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import film
 from tribodyn.workflows.pictures.figures import axes_of, length_unit
@@ -149,7 +150,7 @@ def pattern_wear(
         output = f"{OUTPUT}@{blade}"
         duties = [replace(duty, site=_of_output(duty.site, output)) for duty in settings.mission(file.scene)]
         area = np.tile(sector_problem.area, n)
-        limit = settings.step_limit(file.scene, references.free_deflection(blades.wheel.wave), sector_problem.area)
+        scale = settings.depth_scale(file.scene, references.free_deflection(blades.wheel.wave), sector_problem.area)
         problem = WearProblem(
             balance,
             tuple(duties),
@@ -160,7 +161,7 @@ def pattern_wear(
             sector_problem.any_joint,
             n,
         )
-        history = wear_run.evolve(problem, wear_settings, limit, wear_settings.max_steps, on_row)
+        history = evolve(wear_run.rule_of(file.scene, problem, scale), wear_settings.max_steps, on_row)
     names = list(balance.compliance.output_names)
     rows = [names.index(f"{OUTPUT}@{k}") for k in range(n)]
     per = (len(history.cycles), n, -1)

@@ -24,9 +24,10 @@ from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import PeriodicMotion
-from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState, wear_of
 from tribodyn.hbm.wear.history import WearHistory, WearRow
-from tribodyn.hbm.wear.step_control import Tolerance, expected
+from tribodyn.hbm.wear.step_control import Tolerance, expected_life
+from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_state import Means, WearState, wear_of
 from tribodyn.refusal import Refusal
 
 GAMMA = 1 - 1 / np.sqrt(2)
@@ -56,7 +57,7 @@ class MotionRules:
 RULES = MotionRules()
 
 
-class MachineMotion:
+class SteadyMotion:
     """The motions of all duties, each followed while the contact wears and the balance's own motion is left.
 
     tolerance : of the steps; always : whether they are followed where the balance's own is kept, too
@@ -98,7 +99,7 @@ class MachineMotion:
             found[i, i] += k[row]
         return found
 
-    def take_up(self, row: WearRow) -> None:
+    def restore(self, row: WearRow) -> None:
         """What moved when the row of an interrupted run was come to."""
         if not row.moving.any():
             return
@@ -107,7 +108,7 @@ class MachineMotion:
         for follower, balance, part in zip(self._followers, balances, np.split(row.moving, len(balances)), strict=True):
             follower.take_up(balance, part)
 
-    def of(self, state: WearState, planned: float) -> WearState:
+    def follow(self, state: WearState, planned: float) -> WearState:
         """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own.
 
         planned : cycles of the step from it, 0 where that is not known
@@ -130,7 +131,7 @@ class MachineMotion:
         return found
 
     def step(self, state: WearState, there: WearState, stride: float) -> tuple[WearState, np.ndarray, np.ndarray]:
-        """A step from a state, with the balance at the depth that `ahead` foresees.
+        """A step from a state, with the balance at the depth that `predicted_depth` predicts.
 
         Returns the state there with its rates, the depth that wears (n_pair,) and its deviation from a step of first
         order [m]
@@ -140,7 +141,7 @@ class MachineMotion:
         k2 = np.linalg.solve(matrix, there.rate - 2 * k1)
         return there, np.maximum(stride * (1.5 * k1 + 0.5 * k2), 0.0), 0.5 * stride * (k1 + k2)
 
-    def ahead(self, state: WearState, stride: float) -> np.ndarray:
+    def predicted_depth(self, state: WearState, stride: float) -> np.ndarray:
         """Depth (n_pair,) [m] at which a step from a state takes its second rate."""
         return state.depth + stride * np.maximum(self._ahead(state, stride)[1], 0.0)
 
@@ -161,7 +162,7 @@ class MachineMotion:
     def _along(self, state: WearState, near: WearState, stride: float) -> WearState:
         """The state with its means at the frequencies of `near`, as exact as `stride` cycles with them ask for."""
         problem, depth, cycles = self._problem, state.depth, state.cycles
-        life = float(expected(self._tolerance, cycles, depth)) if stride else np.inf
+        life = float(expected_life(self._tolerance, cycles, depth)) if stride else np.inf
         asked = self._tolerance.share * life / (stride or 1.0) if self.always else None
         found: list[MeanMotion] = []
         for follower, duty, point in zip(self._followers, problem.mission, near.points, strict=True):

@@ -16,10 +16,12 @@ from tribodyn.declarations import Role, name_of
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.outcome import SolveEnd
-from tribodyn.hbm.wear import fewer_harmonics, law as wear_law
-from tribodyn.hbm.wear.evolution import WearProblem, WearState, worn_state
+from tribodyn.hbm.wear import harmonic_fallback, law as wear_law
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
+from tribodyn.hbm.wear.step_memory import StepMemory
+from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_state import WearState, worn_state
 from tribodyn.refusal import Refusal
 
 GAMMA = 1 - 1 / np.sqrt(2)
@@ -43,12 +45,12 @@ class StageRules:
 RULES = StageRules()
 
 
-def stages(
-    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[Search]
+def solve_stages(
+    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[FrequencySearch]
 ) -> tuple[WearState, WearState]:
     """Both stages of a step from a state; the second is the state after it."""
     ahead = GAMMA * stride
-    first = first_stage(problem, state, stride, drift, searches)
+    first = solve_first_stage(problem, state, stride, drift, searches)
     if first.failure:
         return first, replace(first, solves=0)
     base = state.depth + (1 - GAMMA) / GAMMA * (first.depth - state.depth)
@@ -59,21 +61,22 @@ def stages(
     return first, _stage(problem, first, base, ahead, state.cycles + stride, guess, np.array(further), searches)
 
 
-def begun(
+def initial_guess(
     problem: WearProblem, state: WearState, rows: Sequence[WearRow], whole: WearProblem
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n_duty,) d omega / d cycles, and d miss / d omega of the searches, that a step begins with."""
     drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), RULES.unknown_slope)
-    if rows and rows[-1].plan[0] > 0:
-        slopes, top = rows[-1].plan[1:-1], problem.balance.basis.harmonics[-1]
-        if fewer_harmonics.top_harmonic(whole.balance.basis, list(rows[-1].duty_displacement)) == top:
+    memory = StepMemory.of_row(rows[-1]) if rows else None
+    if memory is not None and memory.next_cycles > 0:
+        slopes, top = memory.frequency_slopes, problem.balance.basis.harmonics[-1]
+        if harmonic_fallback.top_harmonic(whole.balance.basis, list(rows[-1].duty_displacement)) == top:
             omega = np.array([point.state.omega for point in state.points])
             drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
     return drift, slopes
 
 
-def first_stage(
-    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[Search]
+def solve_first_stage(
+    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[FrequencySearch]
 ) -> WearState:
     """The first stage of a step from a state."""
     guess, ahead = [], GAMMA * stride
@@ -92,7 +95,7 @@ def _stage(
     cycles: float,
     guess: Sequence[np.ndarray],
     omega: np.ndarray,
-    searches: Sequence[Search],
+    searches: Sequence[FrequencySearch],
 ) -> WearState:
     """Solve depth = base + stretch rate(depth) with every duty at its site; the wear per work of `near` is tried."""
     duties = problem.mission
@@ -145,7 +148,7 @@ def depth_per_work(problem: WearProblem, state: WearState) -> np.ndarray:
         rate, work = state.rate[pairs], state.work[pairs]
         works = work > 0
         if np.any(rate[~works] > 0):
-            raise Refusal(f'wear law "{wear.law}" wears pairs without friction work: take the thesis\'s rule')
+            raise Refusal(f'wear law "{wear.law}" wears pairs without friction work: take rule = "thesis"')
         coefficient = name_of(Role.WEAR_COEFFICIENT, wear_law.declared(wear.law))
         own = (np.ones(len(pairs)) if coefficient is None else problem.numbers(name)[coefficient]) / area[pairs]
         known = works & (own > 0)
@@ -154,7 +157,7 @@ def depth_per_work(problem: WearProblem, state: WearState) -> np.ndarray:
     return gain
 
 
-class Search:
+class FrequencySearch:
     """The frequency at which a miss vanishes, from the misses so far; the miss falls as the frequency rises."""
 
     def __init__(self, slope: float):

@@ -1,0 +1,1 @@
+"""The wear rules of the product, one a file."""

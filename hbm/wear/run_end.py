@@ -1,0 +1,72 @@
+"""When a wear run is over: the contact is lost, nothing wears any more, or a solve failed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tribodyn.hbm.outcome import Outcome, WearEnd
+from tribodyn.hbm.wear.history import WearRow
+from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_state import WearState
+
+FADED_SHARE = 1e-3  # share of the first friction work per cycle below which wear may have faded out
+ENDLESS = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
+
+
+def reason_to_stop(
+    problem: WearProblem,
+    state: WearState,
+    rows: Sequence[WearRow] = (),
+    step_depth: float = 0.0,
+) -> Outcome[WearEnd] | None:
+    """Why a run ends at a state; None where it continues.
+
+    rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
+        more than ENDLESS cycles for it
+    """
+    if state.failure:
+        return state.failure
+    share = problem.lost_below_at_rest
+    if share is not None and state.preload_at_rest <= share * (rows[0] if rows else state).preload_at_rest:
+        return WearEnd.LOST_AT_REST.say(f" {share:.3g} of its first value")
+    if state.separated:
+        return WearEnd.LOST.say()
+    preload = problem.preload_of(state)
+    if preload < problem.lost_below * first_preload(problem, rows, state):
+        return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value")
+    lost = lost_joint(problem, state, rows) if problem.any_joint else None
+    if lost is not None:
+        return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value in joint {lost}")
+    left = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
+    if state.rate.max() <= 0.0:
+        if state.work.max() > 0.0:
+            return WearEnd.NO_LOSS.say()
+        return (WearEnd.NO_SLIP if len(rows) else WearEnd.NEVER_SLIPS).say(left)
+    fading = rows and state.work.sum() < FADED_SHARE * rows[0].energy.sum()
+    if fading and state.rate.max() * ENDLESS < step_depth:
+        return WearEnd.FADED.say(left)
+    return None
+
+
+def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> str | None:
+    """The first joint whose preload has fallen below the share that the problem asks for; None for none."""
+    if not rows or "n" not in problem.balance.contact.components or not problem.balance.basis.has_static:
+        return None
+    contact, normal = problem.balance.contact, problem.normal_force(state)
+    size = contact.n_pair // problem.copies
+    for name in problem.wearing:
+        pairs = contact.joint(name).rows
+        first, left = (
+            np.bincount(pairs // size, force[pairs], problem.copies) for force in (rows[0].normal_force, normal)
+        )
+        lost = np.flatnonzero(left < problem.lost_below * first)
+        if len(lost):
+            return f"{name}@{lost[0]}" if problem.copies > 1 else name
+    return None
+
+
+def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:
+    """Preload of the unworn contact [N]."""
+    return rows[0].preload if rows else problem.preload_of(state)
