@@ -50,7 +50,7 @@ class Assembly:
     doflocs, boundaries, subdomains, nelements : as of a mesh; facets and elements are numbered body by body
     node_sets : "body.group", see `group_name`, -> nodes; "body" -> all nodes of a body; "point" and "point.turn" of a
         reference point
-    Raises  ValueError where two bodies have one name
+    Raises  Refusal where two bodies have one name
     """
 
     def __init__(self, bodies: Sequence[Body], points: Mapping[str, Sequence[float]] | None = None):
@@ -75,15 +75,16 @@ class Assembly:
             if body.name:
                 self.node_sets[body.name] = piece.node + np.arange(body.mesh.doflocs.shape[1])
                 self.subdomains[body.name] = piece.element + np.arange(body.mesh.t.shape[1])
-            for own, shared, start in (
+            for groups, shared, start in (
                 (body.node_sets, self.node_sets, piece.node),
                 (body.mesh.boundaries or {}, self.boundaries, piece.facet),
                 (body.mesh.subdomains or {}, self.subdomains, piece.element),
             ):
-                named = {
-                    group_name(body.name, name, body.node_sets): np.asarray(of) + start for name, of in own.items()
+                renamed = {
+                    group_name(body.name, name, body.node_sets): np.asarray(members) + start
+                    for name, members in groups.items()
                 }
-                shared.update(named)
+                shared.update(renamed)
         for name, (node, turn) in self.points.items():
             self.node_sets[name] = np.array([node])
             self.node_sets[f"{name}.turn"] = np.array([turn])
@@ -118,7 +119,7 @@ def materials_of(mesh: Any, material: Any) -> Iterator[tuple[Piece, Materials]]:
 def piece_of_facets(mesh: Any, facets: np.ndarray) -> tuple[Piece, np.ndarray]:
     """The piece that some facets belong to, and their numbers in its mesh.
 
-    Raises  ValueError where they belong to several bodies
+    Raises  Refusal where they belong to several bodies
     """
     facets = np.asarray(facets, dtype=int)
     for piece in pieces(mesh):

@@ -36,7 +36,7 @@ class Bolt:
     def elongation(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
         """Row e (3 n_node,).
 
-        Raises  ValueError for unknown faces, where the bolt crosses nothing, or pulls at a face instead of pressing
+        Raises  Refusal for unknown faces, where the bolt crosses nothing, or pulls at a face instead of pressing
         """
         points = coordinates(mesh)
         row = np.zeros(points.shape)

@@ -22,11 +22,11 @@ AXES = "xyz"
 def find_group(groups: Mapping[str, np.ndarray], name: str, kind: str = "node set") -> np.ndarray:
     """The group of that name.
 
-    Raises  ValueError that lists the names which exist, or that the group is empty
+    Raises  Refusal that lists the names which exist, or that the group is empty
     """
     if name not in groups:
-        near = get_close_matches(name, groups, 1)
-        guess = f" (did you mean '{near[0]}'?)" if near else ""
+        matches = get_close_matches(name, groups, 1)
+        guess = f" (did you mean '{matches[0]}'?)" if matches else ""
         raise Refusal(f"the mesh has no {kind} '{name}'{guess}; it has {', '.join(sorted(groups)) or 'none'}")
     if len(groups[name]) == 0:
         raise Refusal(f"the {kind} '{name}' is empty; check the geometry that defines it")
@@ -63,7 +63,7 @@ class NoMeanRotation:
     def row(self, points: np.ndarray, mass: Any) -> np.ndarray:
         """c (3 n_node,) [kg], for nodes at points (n_node, 3) and the mass over all DOFs.
 
-        Raises  ValueError for an axis that is none
+        Raises  Refusal for an axis that is none
         """
         axis = np.asarray(self.axis, dtype=float)
         if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
@@ -76,7 +76,7 @@ class NoMeanRotation:
 def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
     """Sorted DOFs (n_free,) that no clamp holds.
 
-    Raises  ValueError where everything is held
+    Raises  Refusal where everything is held
     """
     free = np.ones(n_dof, dtype=bool)
     for clamp in clamps:
@@ -88,14 +88,14 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
 
 @dataclass(frozen=True)
 class Dependence:
-    """DOFs (k,) that follow others: u[dofs] = map @ u with map (k, n_dof); what : which constraint, for errors.
+    """DOFs (k,) that depend on others: u[dofs] = map @ u with map (k, n_dof); label : of the constraint, for errors.
 
     equation : each DOF is of an equation, and another of it may follow where this one is held or follows already
     """
 
     dofs: np.ndarray
     map: csr_matrix
-    what: str
+    label: str
     equation: bool = False
 
 
@@ -133,87 +133,96 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Dependence])
     """The DOFs (n_free,) that are left, and the map (n_dof, n_free) from them to all.
 
     free : DOFs that no clamp holds
-    Raises  ValueError, naming the constraints, where a DOF follows twice, is clamped and follows, or follows itself
+    Raises  Refusal, naming the constraints, where a DOF follows twice, is clamped and follows, or follows itself
     """
     owner = np.full(n_dof, -1)
-    held = np.ones(n_dof, dtype=bool)
-    held[free] = False
-    constraints = _pivoted(constraints, held)
+    clamped = np.ones(n_dof, dtype=bool)
+    clamped[free] = False
+    constraints = _pivoted(constraints, clamped)
     rows, dofs = [], []
-    for number, one in enumerate(constraints):
-        taken = one.dofs[owner[one.dofs] >= 0]
-        if len(taken):
+    for number, constraint in enumerate(constraints):
+        occupied = constraint.dofs[owner[constraint.dofs] >= 0]
+        if len(occupied):
             raise Refusal(
-                f"{one.what} and {constraints[owner[taken[0]]].what} both move the same nodes; let one of them take "
-                "the other face first"
+                f"{constraint.label} and {constraints[owner[occupied[0]]].label} both move the same nodes; let one "
+                "of them take the other face first"
             )
-        if held[one.dofs].any():
-            raise Refusal(f"{one.what} moves nodes that are clamped; swap its faces, or clamp the other one")
-        owner[one.dofs] = number
-        rows.append(one.map)
-        dofs.append(one.dofs)
-    moved = np.concatenate([*dofs, []]).astype(int)
-    every = eye_array(n_dof, format="csr")
-    keep = csr_matrix(every.multiply((owner < 0)[:, None]))
-    place = csr_matrix((np.ones(len(moved)), (moved, np.arange(len(moved)))), shape=(n_dof, len(moved)))
+        if clamped[constraint.dofs].any():
+            raise Refusal(f"{constraint.label} moves nodes that are clamped; swap its faces, or clamp the other one")
+        owner[constraint.dofs] = number
+        rows.append(constraint.map)
+        dofs.append(constraint.dofs)
+    dependent = np.concatenate([*dofs, []]).astype(int)
+    identity = eye_array(n_dof, format="csr")
+    keep = csr_matrix(identity.multiply((owner < 0)[:, None]))
+    place = csr_matrix((np.ones(len(dependent)), (dependent, np.arange(len(dependent)))), shape=(n_dof, len(dependent)))
     step = csr_matrix(keep + place @ csr_matrix(vstack(rows)))
     follow = step
     for _ in range(len(constraints)):
-        if not (np.abs(follow[:, moved]).sum() if len(moved) else 0):
+        if not (np.abs(follow[:, dependent]).sum() if len(dependent) else 0):
             break
         follow = csr_matrix(follow @ step)
     else:
-        if len(moved) and np.abs(follow[:, moved]).sum():
-            names = ", ".join(one.what for one in constraints)
+        if len(dependent) and np.abs(follow[:, dependent]).sum():
+            names = ", ".join(constraint.label for constraint in constraints)
             raise Refusal(f"the nodes moved by {names} follow each other in a circle; swap the faces of one of them")
-    left = np.setdiff1d(free, moved)
-    follow = csr_matrix(follow[:, left])
+    independent = np.setdiff1d(free, dependent)
+    follow = csr_matrix(follow[:, independent])
     follow.eliminate_zeros()
-    return left, follow
+    return independent, follow
 
 
-def _pivoted(constraints: Sequence[Dependence], held: np.ndarray) -> list[Dependence]:
+def _pivoted(constraints: Sequence[Dependence], clamped: np.ndarray) -> list[Dependence]:
     """The constraints, equations last and each for a DOF that neither is held nor follows already, by elimination."""
-    found = [one for one in constraints if not one.equation]
-    if len(found) == len(constraints):
-        return found
-    row_of = {int(dof): (one.map, k) for one in found for k, dof in enumerate(one.dofs)}
-    rows = ((one, int(first), k) for one in constraints if one.equation for k, first in enumerate(one.dofs))
-    for one, first, k in rows:
+    solved_constraints = [constraint for constraint in constraints if not constraint.equation]
+    if len(solved_constraints) == len(constraints):
+        return solved_constraints
+    row_of = {
+        int(dof): (constraint.map, k) for constraint in solved_constraints for k, dof in enumerate(constraint.dofs)
+    }
+    rows = (
+        (constraint, int(first), k)
+        for constraint in constraints
+        if constraint.equation
+        for k, first in enumerate(constraint.dofs)
+    )
+    for constraint, first, k in rows:
         row: dict[int, float] = {}
-        waiting = [(first, -1.0), *_entries(one.map, k)]
+        waiting = [(first, -1.0), *_entries(constraint.map, k)]
         while waiting:
             dof, factor = waiting.pop()
             if dof in row_of:
                 waiting += [(other, factor * value) for other, value in _entries(*row_of[dof])]
-            elif not held[dof]:
+            elif not clamped[dof]:
                 row[dof] = row.get(dof, 0.0) + factor
         largest = max(map(abs, row.values()), default=0.0)
         row = {dof: value for dof, value in row.items() if abs(value) > 1e-12 * largest}
         if not row:
             continue  # the others say it already
         pivot = first if first in row else max(row, key=lambda dof: abs(row[dof]))
-        rest = {dof: -value / row[pivot] for dof, value in row.items() if dof != pivot}
-        at = ([0] * len(rest), list(rest))
-        shape = (1, one.map.shape[1])
-        solved = Dependence(np.array([pivot]), csr_matrix((list(rest.values()), at), shape), one.what, True)
+        coefficients = {dof: -value / row[pivot] for dof, value in row.items() if dof != pivot}
+        at = ([0] * len(coefficients), list(coefficients))
+        shape = (1, constraint.map.shape[1])
+        solved = Dependence(
+            np.array([pivot]), csr_matrix((list(coefficients.values()), at), shape), constraint.label, True
+        )
         row_of[pivot] = (solved.map, 0)
-        found.append(solved)
-    return found
+        solved_constraints.append(solved)
+    return solved_constraints
 
 
 def _entries(matrix: csr_matrix, row: int) -> list[tuple[int, float]]:
     """Column and value of the entries of one row."""
-    own = slice(*matrix.indptr[row : row + 2].tolist())
-    return list(zip(matrix.indices[own].tolist(), matrix.data[own].tolist(), strict=True))
+    place = slice(*matrix.indptr[row : row + 2].tolist())
+    return list(zip(matrix.indices[place].tolist(), matrix.data[place].tolist(), strict=True))
 
 
-def partition(n_dof: int, chosen: np.ndarray, what: str) -> tuple[np.ndarray, np.ndarray]:
-    """Split the DOFs of a system into (others, chosen), both sorted: prescribed from free ones, masters from slaves.
+def partition(n_dof: int, chosen: np.ndarray, label: str) -> tuple[np.ndarray, np.ndarray]:
+    """Split the DOFs of a system into (remaining, chosen), both sorted: prescribed from free ones, masters from slaves.
 
-    Raises  ValueError, naming what was chosen, where one lies outside the system
+    Raises  Refusal, naming the chosen ones by `label`, where one lies outside the system
     """
     chosen = np.unique(np.asarray(chosen, dtype=int))
     if len(chosen) and not 0 <= chosen[0] <= chosen[-1] < n_dof:
-        raise Refusal(f"a {what} lies outside the {n_dof} DOFs of the system; clamped DOFs are no part of it")
+        raise Refusal(f"a {label} lies outside the {n_dof} DOFs of the system; clamped DOFs are no part of it")
     return np.setdiff1d(np.arange(n_dof), chosen), chosen

@@ -38,7 +38,7 @@ class ContactFaces:
     reach : farthest opening at which two faces still meet [m], a tenth of the length of the first by default
     joint : name of the joint that it belongs to, that of the face by default
     turn : (3, 3) rotation from a sector of a wheel to the next one, whose opposite face is met; None for the same body
-    Raises  ValueError, as its methods, for what contradicts itself
+    Raises  Refusal, as its methods, for what contradicts itself
     """
 
     face: str
@@ -69,7 +69,7 @@ class ContactFaces:
         """The interface with B over all 3 n_node DOFs of the mesh, pairs in ascending node order.
 
         Where the second face is a neighbour's B is the half of the first alone
-        Raises  ValueError for an unknown or empty face, a t1 along the normal, a gap of the wrong length
+        Raises  Refusal for an unknown or empty face, a t1 along the normal, a gap of the wrong length
         """
         if self.face_centres:
             return self._at_centres(replace(self, face_centres=False).build(mesh))
@@ -81,15 +81,15 @@ class ContactFaces:
         if self.plane is not None:
             normal = unit(self.plane, "the direction in which a plane contact closes")
             face = replace(face, normals=np.tile(normal, (len(face.nodes), 1)))
-            along = contact_frames(face.normals, self.t1)[0, 1]
-            away = np.tan(self.inclination) * (face.points @ along) - face.points @ normal
-            gap = gap + away - away.min()
+            tangent = contact_frames(face.normals, self.t1)[0, 1]
+            height = np.tan(self.inclination) * (face.points @ tangent) - face.points @ normal
+            gap = gap + height - height.min()
         return self._interface(mesh, face, gap)
 
     def _at_centres(self, nodes: ContactInterface) -> ContactInterface:
         """One pair for each polygon: one-point integration, as zero-thickness elements have it."""
         n_face, k = nodes.faces.shape
-        corner, at = nodes.points[nodes.faces], nodes.points[nodes.faces].mean(axis=1)
+        corner, centres = nodes.points[nodes.faces], nodes.points[nodes.faces].mean(axis=1)
         area = np.linalg.norm(np.cross(corner[:, 2] - corner[:, 0], corner[:, -1] - corner[:, 1]), axis=1) / 2
         if self.turn is not None or abs(area.sum() / nodes.area.sum() - 1) > 0.01:  # of a curved face
             needs = "nodes at the corners of the faces of elements (vertices_only), and both faces in one sector"
@@ -98,14 +98,14 @@ class ContactFaces:
         frames = contact_frames(across / np.linalg.norm(across, axis=1, keepdims=True), self.t1)
         mean = csr_matrix((np.full(n_face * k, 1 / k), nodes.faces.ravel(), k * np.arange(n_face + 1)))
         B, none = kron(mean, eye_array(len(nodes.components)), "csr") @ nodes.B, np.zeros((0, k), int)
-        return ContactInterface(nodes.components, at, frames, area, mean @ nodes.gap, B, none, nodes, mean)
+        return ContactInterface(nodes.components, centres, frames, area, mean @ nodes.gap, B, none, nodes, mean)
 
     def halves(self, mesh: Any) -> tuple[ContactInterface, csr_matrix]:
         """Both halves of a contact of two faces, over all DOFs of the mesh.
 
         Returns interface whose B is the half of the first face, and the half B_2 of the second one in the coordinates
             of its own sector: relative displacement = B q - B_2 q_2
-        Raises  ValueError, naming the faces, where they do not meet, or do not match where nodes are to be paired
+        Raises  Refusal, naming the faces, where they do not meet, or do not match where nodes are to be paired
         """
         assert self.opposite is not None
         faces = mesh.boundaries or {}
@@ -124,12 +124,12 @@ class ContactFaces:
         if self.pairing != "mortar":
             matched = self._matched(mesh, first, second, turn, reach)
             if matched is None and self.pairing == "nodes":
-                face, other = (surface(mesh, facets, self.vertices_only) for facets in (first, second))
-                partner = partners(face.points, other.points @ turn.T, "the two contact faces")
-                matched = face, other.nodes[partner], np.zeros(len(partner))
+                face, second_face = (surface(mesh, facets, self.vertices_only) for facets in (first, second))
+                partner = partners(face.points, second_face.points @ turn.T, "the two contact faces")
+                matched = face, second_face.nodes[partner], np.zeros(len(partner))
         if matched is None:
-            one, two = side(mesh, first), side(mesh, second, None if self.turn is None else turn)
-            interface, B_2 = mortar_halves(one, two, self.t1, self.components, reach, self.vertices_only)
+            first_side, second_side = side(mesh, first), side(mesh, second, None if self.turn is None else turn)
+            interface, B_2 = mortar_halves(first_side, second_side, self.t1, self.components, reach, self.vertices_only)
             if self.gap is not None:
                 interface = replace(interface, gap=_gaps(self.gap, interface.area))
             return interface, B_2
@@ -144,20 +144,20 @@ class ContactFaces:
         """The first face, the partners of its nodes on the second and their opening (n_pair,) [m]; None where facets do
         not match.
         """
-        one, two = facet_nodes(mesh, first), facet_nodes(mesh, second)
-        if one.shape[1] != two.shape[1] or len(one) > len(two):
+        first_nodes, second_nodes = facet_nodes(mesh, first), facet_nodes(mesh, second)
+        if first_nodes.shape[1] != second_nodes.shape[1] or len(first_nodes) > len(second_nodes):
             return None
         face = surface(mesh, first, self.vertices_only)
-        nodes = np.unique(two)
-        found = facing_partners(face.points, face.normals, np.asarray(mesh.doflocs.T)[nodes] @ turn.T, reach)
-        if found is None:
+        nodes = np.unique(second_nodes)
+        match = facing_partners(face.points, face.normals, np.asarray(mesh.doflocs.T)[nodes] @ turn.T, reach)
+        if match is None:
             return None
-        partner, opening = nodes[found[0]], found[1]
-        quads = one.shape[1] != 6
+        partner, opening = nodes[match[0]], match[1]
+        quads = first_nodes.shape[1] != 6
         of_facet = slice(0, 4) if quads else slice(0, 3) if self.vertices_only else slice(3, 6)
-        place = np.searchsorted(face.nodes, one[:, of_facet])
-        there = {tuple(row) for row in np.sort(two[:, of_facet], axis=1).tolist()}
-        if not all(tuple(row) in there for row in np.sort(partner[place], axis=1).tolist()):
+        place = np.searchsorted(face.nodes, first_nodes[:, of_facet])
+        facets = {tuple(row) for row in np.sort(second_nodes[:, of_facet], axis=1).tolist()}
+        if not all(tuple(row) in facets for row in np.sort(partner[place], axis=1).tolist()):
             return None
         return face, partner, opening
 

@@ -32,86 +32,86 @@ class Tie:
 
     The functions are dual to those of its coefficients, so that each of these follows the other face near it alone
 
-    what : name for errors; first, second : boundary names; reach : farthest opening [m], which is then bridged; where
+    label : for errors; first, second : boundary names; reach : farthest opening [m], which is then bridged; where
         it is None a tenth of the length of the first face, and faces that are apart are refused
     """
 
-    what: str
+    label: str
     first: str
     second: str
     reach: float | None = None
 
     def meeting(self, mesh: Any) -> tuple[Side, Side, SharedSurface]:
-        """Both faces and the surface that they share; raises ValueError as `build` does."""
+        """Both faces and the surface that they share; raises Refusal as `build` does."""
         faces = mesh.boundaries or {}
-        one, two = (side(mesh, find_group(faces, name, "face")) for name in (self.first, self.second))
-        reach = MORTAR.reach * one.length if self.reach is None else self.reach
-        shared = shared_surface(one, two, reach)
+        side_1, side_2 = (side(mesh, find_group(faces, name, "face")) for name in (self.first, self.second))
+        reach = MORTAR.reach * side_1.length if self.reach is None else self.reach
+        shared = shared_surface(side_1, side_2, reach)
         if not len(shared.weight):
-            raise Refusal(f"{self.what}: {describe_separation(one, two, reach)}")
-        return one, two, shared
+            raise Refusal(f"{self.label}: {describe_separation(side_1, side_2, reach)}")
+        return side_1, side_2, shared
 
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The nodes of the first face in terms of the others.
 
-        Raises  ValueError where a face is unknown, or the faces do not meet
+        Raises  Refusal where a face is unknown, or the faces do not meet
         """
-        one, two, shared = self.meeting(mesh)
+        side_1, side_2, shared = self.meeting(mesh)
         gap = float(np.average(np.abs(shared.gap), weights=np.abs(shared.weight)))
-        if self.reach is None and gap > MORTAR.apart * one.length:
+        if self.reach is None and gap > MORTAR.separated * side_1.length:
             who = f"{self.first} and {self.second} are {1e3 * gap:.3g} mm apart on average"
-            raise Refusal(f'{self.what}: {who}: bring them together, or give reach = "{2e3 * gap:.2g} mm"')
-        n, k = mesh.doflocs.shape[1], one.nodes.shape[1]
-        psi, d = dual(one, shared)
-        other = tabulate(two.nodes.shape[1], shared.eta)[0]
+            raise Refusal(f'{self.label}: {who}: bring them together, or give reach = "{2e3 * gap:.2g} mm"')
+        n, k = mesh.doflocs.shape[1], side_1.nodes.shape[1]
+        psi, d = dual(side_1, shared)
+        shapes = tabulate(side_2.nodes.shape[1], shared.eta)[0]
         cuts = shared.cuts[:-1]
         M = _summed(
-            np.array([psi[:, g] @ other[:, g].T for *_, g in shared.each()]),
-            one.nodes[shared.first[cuts]],
-            two.nodes[shared.second[cuts]],
+            np.array([psi[:, g] @ shapes[:, g].T for *_, g in shared.each()]),
+            side_1.nodes[shared.first[cuts]],
+            side_2.nodes[shared.second[cuts]],
             n,
         )
-        edge = one.points[:, 1:3] - one.points[:, :1]
+        edge = side_1.points[:, 1:3] - side_1.points[:, :1]
         area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
-        weigh, whole, count = np.zeros((3, n))
-        for into, value in ((weigh, d), (whole, area[:, None] / k), (count, 1.0)):
-            np.add.at(into, one.nodes, value)
+        weigh, full_weight, count = np.zeros((3, n))
+        for into, value in ((weigh, d), (full_weight, area[:, None] / k), (count, 1.0)):
+            np.add.at(into, side_1.nodes, value)
         nodes = np.flatnonzero(count)
-        is_tied = weigh > MORTAR.tied * whole
-        tied, rest = nodes[is_tied[nodes]], nodes[~is_tied[nodes]]
+        is_tied = weigh > MORTAR.tied * full_weight
+        tied, untied = nodes[is_tied[nodes]], nodes[~is_tied[nodes]]
         # of second order, coefficients F u are tied: F u_tied + F u_rest = M u_2 / d, F = diagonal (1 - N), N^3 = 0
-        F = _summed(np.tile(coefficients(k), (len(one.nodes), 1, 1)), one.nodes, one.nodes, n)
+        F = _summed(np.tile(coefficients(k), (len(side_1.nodes), 1, 1)), side_1.nodes, side_1.nodes, n)
         F = csr_matrix(diags_array(1 / count[tied]) @ F[tied])
-        free = csr_matrix((np.ones(len(rest)), (rest, rest)), shape=(n, n))
+        free = csr_matrix((np.ones(len(untied)), (untied, untied)), shape=(n, n))
         right = diags_array(1 / weigh[tied]) @ M[tied] - F @ free
         inverse = diags_array(1 / F[:, tied].diagonal())
         N = csr_matrix(eye_array(len(tied)) - inverse @ F[:, tied])
-        moved = inverse @ right
-        moved = csr_matrix(moved + N @ (moved + N @ moved))
-        moved.data[np.abs(moved.data) < SMALL] = 0.0
-        moved.eliminate_zeros()
+        dependence = inverse @ right
+        dependence = csr_matrix(dependence + N @ (dependence + N @ dependence))
+        dependence.data[np.abs(dependence.data) < SMALL] = 0.0
+        dependence.eliminate_zeros()
         dofs = (tied[:, None] * 3 + np.arange(3)).ravel()
-        return Dependence(dofs, csr_matrix(kron(moved, np.eye(3), format="csr")), self.what)
+        return Dependence(dofs, csr_matrix(kron(dependence, np.eye(3), format="csr")), self.label)
 
 
 @dataclass(frozen=True)
 class Equation:
     """A linear equation between displacements of single nodes, sum of factor * u = 0; the first one that can follows.
 
-    what : name for errors; terms : (group of one node, axis 0..2, factor)
+    label : for errors; terms : (group of one node, axis 0..2, factor)
     """
 
-    what: str
+    label: str
     terms: Sequence[tuple[str, int, float]]
 
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
-        """The first displacement in terms of the others; raises ValueError where its factor is zero."""
+        """The first displacement in terms of the others; raises Refusal where its factor is zero."""
         if len(self.terms) < 2 or not self.terms[0][2]:
-            raise Refusal(f"{self.what} needs two terms or more, the first with a factor that is not zero")
+            raise Refusal(f"{self.label} needs two terms or more, the first with a factor that is not zero")
         dofs = [3 * int(find_group(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
         factors = [-factor / self.terms[0][2] for _, _, factor in self.terms[1:]]
         row = coo_matrix((factors, ([0] * len(factors), dofs[1:])), shape=(1, 3 * mesh.doflocs.shape[1]))
-        return Dependence(np.array(dofs[:1]), csr_matrix(row), self.what, equation=True)
+        return Dependence(np.array(dofs[:1]), csr_matrix(row), self.label, equation=True)
 
 
 def _summed(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, n: int) -> csr_matrix:
@@ -128,7 +128,7 @@ class RigidCoupling:
     face: str
 
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
-        """The nodes of the face in terms of the point; raises ValueError where the face is unknown."""
+        """The nodes of the face in terms of the point; raises Refusal where the face is unknown."""
         nodes = find_group(node_sets, self.face)
         place, turn = mesh.points[self.point]
         arm = coordinates(mesh)[nodes] - coordinates(mesh)[place]
@@ -153,7 +153,7 @@ class DistributedCoupling:
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The point in terms of the nodes of the face.
 
-        Raises  ValueError where the face is unknown, or its nodes lie on one line, so that it has no turn
+        Raises  Refusal where the face is unknown, or its nodes lie on one line, so that it has no turn
         """
         nodes, share = shares(mesh, node_sets, self.face)
         place, turn = mesh.points[self.point]
@@ -179,26 +179,26 @@ class DistributedCoupling:
 class Link:
     """Two points of couplings that move alike but for some of their motions.
 
-    what : name for errors; first, second : the couplings; free : motions out of 0..2 along and 3..5 about x, y, z in
+    label : for errors; first, second : the couplings; free : motions out of 0..2 along and 3..5 about x, y, z in
         which they stay free of each other
     """
 
-    what: str
+    label: str
     first: RigidCoupling | DistributedCoupling
     second: RigidCoupling | DistributedCoupling
     free: Sequence[int] = ()
 
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """As many displacements of the first point, or of the face that it follows, in terms of the others."""
-        alike = np.setdiff1d(np.arange(6), np.asarray(self.free, int))
-        one, two = (self._motion(c, mesh, node_sets)[alike] for c in (self.first, self.second))
-        rows = csr_matrix(one - two)
-        own = np.unique(one.nonzero()[1])
-        pivots = own[np.sort(qr(one[:, own].toarray(), mode="r", pivoting=True)[1][: len(alike)])]
-        moved = np.linalg.solve(rows[:, pivots].toarray(), -rows.toarray())
-        moved[:, pivots] = 0.0
-        moved[np.abs(moved) < SMALL] = 0.0
-        return Dependence(pivots, csr_matrix(moved), self.what)
+        linked = np.setdiff1d(np.arange(6), np.asarray(self.free, int))
+        motion_1, motion_2 = (self._motion(c, mesh, node_sets)[linked] for c in (self.first, self.second))
+        rows = csr_matrix(motion_1 - motion_2)
+        columns = np.unique(motion_1.nonzero()[1])
+        pivots = columns[np.sort(qr(motion_1[:, columns].toarray(), mode="r", pivoting=True)[1][: len(linked)])]
+        coefficients = np.linalg.solve(rows[:, pivots].toarray(), -rows.toarray())
+        coefficients[:, pivots] = 0.0
+        coefficients[np.abs(coefficients) < SMALL] = 0.0
+        return Dependence(pivots, csr_matrix(coefficients), self.label)
 
     @staticmethod
     def _motion(

@@ -34,8 +34,8 @@ class Sector:
 
     system : n coordinates, real
     interface : its contacts; B (n_c, n) is what this sector moves, of a contact with the neighbour the right face
-    left : (n_c, n) the half of the left face: relative displacement = B q_n - left q_(n-1); rows of zero for a contact
-        inside the sector or with the ground
+    left_map : (n_c, n) the half of the left face: relative displacement = B q_n - left_map q_(n-1); zero rows for a
+        contact inside the sector or with the ground
     seam_right, seam_left : (k, 3) coordinates of matched nodes where sectors are joined, x, y, z; k = 0 for none
     turn : (3, 3) rotation by one pitch, from a sector to the one on its left
     n_sectors : sectors of the wheel; joints : joint -> its pairs
@@ -44,7 +44,7 @@ class Sector:
 
     system: SecondOrderSystem
     interface: ContactInterface
-    left: Any
+    left_map: Any
     seam_right: np.ndarray
     seam_left: np.ndarray
     turn: np.ndarray
@@ -69,7 +69,7 @@ def with_neighbours(
     contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[float] = AXIS
 ) -> list[ContactFaces]:
     """Contacts of a sector, face on its right, with the opposite faces of its neighbours on the left, which each meets
-    after a turn by one pitch about the axis; raises ValueError as `cut_sector` does.
+    after a turn by one pitch about the axis; raises Refusal as `cut_sector` does.
     """
     if n_sectors < 2:
         raise Refusal(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
@@ -92,16 +92,16 @@ def cut_sector(
     contacts : those that the part was built with; the ones of `turned` meet the neighbour, the others stay inside
     seam : names of the right and the left face where sectors are one piece, None where only contacts couple them
     axis : of the wheel, through the origin
-    Raises  ValueError where faces do not match after the turn, a seam is held on one side only, or a contact has no
+    Raises  Refusal where faces do not match after the turn, a seam is held on one side only, or a contact has no
         opposite face
     """
     if n_sectors < 2:
         raise Refusal(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     turn = rotation(unit(axis, "the axis of rotation"), 2 * np.pi / n_sectors)
-    left = part.rows(_left_halves(part, contacts))
+    left_map = part.rows(_left_halves(part, contacts))
     none = np.empty((0, 3), dtype=int)
     seams = (none, none) if seam is None else _seams(part, seam, turn)
-    return Sector(part.system, part.interface, left, *seams, turn, n_sectors, part.joints)
+    return Sector(part.system, part.interface, left_map, *seams, turn, n_sectors, part.joints)
 
 
 def _left_halves(part: Part, contacts: Sequence[ContactFaces]) -> csr_matrix:
@@ -116,48 +116,48 @@ def _left_halves(part: Part, contacts: Sequence[ContactFaces]) -> csr_matrix:
 
 def _seams(part: Part, seam: tuple[str, str], turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Free DOFs (k, 3) of the right seam and of its partners on the left."""
-    right, left = (find_group(part.node_sets, name) for name in seam)
-    what = f"the cyclic faces '{seam[0]}' and '{seam[1]}'"
-    if len(right) != len(left):
-        raise Refusal(f"{what} have {len(right)} and {len(left)} nodes; mesh both with the same grid")
-    left = left[partners(part.points[right] @ turn.T, part.points[left], what)]
+    right_nodes, left_nodes = (find_group(part.node_sets, name) for name in seam)
+    label = f"the cyclic faces '{seam[0]}' and '{seam[1]}'"
+    if len(right_nodes) != len(left_nodes):
+        raise Refusal(f"{label} have {len(right_nodes)} and {len(left_nodes)} nodes; mesh both with the same grid")
+    left_nodes = left_nodes[partners(part.points[right_nodes] @ turn.T, part.points[left_nodes], label)]
     place = np.full(3 * len(part.points), -1)
     place[part.free] = np.arange(len(part.free))
-    dofs = [place[nodes[:, None] * 3 + np.arange(3)] for nodes in (right, left)]
+    dofs = [place[nodes[:, None] * 3 + np.arange(3)] for nodes in (right_nodes, left_nodes)]
     free = [(d >= 0) for d in dofs]
-    whole = free[0].all(axis=1) | ~free[0].any(axis=1)
-    if not whole.all() or (free[0] != free[1]).any():
-        raise Refusal(f"{what} are held unequally; clamp nodes on both of them, in all axes")
+    is_uniform = free[0].all(axis=1) | ~free[0].any(axis=1)
+    if not is_uniform.all() or (free[0] != free[1]).any():
+        raise Refusal(f"{label} are held unequally; clamp nodes on both of them, in all axes")
     if np.intersect1d(dofs[0][free[0]], dofs[1][free[1]]).size:
-        raise Refusal(f"{what} share nodes; a sector cannot reach the axis of the wheel")
-    kept = free[0][:, 0]
-    return dofs[0][kept], dofs[1][kept]
+        raise Refusal(f"{label} share nodes; a sector cannot reach the axis of the wheel")
+    is_free = free[0][:, 0]
+    return dofs[0][is_free], dofs[1][is_free]
 
 
 def seam_parts(sector: Sector) -> tuple[csr_matrix, csr_matrix]:
-    """Own (n, m) and next (n, m): q_n = own z_n + next z_(n+1), where sector n + 1 owns the seam both share."""
+    """Maps (n, m) of q_n = base z_n + next z_(n+1); sector n + 1 owns the seam that both share."""
     n, shape = sector.system.n_dof, (len(sector.seam_left), 3, 3)
-    kept = np.setdiff1d(np.arange(n), sector.seam_left)
+    independent = np.setdiff1d(np.arange(n), sector.seam_left)
     place = np.full(n, -1)
-    place[kept] = np.arange(len(kept))
-    own = csr_matrix((np.ones(len(kept)), (kept, place[kept])), shape=(n, len(kept)))
+    place[independent] = np.arange(len(independent))
+    base = csr_matrix((np.ones(len(independent)), (independent, place[independent])), shape=(n, len(independent)))
     rows = np.broadcast_to(sector.seam_left[:, :, None], shape).ravel()
     columns = place[np.broadcast_to(sector.seam_right[:, None, :], shape)].ravel()
     turn = np.broadcast_to(sector.turn, shape).ravel()
-    return own, csr_matrix((turn, (rows, columns)), shape=own.shape)
+    return base, csr_matrix((turn, (rows, columns)), shape=base.shape)
 
 
 def seam_map(sector: Sector, index: int) -> csr_matrix:
     """T (n, m) of a wave: the left seam follows the right one, u_left = exp(-i phi) R u_right, q = T z."""
-    own, following = seam_parts(sector)
-    return own + sector.phase(index) * following  # 3.12, 3.15
+    base, next_sector = seam_parts(sector)
+    return base + sector.phase(index) * next_sector  # 3.12, 3.15
 
 
 def wave_system(sector: Sector, index: int) -> tuple[SecondOrderSystem, Any]:
     """The system and the contact map (n_c, m) that a wave of this index sees; Hermitian, real for 0 and N/2."""
     T = seam_map(sector, index)
     ahead = np.conj(sector.phase(index))
-    return sector.system.projected(T), (sector.interface.B - ahead * sector.left) @ T  # 3.17
+    return sector.system.projected(T), (sector.interface.B - ahead * sector.left_map) @ T  # 3.17
 
 
 def sector_name(name: str, n: int) -> str:
@@ -167,10 +167,10 @@ def sector_name(name: str, n: int) -> str:
 
 def sector_maps(sector: Sector) -> list[csr_matrix]:
     """P_n (n, n_wheel), one per sector: q_n = P_n q; q holds what each sector owns, in its frame, sector by sector."""
-    own, following = seam_parts(sector)
+    base, next_sector = seam_parts(sector)
     place = np.eye(sector.n_sectors)
     return [
-        csr_matrix(kron(place[k : k + 1], own) + kron(np.roll(place, -1, axis=0)[k : k + 1], following))
+        csr_matrix(kron(place[k : k + 1], base) + kron(np.roll(place, -1, axis=0)[k : k + 1], next_sector))
         for k in range(sector.n_sectors)
     ]
 
@@ -183,7 +183,7 @@ def assemble_wheel(
     stiffness : (N,) factor on the stiffness of each sector, 1 for all by default: stiffness mistuning
     Returns the system, dense where the sector's is, loads and outputs named "<name>@<sector>"; the interface: pairs of
         sector 0 against sector N - 1, then of sector 1 against 0, and so on, in the turned frames of each
-    Raises  ValueError where there is not one positive factor per sector
+    Raises  Refusal where there is not one positive factor per sector
     """
     n_sectors, system, half = sector.n_sectors, sector.system, sector.interface
     factors = np.ones(n_sectors) if stiffness is None else np.asarray(stiffness, dtype=float)
@@ -207,6 +207,6 @@ def assemble_wheel(
     )
     contacts = []
     for k, P in enumerate(maps):
-        back, B = np.linalg.matrix_power(sector.turn, k).T, half.B @ P - sector.left @ maps[k - 1]
+        back, B = np.linalg.matrix_power(sector.turn, k).T, half.B @ P - sector.left_map @ maps[k - 1]
         contacts.append(replace(half, points=half.points @ back, frames=half.frames @ back, B=B))
     return wheel, join(contacts)

@@ -32,12 +32,14 @@ def assemble(mesh: Any, material: Any, order: int = 5) -> tuple[csr_matrix, csr_
     order : quadrature order
     Returns M [kg], K [N/m], each (3 n_node, 3 n_node), symmetric to the last bit
     """
-    found = [_assemble(piece.mesh, one, order) for piece, one in materials_of(mesh, material)]
-    n_beyond = 3 * mesh.doflocs.shape[1] - sum(M.shape[0] for M, _ in found)
-    if len(found) == 1 and not n_beyond:
-        return found[0]
-    beyond = [csr_matrix((n_beyond, n_beyond))] if n_beyond else []
-    mass, stiffness = (block_diag([*blocks, *beyond], format="csr") for blocks in zip(*found, strict=True))
+    matrices = [
+        _assemble(piece.mesh, material_of_piece, order) for piece, material_of_piece in materials_of(mesh, material)
+    ]
+    n_reference = 3 * mesh.doflocs.shape[1] - sum(M.shape[0] for M, _ in matrices)
+    if len(matrices) == 1 and not n_reference:
+        return matrices[0]
+    reference_points = [csr_matrix((n_reference, n_reference))] if n_reference else []
+    mass, stiffness = (block_diag([*blocks, *reference_points], format="csr") for blocks in zip(*matrices, strict=True))
     return mass, stiffness
 
 
@@ -46,9 +48,9 @@ def _assemble(
 ) -> tuple[csr_matrix, csr_matrix]:
     nodes = connectivity(mesh)
     kinds, _ = element_materials(mesh, material)
-    isotropic = all(isinstance(one, Material) for one in kinds)
+    isotropic = all(isinstance(kind, Material) for kind in kinds)
     rho = densities(mesh, material)
-    reduced = [isinstance(one, Material) and one.linear_reduced for one in kinds]
+    reduced = [isinstance(kind, Material) and kind.linear_reduced for kind in kinds]
     if any(reduced):
         if not all(reduced):
             raise Refusal('material: elements = "linear_reduced" is for all materials of a mesh, or for none')
@@ -88,7 +90,7 @@ def _linear_reduced(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]
 def strain_points(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> Iterator[tuple[np.ndarray, ...]]:
     """Yield (elements, nodes, N, grad N, weight) as `batches` does, nodes (n_e, n_a) of each element besides, where the
     strain of one mesh is taken: for linear reduced elements, once or eight times in each of the mesh, its mean."""
-    if any(isinstance(one, Material) and one.linear_reduced for one in element_materials(mesh, material)[0]):
+    if any(isinstance(kind, Material) and kind.linear_reduced for kind in element_materials(mesh, material)[0]):
         cells, gradient, volume, _ = reduced_elements(mesh)
         parents = np.tile(np.arange(mesh.nelements), len(cells) // mesh.nelements)
         yield parents, cells, np.full((1, 8), 1 / 8), gradient[:, None], volume[:, None]
@@ -139,7 +141,7 @@ def element_materials(
 ) -> tuple[list[AnyMaterial], np.ndarray]:
     """Materials, and for each element of one mesh (n_element,) which of them it has.
 
-    Raises  ValueError for a subdomain the mesh lacks, or an element with no or two materials
+    Raises  Refusal for a subdomain the mesh lacks, or an element with no or two materials
     """
     n_element = mesh.t.shape[1]
     if not isinstance(material, Mapping):
@@ -160,23 +162,23 @@ def element_materials(
 
 
 def densities(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> np.ndarray:
-    """Density of each element of one mesh (n_element,) [kg/m3]; raises ValueError as `of_elements` does."""
+    """Density of each element of one mesh (n_element,) [kg/m3]; raises Refusal as `of_elements` does."""
     kinds, kind = element_materials(mesh, material)
-    return np.array([one.rho for one in kinds])[kind]
+    return np.array([material_kind.rho for material_kind in kinds])[kind]
 
 
-def element_tensors(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], what: str) -> np.ndarray:
+def element_tensors(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], name: str) -> np.ndarray:
     """A tensor (n_element, 3, ...) of the material at the centre of each element of one mesh.
 
-    what : "tensor" [Pa] or "expansion_tensor" [1/K]
+    name : "tensor" [Pa] or "expansion_tensor" [1/K]
     """
     kinds, kind = element_materials(mesh, material)
     centres = mesh.p[:, mesh.t].mean(axis=1).T
-    found = [getattr(one, what)(centres[kind == i]) for i, one in enumerate(kinds)]
-    whole = np.empty((len(kind), *found[0].shape[1:]))
-    for i, values in enumerate(found):
-        whole[kind == i] = values
-    return whole
+    kind_values = [getattr(material_kind, name)(centres[kind == i]) for i, material_kind in enumerate(kinds)]
+    tensors = np.empty((len(kind), *kind_values[0].shape[1:]))
+    for i, tensor in enumerate(kind_values):
+        tensors[kind == i] = tensor
+    return tensors
 
 
 def element_constants(
@@ -184,7 +186,9 @@ def element_constants(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lame's constants [Pa] and density [kg/m3] of each element of isotropic materials, three arrays (n_element,)."""
     kinds, kind = element_materials(mesh, material)
-    values = np.array([[*one.lame, one.rho] for one in kinds if isinstance(one, Material)])
+    values = np.array(
+        [[*material_kind.lame, material_kind.rho] for material_kind in kinds if isinstance(material_kind, Material)]
+    )
     return values[kind, 0], values[kind, 1], values[kind, 2]
 
 
@@ -195,7 +199,7 @@ def reduced_elements(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     They are those of a first-order mesh, or eight on the nodes of each 27-node one. The gradient is the mean over the
     element and the mass lumped: what explicit programs and many published models have, softer than the 27-node element.
     The fourth, (n, 8, 8) [m], times the shear modulus and a unit matrix (3, 3), holds hourglass modes
-    Raises  ValueError for a mesh of other elements
+    Raises  Refusal for a mesh of other elements
     Source  Flanagan and Belytschko, IJNME 17 (1981) 679
     """
     nodes = connectivity(mesh)
@@ -204,8 +208,8 @@ def reduced_elements(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     reference = np.asarray(mesh.elem().doflocs).reshape(-1, 3)
     side = 2 if nodes.shape[1] == 27 else 1  # linear elements along an edge of one of the mesh
     corners = [(np.array(at) + (1 + SIGNS) / 2) / side for at in product(range(side), repeat=3)]
-    own = [[int(np.abs(reference - corner).max(axis=1).argmin()) for corner in eight] for eight in corners]
-    cells = np.concatenate([nodes[:, eight] for eight in own])
+    local = [[int(np.abs(reference - corner).max(axis=1).argmin()) for corner in eight] for eight in corners]
+    cells = np.concatenate([nodes[:, eight] for eight in local])
     x = coordinates(mesh)[cells]
     weighted, volume = np.zeros((len(x), 3, 8)), np.zeros(len(x))
     for corner in SIGNS:
@@ -216,8 +220,8 @@ def reduced_elements(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
         volume += det
     mean = weighted / volume[:, None, None]
     shape = (MODES[None] - np.einsum("hI,eIi,eiJ->ehJ", MODES, x, mean)) / 8
-    against = 8 * HOURGLASS * volume * (mean**2).sum(axis=(1, 2))
-    return cells, mean, volume, np.einsum("e,ehI,ehJ->eIJ", against, shape, shape)
+    hourglass_stiffness = 8 * HOURGLASS * volume * (mean**2).sum(axis=(1, 2))
+    return cells, mean, volume, np.einsum("e,ehI,ehJ->eIJ", hourglass_stiffness, shape, shape)
 
 
 def _slopes(at: np.ndarray) -> np.ndarray:

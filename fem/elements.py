@@ -24,7 +24,7 @@ def coordinates(mesh: Any) -> np.ndarray:
 def connectivity(mesh: Any) -> np.ndarray:
     """Nodes of the elements (n_element, 27, 10 or 8), in scikit-fem's local order.
 
-    Raises  ValueError where the mesh is not of 27-node or 8-node hexahedra or 10-node tetrahedra
+    Raises  Refusal where the mesh is not of 27-node or 8-node hexahedra or 10-node tetrahedra
     """
     if not isinstance(mesh, MeshHex1 | MeshTet2):  # MeshHex2 is a MeshHex1
         raise Refusal(
@@ -50,7 +50,7 @@ def mapped_batches(mesh: Any, order: int = 5, size: int = 256) -> Iterator[tuple
     size : elements at a time; memory only
     Yields elements (n_e,), N (n_q, n_a) [-], dN (n_q, 3, n_a) in the reference element [-], J (n_e, n_q, 3, 3) [m] with
         d x_j / d X_i at [i, j], weight |J| w (n_e, n_q) [m3]
-    Raises  ValueError where an element is folded
+    Raises  Refusal where an element is folded
     """
     nodes, points = connectivity(mesh), coordinates(mesh)
     element = mesh.elem()

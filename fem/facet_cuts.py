@@ -34,18 +34,18 @@ def clip_polygons(subject: np.ndarray, region: np.ndarray) -> np.ndarray:
     for k in range(region.shape[1]):
         start, end = region[:, k], region[:, (k + 1) % region.shape[1]]
         edge = end - start
-        away = subject - start[:, None]
-        inside = edge[:, None, 0] * away[..., 1] - edge[:, None, 1] * away[..., 0]
-        following, beyond = np.roll(subject, -1, axis=1), np.roll(inside, -1, axis=1)
-        crosses = (inside >= 0) != (beyond >= 0)
-        t = np.divide(inside, inside - beyond, out=np.zeros_like(inside), where=crosses)
+        offset = subject - start[:, None]
+        inside = edge[:, None, 0] * offset[..., 1] - edge[:, None, 1] * offset[..., 0]
+        following, next_inside = np.roll(subject, -1, axis=1), np.roll(inside, -1, axis=1)
+        crosses = (inside >= 0) != (next_inside >= 0)
+        t = np.divide(inside, inside - next_inside, out=np.zeros_like(inside), where=crosses)
         crossing = subject + t[..., None] * (following - subject)
         m = subject.shape[1]
         candidates = np.stack([subject, crossing], axis=2).reshape(len(subject), 2 * m, 2)
-        kept = np.stack([inside >= 0, crosses], axis=2).reshape(len(subject), 2 * m)
-        count = kept.sum(axis=1)
+        is_kept = np.stack([inside >= 0, crosses], axis=2).reshape(len(subject), 2 * m)
+        count = is_kept.sum(axis=1)
         width = max(int(count.max(initial=0)), 1)
-        order = np.argsort(~kept, axis=1, kind="stable")[:, :width]
+        order = np.argsort(~is_kept, axis=1, kind="stable")[:, :width]
         packed = np.take_along_axis(candidates, order[..., None], axis=1)
         last = np.maximum(count - 1, 0)[:, None]
         place = np.minimum(np.arange(width)[None], last)

@@ -38,13 +38,13 @@ def factorise(
     K: Any,
     definite: bool = True,
     solver: str | None = None,
-    few: np.ndarray | None = None,
+    selected_rows: np.ndarray | None = None,
 ) -> Factor:
     """Factorise a sparse symmetric real matrix once, for many right-hand sides.
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix).
     solver : "pardiso" or "superlu", the best available by default; "mumps" in MPI processes of another Python
-    few : rows that `solve_few` is to be fast for
+    selected_rows : those that `solve_selected` is to be fast for
     Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
     K = csr_matrix(K)
@@ -57,7 +57,7 @@ def factorise(
         if solver == "mumps":
             factor = Mumps(K, definite)
         else:
-            factor = Pardiso(K, definite, few=few) if solver == "pardiso" else SuperLU(K, definite)
+            factor = Pardiso(K, definite, selected_rows=selected_rows) if solver == "pardiso" else SuperLU(K, definite)
         regular = softest_residual(K, factor.solve) < SINGULAR
     except (RuntimeError, ArithmeticError):
         regular = False
@@ -69,15 +69,15 @@ def factorise(
     return factor
 
 
-def solve_few(factor: Factor, rhs: np.ndarray) -> np.ndarray:
-    """The solution in the `few` rows that the factor was made for, where rhs (n, k) vanishes in all others.
+def solve_selected(factor: Factor, rhs: np.ndarray) -> np.ndarray:
+    """The solution in the `selected_rows` of the factor, where rhs (n, k) vanishes in all others.
 
-    What stands in the other rows is no solution
+    The other rows hold no solution
     """
     if not isinstance(factor, Pardiso):
         return factor.solve(rhs)
-    more = -rhs.shape[1] % 4 if rhs.shape[1] > 4 else 0  # PARDISO takes 15 % longer for seven columns than for eight
-    return factor.solve(np.pad(rhs, ((0, 0), (0, more))), few=True)[:, : rhs.shape[1]]
+    padding = -rhs.shape[1] % 4 if rhs.shape[1] > 4 else 0  # PARDISO takes 15 % longer for seven columns than for eight
+    return factor.solve(np.pad(rhs, ((0, 0), (0, padding))), selected_only=True)[:, : rhs.shape[1]]
 
 
 def eigenvalues_below(K: Any, M: Any, value: float) -> int:
@@ -125,15 +125,17 @@ def pardiso_available() -> bool:
 class Pardiso:
     """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite).
 
-    few : rows that are eliminated last, so that a solution in them from forces on them visits no others
+    selected_rows : eliminated last, so that a solution in them from forces on them visits no others
     """
 
     NO_MEMORY = -2  # error code
     ANALYSE, FACTORISE, SOLVE = 11, 22, 33  # phases
     PERMUTED, SIZE, PARTIAL = 5, 17, 31  # places of switches, and of the memory of factors [kB]
-    MOST_FEW = 0.5  # share of the few rows, whose triangle is dense, in that: 0.3 saves two thirds, 0.8 takes ten times
+    MOST_SELECTED = (
+        0.5  # share of the selected rows, whose triangle is dense, in that: 0.3 saves two thirds, 0.8 takes ten times
+    )
 
-    def __init__(self, K: csr_matrix, definite: bool = True, few: np.ndarray | None = None) -> None:
+    def __init__(self, K: csr_matrix, definite: bool = True, selected_rows: np.ndarray | None = None) -> None:
         from pypardiso import PyPardisoSolver
 
         self.name = "MKL PARDISO, " + ("Cholesky" if definite else "LDL^T")
@@ -149,14 +151,16 @@ class Pardiso:
         # METIS, and no iterative refinement unless pivots were perturbed: MKL's defaults refine twice, 5 times slower
         for place, value in {1: 1, 2: 2, 8: 0, 10: 8}.items():
             self._solver.set_iparm(place, value)
-        self._few, nothing = few is not None, np.zeros(K.shape[0])
-        if few is not None:
+        self._selects, nothing = selected_rows is not None, np.zeros(K.shape[0])
+        if selected_rows is not None:
             self._solver.perm = np.zeros(K.shape[0], np.int32)
-            self._solver.perm[few] = 1
+            self._solver.perm[selected_rows] = 1
             self._solver.set_iparm(self.PARTIAL, 1)
         self._call(self.ANALYSE, nothing)
-        if few is not None and 4 * len(few) ** 2 > self.MOST_FEW * 1024 * int(self._solver.get_iparm(self.SIZE)):
-            self._few = False
+        if selected_rows is not None and 4 * len(selected_rows) ** 2 > self.MOST_SELECTED * 1024 * int(
+            self._solver.get_iparm(self.SIZE)
+        ):
+            self._selects = False
             self._solver.free_memory(everything=True)
             for place in (self.PERMUTED, self.PARTIAL):
                 self._solver.set_iparm(place, 0)
@@ -168,14 +172,14 @@ class Pardiso:
         """How many eigenvalues of an indefinite K are negative: the signs of its pivots, by Sylvester's law."""
         return int(self._solver.get_iparm(23))
 
-    def solve(self, rhs: np.ndarray, few: bool = False) -> np.ndarray:
-        """Solution of the same shape as rhs, (n,) or (n, k); of the few rows alone where asked for, see `solve_few`."""
-        self._solver.set_iparm(self.PARTIAL, int(few and self._few))
+    def solve(self, rhs: np.ndarray, selected_only: bool = False) -> np.ndarray:
+        """Solution of the same shape as rhs, (n,) or (n, k); of the selected rows alone where `selected_only`."""
+        self._solver.set_iparm(self.PARTIAL, int(selected_only and self._selects))
         return np.ascontiguousarray(self._call(self.SOLVE, np.asfortranarray(rhs, dtype=float)))
 
     def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
         """One call of PARDISO; rhs (n,) or (n, k) in Fortran's order. Raises MemoryError, ArithmeticError."""
-        found, trouble, own = np.zeros_like(rhs), ctypes.c_int32(0), self._solver
+        solution, error, solver = np.zeros_like(rhs), ctypes.c_int32(0), self._solver
         values, rows, columns = self._matrix
 
         def number(value: int) -> Any:
@@ -184,18 +188,18 @@ class Pardiso:
         def integers(array: np.ndarray) -> Any:
             return array.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))
 
-        own._mkl_pardiso(
-            own.pt.ctypes.data_as(ctypes.POINTER(own._pt_type[0])), number(1), number(1), number(own.mtype),
+        solver._mkl_pardiso(
+            solver.pt.ctypes.data_as(ctypes.POINTER(solver._pt_type[0])), number(1), number(1), number(solver.mtype),
             number(phase), number(len(rows) - 1), values.ctypes.data_as(ctypes.c_void_p), integers(rows),
-            integers(columns), integers(own.perm), number(rhs.size // max(len(rows) - 1, 1)), integers(own.iparm),
-            number(0), rhs.ctypes.data_as(ctypes.c_void_p), found.ctypes.data_as(ctypes.c_void_p),
-            ctypes.byref(trouble),
+            integers(columns), integers(solver.perm), number(rhs.size // max(len(rows) - 1, 1)), integers(solver.iparm),
+            number(0), rhs.ctypes.data_as(ctypes.c_void_p), solution.ctypes.data_as(ctypes.c_void_p),
+            ctypes.byref(error),
         )  # fmt: skip
-        if trouble.value == self.NO_MEMORY:
+        if error.value == self.NO_MEMORY:
             raise MemoryError(f"the memory is not enough for the factors of {len(rows) - 1} equations")
-        if trouble.value:
-            raise ArithmeticError(f"PARDISO's error {trouble.value}")
-        return found
+        if error.value:
+            raise ArithmeticError(f"PARDISO's error {error.value}")
+        return solution
 
     def __del__(self) -> None:
         if hasattr(self, "_solver") and not sys.is_finalizing():  # with the process its memory goes anyway

@@ -56,11 +56,11 @@ class ContactInterface:
 
 
 def checked_components(components: Sequence[str]) -> tuple[str, ...]:
-    """The components; raises ValueError where they are not some of t1, t2, n in this order."""
-    found = tuple(components)
-    if not found or found != tuple(c for c in COMPONENTS if c in found):
-        raise Refusal(f"contact components {list(found)} must be some of t1, t2, n, in this order")
-    return found
+    """The components; raises Refusal where they are not some of t1, t2, n in this order."""
+    names = tuple(components)
+    if not names or names != tuple(c for c in COMPONENTS if c in names):
+        raise Refusal(f"contact components {list(names)} must be some of t1, t2, n, in this order")
+    return names
 
 
 def contact_frames(normals: np.ndarray, t1: Sequence[float] | None) -> np.ndarray:
@@ -68,27 +68,27 @@ def contact_frames(normals: np.ndarray, t1: Sequence[float] | None) -> np.ndarra
 
     t1 : where None the first of x, y, z that lies most along the face
 
-    Raises  ValueError where the direction is along a normal
+    Raises  Refusal where the direction is along a normal
     """
     if t1 is None:
         t1 = np.eye(3)[int(np.argmin(np.round(np.abs(normals).max(axis=0), 3)))]
     direction = unit(t1, "the contact direction t1")
-    along = direction - (normals @ direction)[:, None] * normals
-    length = np.linalg.norm(along, axis=1, keepdims=True)
+    tangent = direction - (normals @ direction)[:, None] * normals
+    length = np.linalg.norm(tangent, axis=1, keepdims=True)
     if (length < 1e-3).any():
         raise Refusal(f"the contact direction t1 = {list(t1)} is along the contact normal; give one along the face")
-    first = along / length
+    first = tangent / length
     return np.stack([first, np.cross(normals, first), normals], axis=1)
 
 
-def unit(direction: Sequence[float], what: str) -> np.ndarray:
+def unit(direction: Sequence[float], label: str) -> np.ndarray:
     """Unit vector (3,) along a direction.
 
-    Raises  ValueError, naming what, for a zero vector or a wrong length
+    Raises  Refusal, naming it by `label`, for a zero vector or a wrong length
     """
     vector = np.asarray(direction, dtype=float)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
-        raise Refusal(f"{what} must be three numbers that are not all zero, but is {list(np.ravel(direction))}")
+        raise Refusal(f"{label} must be three numbers that are not all zero, but is {list(np.ravel(direction))}")
     return vector / np.linalg.norm(vector)
 
 
@@ -96,7 +96,7 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     """Several contacts of one structure as one interface, pairs in the order given; triangles become quadrangles that
     repeat a corner where there are quadrangles too.
 
-    Raises  ValueError where they differ in components
+    Raises  Refusal where they differ in components
     """
     if len({i.components for i in interfaces}) > 1:
         raise Refusal("the contacts of a structure must be built with the same components")

@@ -57,7 +57,7 @@ class Moment:
     direction: Sequence[float]
 
     def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
-        """Force vector (3 n_node,) [N m/N m]; raises ValueError where there is no such point."""
+        """Force vector (3 n_node,) [N m/N m]; raises Refusal where there is no such point."""
         points = mesh.points if isinstance(mesh, Assembly) else {}
         if self.point not in points:
             raise Refusal(f"a moment acts on the point of a coupling, but '{self.point}' is none; couple the group")

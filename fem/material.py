@@ -69,13 +69,13 @@ class _Turned:
         raise NotImplementedError
 
     @property
-    def _own(self) -> np.ndarray:
+    def _tensor(self) -> np.ndarray:
         """Elasticity tensor (3, 3, 3, 3) [Pa] along its axes."""
-        D, own = self.stiffness, np.empty((3, 3, 3, 3))
+        D, tensor = self.stiffness, np.empty((3, 3, 3, 3))
         for a, (i, j) in enumerate(VOIGT):
             for b, (k, l) in enumerate(VOIGT):
-                own[i, j, k, l] = own[j, i, k, l] = own[i, j, l, k] = own[j, i, l, k] = D[a, b]
-        return own
+                tensor[i, j, k, l] = tensor[j, i, k, l] = tensor[i, j, l, k] = tensor[j, i, l, k] = D[a, b]
+        return tensor
 
     def rotation(self, points: np.ndarray) -> np.ndarray:
         """(n, 3, 3) rows are the material axes at points (n, 3); one (1, 3, 3) where they are the same everywhere."""
@@ -86,7 +86,7 @@ class _Turned:
     def tensor(self, points: np.ndarray) -> np.ndarray:
         """Elasticity tensors (n, 3, 3, 3, 3) [Pa] along x, y, z at points (n, 3)."""
         R = self.rotation(points)
-        C = np.einsum("nai,nbj,nck,ndl,abcd->nijkl", R, R, R, R, self._own, optimize=True)
+        C = np.einsum("nai,nbj,nck,ndl,abcd->nijkl", R, R, R, R, self._tensor, optimize=True)
         return np.broadcast_to(C, (len(points), 3, 3, 3, 3))
 
     def expansion_tensor(self, points: np.ndarray) -> np.ndarray:

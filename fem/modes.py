@@ -51,7 +51,7 @@ def modes(
     factor : factorisation of K - sigma M that exists already
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its
         first large entry positive
-    Raises  ValueError where n is not between 1 and N, or the iteration does not converge; StaticDivergence where a
+    Raises  Refusal where n is not between 1 and N, or the iteration does not converge; StaticDivergence where a
         squared frequency is negative beyond rounding
     """
     size = K.shape[0]
@@ -89,7 +89,7 @@ def turning_frequencies(K: Any, M: Any, G: Any, n: int) -> np.ndarray:
     K, M : (N, N) sparse or dense, Hermitian, as for `modes`; G : (N, N) anti-Hermitian [N s/m]
     Of a wave of index j these are the motions that run with the rotation where j > 0; those against it belong to -j.
     The pencil is linearised as A y = omega B y, A = diag(K, M), B = [[-H, M], [M, 0]], H = iG, y = (q, omega q)
-    Raises  ValueError where n is too large, StaticDivergence as `modes` does
+    Raises  Refusal where n is too large, StaticDivergence as `modes` does
     Source  Meirovitch, Computational Methods in Structural Dynamics, 1980, chapter 5
     """
     lowest, phi = modes(K, M, min(K.shape[0], max(EIGEN.spanned, 2 * n)))

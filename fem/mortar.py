@@ -36,12 +36,12 @@ class MortarOptions:
     facing : cosine between directions from which on they look the same way; facets that face each other have less than
         its negative, which keeps the rims of bores and rounded edges out
     sliver : part of a facet that is too small to be a cut
-    whole : part of a facet that counts as all of it
-    few : part of a point's own area that is too little to carry
+    full : part of a facet that counts as all of it
+    negligible : part of a point's own area that is too little to carry
     tied : part of it from which on a node is tied; less asks too much of the other face by extrapolation
     independent : least eigenvalue, of the largest possible 1, at which shape functions still differ on a cut facet
     rounding : gap that is rounding of node positions, over the length of the face
-    apart : mean gap of two tied faces, over the length of the first, from which on they do not touch
+    separated : mean gap of two tied faces, over the length of the first, from which on they do not touch
     """
 
     reach: float = 0.1
@@ -51,12 +51,12 @@ class MortarOptions:
     curved_order: int = 12
     facing: float = 0.3
     sliver: float = 1e-10
-    whole: float = 1 - 1e-6
-    few: float = 1e-6
+    full: float = 1 - 1e-6
+    negligible: float = 1e-6
     tied: float = 1e-3
     independent: float = 1e-7
     rounding: float = 1e-9
-    apart: float = 5e-3
+    separated: float = 5e-3
 
 
 MORTAR = MortarOptions()
@@ -102,8 +102,11 @@ def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> S
     """The side that some facets of one body make, turned by a rotation (3, 3) about the origin."""
     require_outside(mesh, facets)
     nodes = facet_nodes(mesh, facets)
-    piece, own = piece_of_facets(mesh, facets)
-    points, inner = coordinates(mesh)[nodes], piece.mesh.p[:, piece.mesh.t[:, piece.mesh.f2t[0, own]]].mean(axis=1).T
+    piece, local_facets = piece_of_facets(mesh, facets)
+    points, inner = (
+        coordinates(mesh)[nodes],
+        piece.mesh.p[:, piece.mesh.t[:, piece.mesh.f2t[0, local_facets]]].mean(axis=1).T,
+    )
     if rotation is not None:
         points, inner = points @ rotation.T, inner @ rotation.T
     n = 4 if isinstance(piece.mesh, MeshHex1) else 3
@@ -142,72 +145,78 @@ class SharedSurface:
             yield int(self.first[start]), int(self.second[start]), slice(start, stop)
 
 
-def shared_surface(one: Side, two: Side, reach: float) -> SharedSurface:
-    """Where two sides face each other.
+def shared_surface(first_side: Side, second_side: Side, reach: float) -> SharedSurface:
+    """Gauss points of the surface on which two sides face each other.
 
     reach : farthest distance along the normal at which facets still meet [m]
     Returns the points, none where the sides do not meet
     """
-    i, j = _candidates(one, two, reach)
+    i, j = _candidates(first_side, second_side, reach)
     if not len(i):
         none, pairs = np.zeros(0), np.zeros((2, 0))
         return SharedSurface(
-            i, j, pairs, pairs, none, np.zeros((0, 3)), none, np.zeros(1, int), np.zeros(len(one.nodes))
+            i, j, pairs, pairs, none, np.zeros((0, 3)), none, np.zeros(1, int), np.zeros(len(first_side.nodes))
         )
-    frames = tangent_planes(one.normal)[i]
-    curved = one.bulge > MORTAR.curved
-    outline = _outline(two, two.bulge > MORTAR.curved)[j]
-    corners = one.points[:, : one.corners]
+    frames = tangent_planes(first_side.normal)[i]
+    curved = first_side.bulge > MORTAR.curved
+    outline = _outline(second_side, second_side.bulge > MORTAR.curved)[j]
+    corners = first_side.points[:, : first_side.corners]
     if curved:
-        region = reference_corners(one.corners)[None].repeat(len(i), axis=0)
+        region = reference_corners(first_side.corners)[None].repeat(len(i), axis=0)
         m = outline.shape[1]
-        s = locate_on_facets(one.points[i].repeat(m, 0), outline.reshape(-1, 3), frames.repeat(m, 0))
+        s = locate_on_facets(first_side.points[i].repeat(m, 0), outline.reshape(-1, 3), frames.repeat(m, 0))
         subject = s.T.reshape(len(i), m, 2)
     else:
-        region = np.einsum("pkx,pdx->pkd", corners[i] - one.centre[i][:, None], frames)
-        subject = np.einsum("pkx,pdx->pkd", outline - one.centre[i][:, None], frames)
-    whole = polygon_areas(region)
-    region[whole < 0] = region[whole < 0][:, ::-1]
+        region = np.einsum("pkx,pdx->pkd", corners[i] - first_side.centre[i][:, None], frames)
+        subject = np.einsum("pkx,pdx->pkd", outline - first_side.centre[i][:, None], frames)
+    facet_area = polygon_areas(region)
+    region[facet_area < 0] = region[facet_area < 0][:, ::-1]
     polygon = clip_polygons(subject, region)
-    found = np.abs(polygon_areas(polygon)) > MORTAR.sliver * np.abs(whole)
-    i, j, frames, polygon, whole = i[found], j[found], frames[found], polygon[found], np.abs(whole[found])
+    is_cut = np.abs(polygon_areas(polygon)) > MORTAR.sliver * np.abs(facet_area)
+    i, j, frames, polygon, facet_area = (
+        i[is_cut],
+        j[is_cut],
+        frames[is_cut],
+        polygon[is_cut],
+        np.abs(facet_area[is_cut]),
+    )
 
     X, w = get_quadrature(ElementTriP1, MORTAR.curved_order if curved else MORTAR.flat_order)
     hub = polygon.mean(axis=1, keepdims=True)
     a, b = polygon - hub, np.roll(polygon, -1, axis=1) - hub
     twice = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     twice *= np.sign(twice.sum(axis=1, keepdims=True))
-    pair, corner = np.nonzero(np.abs(twice) > MORTAR.sliver * whole[:, None])
+    pair, corner = np.nonzero(np.abs(twice) > MORTAR.sliver * facet_area[:, None])
     s = hub[pair, 0][:, None] + X[0][:, None] * a[pair, corner][:, None] + X[1][:, None] * b[pair, corner][:, None]
     weight = (twice[pair, corner][:, None] * w).ravel()
     s, of = s.reshape(-1, 2).T, np.repeat(pair, len(w))
 
-    local = one.points[i[of]]
+    local = first_side.points[i[of]]
     if curved:
         xi = s
     else:
         e = frames[of]
-        at = one.centre[i[of]] + s[0][:, None] * e[:, 0] + s[1][:, None] * e[:, 1]
+        at = first_side.centre[i[of]] + s[0][:, None] * e[:, 0] + s[1][:, None] * e[:, 1]
         xi = locate_on_facets(local, at, e)
     N, slopes = tabulate(local.shape[1], xi)
     x = np.einsum("an,nax->nx", N, local)
-    normal = np.cross(*np.einsum("ain,nax->inx", slopes, local)) * one.sign[i[of]][:, None]
+    normal = np.cross(*np.einsum("ain,nax->inx", slopes, local)) * first_side.sign[i[of]][:, None]
     size = np.linalg.norm(normal, axis=1)
     if curved:
         weight = weight * size
     normal = normal / size[:, None]
-    eta = locate_on_facets(two.points[j[of]], x, frames[of])
-    y = np.einsum("an,nax->nx", tabulate(two.points.shape[1], eta)[0], two.points[j[of]])
+    eta = locate_on_facets(second_side.points[j[of]], x, frames[of])
+    y = np.einsum("an,nax->nx", tabulate(second_side.points.shape[1], eta)[0], second_side.points[j[of]])
     gap = np.einsum("nx,nx->n", y - x, normal)
-    covered = np.bincount(i, np.abs(polygon_areas(polygon)) / whole, len(one.nodes))
-    near = np.abs(gap) <= reach
-    starts = np.append(np.flatnonzero(np.diff(of[near], prepend=-1)), near.sum())
-    if not near.all():
-        kept = np.bincount(i[of], np.where(near, np.abs(weight), 0.0), len(one.nodes))
-        everything = np.bincount(i[of], np.abs(weight), len(one.nodes))
-        covered = covered * np.divide(kept, everything, out=np.zeros_like(kept), where=everything > 0)
+    covered = np.bincount(i, np.abs(polygon_areas(polygon)) / facet_area, len(first_side.nodes))
+    is_near = np.abs(gap) <= reach
+    starts = np.append(np.flatnonzero(np.diff(of[is_near], prepend=-1)), is_near.sum())
+    if not is_near.all():
+        kept_weight = np.bincount(i[of], np.where(is_near, np.abs(weight), 0.0), len(first_side.nodes))
+        full_weight = np.bincount(i[of], np.abs(weight), len(first_side.nodes))
+        covered = covered * np.divide(kept_weight, full_weight, out=np.zeros_like(kept_weight), where=full_weight > 0)
     return SharedSurface(
-        i[of][near], j[of][near], xi[:, near], eta[:, near], weight[near], normal[near], gap[near],
+        i[of][is_near], j[of][is_near], xi[:, is_near], eta[:, is_near], weight[is_near], normal[is_near], gap[is_near],
         starts, covered,
     )  # fmt: skip
 
@@ -222,13 +231,13 @@ def coefficients(k: int) -> np.ndarray:
     if k == 9:
         i, j = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (1, 2), (2, 1), (0, 2), (2, 2)]).T
         return np.asarray(line[i[:, None], i] * line[j[:, None], j])
-    whole = np.eye(k)
+    matrix = np.eye(k)
     for middle in range(3, k if k == 6 else 0):
-        whole[middle, [middle - 3, (middle - 2) % 3, middle]] = line[2]
-    return whole
+        matrix[middle, [middle - 3, (middle - 2) % 3, middle]] = line[2]
+    return matrix
 
 
-def dual(one: Side, shared: SharedSurface) -> tuple[np.ndarray, np.ndarray]:
+def dual(side: Side, shared: SharedSurface) -> tuple[np.ndarray, np.ndarray]:
     """Dual functions of the first side, times the weights of the points, and what each coefficient weighs.
 
     Returns psi (k, n) [m2] and d (n_facet, k) [m2] with sum(psi_a u) = d_a times the Bernstein coefficient a of u, for
@@ -236,14 +245,14 @@ def dual(one: Side, shared: SharedSurface) -> tuple[np.ndarray, np.ndarray]:
         constant tractions are carried exactly. Where a cut is so thin that shape functions look alike on it, this
         holds for u that are linear in space, rigid motions among them
     """
-    k = one.nodes.shape[1]
+    k = side.nodes.shape[1]
     to = coefficients(k)
     N = np.linalg.inv(to).T @ tabulate(k, shared.xi)[0]
-    away = one.points - one.centre[:, None]
-    away /= np.abs(away).max(axis=(1, 2), keepdims=True)
-    affine = np.concatenate([np.ones((*one.nodes.shape, 1)), to @ away], axis=2)
-    starts = np.searchsorted(shared.first, np.arange(len(one.nodes) + 1))
-    psi, d = np.zeros_like(N), np.zeros(one.nodes.shape)
+    offset = side.points - side.centre[:, None]
+    offset /= np.abs(offset).max(axis=(1, 2), keepdims=True)
+    affine = np.concatenate([np.ones((*side.nodes.shape, 1)), to @ offset], axis=2)
+    starts = np.searchsorted(shared.first, np.arange(len(side.nodes) + 1))
+    psi, d = np.zeros_like(N), np.zeros(side.nodes.shape)
     for i in np.unique(shared.first):
         g = slice(starts[i], starts[i + 1])
         sign, root = np.sign(shared.weight[g]), np.sqrt(np.abs(shared.weight[g]))  # below 0 in parts of a hollow cut
@@ -260,17 +269,17 @@ def dual(one: Side, shared: SharedSurface) -> tuple[np.ndarray, np.ndarray]:
     return psi, d
 
 
-def _candidates(one: Side, two: Side, reach: float) -> tuple[np.ndarray, np.ndarray]:
+def _candidates(first_side: Side, second_side: Side, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of facets that may meet."""
-    r_1, r_2 = (np.linalg.norm(s.points - s.centre[:, None], axis=2).max(axis=1) for s in (one, two))
-    near = scipy.spatial.cKDTree(two.centre).query_ball_point(one.centre, r_1 + r_2.max() + reach)
-    i = np.repeat(np.arange(len(near)), [len(n) for n in near])
-    j = np.concatenate([np.sort(np.asarray(n, dtype=int)) for n in near]) if len(i) else np.zeros(0, dtype=int)
-    apart = two.centre[j] - one.centre[i]
-    along = np.einsum("px,px->p", apart, one.normal[i])
-    across = np.linalg.norm(apart - along[:, None] * one.normal[i], axis=1)
-    facing = np.einsum("px,px->p", one.normal[i], two.normal[j]) < -MORTAR.facing
-    meet = facing & (across <= r_1[i] + r_2[j]) & (np.abs(along) <= reach + r_1[i] + r_2[j])
+    r_1, r_2 = (np.linalg.norm(s.points - s.centre[:, None], axis=2).max(axis=1) for s in (first_side, second_side))
+    neighbours = scipy.spatial.cKDTree(second_side.centre).query_ball_point(first_side.centre, r_1 + r_2.max() + reach)
+    i = np.repeat(np.arange(len(neighbours)), [len(n) for n in neighbours])
+    j = np.concatenate([np.sort(np.asarray(n, dtype=int)) for n in neighbours]) if len(i) else np.zeros(0, dtype=int)
+    offset = second_side.centre[j] - first_side.centre[i]
+    normal_distance = np.einsum("px,px->p", offset, first_side.normal[i])
+    across = np.linalg.norm(offset - normal_distance[:, None] * first_side.normal[i], axis=1)
+    facing = np.einsum("px,px->p", first_side.normal[i], second_side.normal[j]) < -MORTAR.facing
+    meet = facing & (across <= r_1[i] + r_2[j]) & (np.abs(normal_distance) <= reach + r_1[i] + r_2[j])
     return i[meet], j[meet]
 
 

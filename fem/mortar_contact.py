@@ -24,8 +24,8 @@ from tribodyn.fem.surface import NINE_NODE_QUADS, side_functions, side_polygons,
 
 
 def mortar_halves(
-    one: Side,
-    two: Side,
+    first_side: Side,
+    second_side: Side,
     t1: Sequence[float] | None,
     components: Sequence[str],
     reach: float,
@@ -37,15 +37,15 @@ def mortar_halves(
     reach : farthest distance along the normal at which the faces still meet [m]
     Raises  Mismatch where they do not meet
     """
-    shared = shared_surface(one, two, reach)
+    shared = shared_surface(first_side, second_side, reach)
     if not len(shared.weight):
-        raise Mismatch(describe_separation(one, two, reach))
-    n = one.corners
-    whole = (shared.covered >= MORTAR.whole) & (not vertices_only)
+        raise Mismatch(describe_separation(first_side, second_side, reach))
+    n = first_side.corners
+    is_full = (shared.covered >= MORTAR.full) & (not vertices_only)
     frames = contact_frames(shared.normal, t1)
     picked = [COMPONENTS.index(c) for c in checked_components(components)]
 
-    carriers = _carriers(one, whole)
+    carriers = _carriers(first_side, is_full)
     nodes = np.unique(np.concatenate(carriers))
     place = {int(node): at for at, node in enumerate(nodes)}
     area, gap = np.zeros((2, len(nodes)))
@@ -54,43 +54,43 @@ def mortar_halves(
     second: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for i, j, g in shared.each():
         xi = shared.xi[:, g]
-        phi = side_functions(xi) if len(carriers[i]) == 3 and whole[i] else tabulate(len(carriers[i]), xi)[0]
+        phi = side_functions(xi) if len(carriers[i]) == 3 and is_full[i] else tabulate(len(carriers[i]), xi)[0]
         phi = phi * shared.weight[g]
         at = np.array([place[int(node)] for node in carriers[i]])
         np.add.at(area, at, phi.sum(axis=1))
         np.add.at(gap, at, phi @ shared.gap[g])
         np.add.at(directions, at, np.einsum("ag,gcx->acx", phi, frames[g]))
-        for found, of, xi, frame in (
-            (first, one.nodes[i], shared.xi[:, g], frames[g][:, picked]),
-            (second, two.nodes[j], shared.eta[:, g], frames[g][:, picked] @ two.turn),
+        for parts, facet, xi, frame in (
+            (first, first_side.nodes[i], shared.xi[:, g], frames[g][:, picked]),
+            (second, second_side.nodes[j], shared.eta[:, g], frames[g][:, picked] @ second_side.turn),
         ):
-            N = tabulate(len(of), xi)[0]
+            N = tabulate(len(facet), xi)[0]
             rows = phi @ np.einsum("gcx,kg->gckx", frame, N).reshape(len(xi[0]), -1)
             lines = at[:, None, None, None] * len(picked) + np.arange(len(picked))[None, :, None, None]
-            columns = of[None, None, :, None] * 3 + np.arange(3)
-            shape = (len(at), len(picked), len(of), 3)
-            found.append((rows, np.broadcast_to(lines, shape).ravel(), np.broadcast_to(columns, shape).ravel()))
+            columns = facet[None, None, :, None] * 3 + np.arange(3)
+            shape = (len(at), len(picked), len(facet), 3)
+            parts.append((rows, np.broadcast_to(lines, shape).ravel(), np.broadcast_to(columns, shape).ravel()))
 
-    kept = area > MORTAR.few * _own_area(one, carriers, nodes)
-    area, gap, directions = area[kept], gap[kept] / area[kept], directions[kept]
-    gap[np.abs(gap) < MORTAR.rounding * one.length] = 0.0
-    n_dof = 3 * one.n_node
-    B_1, B_2 = (_map(found, kept, area, len(picked), n_dof) for found in (first, second))
-    new = np.cumsum(kept) - 1
+    carries = area > MORTAR.negligible * _least_area(first_side, carriers, nodes)
+    area, gap, directions = area[carries], gap[carries] / area[carries], directions[carries]
+    gap[np.abs(gap) < MORTAR.rounding * first_side.length] = 0.0
+    n_dof = 3 * first_side.n_node
+    B_1, B_2 = (_map(parts, carries, area, len(picked), n_dof) for parts in (first, second))
+    position = np.cumsum(carries) - 1
     polygons = [
-        of[quad]
-        for i, of in enumerate(one.nodes)
-        if shared.covered[i] > 0 and not (n == 3 and whole[i])
-        for quad in (NINE_NODE_QUADS if whole[i] and len(of) == 9 else [np.arange(n)])
+        facet[quad]
+        for i, facet in enumerate(first_side.nodes)
+        if shared.covered[i] > 0 and not (n == 3 and is_full[i])
+        for quad in (NINE_NODE_QUADS if is_full[i] and len(facet) == 9 else [np.arange(n)])
     ]
-    if n == 3 and whole.any():
-        polygons += list(side_polygons(one.nodes[whole, :3], one.nodes[whole, 3:]))
+    if n == 3 and is_full.any():
+        polygons += list(side_polygons(first_side.nodes[is_full, :3], first_side.nodes[is_full, 3:]))
     at_points = np.array([[place[int(node)] for node in polygon] for polygon in polygons], dtype=int).reshape(-1, n)
-    faces = new[at_points[kept[at_points].all(axis=1)]]
-    every, first_place = np.unique(one.nodes.ravel(), return_index=True)
+    faces = position[at_points[carries[at_points].all(axis=1)]]
+    all_nodes, first_place = np.unique(first_side.nodes.ravel(), return_index=True)
     interface = ContactInterface(
         components=tuple(components),
-        points=one.points.reshape(-1, 3)[first_place[np.searchsorted(every, nodes[kept])]],
+        points=first_side.points.reshape(-1, 3)[first_place[np.searchsorted(all_nodes, nodes[carries])]],
         frames=_mean_frames(directions),
         area=area,
         gap=gap,
@@ -100,18 +100,18 @@ def mortar_halves(
     return interface, B_2
 
 
-def describe_separation(one: Side, two: Side, reach: float) -> str:
+def describe_separation(first_side: Side, second_side: Side, reach: float) -> str:
     """Why two sides do not meet, in a sentence."""
-    distance, other = scipy.spatial.cKDTree(two.centre).query(one.centre)
+    distance, other = scipy.spatial.cKDTree(second_side.centre).query(first_side.centre)
     nearest = int(distance.argmin())
-    facing = float(one.normal[nearest] @ two.normal[other[nearest]])
-    if distance.min() <= reach + one.length and facing > 0:
+    facing = float(first_side.normal[nearest] @ second_side.normal[other[nearest]])
+    if distance.min() <= reach + first_side.length and facing > 0:
         return "the two faces look the same way: give faces that look at each other"
-    between = two.centre[other[nearest]] - one.centre[nearest]
-    inside = float(between @ one.normal[nearest])
-    beside = float(np.linalg.norm(between - inside * one.normal[nearest]))
-    facet = float(np.linalg.norm(one.points[nearest] - one.centre[nearest], axis=1).max())
-    if facing < 0 and inside < -reach and beside < facet:
+    between = second_side.centre[other[nearest]] - first_side.centre[nearest]
+    inside = float(between @ first_side.normal[nearest])
+    lateral = float(np.linalg.norm(between - inside * first_side.normal[nearest]))
+    facet = float(np.linalg.norm(first_side.points[nearest] - first_side.centre[nearest], axis=1).max())
+    if facing < 0 and inside < -reach and lateral < facet:
         return (
             f"the bodies overlap: the second face lies about {-inside:.3g} m inside the first body, farther than the "
             f"{reach:.3g} m where faces are looked for; move a body, or give reach"
@@ -122,17 +122,17 @@ def describe_separation(one: Side, two: Side, reach: float) -> str:
     )
 
 
-def _carriers(one: Side, whole: np.ndarray) -> list[np.ndarray]:
+def _carriers(side: Side, is_full: np.ndarray) -> list[np.ndarray]:
     """The nodes of each facet that carry its pairs: of a whole one all nine or the three at sides, else its corners."""
-    n = one.corners
+    n = side.corners
     of_whole = slice(None) if n == 4 else slice(3, 6)
-    return [nodes[of_whole] if full else nodes[:n] for nodes, full in zip(one.nodes, whole.tolist(), strict=True)]
+    return [nodes[of_whole] if full else nodes[:n] for nodes, full in zip(side.nodes, is_full.tolist(), strict=True)]
 
 
-def _own_area(one: Side, carriers: list[np.ndarray], nodes: np.ndarray) -> np.ndarray:
+def _least_area(side: Side, carriers: list[np.ndarray], nodes: np.ndarray) -> np.ndarray:
     """Least area of each point if all its facets were covered, to within their distortion [m2]."""
-    n = one.corners
-    corner = one.points[:, :n]
+    n = side.corners
+    corner = side.points[:, :n]
     size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, -1] - corner[:, 0]), axis=1)
     total = np.zeros(len(nodes))
     count = [len(of) for of in carriers]
@@ -141,13 +141,17 @@ def _own_area(one: Side, carriers: list[np.ndarray], nodes: np.ndarray) -> np.nd
 
 
 def _map(
-    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]], kept: np.ndarray, area: np.ndarray, n_comp: int, n_dof: int
+    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    carries: np.ndarray,
+    area: np.ndarray,
+    n_comp: int,
+    n_dof: int,
 ) -> csr_matrix:
     """Rows of the kept points over all DOFs, means over their areas."""
-    values = np.concatenate([rows.ravel() for rows, _, _ in found])
-    lines, columns = (np.concatenate([item[k] for item in found]) for k in (1, 2))
-    full = csr_matrix(coo_matrix((values, (lines, columns)), shape=(len(kept) * n_comp, n_dof)))
-    rows = csr_matrix(full[np.repeat(kept, n_comp)])
+    values = np.concatenate([rows.ravel() for rows, _, _ in parts])
+    lines, columns = (np.concatenate([item[k] for item in parts]) for k in (1, 2))
+    full = csr_matrix(coo_matrix((values, (lines, columns)), shape=(len(carries) * n_comp, n_dof)))
+    rows = csr_matrix(full[np.repeat(carries, n_comp)])
     rows.data /= np.repeat(np.repeat(area, n_comp), np.diff(rows.indptr))
     rows.data[np.abs(rows.data) < 1e-14] = 0.0  # rounding must not make a DOF a master
     rows.eliminate_zeros()

@@ -31,7 +31,7 @@ class Mumps:
     """A Cholesky factor, or LDL^T where the matrix is indefinite, that lives in MPI processes until this is deleted.
 
     K : (n, n) symmetric. The environment's TRIBODYN_MPI is the command that starts the processes; one alone by default
-    Raises  ValueError where PETSc cannot be started; ArithmeticError where a pivot is zero or negative; RuntimeError,
+    Raises  Refusal where PETSc cannot be started; ArithmeticError where a pivot is zero or negative; RuntimeError,
         as `solve`, where the processes end
     Source  MUMPS: Amestoy, Duff, Koster, L'Excellent 2001, doi 10.1137/S0895479899358194
     """
@@ -49,14 +49,14 @@ class Mumps:
             (folder / "definite").touch()
         # the other Python has packages of its own, and each process one thread
         ours = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
-        own = {key: value for key, value in os.environ.items() if key not in ours}
-        own |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+        environment = {key: value for key, value in os.environ.items() if key not in ours}
+        environment |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         command = shlex.split(os.environ.get(COMMAND, DEFAULT))
         self._errors = open(folder / "errors", "w+", encoding="utf-8")  # noqa: SIM115 - lives as long as the processes
         try:
             self._process = subprocess.Popen(
                 [*command, str(WORKER), str(folder)],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, text=True, env=own,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, text=True, env=environment,
             )  # fmt: skip
         except OSError as trouble:
             raise Refusal(f"the solver mumps cannot start {command[0]} ({trouble.strerror}): {CURE}") from None
@@ -64,7 +64,7 @@ class Mumps:
         if words[:1] == ["trouble"]:
             raise ArithmeticError(f"MUMPS's error {words[1]}")
         if words[:1] != ["ready"]:
-            raise Refusal(f"the solver mumps does not start{self._why()}: {CURE}")
+            raise Refusal(f"the solver mumps does not start{self._last_error()}: {CURE}")
         self.name = f"MUMPS of PETSc {words[2]}, {words[1]} MPI process{'es' if words[1] != '1' else ''}"
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
@@ -73,10 +73,10 @@ class Mumps:
         if not columns.size:
             return np.zeros(np.shape(rhs))
         folder = Path(self._folder.name)
-        found = np.memmap(folder / "found", np.float64, "w+", shape=columns.shape, order="F")
-        given = np.memmap(folder / "rhs", np.float64, "w+", shape=columns.shape, order="F")
-        given[:] = columns
-        given.flush()
+        solution = np.memmap(folder / "found", np.float64, "w+", shape=columns.shape, order="F")
+        right_side = np.memmap(folder / "rhs", np.float64, "w+", shape=columns.shape, order="F")
+        right_side[:] = columns
+        right_side.flush()
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(f"{columns.shape[1]}\n")
@@ -84,15 +84,15 @@ class Mumps:
         except OSError:
             pass  # its last answer has the reason
         if self._answer() != ["solved"]:
-            raise SolverFailure(f"the processes of MUMPS have ended{self._why()}")
-        return np.array(found, order="C").reshape(np.shape(rhs))
+            raise SolverFailure(f"the processes of MUMPS have ended{self._last_error()}")
+        return np.array(solution, order="C").reshape(np.shape(rhs))
 
     def _answer(self) -> list[str]:
         """Words of the next line of the first process; none where it has ended."""
         assert self._process.stdout is not None
         return self._process.stdout.readline().split()
 
-    def _why(self) -> str:
+    def _last_error(self) -> str:
         """The last line of what they wrote as they ended."""
         self._process.wait()
         self._errors.seek(0)

@@ -22,9 +22,9 @@ def main(folder: Path) -> None:
     rows, columns, values = (np.load(folder / f"{name}.npy", mmap_mode="r") for name in ("rows", "columns", "values"))
     n = len(rows) - 1
     start, stop = n * rank // processes, n * (rank + 1) // processes
-    own, some = stop - start, slice(int(rows[start]), int(rows[stop]))
-    own_rows = (np.array(a, np.int32) for a in (rows[start : stop + 1] - rows[start], columns[some]))
-    matrix = petsc.Mat().createAIJ(((own, n), (own, n)), csr=(*own_rows, np.array(values[some])), comm=comm)
+    n_local, entries = stop - start, slice(int(rows[start]), int(rows[stop]))
+    own_rows = (np.array(a, np.int32) for a in (rows[start : stop + 1] - rows[start], columns[entries]))
+    matrix = petsc.Mat().createAIJ(((n_local, n), (n_local, n)), csr=(*own_rows, np.array(values[entries])), comm=comm)
     matrix.setOption(petsc.Mat.Option.SYMMETRIC, True)
     matrix.setOption(petsc.Mat.Option.SPD, (folder / "definite").exists())
     pc = petsc.PC().create(comm)
@@ -36,20 +36,20 @@ def main(folder: Path) -> None:
     trouble = factor.getMumpsInfog(1)
     version = ".".join(str(number) for number in petsc.Sys.getVersion())
     _tell(rank, f"trouble {trouble}" if trouble < 0 else f"ready {processes} {version}")
-    while (count := comm.bcast(_asked() if rank == 0 else None)) and trouble >= 0:
+    while (count := comm.bcast(_next_count() if rank == 0 else None)) and trouble >= 0:
         rhs = np.memmap(folder / "rhs", np.float64, "r", shape=(n, count), order="F")
-        found = np.memmap(folder / "found", np.float64, "r+", shape=(n, count), order="F")
-        shape, part = ((own, n), (None, count)), np.array(rhs[start:stop], order="F")
-        given = petsc.Mat().createDense(shape, array=part, comm=comm)
+        solution = np.memmap(folder / "found", np.float64, "r+", shape=(n, count), order="F")
+        shape, part = ((n_local, n), (None, count)), np.array(rhs[start:stop], order="F")
+        right_side = petsc.Mat().createDense(shape, array=part, comm=comm)
         solved = petsc.Mat().createDense(shape, comm=comm)
-        for each in (given, solved):
+        for each in (right_side, solved):
             each.setUp()
             each.assemble()
-        factor.matSolve(given, solved)
-        found[start:stop] = solved.getDenseArray()
-        found.flush()
+        factor.matSolve(right_side, solved)
+        solution[start:stop] = solved.getDenseArray()
+        solution.flush()
         comm.Barrier()
-        given.destroy()
+        right_side.destroy()
         solved.destroy()
         _tell(rank, "solved")
 
@@ -67,7 +67,7 @@ def _petsc() -> tuple[Any, Any]:
     return PETSc, MPI.COMM_WORLD
 
 
-def _asked() -> int:
+def _next_count() -> int:
     """How many right-hand sides the next line asks for; 0 where there is no more."""
     line = sys.stdin.readline().split()
     return int(line[0]) if line else 0

@@ -32,10 +32,11 @@ class StiffnessElement(Protocol):
 class Part:
     """system : over the free DOFs; interface : likewise; free : (n_free,) DOF of the mesh that each one is,
     node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; nodes : (n_pair,) nearest to the pairs
-    mesh : scikit-fem's, or an assembly; held : (k, n_free) held besides, held @ q = 0, for reduction.prescribed
+    mesh : scikit-fem's, or an assembly
+    held_rows : (k, n_free) motions held besides, held_rows @ q = 0, for reduction.prescribed
     pairs : contact face -> its pairs in the interface; node_sets : as geometry.mesh.read gives them
     joints : joint -> its pairs
-    follow : (n_dof, n_free) displacement of all DOFs where some follow others, None where they are free or held
+    dependence : (n_dof, n_free) displacement of all DOFs where some depend on others, else None
     """
 
     system: SecondOrderSystem
@@ -44,30 +45,30 @@ class Part:
     points: np.ndarray
     nodes: np.ndarray
     mesh: Any
-    held: np.ndarray
+    held_rows: np.ndarray
     pairs: Mapping[str, slice]
     node_sets: Mapping[str, np.ndarray]
     joints: Mapping[str, slice] = field(default_factory=dict)
-    follow: csr_matrix | None = None
+    dependence: csr_matrix | None = None
 
     def dofs(self, group: str, axis: str) -> np.ndarray:
         """Places among the free DOFs (k,) of the displacements of a node set along "x", "y" or "z".
 
-        Raises  ValueError where the set is unknown or empty, or where one of them is clamped
+        Raises  Refusal where the set is unknown or empty, or where one of them is clamped
         """
-        wanted = find_group(self.node_sets, group) * 3 + AXES.index(axis)
-        place = np.searchsorted(self.free, wanted)
-        if not np.array_equal(self.free[np.minimum(place, len(self.free) - 1)], wanted):
+        group_dofs = find_group(self.node_sets, group) * 3 + AXES.index(axis)
+        place = np.searchsorted(self.free, group_dofs)
+        if not np.array_equal(self.free[np.minimum(place, len(self.free) - 1)], group_dofs):
             raise Refusal(f"a node of '{group}' is clamped along {axis}; choose nodes that can move")
         return place
 
     def field(self, q: np.ndarray) -> np.ndarray:
         """Displacement (n_node, 3, ...) [m] of all nodes from free DOFs q (n_free, ...)."""
         full = np.zeros((3 * len(self.points), *q.shape[1:]), dtype=q.dtype)
-        if self.follow is None:
+        if self.dependence is None:
             full[self.free] = q
         else:
-            full = (self.follow @ q.reshape(len(q), -1)).reshape(full.shape)
+            full = (self.dependence @ q.reshape(len(q), -1)).reshape(full.shape)
         return full.reshape(len(self.points), 3, *q.shape[1:])
 
     def largest(self, q: np.ndarray) -> float:
@@ -76,17 +77,17 @@ class Part:
 
     def rows(self, vectors: Any) -> Any:
         """Rows (k, n_dof) over all DOFs, sparse, as rows (k, n_free) over the free ones."""
-        return vectors[:, self.free] if self.follow is None else csr_matrix(vectors @ self.follow)
+        return vectors[:, self.free] if self.dependence is None else csr_matrix(vectors @ self.dependence)
 
     def restricted(self, matrix: Any) -> Any:
         """A symmetric matrix (n_dof, n_dof) over all DOFs as one (n_free, n_free) over the free ones."""
-        if self.follow is None:
+        if self.dependence is None:
             return matrix[self.free][:, self.free]
-        return csr_matrix(self.follow.T @ matrix @ self.follow)
+        return csr_matrix(self.dependence.T @ matrix @ self.dependence)
 
     def force(self, vector: np.ndarray) -> np.ndarray:
         """A force (n_dof,) on all DOFs as one (n_free,) on the free ones."""
-        return vector[self.free] if self.follow is None else np.asarray(self.follow.T @ vector)
+        return vector[self.free] if self.dependence is None else np.asarray(self.dependence.T @ vector)
 
 
 def build(
@@ -98,7 +99,7 @@ def build(
     loads: Mapping[str, Load],
     outputs: Mapping[str, Load],
     springs: Sequence[StiffnessElement] = (),
-    held: Sequence[NoMeanRotation] = (),
+    held_motions: Sequence[NoMeanRotation] = (),
     constraints: Sequence[Constraint] = (),
     masses: Sequence[Mass] = (),
 ) -> Part:
@@ -107,47 +108,53 @@ def build(
     mesh, node_sets : as geometry.mesh.read gives them, or an Assembly and its node sets
     material : one, or subdomain name -> material; of an assembly one, or body name -> these
     springs : joints that give way, to the ground or between sets
-    held : motions that are held besides the clamps; constraints : DOFs that follow others; masses : on points or sets
-    Raises  ValueError where a name is unknown or a group is empty, one sentence
+    held_motions : held besides the clamps; constraints : DOFs that depend on others; masses : on points or sets
+    Raises  Refusal where a name is unknown or a group is empty, one sentence
     """
     M, K = assemble(mesh, material)
     K = sum((spring.matrix(mesh, node_sets) for spring in springs), start=K)
     M = sum((mass.matrix(mesh, node_sets) for mass in masses), start=M)
     points = coordinates(mesh)
     free = free_dofs(K.shape[0], clamps, node_sets)
-    follow = None
+    dependence = None
     if constraints:
-        free, follow = restriction(K.shape[0], free, [one.build(mesh, node_sets) for one in constraints])
-    built = [contact.build(mesh) for contact in contacts]
-    ends = np.cumsum([0] + [one.n_pair for one in built])
-    interface = join(built) if built else no_contact(K.shape[0])
+        free, dependence = restriction(
+            K.shape[0], free, [constraint.build(mesh, node_sets) for constraint in constraints]
+        )
+    interfaces = [contact.build(mesh) for contact in contacts]
+    ends = np.cumsum([0] + [contact_interface.n_pair for contact_interface in interfaces])
+    interface = join(interfaces) if interfaces else no_contact(K.shape[0])
     pairs: dict[str, slice] = {}
     joints: dict[str, slice] = {}
     for i, contact in enumerate(contacts):
-        own = slice(*ends[i : i + 2].tolist())
-        pairs[contact.face if contact.face not in pairs else f"{contact.face} on {contact.opposite}"] = own
+        pairs_of_contact = slice(*ends[i : i + 2].tolist())
+        pairs[contact.face if contact.face not in pairs else f"{contact.face} on {contact.opposite}"] = pairs_of_contact
         joint = contact.joint or contact.face
-        joints[joint] = slice(joints[joint].start if joint in joints else own.start, own.stop)
-    rows = np.array([motion.row(points, M) for motion in held]).reshape(len(held), K.shape[0])
-    nothing, near = SecondOrderSystem(M, K), scipy.spatial.cKDTree(points).query(interface.points)[1]
-    part = Part(nothing, interface, free, points, near, mesh, rows, pairs, node_sets, joints, follow)
+        joints[joint] = slice(joints[joint].start if joint in joints else pairs_of_contact.start, pairs_of_contact.stop)
+    rows = np.array([motion.row(points, M) for motion in held_motions]).reshape(len(held_motions), K.shape[0])
+    nothing, nearest_nodes = SecondOrderSystem(M, K), scipy.spatial.cKDTree(points).query(interface.points)[1]
+    part = Part(nothing, interface, free, points, nearest_nodes, mesh, rows, pairs, node_sets, joints, dependence)
     system = SecondOrderSystem(
         mass=part.restricted(M),
         stiffness=part.restricted(K),
-        loads={name: _felt(part, f"load '{name}'", load.vector(mesh, node_sets, M)) for name, load in loads.items()},
-        outputs={name: _felt(part, f"output '{name}'", of.vector(mesh, node_sets, M)) for name, of in outputs.items()},
+        loads={
+            name: _on_free_dofs(part, f"load '{name}'", load.vector(mesh, node_sets, M)) for name, load in loads.items()
+        },
+        outputs={
+            name: _on_free_dofs(part, f"output '{name}'", of.vector(mesh, node_sets, M)) for name, of in outputs.items()
+        },
     )
-    held_rows = np.array([part.force(row) for row in rows]).reshape(len(held), len(free))
+    held_rows = np.array([part.force(row) for row in rows]).reshape(len(held_motions), len(free))
     nodes = interface.nodes and replace(interface.nodes, B=part.rows(interface.nodes.B))
     interface = replace(interface, B=part.rows(interface.B), nodes=nodes)
-    return replace(part, system=system, interface=interface, held=held_rows)
+    return replace(part, system=system, interface=interface, held_rows=held_rows)
 
 
-def _felt(part: Part, what: str, vector: np.ndarray) -> np.ndarray:
-    """A load or output (n_dof,) on the free DOFs; raises ValueError where it is on held ones alone."""
+def _on_free_dofs(part: Part, label: str, vector: np.ndarray) -> np.ndarray:
+    """A load or output (n_dof,) on the free DOFs; raises Refusal where it is on held ones alone."""
     felt = part.force(vector)
     if vector.any() and not felt.any():
-        raise Refusal(f"{what} is on nodes alone that are held along its direction: name a group that can move")
+        raise Refusal(f"{label} is on nodes alone that are held along its direction: name a group that can move")
     return felt
 
 
@@ -156,8 +163,8 @@ def unbalanced_load(force: np.ndarray, part: Part, motions: np.ndarray) -> str:
 
     force : (n_free,) of all static loads [N]; motions : (n_free, r) the rigid motions that it pushes
     """
-    moved = np.linalg.norm(part.field(motions), axis=(1, 2))
-    moves = moved > 1e-6 * moved.max()
+    motion_size = np.linalg.norm(part.field(motions), axis=(1, 2))
+    moves = motion_size > 1e-6 * motion_size.max()
     names = [""]
     if isinstance(part.mesh, Assembly):
         names = [body.name for body in part.mesh.bodies if body.name and moves[part.node_sets[body.name]].any()]
@@ -171,9 +178,9 @@ def unbalanced_load(force: np.ndarray, part: Part, motions: np.ndarray) -> str:
     resultant = full.reshape(6, -1)[:, part.free] @ force
     size, reach = float(np.abs(force).sum()), float(np.abs(arm).max())
     where = _vector(1e3 * centre, 1e-6 * reach)
-    it, what = "them" if len(names) > 1 else "it", " and ".join(filter(None, names)) or "the structure"
+    it, label = "them" if len(names) > 1 else "it", " and ".join(filter(None, names)) or "the structure"
     return (
-        f"nothing holds {what}, and the static loads on {it} are not in equilibrium: their resultant is "
+        f"nothing holds {label}, and the static loads on {it} are not in equilibrium: their resultant is "
         f"{_vector(resultant[:3], 1e-9 * size)} N with {_vector(resultant[3:], 1e-9 * size * reach)} N m about "
         f"{where} mm: balance them, clamp {it} or add a spring"
     )

@@ -88,9 +88,9 @@ def largest_rotation(mesh: Any, u: np.ndarray) -> float:
     """Largest rotation [rad] of any element under the displacement u (n_node, 3) [m]: of its mean gradient."""
     largest = 0.0
     for piece in pieces(mesh):
-        nodes, own = connectivity(piece.mesh), u[piece.node : piece.node + piece.mesh.doflocs.shape[1]]
+        nodes, displacement = connectivity(piece.mesh), u[piece.node : piece.node + piece.mesh.doflocs.shape[1]]
         for elements, _, gradient, weight in batches(piece.mesh):
-            slope = gradient @ own[nodes[elements]][:, None]  # d u_j / d x_i
+            slope = gradient @ displacement[nodes[elements]][:, None]  # d u_j / d x_i
             mean = np.einsum("eq,eqij->eij", weight, slope) / weight.sum(axis=1)[:, None, None]
             turn = 0.5 * (mean - mean.swapaxes(1, 2))
             largest = max(largest, float(np.linalg.norm(turn, axis=(1, 2)).max() / np.sqrt(2)))
@@ -113,19 +113,19 @@ def geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np
     temperature : (n_node,) change of temperature [K] whose free expansion carries no stress
     """
     blocks = []
-    for piece, one in materials_of(mesh, material):
-        own = slice(piece.node, piece.node + piece.mesh.doflocs.shape[1])
-        heat = None if temperature is None else temperature[own]
-        blocks.append(_geometric_stiffness(piece.mesh, one, u[own], heat))
+    for piece, material_of_piece in materials_of(mesh, material):
+        nodes = slice(piece.node, piece.node + piece.mesh.doflocs.shape[1])
+        heat = None if temperature is None else temperature[nodes]
+        blocks.append(_geometric_stiffness(piece.mesh, material_of_piece, u[nodes], heat))
     n_beyond = mesh.doflocs.shape[1] - sum(block.shape[0] for block in blocks)
-    whole = block_diag([*blocks, csr_matrix((n_beyond, n_beyond))], format="csr")
-    return kron(whole, identity(3), format="csr")
+    matrix = block_diag([*blocks, csr_matrix((n_beyond, n_beyond))], format="csr")
+    return kron(matrix, identity(3), format="csr")
 
 
 def _geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np.ndarray | None) -> csr_matrix:
     """The same of one mesh, without the factor of three components: (n_node, n_node)."""
-    C, expansion = (element_tensors(mesh, material, what) for what in ("tensor", "expansion_tensor"))
-    found = []
+    C, expansion = (element_tensors(mesh, material, name) for name in ("tensor", "expansion_tensor"))
+    blocks_by_batch = []
     for elements, nodes, N, gradient, weight in strain_points(mesh, material):
         strain = gradient @ u[nodes][:, None]  # d u_j / d x_i; the tensor takes its symmetric part
         if temperature is not None:
@@ -133,8 +133,8 @@ def _geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: n
         stress = np.einsum("eijkl,eqkl->eqij", C[elements], strain, optimize=True)
         weighted = weight[..., None, None] * (stress @ gradient)
         blocks = np.einsum("eqia,eqib->eab", gradient, weighted, optimize=True)[..., None, None]
-        found.append((nodes, symmetric(blocks)))
-    nodes, blocks = (np.concatenate(of) for of in zip(*found, strict=True))
+        blocks_by_batch.append((nodes, symmetric(blocks)))
+    nodes, blocks = (np.concatenate(of) for of in zip(*blocks_by_batch, strict=True))
     return scatter(nodes, mesh.doflocs.shape[1], blocks)
 
 

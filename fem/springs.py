@@ -39,7 +39,7 @@ class Spring:
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
         """Stiffness (3 n_node, 3 n_node) [N/m].
 
-        Raises  ValueError where a set is unknown or empty, or where the nodes across the joint do not match
+        Raises  Refusal where a set is unknown or empty, or where the nodes across the joint do not match
         """
         elongation, share = self.elongation(mesh, node_sets)
         return csr_matrix(elongation.T @ elongation.multiply(self.stiffness * share[:, None]))
@@ -51,19 +51,19 @@ class Spring:
         rows = np.repeat(np.arange(len(nodes)), 3)
         shape = (len(nodes), 3 * mesh.doflocs.shape[1])
 
-        def along(of: np.ndarray) -> csr_matrix:
+        def components(of: np.ndarray) -> csr_matrix:
             columns = (of[:, None] * 3 + np.arange(3)).ravel()
             matrix = csr_matrix((np.tile(direction, len(of)), (rows, columns)), shape=shape)
             matrix.eliminate_zeros()
             return matrix
 
         if self.opposite is None:
-            return along(nodes), share
-        others, points = find_group(node_sets, self.opposite), coordinates(mesh)
-        what = f"the spring from '{self.nodes}' to '{self.opposite}': its nodes"
+            return components(nodes), share
+        opposite_nodes, points = find_group(node_sets, self.opposite), coordinates(mesh)
+        label = f"the spring from '{self.nodes}' to '{self.opposite}': its nodes"
         size = np.linalg.norm(np.ptp(points[nodes], axis=0)) or np.linalg.norm(np.ptp(points, axis=0))
-        place = partners(points[nodes], points[others], what, float(size))
-        return csr_matrix(along(nodes) - along(others[place])), share
+        place = partners(points[nodes], points[opposite_nodes], label, float(size))
+        return csr_matrix(components(nodes) - components(opposite_nodes[place])), share
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class ElongationSpring:
     stiffness: float
 
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
-        """Stiffness (3 n_node, 3 n_node) [N/m]; raises ValueError where a node is unknown."""
+        """Stiffness (3 n_node, 3 n_node) [N/m]; raises Refusal where a node is unknown."""
         dofs = [3 * int(find_group(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
         row = csr_matrix(
             ([factor for *_, factor in self.terms], ([0] * len(dofs), dofs)), (1, 3 * mesh.doflocs.shape[1])
@@ -113,7 +113,7 @@ class Mass:
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
         """Mass (3 n_node, 3 n_node) [kg]; [kg m2] at the rotations of a point.
 
-        Raises  ValueError where the set is unknown or empty, or has an inertia
+        Raises  Refusal where the set is unknown or empty, or has an inertia
         """
         diagonal = np.zeros((mesh.doflocs.shape[1], 3))
         points = mesh.points if isinstance(mesh, Assembly) else {}

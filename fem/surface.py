@@ -40,7 +40,7 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     Tributary areas are the consistent integrals of the shape functions of the nodes kept: 1/36, 4/36, 16/36 of a flat
     nine-node face, 1/4 or 1/3 with vertices only. A six-node face has none at its corners and 1/3 at each mid-side
     node, which are its nodes here. All nodes keep the first and second moments of a flat face; vertices only do not.
-    Raises  ValueError where there are no facets, where they lie inside the body, or where an area is not positive
+    Raises  Refusal where there are no facets, where they lie inside the body, or where an area is not positive
     """
     facets = np.asarray(facets, dtype=int)
     if len(facets) == 0:
@@ -84,16 +84,16 @@ def side_polygons(corners: np.ndarray, sides: np.ndarray) -> np.ndarray:
     corners, sides : (n_facet, 3) numbers, side j between the corners that are not OPPOSITE it
     At the rim of the face the small triangles beyond the middles stay out
     """
-    found = [np.asarray(sides)]
-    around: dict[int, list[tuple[int, int]]] = {}
+    triangles = [np.asarray(sides)]
+    links_of: dict[int, list[tuple[int, int]]] = {}
     for of, middles in zip(corners.tolist(), sides.tolist(), strict=True):
         for j, corner in enumerate(of):
             ends = [middles[k] for k in range(3) if OPPOSITE[k] != j]
-            around.setdefault(corner, []).append((ends[0], ends[1]))
-    for links in around.values():
+            links_of.setdefault(corner, []).append((ends[0], ends[1]))
+    for links in links_of.values():
         ring = _chain(links)
-        found.append(np.array([(ring[0], a, b) for a, b in pairwise(ring[1:])], dtype=int).reshape(-1, 3))
-    return np.concatenate(found)
+        triangles.append(np.array([(ring[0], a, b) for a, b in pairwise(ring[1:])], dtype=int).reshape(-1, 3))
+    return np.concatenate(triangles)
 
 
 def _chain(links: list[tuple[int, int]]) -> list[int]:
@@ -102,17 +102,17 @@ def _chain(links: list[tuple[int, int]]) -> list[int]:
     for a, b in links:
         joined.setdefault(a, []).append(b)
         joined.setdefault(b, []).append(a)
-    here = next((a for a, others in joined.items() if len(others) == 1), links[0][0])
-    row, seen = [here], {here}
-    while (step := next((b for b in joined[here] if b not in seen), None)) is not None:
+    current = next((a for a, neighbours in joined.items() if len(neighbours) == 1), links[0][0])
+    row, visited = [current], {current}
+    while (step := next((b for b in joined[current] if b not in visited), None)) is not None:
         row.append(step)
-        seen.add(step)
-        here = step
+        visited.add(step)
+        current = step
     return row
 
 
 def require_outside(mesh: Any, facets: np.ndarray) -> None:
-    """Raise ValueError where some of the facets lie inside a body."""
+    """Raise Refusal where some of the facets lie inside a body."""
     piece, facets = piece_of_facets(mesh, facets)
     inside = int(np.sum(piece.mesh.f2t[1, facets] >= 0))
     if inside:
@@ -165,6 +165,6 @@ ELEMENTS: dict[int, Any] = {9: ElementQuad2, 6: ElementTriP2, 4: ElementQuad1, 3
 def tabulate(k: int, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shape functions (k, n) and slopes (k, 2, n) of a facet of k nodes (9, 6, 4 or 3) at xi (2, n)."""
     element = ELEMENTS[k]()
-    found = [element.lbasis(xi, a) for a in range(k)]
-    slopes = [np.stack(np.broadcast_arrays(*slope, xi[0])[:2]) for _, slope in found]
-    return np.stack([np.broadcast_to(value, xi.shape[1:]) for value, _ in found]), np.stack(slopes)
+    values = [element.lbasis(xi, a) for a in range(k)]
+    slopes = [np.stack(np.broadcast_arrays(*slope, xi[0])[:2]) for _, slope in values]
+    return np.stack([np.broadcast_to(value, xi.shape[1:]) for value, _ in values]), np.stack(slopes)

@@ -34,7 +34,7 @@ class Heating:
     def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
         """Force vector (3 n_node,) [N/K].
 
-        Raises  ValueError for a body that is not there, or where nothing expands
+        Raises  Refusal for a body that is not there, or where nothing expands
         """
         names = [body.name for body in mesh.bodies] if isinstance(mesh, Assembly) else [""]
         for name in self.bodies:
@@ -46,12 +46,16 @@ class Heating:
         for name, (piece, material) in zip(names, materials_of(mesh, self.material), strict=True):
             if self.bodies and name not in self.bodies:
                 continue
-            C, expansion = (element_tensors(piece.mesh, material, what) for what in ("tensor", "expansion_tensor"))
+            C, expansion = (
+                element_tensors(piece.mesh, material, tensor_name) for tensor_name in ("tensor", "expansion_tensor")
+            )
             held_back = np.einsum("eijkl,ekl->eij", C, expansion)
             for elements, nodes, N, gradient, weight in strain_points(piece.mesh, material):
-                at = values[nodes + piece.node] @ N.T
-                own = np.einsum("eq,eij,eqja->eai", weight * at, held_back[elements], gradient, optimize=True)
-                np.add.at(force, nodes + piece.node, own)
+                temperature = values[nodes + piece.node] @ N.T
+                element_force = np.einsum(
+                    "eq,eij,eqja->eai", weight * temperature, held_back[elements], gradient, optimize=True
+                )
+                np.add.at(force, nodes + piece.node, element_force)
         if not force.any():
             raise Refusal("temperature: no body that is heated expands; give its material an expansion")
         return force.ravel()
@@ -61,7 +65,7 @@ def temperature_at(path: Path, points: np.ndarray) -> np.ndarray:
     """Values (n,) at points (n, 3) [m] from a table with columns x, y, z [m] and value, linear between its rows; beyond
     them that of the nearest row.
 
-    Raises  ValueError for a file that is no such table
+    Raises  Refusal for a file that is no such table
     """
     try:
         table = np.loadtxt(path, delimiter=",", comments="#", skiprows=_header(path), ndmin=2)

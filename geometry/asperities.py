@@ -91,7 +91,7 @@ class Asperities:
 
         The density is linear between the rows and keeps the number and the mean gap of the summits: each counts at
         the rows on its two sides, more at the nearer one.
-        Raises  ValueError: fewer than two rows, or all summits at one height
+        Raises  Refusal: fewer than two rows, or all summits at one height
         """
         if rows < 2:
             raise Refusal(f"a table of {rows} rows holds no density of asperities: give 2 or more")
@@ -115,7 +115,7 @@ def identify(
     second : in the coordinates of the first, already mirrored; both are centred and the smaller extent counts
     cutoff : wavelength [m] above which waves are no roughness and taken off; only the mean plane by default
     shortest : wavelength [m] below which waves are noise of the instrument and taken off (S-filter of ISO 25178-2)
-    Raises  ValueError: what surface.prepare refuses, heights that come in steps, too few summits
+    Raises  Refusal: what surface.prepare refuses, heights that come in steps, too few summits
     """
     faces: list[HeightMap] = []
     repairs: list[str] = []
@@ -155,7 +155,7 @@ def summits(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     """Heights above the mean of the face [m] and curvatures [1/m] of the points above all eight neighbours, (n,) each.
 
     The curvature is the mean of the second differences along x and y. The rim holds no summit.
-    Raises  ValueError: holes, too few summits
+    Raises  Refusal: holes, too few summits
     """
     z = surface.z
     if not np.isfinite(z).all():
@@ -180,7 +180,7 @@ def _highest_neighbour(z: np.ndarray) -> np.ndarray:
 
 
 def _refuse_steps(surface: HeightMap) -> None:
-    """Raise ValueError where many summits are terraces, because an instrument gave its heights in steps.
+    """Raise Refusal where many summits are terraces, because an instrument gave its heights in steps.
 
     To be asked before levelling, which tilts them. Plane land around a terrace is none.
     """

@@ -64,7 +64,7 @@ def body(blocks: Sequence[Block], points: Mapping[str, Sequence[float] | np.ndar
     """Join blocks where their nodes coincide, and name nodes by their place.
 
     points : name -> position (3,) or positions (k, 3) of nodes [m]
-    Raises ValueError: the blocks do not meet, a mapping folds cells, or no node lies at a named point
+    Raises Refusal: the blocks do not meet, a mapping folds cells, or no node lies at a named point
     """
     nodes: list[np.ndarray] = []
     cells: list[np.ndarray] = []
@@ -101,7 +101,7 @@ def write(path: str | Path, *bodies: JoinedBlocks) -> None:
     """Write bodies, which stay apart even where they touch, as one second-order Gmsh mesh.
 
     path : the .msh file. Equal names in several bodies make one physical group
-    Raises ValueError: one name is used for groups of different dimension
+    Raises Refusal: one name is used for groups of different dimension
     """
     starts = np.cumsum([0] + [len(b.nodes) for b in bodies])
     cells = np.vstack([b.cells + start for b, start in zip(bodies, starts, strict=False)])

@@ -83,7 +83,7 @@ def onto_nodes(surface: HeightMap, nodes: np.ndarray, cells_across: int = 8) -> 
     nodes : (n, 2) positions in the coordinates of the map [m]; the patch is their convex hull
     cells_across : sampling cells across the distance of neighbouring nodes, at least
     Returns (n,) heights [m]; weighted by tributary area their mean is the mean height of the patch
-    Raises  ValueError: nodes off the map, holes, nodes on a line
+    Raises  Refusal: nodes off the map, holes, nodes on a line
     Source  Tamatam 2021, 5.4.2: down-sampling by elemental area; here a point belongs to its nearest node
     """
     nodes = np.asarray(nodes, float).reshape(-1, 2)

@@ -38,7 +38,7 @@ def read(
 
     spacing : steps along x and y of a matrix text, in lateral units; None for text with x y z
     lateral_unit, height_unit : metres per unit of a text, 1e-6 for micrometres; other formats know their units
-    Raises  ValueError: no such file, an empty one, not a regular grid, a reader that is not installed
+    Raises  Refusal: no such file, an empty one, not a regular grid, a reader that is not installed
     """
     path = Path(path)
     if not path.is_file():
@@ -143,7 +143,7 @@ def read_sdf(path: Path) -> HeightMap:
     in ISO, the largest in BCR. The first profile is at y = 0 in ISO; BCR leaves it open and is read as MountainsMap
     shows it, the first profile at the largest y.
 
-    Raises  ValueError: compressed data, a missing header line, a size that differs from the header
+    Raises  Refusal: compressed data, a missing header line, a size that differs from the header
     """
     content = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     magic = MAGIC.match(content)

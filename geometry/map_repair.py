@@ -63,7 +63,7 @@ def prepare(surface: HeightMap, cutoff: float, expected_size: tuple[float, float
 
     cutoff : wavelength that parts waviness from roughness [m]
     expected_size : sides of the face it should cover [m]
-    Raises  ValueError: what the steps refuse
+    Raises  Refusal: what the steps refuse
     """
     levelled, repairs = repair(surface, expected_size)
     return PreparedMap(*split(levelled, cutoff), repairs)
@@ -78,7 +78,7 @@ def repair(surface: HeightMap, expected_size: tuple[float, float] | None = None)
 
 
 def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> None:
-    """Raise ValueError for a map that cannot be a measured face in metres.
+    """Raise Refusal for a map that cannot be a measured face in metres.
 
     expected_size : sides it should cover [m]; up to five times as large is taken as a wider measurement
     """
@@ -177,7 +177,7 @@ def split(surface: HeightMap, cutoff: float) -> tuple[HeightMap, HeightMap]:
 
     cutoff : wavelength [m] of which one half of the amplitude goes to either part
     Returns (waviness, roughness), their sum is the surface
-    Raises  ValueError: holes, or a cut-off that the map cannot hold
+    Raises  Refusal: holes, or a cut-off that the map cannot hold
     Source  ISO 16610-61 (areal Gaussian, separable), weights of ISO 16610-21 out to one cut-off; at the edges the local
         linear fit with the same weights, which keeps planes (moment criterion of ISO 16610-28)
     """

@@ -25,7 +25,7 @@ def read(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, Groups]:
     sizes : of the elements of a CAD file, in its unit
     Returns mesh : skfem MeshHex2 or MeshTet2; surface groups are its boundaries, volume groups its subdomains;
         node_sets : every group of any dimension, name -> node numbers, edge, face and middle nodes included
-    Raises ValueError: no such file, one that is no mesh, a group outside the volume mesh, an inverted element
+    Raises Refusal: no such file, one that is no mesh, a group outside the volume mesh, an inverted element
     """
     mesh, node_sets, _ = read_with_notes(path, sizes)
     return mesh, node_sets
@@ -67,7 +67,7 @@ def quality(mesh: Any) -> Quality:
     """Measure a mesh at its nodes and quadrature points.
 
     mesh : skfem MeshHex2 or MeshTet2
-    Raises ValueError: an element is inverted or degenerate somewhere
+    Raises Refusal: an element is inverted or degenerate somewhere
     Source  scaled Jacobian: Knupp, 2000; for tetrahedra normalised to 1 for the regular one
     """
     points, weights = get_quadrature(mesh.elem.refdom, 5)
@@ -117,7 +117,7 @@ class MeshFacts:
 def facts(mesh: Any, density: np.ndarray | None = None) -> MeshFacts:
     """Measure a mesh. mesh : skfem MeshHex2 or MeshTet2; density : (n_element,) [kg/m3]
 
-    Raises  ValueError: an element is inverted or degenerate
+    Raises  Refusal: an element is inverted or degenerate
     """
     found = quality(mesh)
     X, w = get_quadrature(mesh.elem.refdom, 5)

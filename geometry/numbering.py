@@ -41,7 +41,7 @@ def permutation(source: np.ndarray, target: np.ndarray) -> np.ndarray:
 
     source, target : (n, d) reference coordinates of the same nodes in two numberings, on the same reference element
     Returns (n,) so that source[result] equals target
-    Raises ValueError: the two do not list the same nodes
+    Raises Refusal: the two do not list the same nodes
     """
     distance = np.abs(source[None, :, :] - target[:, None, :]).max(axis=2)
     order = distance.argmin(axis=1)

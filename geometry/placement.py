@@ -39,7 +39,7 @@ def extract_volume(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) 
 
     Returns mesh and node_sets as geometry.mesh.read gives them, of the groups that reach into the volume; a surface
         group inside the mesh becomes a face of it
-    Raises  ValueError where there is no such volume
+    Raises  Refusal where there is no such volume
     """
     volumes = mesh.subdomains or {}
     if volume not in volumes:

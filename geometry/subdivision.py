@@ -34,7 +34,7 @@ def subdivide(mesh: Any, node_sets: Mapping[str, np.ndarray], times: int = 1) ->
 def first_order(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[Any, Groups]:
     """A mesh of hexahedra with straight edges as one of 8-node ones (MeshHex1); a corner keeps its number.
 
-    Raises  ValueError, which names the body, for tetrahedra or curved elements
+    Raises  Refusal, which names the body, for tetrahedra or curved elements
     """
     if not isinstance(mesh, MeshHex2):
         raise Refusal(f"elements = \"linear_reduced\" needs hexahedra, and body '{name}' has tetrahedra")

@@ -85,7 +85,8 @@ def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None 
         rows, share = Spring(s.group, s.direction, 1.0, s.opposite).elongation(mesh, node_sets)
         stretch[name] = (rows[:, part.free], share)
     masters = np.unique(np.concatenate([rows.nonzero()[1] for rows, _ in stretch.values()]))
-    model = hold(craig_bampton(system, interface, scene.reduction.modes, scene.reduction.cutoff, masters), part.held)
+    reduced = craig_bampton(system, interface, scene.reduction.modes, scene.reduction.cutoff, masters)
+    model = hold(reduced, part.held_rows)
     basis = model.origin.basis if back is None else back @ model.origin.basis
     units = {}
     for name, (rows, share) in stretch.items():

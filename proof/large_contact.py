@@ -50,7 +50,7 @@ WATCHED: dict[str, tuple[Any, str]] = {  # what a curve by residual flexibility 
     "products": (all_harmonics, "nearly_displaced"),
     "modes": (CompliancePoint, "nearly"),
     "rest": (ResidualFlexibility, "apply"),
-    "factor": (residual_flexibility, "solve_few"),
+    "factor": (residual_flexibility, "solve_selected"),
 }
 
 

@@ -143,7 +143,7 @@ def _cut(system: SecondOrderSystem, free: np.ndarray, held: np.ndarray, name: st
 def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     """The model without the motions that break rows @ q_full = 0.
 
-    rows : (k, n_full), such as Part.held; none leaves the model as it is
+    rows : (k, n_full), such as `Part.held_rows`; none leaves the model as it is
     Returns the model in coordinates p, q = N p with N an orthonormal basis of what is allowed; they are no longer the
         displacements of single DOFs, but the contact map, loads, outputs and the way back know that
     Raises  ValueError for a model without a full field, or one whose harmonics see different systems

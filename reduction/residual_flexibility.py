@@ -31,7 +31,7 @@ import scipy.linalg as sla
 from scipy.sparse import csc_matrix, csr_matrix, hstack
 from threadpoolctl import threadpool_limits
 
-from tribodyn.fem.factor import Factor, factorise, solve_few
+from tribodyn.fem.factor import Factor, factorise, solve_selected
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.system import SecondOrderSystem
@@ -67,7 +67,7 @@ class ResidualFlexibility:
     @cached_property
     def factor(self) -> Factor:
         """Of K_s; it does not travel between processes, each makes its own."""
-        return factorise(self.matrix, solver=self.solver, few=np.unique(self.B.indices))
+        return factorise(self.matrix, solver=self.solver, selected_rows=np.unique(self.B.indices))
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "factor"}
@@ -83,7 +83,7 @@ class ResidualFlexibility:
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         """R f: displacement of the contact (n_contact, k) [m] under contact forces (n_contact, k) [N]."""
-        moved: np.ndarray = self.B @ solve_few(self.factor, self.B.T @ force)
+        moved: np.ndarray = self.B @ solve_selected(self.factor, self.B.T @ force)
         return moved - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
 
     def recalled(self, force: np.ndarray, asked: Sequence[np.ndarray]) -> np.ndarray:
@@ -196,7 +196,7 @@ def residual_flexibility(
     K = system.stiffness
     K_s = stuck_stiffness(K, interface.B, k)
     M, B = system.mass, csr_matrix(interface.B)
-    factor = factorise(K_s, solver=solver, few=np.unique(csr_matrix(interface.B).indices))
+    factor = factorise(K_s, solver=solver, selected_rows=np.unique(csr_matrix(interface.B).indices))
     omega, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
     del K_s
     forces = [np.asarray(v, float) for v in (*system.loads.values(), *system.outputs.values())]

@@ -50,7 +50,7 @@ def reduce_sector(
 
     Raises  Refusal as `craig_bampton` does
     """
-    both_faces = replace(sector.interface, B=vstack([sector.interface.B, sector.left], format="csr"))
+    both_faces = replace(sector.interface, B=vstack([sector.interface.B, sector.left_map], format="csr"))
     seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
     model = craig_bampton(sector.system, both_faces, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
     assert isinstance(model.origin, Reduction)
@@ -63,7 +63,7 @@ def in_coordinates(sector: Sector, system: SecondOrderSystem, origin: Reduction)
         sector,
         system=system,
         interface=replace(sector.interface, B=np.asarray(sector.interface.B @ origin.basis)),
-        left=np.asarray(sector.left @ origin.basis),
+        left_map=np.asarray(sector.left_map @ origin.basis),
         seam_right=np.searchsorted(origin.masters, sector.seam_right),
         seam_left=np.searchsorted(origin.masters, sector.seam_left),
         prestress=None,
@@ -100,17 +100,17 @@ def nodal_diameters(
 
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:
     """The sector with each row of its contact once, where joints share nodes, and which of them each row was (n_c,)."""
-    right, left = np.asarray(sector.interface.B), np.asarray(sector.left)
+    right, left = np.asarray(sector.interface.B), np.asarray(sector.left_map)
     same = (right @ right.T >= 1 - LIMITS.rounding) & (left @ left.T >= 1 - LIMITS.rounding)
     same[np.arange(len(right)), np.arange(len(right))] = True
     first, of_row = np.unique(same.argmax(axis=1), return_inverse=True)
-    once = replace(sector, interface=replace(sector.interface, B=right[first]), left=left[first])
+    once = replace(sector, interface=replace(sector.interface, B=right[first]), left_map=left[first])
     return once, of_row
 
 
 def node_to_node(sector: Sector) -> bool:
     """Whether every contact is one of the neighbours' nodes, each in one pair, as `relative_map` needs it."""
-    right, left = np.asarray(sector.interface.B), np.asarray(sector.left)
+    right, left = np.asarray(sector.interface.B), np.asarray(sector.left_map)
     between = np.abs(left).max(axis=1, initial=0.0) > 0
     return bool(between.all()) and np.abs(right @ right.T - np.eye(len(right))).max(initial=0.0) <= LIMITS.rounding
 
@@ -124,7 +124,7 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     Raises  ValueError where a right contact face is not made of masters, or shares nodes with a left one or a seam
     """
     S = seam_map(sector, index)
-    right, left = sector.interface.B @ S, sector.left @ S
+    right, left = sector.interface.B @ S, sector.left_map @ S
     faces = np.flatnonzero(np.abs(right).max(axis=0))
     if np.abs(right @ right.conj().T - np.eye(len(right))).max() > LIMITS.rounding or left[:, faces].any():
         raise Refusal(

@@ -176,7 +176,7 @@ class WaveIndices:
             return *wave_system(self._sector, index), seam_map(self._sector, index).toarray()
         T = relative_map(once, index)[0]
         system = self._sector.system.projected(T)
-        return system, np.eye(len(once.left), system.n_dof)[of_row], T
+        return system, np.eye(len(once.left_map), system.n_dof)[of_row], T
 
     def _small(self, system: SecondOrderSystem, B: np.ndarray, T: np.ndarray) -> IndexSystem:
         """The same in fewer coordinates where there are many."""

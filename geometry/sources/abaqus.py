@@ -131,7 +131,7 @@ class DeckAssembly:
 
 
 def load(path: Path) -> DeckAssembly:
-    """Sort the cards of a deck into parts, instances and the rest. Raises ValueError on what cannot be read."""
+    """Sort the cards of a deck into parts, instances and the rest. Raises Refusal on what cannot be read."""
     parts: dict[str, Scope] = {}
     assembly = DeckAssembly({}, {}, Scope(), [], Counter())
     scope, flat = assembly.top, True

@@ -34,7 +34,7 @@ FIRST = {"COUPLING", "KINEMATIC", "DISTRIBUTING", "KINEMATIC COUPLING", "DISTRIB
 
 
 def read(path: Path) -> RawMesh:
-    """Read a deck. Raises ValueError: one sentence that names the card and the cure."""
+    """Read a deck. Raises Refusal: one sentence that names the card and the cure."""
     assembly = abaqus.load(path)
     raw, row, number = raw_of(assembly)
     if not raw.cells:

@@ -25,7 +25,7 @@ from tribodyn.refusal import Refusal
 def raw_of(assembly: DeckAssembly) -> tuple[RawMesh, dict[Node, int], dict[Node, int]]:
     """Mesh, sets and surfaces of a deck, lengths as in the file, the row of each node and the number of each solid.
 
-    Raises  ValueError: an element that names a node that is not there
+    Raises  Refusal: an element that names a node that is not there
     """
     scopes = {**assembly.instances, "": assembly.top}
     row: dict[Node, int] = {}

@@ -25,7 +25,7 @@ _PAIRS = ("XY", "XZ", "YZ")
 
 
 def read(path: Path) -> RawMesh:
-    """Read an archive. Raises ValueError: one sentence that names the block and the cure."""
+    """Read an archive. Raises Refusal: one sentence that names the block and the cure."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     return _Archive(path, lines, LabelledMesh(SkippedCards(TABLE))).taken()
 

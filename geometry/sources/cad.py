@@ -43,7 +43,7 @@ class Sizes:
 def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
     """Mesh a CAD file. Lengths are those of the file: Gmsh does not convert them.
 
-    Raises  ValueError: a file that cannot be read, has no solid or cannot be meshed, a size for what is not there
+    Raises  Refusal: a file that cannot be read, has no solid or cannot be meshed, a size for what is not there
     """
     with session() as gmsh:
         shapes = _solids(gmsh, path)
@@ -51,7 +51,7 @@ def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
 
 
 def default_size(path: Path) -> float:
-    """Size of the elements where none is asked for, in the unit of the file; raises ValueError as `read` does."""
+    """Size of the elements where none is asked for, in the unit of the file; raises Refusal as `read` does."""
     with session() as gmsh:
         _solids(gmsh, path)
         return _default_size(gmsh.model, Sizes())

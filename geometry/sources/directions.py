@@ -28,7 +28,7 @@ class Directions(Protocol):
 def orthogonal(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """(..., 3, 3) rows: along the first vector, in the plane of both, and normal to it.
 
-    Raises  ValueError where the two are parallel
+    Raises  Refusal where the two are parallel
     """
     third = np.cross(first, second)
     size = np.linalg.norm(third, axis=-1)
@@ -55,7 +55,7 @@ class System:
 
     @classmethod
     def of_points(cls, kind: str, origin: Sequence[float], pole: Sequence[float], plane: Sequence[float]) -> System:
-        """By a point on its z axis and one in its x z plane. Raises ValueError where these lie on one line."""
+        """By a point on its z axis and one in its x z plane. Raises Refusal where these lie on one line."""
         at = np.array(origin, dtype=float)
         z, x, y = orthogonal(np.asarray(pole) - at, np.asarray(plane) - at)
         return cls(kind, at, np.stack([x, y, z]))
@@ -86,7 +86,7 @@ class System:
         return np.asarray(self.origin + own @ self.axes)
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """(n, 3, 3) directions at points (n, 3), rows. Raises ValueError at a point on the axis or pole."""
+        """(n, 3, 3) directions at points (n, 3), rows. Raises Refusal at a point on the axis or pole."""
         if self.kind == "rectangular":
             return np.broadcast_to(self.turn @ self.axes, (len(points), 3, 3))
         z = np.broadcast_to(self.axes[2], points.shape)

@@ -44,7 +44,7 @@ def outline(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def select_facets(mesh: Any, rule: FacetRule) -> np.ndarray:
-    """Facets that satisfy a rule; raises ValueError where none does, or where the rule is empty."""
+    """Facets that satisfy a rule; raises Refusal where none does, or where the rule is empty."""
     found = []
     if rule.box is not None:
         found.append(within_box(mesh, *rule.box))
@@ -67,7 +67,7 @@ def add_faces(
 ) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh and its node sets with a face for each rule.
 
-    Raises  ValueError, naming the face, where it picks nothing or has the name of a group that is there
+    Raises  Refusal, naming the face, where it picks nothing or has the name of a group that is there
     """
     boundaries, sets = dict(mesh.boundaries or {}), dict(node_sets)
     for name, rule in rules.items():
@@ -82,7 +82,7 @@ def add_faces(
 
 
 def within_box(mesh: Any, low: Sequence[float], high: Sequence[float]) -> np.ndarray:
-    """Boundary facets whose corners all lie in a box [m]; raises ValueError where there are none."""
+    """Boundary facets whose corners all lie in a box [m]; raises Refusal where there are none."""
     facets, _, _ = outline(mesh)
     corners = mesh.p[:, mesh.facets[:, facets]]
     slack = 1e-6 * float(np.ptp(mesh.p, axis=1).max())
@@ -91,7 +91,7 @@ def within_box(mesh: Any, low: Sequence[float], high: Sequence[float]) -> np.nda
 
 
 def by_normal(mesh: Any, direction: Sequence[float], degrees: float) -> np.ndarray:
-    """Boundary facets whose outward normal points along a direction to within an angle; raises ValueError likewise."""
+    """Boundary facets whose outward normal points along a direction to within an angle; raises Refusal likewise."""
     facets, _, normal = outline(mesh)
     along = np.asarray(direction, dtype=float)
     if along.shape != (3,) or not along.any():
@@ -101,7 +101,7 @@ def by_normal(mesh: Any, direction: Sequence[float], degrees: float) -> np.ndarr
 
 
 def by_number(mesh: Any, numbers: Sequence[int]) -> np.ndarray:
-    """Facets of faces of a CAD file by their numbers; raises ValueError for one that the body has not."""
+    """Facets of faces of a CAD file by their numbers; raises Refusal for one that the body has not."""
     boundaries = mesh.boundaries or {}
     known = [name for name in boundaries if name.startswith("face ")]
     for number in numbers:

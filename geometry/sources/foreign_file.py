@@ -64,7 +64,7 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
 
     path : its ending tells the format; unit : of length in the file, "m", "mm", "in", ...
     sizes : of the elements of a CAD file, in its unit
-    Raises  ValueError: one sentence that names the file and the cure
+    Raises  Refusal: one sentence that names the file and the cure
     """
     raw = read_raw(path, unit, sizes)
     parts = solid_body.bodies(raw)
@@ -79,7 +79,7 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
 
 
 def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> RawMesh:
-    """The mesh of a file, lengths in metres. Raises ValueError as `read` does."""
+    """The mesh of a file, lengths in metres. Raises Refusal as `read` does."""
     file = Path(path)
     if unit not in UNITS:
         raise Refusal(f"unit = \"{unit}\" of mesh file '{path}' is no length that is known: give {', '.join(UNITS)}")

@@ -28,7 +28,7 @@ class Card:
         return next((self.options[key] for key in keys if key in self.options), "")
 
     def floats(self, fields: list[str], count: int) -> list[float]:
-        """The first `count` numbers of a data line, 0 for what is left out; raises ValueError, naming the card."""
+        """The first `count` numbers of a data line, 0 for what is left out; raises Refusal, naming the card."""
         return [self.number(text) for text in (fields + [""] * count)[:count]]
 
     def number(self, text: str) -> float:
@@ -55,7 +55,7 @@ def cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[Card]:
     """All cards of a deck in order, those of included files in their place.
 
     within : files that include this one
-    Raises  ValueError: an included file that is not there, or data before the first card
+    Raises  Refusal: an included file that is not there, or data before the first card
     """
     if path.resolve() in within:
         raise Refusal(f"deck '{path}' includes itself: take the *INCLUDE out")

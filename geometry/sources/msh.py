@@ -38,7 +38,7 @@ _KIND_OF_GROUP = ("point", "curve", "surface", "volume")
 
 
 def read(path: Path) -> RawMesh:
-    """Let Gmsh read one of its files. Raises ValueError: it is none, or broken."""
+    """Let Gmsh read one of its files. Raises Refusal: it is none, or broken."""
     _check(path)
     with session() as gmsh:
         try:

@@ -41,7 +41,7 @@ STRESSES = (0, 1, 2, 4, 5, 3)  # of ours, where they stand among x, y, z, xy, yz
 
 
 def read(path: Path) -> RawMesh:
-    """Read bulk data. Raises ValueError: one sentence that names the card and the cure."""
+    """Read bulk data. Raises Refusal: one sentence that names the card and the cure."""
     lines = list(lines_of(path))
     start = next((i + 1 for i, line in enumerate(lines) if line.upper().split()[:2] == ["BEGIN", "BULK"]), 0)
     control = "\n".join(lines[:start])

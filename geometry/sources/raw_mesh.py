@@ -151,7 +151,7 @@ class LabelledMesh:
     def raw(self, path: Path, materials: tuple[deck.DeckMaterial, ...]) -> RawMesh:
         """The mesh, with its materials and all else that was read.
 
-        Raises  ValueError: an element, or a constraint, that names a node that is not there
+        Raises  Refusal: an element, or a constraint, that names a node that is not there
         """
         if not self.solids:
             return NOTHING

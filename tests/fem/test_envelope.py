@@ -32,7 +32,8 @@ def leaf(tmp_path_factory):
 
 
 def part(leaf, springs=()):
-    return fem_part.build(leaf.mesh, leaf.node_sets, STEEL, IN_PLANE, CONTACTS, {}, {}, springs=springs, held=NO_TURN)
+    held = {"springs": springs, "held_motions": NO_TURN}
+    return fem_part.build(leaf.mesh, leaf.node_sets, STEEL, IN_PLANE, CONTACTS, {}, {}, **held)
 
 
 def test_held_rotation_leaves_two_rigid_modes_and_every_elastic_one(leaf):
@@ -40,10 +41,10 @@ def test_held_rotation_leaves_two_rigid_modes_and_every_elastic_one(leaf):
     whole, _ = linear_modes(made, n=12)
     assert (whole[:3] < 1e-3 * whole[3]).all()  # lift, pitch and turn about the radial axis
     reduced = craig_bampton(made.system, made.interface, n_modes=20)
-    envelope, shapes = linear_modes(hold(reduced, made.held), n=10)
+    envelope, shapes = linear_modes(hold(reduced, made.held_rows), n=10)
     assert (envelope[:2] < 1e-3 * envelope[2]).all()
     np.testing.assert_allclose(envelope[2:8], whole[3:9], rtol=2e-3)
-    np.testing.assert_allclose(made.held @ hold(reduced, made.held).origin.basis @ shapes, 0.0, atol=1e-9)
+    np.testing.assert_allclose(made.held_rows @ hold(reduced, made.held_rows).origin.basis @ shapes, 0.0, atol=1e-9)
     free, _ = linear_modes(reduced, n=11)
     np.testing.assert_allclose(envelope[2:], free[3:], rtol=1e-9)  # exactly those without the turn
 
@@ -54,18 +55,18 @@ def test_held_rows_are_the_rotation_about_the_centre_of_mass(leaf):
     x, z = made.points[:, 0], made.points[:, 2] - PARAMETERS.thickness / 2
     unit[:, 0], unit[:, 2] = z, -x
     turn = unit.ravel()[made.free]
-    np.testing.assert_allclose(made.held[0], made.system.mass @ turn, atol=1e-9 * np.abs(made.held).max())
+    np.testing.assert_allclose(made.held_rows[0], made.system.mass @ turn, atol=1e-9 * np.abs(made.held_rows).max())
     inertia = turn @ made.system.mass @ turn
-    assert made.held[0] @ turn == pytest.approx(inertia)
+    assert made.held_rows[0] @ turn == pytest.approx(inertia)
     lift = np.tile([0.0, 0, 1], len(x))[made.free]
-    assert made.held[0] @ lift == pytest.approx(0.0, abs=1e-9 * np.sqrt(inertia))
+    assert made.held_rows[0] @ lift == pytest.approx(0.0, abs=1e-9 * np.sqrt(inertia))
 
 
 def test_springs_hold_a_rigid_leaf_as_a_mass_on_springs(leaf):
     k = 100.0  # soft enough that the leaf stays rigid
     springs = [Spring(f"{side}_pin", (0, 0, 1), k) for side in ("left", "right")]
     made = part(leaf, springs)
-    frequency, _ = linear_modes(hold(craig_bampton(made.system, made.interface, n_modes=5), made.held))
+    frequency, _ = linear_modes(hold(craig_bampton(made.system, made.interface, n_modes=5), made.held_rows))
     lift, pitch = np.zeros((2, len(made.points), 3))
     pins = np.concatenate([leaf.node_sets[name] for name in ("left_pin", "right_pin")])
     y = made.points[:, 1] - made.points[pins, 1].mean()

@@ -13,7 +13,7 @@ from scipy.sparse import eye_array, random_array
 
 from tests.helpers.digest import digest
 from tribodyn.fem import factor
-from tribodyn.fem.factor import Pardiso, eigenvalues_below, factorise, solve_few
+from tribodyn.fem.factor import Pardiso, eigenvalues_below, factorise, solve_selected
 
 FRESH = """
 import sys
@@ -47,17 +47,17 @@ def test_eigenvalues_are_counted_by_one_factorisation(pardiso: bool, monkeypatch
 @pytest.mark.parametrize(("solver", "most"), [("pardiso", 0.5), ("pardiso", 0.0), ("superlu", 0.5)])
 def test_few_rows_are_those_of_the_whole_solution(solver: str, most: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where a force on them vanishes, between solutions in all rows, and where they are too many to pay."""
-    monkeypatch.setattr(Pardiso, "MOST_FEW", most)
+    monkeypatch.setattr(Pardiso, "MOST_SELECTED", most)
     some = random_array((400, 400), density=0.02, rng=1)
     K = some @ some.T + 4 * eye_array(400)
     few = np.array([3, 50, 51, 52, 399])
-    made = factorise(K, solver=solver, few=few)
+    made = factorise(K, solver=solver, selected_rows=few)
     assert getattr(made, "_few", False) == (solver == "pardiso" and most > 0)
     force, every = np.zeros((400, 7)), np.random.default_rng(2).normal(size=(400, 2))
     force[few[:4], :2] = np.random.default_rng(3).normal(size=(4, 2))
     for _ in range(2):
         assert np.allclose(
-            solve_few(made, force)[few], np.linalg.solve(K.toarray(), force)[few], rtol=1e-10, atol=1e-14
+            solve_selected(made, force)[few], np.linalg.solve(K.toarray(), force)[few], rtol=1e-10, atol=1e-14
         )
         assert np.allclose(made.solve(every), np.linalg.solve(K.toarray(), every), rtol=1e-10, atol=1e-13)
 

@@ -104,7 +104,7 @@ def test_left_face_gets_what_the_right_one_of_the_neighbour_gives(sectors):
     state = solved(one, 310.0)
     flat, force = state.flat, state.cycle.force.reshape(state.flat.shape)
     sector, basis = reduced.sector, one.basis
-    right, left = np.asarray(sector.interface.B), np.asarray(sector.left)
+    right, left = np.asarray(sector.interface.B), np.asarray(sector.left_map)
     reaction = {"right": [], "left": []}
     for h, z in zip(basis.harmonics, coordinates(one, flat, force, state.omega), strict=True):
         T, _ = relative_map(sector, h * order)

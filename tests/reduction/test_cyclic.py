@@ -72,7 +72,7 @@ def test_blade_is_what_the_scene_says(published):
 def test_relative_coordinates_are_the_contact_itself(reduced):
     for index in (0, 1, 3, 4, 7):
         T, n_masters = waves.relative_map(reduced.sector, index)
-        n_contact = len(reduced.sector.left)
+        n_contact = len(reduced.sector.left_map)
         S = cyclic_symmetry.seam_map(reduced.sector, index)
         system, B = wave_system(reduced.sector, index)
         z = np.random.default_rng(index).normal(size=T.shape[1])
@@ -103,7 +103,7 @@ def test_model_of_a_wave(reduced):
     undamped = travelling_wave(reduced, 3)
     model = undamped.with_damping(lambda system, B: modal_damping(system, 0.02))
     assert undamped.at_harmonic(1)[0].damping is None
-    n_contact = len(reduced.sector.left)
+    n_contact = len(reduced.sector.left_map)
     for h, index in ((0, 0), (1, 3), (2, 6), (3, 1), (5, 7), (8, 0), (9, 3)):
         system, B = model.at_harmonic(h)
         assert (np.eye(n_contact, system.n_dof) == B).all()
@@ -144,7 +144,7 @@ def test_stuck_ritz_shapes_keep_statics_exact_and_the_contact_near(reduced, monk
     q = np.random.default_rng(0).normal(size=coarse.at_harmonic(1)[0].n_dof)
     B, basis = np.asarray(reduced.sector.interface.B), reduced.origin.basis
     assert coarse.reconstruct(q).shape == (len(basis),)
-    slid = B - np.conj(reduced.sector.phase(3)) * reduced.sector.left
+    slid = B - np.conj(reduced.sector.phase(3)) * reduced.sector.left_map
     inside, *_ = np.linalg.lstsq(basis, coarse.reconstruct(q), rcond=None)
     assert slid @ inside == pytest.approx(coarse.at_harmonic(1)[1] @ q, abs=1e-9 * np.abs(q).max())
 

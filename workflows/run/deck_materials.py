@@ -15,59 +15,63 @@ from tribodyn.workflows.scene.structure import DeckTable as Table
 
 
 def material(
-    of: deck.Deck, name: str, mesh: Any, table: Table, materials: Mapping[str, AnyMaterial], deck_name: str = "NAME"
+    source: deck.Deck, name: str, mesh: Any, table: Table, materials: Mapping[str, AnyMaterial], deck_name: str = "NAME"
 ) -> Any:
     """Material of a body of a deck, or volume group -> material where it has several.
 
-    Raises  ValueError where an element has none or two
+    Raises  Refusal where an element has none or two
     """
-    given: dict[str, AnyMaterial] = {}
+    material_of_group: dict[str, AnyMaterial] = {}
     count = np.zeros(mesh.nelements, dtype=int)
-    for one in of.materials:
-        for group in one.groups:
+    for deck_material in source.materials:
+        for group in deck_material.groups:
             if group in (mesh.subdomains or {}):
-                given[group] = _solid(one, group, materials)
+                material_of_group[group] = _solid(deck_material, group, materials)
                 count[mesh.subdomains[group]] += 1
     if (count > 1).any():
-        many = int((count > 1).sum())
-        raise Refusal(f"the sections of body '{name}' overlap in {many} elements: correct them")
+        n_overlap = int((count > 1).sum())
+        raise Refusal(f"the sections of body '{name}' overlap in {n_overlap} elements: correct them")
     if table.elements == "linear_reduced":
-        given = {group: _reduced(one, name) for group, one in given.items()}
+        material_of_group = {group: _reduced(deck_material, name) for group, deck_material in material_of_group.items()}
     if (count == 1).all():
-        return given if len(given) > 1 else next(iter(given.values()))
+        return material_of_group if len(material_of_group) > 1 else next(iter(material_of_group.values()))
     if table.material is None:
         raise Refusal(
             f"the deck gives {int((count == 0).sum())} of {mesh.nelements} elements of body '{name}' no material: "
             f'name one of the scene with decks.{deck_name}.material = "name"'
         )
-    if not given:
-        own = materials[table.material]
-        return _reduced(own, name) if table.elements == "linear_reduced" else own
+    if not material_of_group:
+        scene_material = materials[table.material]
+        return _reduced(scene_material, name) if table.elements == "linear_reduced" else scene_material
     raise Refusal(f"the deck gives a part of body '{name}' no material: give all its elements a section")
 
 
-def _reduced(one: AnyMaterial, body: str) -> Material:
+def _reduced(source_material: AnyMaterial, body: str) -> Material:
     """A material whose elements are linear with reduced integration."""
-    if not isinstance(one, Material):
+    if not isinstance(source_material, Material):
         raise Refusal(f"elements = \"linear_reduced\" is for isotropic materials, and body '{body}' has another")
-    return replace(one, linear_reduced=True)
+    return replace(source_material, linear_reduced=True)
 
 
-def _solid(one: deck.DeckMaterial, group: str, materials: Mapping[str, AnyMaterial]) -> AnyMaterial:
+def _solid(deck_material: deck.DeckMaterial, group: str, materials: Mapping[str, AnyMaterial]) -> AnyMaterial:
     """A material of the deck along the axes of a group, or the one of the scene that takes its place."""
-    axes: Any = one.directions.get(group, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
-    if one.name in materials:
-        other = materials[one.name]
-        return replace(other, axes=axes) if group in one.directions and not isinstance(other, Material) else other
-    instead = f"give [materials.{one.name}] in the scene, which takes its place"
-    if one.density is None:
-        raise Refusal(f"material '{one.name}' of the deck has no density: {instead}")
-    along = one.expansion or 0.0
-    if one.stiffness is not None:
-        return Anisotropic(np.array(one.stiffness), one.density, axes, (along,) * 3)
-    if one.engineering is not None:
-        e = one.engineering
-        return Orthotropic(e[:3], e[3:6], e[6:], one.density, axes, (along,) * 3)
-    if one.young is None or one.poisson is None:
-        raise Refusal(f"material '{one.name}' of the deck has no elastic constants that are known: {instead}")
-    return Material(one.young, one.poisson, one.density, along)
+    axes: Any = deck_material.directions.get(group, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    if deck_material.name in materials:
+        scene_material = materials[deck_material.name]
+        return (
+            replace(scene_material, axes=axes)
+            if group in deck_material.directions and not isinstance(scene_material, Material)
+            else scene_material
+        )
+    instead = f"give [materials.{deck_material.name}] in the scene, which takes its place"
+    if deck_material.density is None:
+        raise Refusal(f"material '{deck_material.name}' of the deck has no density: {instead}")
+    coefficient = deck_material.expansion or 0.0
+    if deck_material.stiffness is not None:
+        return Anisotropic(np.array(deck_material.stiffness), deck_material.density, axes, (coefficient,) * 3)
+    if deck_material.engineering is not None:
+        e = deck_material.engineering
+        return Orthotropic(e[:3], e[3:6], e[6:], deck_material.density, axes, (coefficient,) * 3)
+    if deck_material.young is None or deck_material.poisson is None:
+        raise Refusal(f"material '{deck_material.name}' of the deck has no elastic constants that are known: {instead}")
+    return Material(deck_material.young, deck_material.poisson, deck_material.density, coefficient)

@@ -56,20 +56,20 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
     """What the deck of a table brings.
 
     materials : those of the scene, which take the place of the deck's of the same name; folder : of the scene
-    Raises  ValueError, one sentence: the deck cannot be read, lacks a material, or has what cannot be carried over
+    Raises  Refusal, one sentence: the deck cannot be read, lacks a material, or has what cannot be carried over
     """
     path = folder / table.file
     if table.unit not in UNITS:
         raise Refusal(f"decks.{name}.unit: expected one of {', '.join(foreign_file.UNITS)}")
     try:
-        return _Carrying(name, table, materials, source(path, UNITS[table.unit])).done()
+        return _DeckConversion(name, table, materials, source(path, UNITS[table.unit])).convert()
     except ValueError as trouble:
         clause = str(trouble)
         raise Refusal(clause if clause.startswith("decks.") else f"decks.{name}: {clause}") from None
 
 
 def source(path: Path, unit: str) -> foreign_file.Source:
-    """What a file holds, read once as long as it does not change; raises ValueError as `read.read` does."""
+    """What a file holds, read once as long as it does not change; raises Refusal as `read.read` does."""
     return _read(path, unit, path.stat().st_mtime_ns if path.is_file() else 0)
 
 
@@ -87,12 +87,12 @@ def notes_of(source: foreign_file.Source, table: Table) -> tuple[str, ...]:
 def with_elements(mesh: Any, node_sets: dict[str, np.ndarray], table: Table, body: str) -> tuple[Any, Any]:
     """Mesh and node sets of a body in the elements that its table asks for.
 
-    Raises  ValueError, which names the body, where it has others than those can stand for
+    Raises  Refusal, which names the body, where it has others than those can stand for
     """
     return subdivision.first_order(mesh, node_sets, body) if table.elements == "linear_reduced" else (mesh, node_sets)
 
 
-class _Carrying:
+class _DeckConversion:
     """One deck on its way into a structure."""
 
     def __init__(self, name: str, table: Table, materials: Mapping[str, AnyMaterial], source: foreign_file.Source):
@@ -104,12 +104,12 @@ class _Carrying:
         self.sets: dict[str, list[str]] = {}
         self.body_of: dict[str, str] = {}  # of such a name
         self._refuse()
-        self.made = CarriedDeck([self._body(body) for body in source.bodies])
-        self.notes = self.made.notes
+        self.content = CarriedDeck([self._body(body) for body in source.bodies])
+        self.notes = self.content.notes
         self.axes_of: dict[str, set[int]] = {}  # point -> its axes that an equation moves
         self.carried: set[str] = set()  # points that a coupling ties to a face
 
-    def done(self) -> CarriedDeck:
+    def convert(self) -> CarriedDeck:
         """All of it."""
         use = self.table.use
         for kind in EVERYTHING:
@@ -117,27 +117,27 @@ class _Carrying:
             if kind in use:
                 getattr(self, f"_{kind}")(entries)
             elif entries:
-                self.notes.append(f"{self._what(kind, entries)} that use leaves out")
+                self.notes.append(f"{self._count_of(kind, entries)} that use leaves out")
         self._points()
-        self.made.clamps += [Clamp(group) for group in self.table.fixed]
-        self.made.clamps += [Clamp(group, axes) for group, axes in self.table.fixed_axes.items()]
-        left = [f"{self.source.refused[name]}, by ignore" for name in self.table.ignore]
-        unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes, *left)]
-        self.made.notes = [
+        self.content.clamps += [Clamp(group) for group in self.table.fixed]
+        self.content.clamps += [Clamp(group, axes) for group, axes in self.table.fixed_axes.items()]
+        ignored = [f"{self.source.refused[name]}, by ignore" for name in self.table.ignore]
+        unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes, *ignored)]
+        self.content.notes = [
             f"decks.{self.name}: {sentence}" for sentence in (*notes_of(self.source, self.table), *unused)
         ]
-        return self.made
+        return self.content
 
     def _refuse(self) -> None:
-        """Raise ValueError where the deck has what is not carried over, unless the scene ignores it."""
+        """Raise Refusal where the deck has what is not carried over, unless the scene ignores it."""
         refused, ignore = self.source.refused, self.table.ignore
         if unknown := [name for name in ignore if name not in refused]:
             raise Refusal(
                 f"ignore: '{unknown[0]}' is not refused, {', '.join(refused) or 'nothing'} is: correct the name"
             )
-        if left := [name for name in refused if name not in ignore]:
-            listed = ", ".join(refused[name] for name in left)
-            names = ", ".join(f'"{name}"' for name in left)
+        if remaining := [name for name in refused if name not in ignore]:
+            listed = ", ".join(refused[name] for name in remaining)
+            names = ", ".join(f'"{name}"' for name in remaining)
             raise Refusal(
                 f"the deck has {listed}, not carried over though stiffness, mass, support or load may change: give it "
                 f"in the scene, and leave it out by decks.{self.name}.ignore = [{names}]"
@@ -146,173 +146,175 @@ class _Carrying:
     # bodies
 
     def _body(self, name: str) -> Body:
-        found = self.source.bodies[name]
+        solid = self.source.bodies[name]
         rules = {}
         for face, rule in self.table.faces.items():
             if rule.body not in self.source.bodies:
-                known = ", ".join(self.source.bodies)
-                raise Refusal(f"faces.{face}: the deck has no body '{rule.body}'; it has {known}")
+                names = ", ".join(self.source.bodies)
+                raise Refusal(f"faces.{face}: the deck has no body '{rule.body}'; it has {names}")
             if rule.body == name:
                 rules[face] = rule.rule
-        mesh, node_sets = face_rules.add_faces(found.mesh, found.node_sets, rules)
+        mesh, node_sets = face_rules.add_faces(solid.mesh, solid.node_sets, rules)
         mesh, node_sets = subdivision.subdivide(mesh, node_sets, self.table.halved)
         mesh, node_sets = with_elements(mesh, node_sets, self.table, name)
-        made = material(self.deck, name, mesh, self.table, self.materials, self.name)
+        body_material = material(self.deck, name, mesh, self.table, self.materials, self.name)
         for group in {*node_sets, *(mesh.boundaries or {})}:
-            kept = self.faces if group in (mesh.boundaries or {}) else self.sets
+            names_of = self.faces if group in (mesh.boundaries or {}) else self.sets
             place = group_name(name, group, node_sets)
-            kept.setdefault(group, []).append(place)
+            names_of.setdefault(group, []).append(place)
             self.body_of[place] = name
-        return Body(name, mesh, node_sets, made)
+        return Body(name, mesh, node_sets, body_material)
 
     # constraints
 
     def _ties(self, ties: Sequence[deck.DeckTie]) -> None:
         for tie in ties:
-            what = f"tie '{tie.name}' of deck {self.name}"
-            slaves, masters = (self._faces(place, what) for place in (tie.slave, tie.master))
+            label = f"tie '{tie.name}' of deck {self.name}"
+            slaves, masters = (self._faces(place, label) for place in (tie.slave, tie.master))
             if len(masters) > 1:
-                raise Refusal(f"{what}: its master lies on {', '.join(masters)}; {self._instead('ties', 'ties')}")
-            self.made.constraints += [Tie(what, slave, masters[0], tie.tolerance) for slave in slaves]
+                raise Refusal(f"{label}: its master lies on {', '.join(masters)}; {self._instead('ties', 'ties')}")
+            self.content.constraints += [Tie(label, slave, masters[0], tie.tolerance) for slave in slaves]
 
     def _couplings(self, couplings: Sequence[deck.Coupling]) -> None:
-        for one in couplings:
-            what = f"coupling '{one.name}' of deck {self.name}"
-            if one.point not in self.source.points:
+        for coupling in couplings:
+            label = f"coupling '{coupling.name}' of deck {self.name}"
+            if coupling.point not in self.source.points:
                 raise Refusal(
-                    f"{what}: its reference node belongs to the mesh; give it one of its own, or "
+                    f"{label}: its reference node belongs to the mesh; give it one of its own, or "
                     f"{self._instead('couplings', 'couplings')}"
                 )
-            if not set(one.axes) >= {0, 1, 2}:
-                raise Refusal(f"{what} couples some directions alone; {self._instead('couplings', 'couplings')}")
-            kind = RigidCoupling if one.kind == "kinematic" else DistributedCoupling
-            places = self._groups(one.face, what)
+            if not set(coupling.axes) >= {0, 1, 2}:
+                raise Refusal(f"{label} couples some directions alone; {self._instead('couplings', 'couplings')}")
+            kind = RigidCoupling if coupling.kind == "kinematic" else DistributedCoupling
+            places = self._groups(coupling.face, label)
             if len(places) > 1 and kind is DistributedCoupling:
                 listed = ", ".join(places)
-                raise Refusal(f"{what}: its face lies on {listed}; {self._instead('couplings', 'couplings')}")
-            self.carried.add(one.point)
-            self.made.constraints += [kind(one.point, place) for place in places]
+                raise Refusal(f"{label}: its face lies on {listed}; {self._instead('couplings', 'couplings')}")
+            self.carried.add(coupling.point)
+            self.content.constraints += [kind(coupling.point, place) for place in places]
 
     def _equations(self, equations: Sequence[deck.DeckEquation]) -> None:
-        for number, one in enumerate(equations, 1):
-            what = f"equation {number} of deck {self.name}"
-            self.made.constraints.append(Equation(what, self._terms(one.terms, what)))
+        for number, equation in enumerate(equations, 1):
+            label = f"equation {number} of deck {self.name}"
+            self.content.constraints.append(Equation(label, self._terms(equation.terms, label)))
 
     def _springs(self, springs: Sequence[deck.DeckSpring]) -> None:
-        for number, one in enumerate(springs, 1):
-            terms = self._terms(one.terms, f"spring {number} of deck {self.name}")
-            self.made.springs.append(ElongationSpring(terms, one.stiffness))
+        for number, spring in enumerate(springs, 1):
+            terms = self._terms(spring.terms, f"spring {number} of deck {self.name}")
+            self.content.springs.append(ElongationSpring(terms, spring.stiffness))
 
-    def _terms(self, terms: Sequence[tuple[str, int, float]], what: str) -> tuple[tuple[str, int, float], ...]:
+    def _terms(self, terms: Sequence[tuple[str, int, float]], label: str) -> tuple[tuple[str, int, float], ...]:
         """Terms of an equation or a spring over the nodes of the assembly."""
-        found = []
+        place_terms = []
         for group, axis, factor in terms:
             if group in self.source.points:
                 self.axes_of.setdefault(group, set()).add(axis)
-                found.append((group if axis < 3 else f"{group}.turn", axis % 3, factor))
+                place_terms.append((group if axis < 3 else f"{group}.turn", axis % 3, factor))
             elif axis < 3:
-                found.append((self._groups(group, what)[0], axis, factor))
+                place_terms.append((self._groups(group, label)[0], axis, factor))
             else:
-                raise Refusal(f"{what} turns a node of a solid, which has no rotation; correct the deck")
-        return tuple(found)
+                raise Refusal(f"{label} turns a node of a solid, which has no rotation; correct the deck")
+        return tuple(place_terms)
 
     def _masses(self, masses: Sequence[deck.PointMass]) -> None:
-        for one in masses:
-            point = one.group in self.source.points
-            places = [one.group] if point else self._groups(one.group, "a mass")
-            inertia = one.inertia if point else (0.0, 0.0, 0.0)  # a node of a solid has no rotation
-            self._needs_coupling(one.group, "mass")
-            self.made.masses += [Mass(place, one.value / len(places), inertia) for place in places]
+        for mass in masses:
+            point = mass.group in self.source.points
+            places = [mass.group] if point else self._groups(mass.group, "a mass")
+            inertia = mass.inertia if point else (0.0, 0.0, 0.0)  # a node of a solid has no rotation
+            self._needs_coupling(mass.group, "mass")
+            self.content.masses += [Mass(place, mass.value / len(places), inertia) for place in places]
 
     def _supports(self, supports: Sequence[deck.Support]) -> None:
-        moved = [one for one in supports if one.value]
-        if moved:
-            self.notes.append(f"{self._what('supports', moved)} with a displacement: give it as [prescribed.NAME]")
-        held: dict[str, set[int]] = {}
-        along: list[tuple[str, int, Directions]] = []
-        for one in supports:
-            if not one.value and one.system is None:
-                held.setdefault(one.group, set()).add(one.axis)
-            elif not one.value and one.system is not None:
-                along.append((one.group, one.axis, one.system))
-        for group, axis, system in along:
+        displaced = [support for support in supports if support.value]
+        if displaced:
+            self.notes.append(
+                f"{self._count_of('supports', displaced)} with a displacement: give it as [prescribed.NAME]"
+            )
+        axes_of_group: dict[str, set[int]] = {}
+        directed: list[tuple[str, int, Directions]] = []
+        for support in supports:
+            if not support.value and support.system is None:
+                axes_of_group.setdefault(support.group, set()).add(support.axis)
+            elif not support.value and support.system is not None:
+                directed.append((support.group, support.axis, support.system))
+        for group, axis, system in directed:
             point = group in self.source.points
             if point and (group in self.carried or group in self.axes_of):
                 places = [group if axis < 3 else f"{group}.turn"]
             else:
                 places = self._groups(group, "a support") if axis < 3 and not point else []
-            self.made.constraints += [ClampAlong(place, system, (axis % 3,)) for place in places]
-        for group, axes in held.items():
+            self.content.constraints += [ClampAlong(place, system, (axis % 3,)) for place in places]
+        for group, axes in axes_of_group.items():
             if group in self.source.points:
                 if group not in self.carried and group not in self.axes_of:
                     self.notes.append(f"the support of point '{group}', which carries nothing")
                     continue
-                self.made.clamps += _held(group, axes)
+                self.content.clamps += _point_clamps(group, axes)
             else:
                 letters = "".join(AXES[axis] for axis in sorted(axes) if axis < 3)
                 places = self._groups(group, "a support") if letters else []
-                self.made.clamps += [Clamp(place, letters) for place in places]
+                self.content.clamps += [Clamp(place, letters) for place in places]
 
     # loads
 
     def _forces(self, forces: Sequence[deck.Force]) -> None:
         parts: list[tuple[Load, float]] = []
-        for one in forces:
-            direction = np.eye(3)[one.axis % 3]
-            if one.group in self.source.points:
-                self._needs_coupling(one.group, "force")
-                kind = NodalForce if one.axis < 3 else Moment
-                parts.append((kind(one.group, direction), one.value))
-            elif one.axis >= 3:
-                raise Refusal(f"a moment acts on '{one.group}', which has no rotation; couple it to a point")
+        for force in forces:
+            direction = np.eye(3)[force.axis % 3]
+            if force.group in self.source.points:
+                self._needs_coupling(force.group, "force")
+                kind = NodalForce if force.axis < 3 else Moment
+                parts.append((kind(force.group, direction), force.value))
+            elif force.axis >= 3:
+                raise Refusal(f"a moment acts on '{force.group}', which has no rotation; couple it to a point")
             else:
-                for place in self._groups(one.group, "a force"):
-                    count = self.source.counts[one.group][self.body_of[place]]
-                    parts.append((NodalForce(place, direction, "nodes"), count * one.value))
+                for place in self._groups(force.group, "a force"):
+                    count = self.source.counts[force.group][self.body_of[place]]
+                    parts.append((NodalForce(place, direction, "nodes"), count * force.value))
         self._load(parts)
 
     def _pressures(self, pressures: Sequence[deck.FacePressure]) -> None:
         self._load([(Pressure(place), p.value) for p in pressures for place in self._faces(p.face, "a pressure")])
 
     def _load(self, parts: Sequence[tuple[Load, float]]) -> None:
-        self.made.load = Sum((*self.made.load.parts, *parts))
+        self.content.load = Sum((*self.content.load.parts, *parts))
 
     # places
 
     def _points(self) -> None:
         """Reference points that something carries; what of them nothing moves is held."""
         for point in [*self.carried, *(p for p in self.axes_of if p not in self.carried)]:
-            self.made.points[point] = self.source.points[point]
+            self.content.points[point] = self.source.points[point]
             if point not in self.carried:
-                self.made.clamps += _held(point, set(ALL_AXES) - self.axes_of[point])
-        idle = [point for point in self.source.points if point not in self.made.points]
+                self.content.clamps += _point_clamps(point, set(ALL_AXES) - self.axes_of[point])
+        idle = [point for point in self.source.points if point not in self.content.points]
         if idle:
             self.notes.append(f"points {', '.join(idle)}, which carry nothing")
 
-    def _needs_coupling(self, group: str, what: str) -> None:
+    def _needs_coupling(self, group: str, label: str) -> None:
         if group in self.source.points and group not in self.carried and group not in self.axes_of:
-            raise Refusal(f"a {what} acts on point '{group}', which is coupled to nothing; couple it to a face")
+            raise Refusal(f"a {label} acts on point '{group}', which is coupled to nothing; couple it to a face")
 
-    def _faces(self, place: str, what: str) -> list[str]:
+    def _faces(self, place: str, label: str) -> list[str]:
         if place in self.faces:
             return self.faces[place]
         kind = "is a set of nodes that make no face" if place in self.sets else "lies on no body"
-        raise Refusal(f"{what}: '{place}' {kind}; give a surface of element faces")
+        raise Refusal(f"{label}: '{place}' {kind}; give a surface of element faces")
 
-    def _groups(self, place: str, what: str) -> list[str]:
-        found = self.faces.get(place, []) + self.sets.get(place, [])
-        if not found:
-            raise Refusal(f"{what}: '{place}' lies on no body; correct the deck")
-        return found
+    def _groups(self, place: str, label: str) -> list[str]:
+        groups = self.faces.get(place, []) + self.sets.get(place, [])
+        if not groups:
+            raise Refusal(f"{label}: '{place}' lies on no body; correct the deck")
+        return groups
 
     def _instead(self, kind: str, table: str) -> str:
         return f"give it as [{table}.NAME] of the scene and leave {kind} out of decks.{self.name}.use"
 
-    def _what(self, kind: str, entries: Sequence[Any]) -> str:
+    def _count_of(self, kind: str, entries: Sequence[Any]) -> str:
         return f"1 of its {kind}" if len(entries) == 1 else f"{len(entries)} {kind}"
 
 
-def _held(point: str, axes: set[int]) -> list[Clamp]:
+def _point_clamps(point: str, axes: set[int]) -> list[Clamp]:
     """Clamps of a reference point along axes 0..5."""
     shifts, turns = ("".join(AXES[axis % 3] for axis in sorted(axes) if axis // 3 == k) for k in (0, 1))
     return [Clamp(name, letters) for name, letters in ((point, shifts), (f"{point}.turn", turns)) if letters]
@@ -321,12 +323,12 @@ def _held(point: str, axes: set[int]) -> list[Clamp]:
 def part(name: str, table: Table, materials: Mapping[str, AnyMaterial], folder: Path) -> Part:
     """All that a deck says as one part: bodies, what joins and holds them, its loads.
 
-    Raises  ValueError as `structure` does
+    Raises  Refusal as `structure` does
     """
-    made = structure(name, table, materials, folder)
-    whole = Assembly(made.bodies, {point: list(place) for point, place in made.points.items()})
-    own = {body.name: body.material for body in whole.bodies}
+    content = structure(name, table, materials, folder)
+    assembly = Assembly(content.bodies, {point: list(place) for point, place in content.points.items()})
+    material_of = {body.name: body.material for body in assembly.bodies}
     return build(
-        whole, whole.node_sets, own, made.clamps, [], {load_name(name): made.load}, {},
-        springs=made.springs, constraints=made.constraints, masses=made.masses,
+        assembly, assembly.node_sets, material_of, content.clamps, [], {load_name(name): content.load}, {},
+        springs=content.springs, constraints=content.constraints, masses=content.masses,
     )  # fmt: skip

@@ -78,7 +78,7 @@ def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) ->
     """
     scene, interface, springs = file.mesh_scene, whole.interface, b""
     speeds = scene.operating_range if scene.wheel and scene.wheel.along_speed else ()
-    if scene.wheel or part_reduction.without_masters(scene, interface.B.shape[0], len(whole.held) > 0):
+    if scene.wheel or part_reduction.without_masters(scene, interface.B.shape[0], len(whole.held_rows) > 0):
         springs = joints.contact_stiffness(scene, joints.unreduced(whole)).tobytes()
     values = values_through(scene, scene.reduced_through)
     found = _kept(file, "reduction", (values, _kinds_of_loads(scene), springs, speeds), make)

@@ -169,7 +169,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
         }
         | {f"{part_reduction.BOLTS}{name}": Sum(((rod, -1.0),)) for name, rod in rods.items()},
         springs=[*joined.springs, *(rod for rod in rods.values() if rod.stiffness)],
-        held=[] if turning is None else [NoMeanRotation(turning)],
+        held_motions=[] if turning is None else [NoMeanRotation(turning)],
         constraints=joined.constraints,
         masses=joined.masses,
     )
@@ -226,7 +226,7 @@ def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
         from tribodyn.workflows.run import sector  # only wheels need it
 
         return sector.along_speed(scene, part) if scene.wheel.along_speed else sector.at_one_speed(scene, part)
-    reduced = hold(part_reduction.reduce(scene, part), part.held)
+    reduced = hold(part_reduction.reduce(scene, part), part.held_rows)
     return replace(reduced, joints=dict(part.joints))
 
 

@@ -60,12 +60,12 @@ def contacts(scene: MeshScene) -> list[ContactFaces]:
 def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact, load and prescribed nodes and a few modes; not damped yet, nothing prescribed yet."""
     wanted, system, interface, back = scene.reduction, part.system, part.interface, None
-    if without_masters(scene, interface.B.shape[0], len(part.held) > 0):
+    if without_masters(scene, interface.B.shape[0], len(part.held_rows) > 0):
         springs = joints.contact_stiffness(scene, joints.unreduced(part))
         own = "mumps" if wanted.solver == "mumps" else None
         return residual_flexibility(system, interface, springs, wanted.modes, wanted.cutoff, solver=own)
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
-    if held and len(part.held):
+    if held and len(part.held_rows):
         raise Refusal("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
     relative_dofs = np.zeros(0, int)
     if wanted.relative:

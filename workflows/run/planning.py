@@ -178,7 +178,7 @@ def _openings(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], joi
     found = []
     for pair in pairs:
         first, _, shared = pair.meeting(mesh)
-        found += check_opening(pair.what, shared.gap, first.length)
+        found += check_opening(pair.label, shared.gap, first.length)
     return found
 
 

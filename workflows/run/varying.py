@@ -184,7 +184,7 @@ class Varying:
     def _sensitivity(self) -> Sensitivity | None:
         """None where the model is no plain reduction by Craig and Bampton of a part that stands still."""
         part, plain, wave = self.part, self.plain, self._sector
-        if part is None or len(part.held) or self._spins or (plain.is_wave and wave is None):
+        if part is None or len(part.held_rows) or self._spins or (plain.is_wave and wave is None):
             return None
         plain = plain if wave is None else wave.model
         origin = plain.origin
@@ -235,13 +235,15 @@ class Varying:
             if wave is not None:
                 from tribodyn.workflows.run import sector
 
-                rows.append(tuple(sector.sector(scene, one).left for one in (there, cast(Part, self.part))))
+                rows.append(tuple(sector.sector(scene, one).left_map for one in (there, cast(Part, self.part))))
             turned = [abs(share) / NODES * ((new - old) @ following.shapes) for new, old in rows]
             moved = replace(moved, interface=self._interface(moved.interface, key, value, turned[0]))
         if wave is None:
             return moved
-        left = wave.sector.left + (turned[1] if turned else 0.0)
-        small = replace(wave, sector=replace(wave.sector, system=moved.system, interface=moved.interface, left=left))
+        left = wave.sector.left_map + (turned[1] if turned else 0.0)
+        small = replace(
+            wave, sector=replace(wave.sector, system=moved.system, interface=moved.interface, left_map=left)
+        )
         from tribodyn.reduction.wave_model import WaveIndices, as_wave, wave_model
 
         return wave_model(small, as_wave(self.plain).engine_order, WaveIndices(small))

@@ -115,7 +115,7 @@ def of_scene(file: SceneFile, scene: MeshScene) -> Forces:
     bodies_found = []
     for name, nodes in sets.items():
         joints = {joint: on[nodes].sum(axis=0) for joint, on in contact.items() if on[nodes].any()}
-        is_supported = not free.reshape(-1, 3)[nodes].all() or part.follow is not None or bool(scene.springs)
+        is_supported = not free.reshape(-1, 3)[nodes].all() or part.dependence is not None or bool(scene.springs)
         bodies_found.append(BodyForces(name, load[nodes].sum(axis=0), joints, is_supported))
     return Forces(tuple(bodies_found))
 

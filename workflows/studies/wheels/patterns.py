@@ -195,7 +195,7 @@ def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
     bodies = [body_of_mesh.name for body_of_mesh in getattr(wheel.part.mesh, "bodies", ()) if body_of_mesh.name]
     if body not in bodies:
         raise SceneError(unknown_key(f"mistuning.body: {body}", bodies))
-    if wheel.part.follow is not None:
+    if wheel.part.dependence is not None:
         raise SceneError("mistuning.body: bodies that are glued or tied have no stiffness of their own: leave it out")
     nodes = np.zeros(len(wheel.part.points), bool)
     nodes[find_group(wheel.part.node_sets, body)] = True
