@@ -78,11 +78,13 @@ class CycleQuantity(StatedQuantity):
     value : SolvedCycle -> number, None where the cycle does not hold it
     slopes : SolvedCycle -> Slopes, for exact derivatives; in_time : MotionInTime -> the number along it, and the least
         one that a difference counts over
+    at_rest : whether it has a value without vibration
     """
 
     value: Callable[[SolvedCycle], float | None]
     slopes: Callable[[SolvedCycle], Slopes] | None = None
     in_time: Callable[[MotionInTime], tuple[float, float]] | None = None
+    at_rest: bool = False
 
 
 @dataclass(frozen=True)

@@ -176,7 +176,7 @@ def _structures(folder: Path) -> list[Base]:
 def _studies() -> list[Base]:
     """A study, lives, a search for an optimum and a fit of a small beam."""
     shared = {"scene": "beam", "set": UNWORN}
-    peak = {"number": "peak_m_first"}
+    peak = {"number": "amplitude_first"}
     drawn = {"study": {**shared, "design": "sobol", "runs": 2, "seed": 1}, "vary": DRAWN}
     best = {"aims": [{**peak, "want": "low"}], "evaluations": 3}
     tables = {

@@ -166,13 +166,13 @@ study = {
     "vary": {"contact.friction": [0.4, 0.5]},
 }
 table = td.studies.grid(study, "results/friction", workers=1)
-print(table.columns["peak_m_first"])  # [m]
+print(table.columns["amplitude_first"])  # [m]
 
 # td.studies.lives
 spread = {
     "study": {"scene": "beam", "design": "sobol", "runs": 8, "set": settings},
     "vary": {"contact.friction": {"distribution": "normal", "mean": 0.5, "cov": "10 %"}},
-    "lives": {"number": "peak_m_first"},
+    "lives": {"number": "amplitude_first"},
 }
 print(td.studies.lives(spread, "results/spread", workers=1))
 
@@ -180,7 +180,7 @@ print(td.studies.lives(spread, "results/spread", workers=1))
 wanted = {
     "study": {"scene": "beam", "design": "sobol", "runs": 2, "set": settings},
     "vary": {"damping.modal": {"distribution": "uniform", "low": "1 %", "high": "4 %"}},
-    "optimise": {"evaluations": 3, "aims": [{"number": "peak_m_first", "want": "low"}]},
+    "optimise": {"evaluations": 3, "aims": [{"number": "amplitude_first", "want": "low"}]},
 }
 print(td.studies.optimise(wanted, "results/best", workers=1))
 

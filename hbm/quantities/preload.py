@@ -29,5 +29,5 @@ def in_time(motion: MotionInTime) -> tuple[float, float]:
 
 
 QUANTITY = CycleQuantity(
-    "preload", "N", value, by_joint=True, error=ErrorKind.CYCLE, rank=5, slopes=slopes, in_time=in_time
+    "preload", "N", value, by_joint=True, error=ErrorKind.CYCLE, rank=5, slopes=slopes, in_time=in_time, at_rest=True
 )

@@ -10,8 +10,8 @@ from tribodyn.workflows.studies.curves.backbones import SceneBackbone as SceneBa
 from tribodyn.workflows.studies.curves.decay import Decay as Decay, ring_down as ring_down
 from tribodyn.workflows.studies.curves.fold_study import FoldStudy as FoldStudy, folds as folds
 from tribodyn.workflows.studies.curves.tracking import Track as Track, track as track
-from tribodyn.workflows.studies.fits.fit_file import Fit as Fit, identify as identify, posterior as posterior
 from tribodyn.workflows.studies.fits.posterior import Posterior as Posterior
+from tribodyn.workflows.studies.fits.scene_fit import Fit as Fit, identify as identify, posterior as posterior
 from tribodyn.workflows.studies.forces import Forces as Forces, forces as forces
 from tribodyn.workflows.studies.inspection import Inspection as Inspection
 from tribodyn.workflows.studies.many.lives import LifeDistribution as LifeDistribution, lives as lives

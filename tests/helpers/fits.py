@@ -11,8 +11,9 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies.fits.curve_target import CurveTarget
-from tribodyn.workflows.studies.fits.fit_file import SceneAnswers, Target
+from tribodyn.workflows.studies.fits.fit_file import Target
 from tribodyn.workflows.studies.fits.identification import FitParameter, Identification, MeasuredNumber, Prediction, fit
+from tribodyn.workflows.studies.fits.scene_answers import SceneAnswers
 
 STEP = 1e-3  # of a parameter, over it or the width of its bounds
 

@@ -350,7 +350,7 @@ def test_the_command_tells_the_verdict_with_the_distribution(
         '"geometry.n_height=1", "reduction.modes=4", "response.points=12", "wear=", '
         "\"response.frequency=['500 Hz', '2000 Hz']\"]\n"
         f'[vary]\n{FRICTION} = {{ distribution = "uniform", low = 0.4, high = 0.6 }}\n'
-        '[lives]\nnumber = "peak_m_first"\n'
+        '[lives]\nnumber = "amplitude_first"\n'
     )
     code, out, _ = leave(["study", "lives", str(file), "--out", str(tmp_path / "out")], capsys)
     assert code == 0

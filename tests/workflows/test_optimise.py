@@ -131,7 +131,7 @@ def test_few_runs_with_derivatives_of_one_aim_say_where_the_next_goes() -> None:
 def tables(**more):
     vary = {FORCE: {"distribution": "uniform", "low": "10 N", "high": "20 N"},
             DAMPING: {"distribution": "loguniform", "low": "0.5 %", "high": "2 %"}}  # fmt: skip
-    aim = [{"number": "peak_m_first", "want": "low"}]
+    aim = [{"number": "amplitude_first", "want": "low"}]
     return {"study": LINEAR, "vary": vary, "optimise": {"aims": aim, "evaluations": 10, **more}}
 
 
@@ -148,10 +148,10 @@ def test_the_linear_scene_comes_to_its_corner_and_resumes(tmp_path: Path, capsys
     optimum = td.studies.optimise(file, folder, workers=1, resume=True)
     assert optimum.record() == said == json.loads((folder / "optimum.json").read_text(encoding="utf-8"))
     assert (folder / "rows.jsonl").read_text(encoding="utf-8") == rows
-    keys, amplitude = optimum.keys(optimum.best), optimum.values(optimum.best)["peak_m_first"]
+    keys, amplitude = optimum.keys(optimum.best), optimum.values(optimum.best)["amplitude_first"]
     assert keys[FORCE] == pytest.approx(10.0, rel=1e-3)
     assert keys[DAMPING] == pytest.approx(0.02, rel=1e-3)
-    assert amplitude == optimum.table.columns["peak_m_first"].min()
+    assert amplitude == optimum.table.columns["amplitude_first"].min()
     assert len(optimum.table.columns["run"]) <= 6  # each with its derivatives
 
 

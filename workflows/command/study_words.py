@@ -6,7 +6,7 @@ from cyclopts import App
 
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.convergence import converge
-from tribodyn.workflows.studies.fits.fit_file import identify, posterior
+from tribodyn.workflows.studies.fits.scene_fit import identify, posterior
 from tribodyn.workflows.studies.forces import forces
 from tribodyn.workflows.studies.many.lives import lives
 from tribodyn.workflows.studies.many.optimum import optimise
