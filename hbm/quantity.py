@@ -24,7 +24,7 @@ from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
 if TYPE_CHECKING:
-    from tribodyn.hbm.continuation.free_vibration import Point
+    from tribodyn.hbm.continuation.free_vibration import ModePoint
 
 __all__ = [
     "CurveQuantity", "CycleQuantity", "EndOfLife", "ErrorKind", "ModeQuantity", "MotionInTime", "Slopes",
@@ -126,11 +126,11 @@ class FoldQuantity(StatedQuantity):
 class ModeQuantity(StatedQuantity):
     """A number of a nonlinear mode.
 
-    value : Point -> number; tangent : (Point, change of the unknowns of a mode) -> change of the number
+    value : ModePoint -> number; tangent : (ModePoint, change of the unknowns of a mode) -> change of the number
     """
 
-    value: Callable[[Point], float]
-    tangent: Callable[[Point, np.ndarray], float] | None = None
+    value: Callable[[ModePoint], float]
+    tangent: Callable[[ModePoint, np.ndarray], float] | None = None
 
 
 Kinds = TypeVar("Kinds", bound=StatedQuantity)

@@ -26,15 +26,17 @@ NEVER = math.inf
 
 # class -> its rules with their neutral values
 RULES: dict[str, dict[str, Any]] = {
-    "continuation.curve.CurveRules": {
+    "continuation.curve_segment.CurveRules": {
         "fold_newton_share": 1.0, "fold_turn": 0.0, "turn_at_fold": NEVER, "largest_slant": NEVER,
     },
-    "continuation.stepper.StepRules": {"least_length_ratio": 0.0, "fold_reach": NEVER, "largest_miss": NEVER},
-    "continuation.methods.arc_length.Rules": {"max_gaps": 0, "max_rewinds": 0, "max_landings": 0},
-    "continuation.methods.adaptive.Rules": {
+    "continuation.curve_stepper.CurveStepRules": {
+        "least_length_ratio": 0.0, "fold_reach": NEVER, "largest_miss": NEVER,
+    },
+    "continuation.methods.arc_length.ArcLengthRules": {"max_gaps": 0, "max_rewinds": 0, "max_landings": 0},
+    "continuation.methods.adaptive.AdaptiveRules": {
         "least_error_share": 0.0, "jump_error": NEVER, "taken": 1.0, "crawled": 10**9, "rejected_error": 1.0,
     },
-    "continuation.methods.natural.Rules": {
+    "continuation.methods.natural.NaturalRules": {
         "least_spacing": 0.0, "max_fold_points": 10**9, "abrupt": NEVER, "max_corner_points": 200,
     },
     "continuation.resonance_peak.AtPeak": {
@@ -70,7 +72,7 @@ class Ablation:
 def without(place: str, rule: str, neutral: Any) -> Iterator[None]:
     """The program with a neutral value in place of the default of a field.
 
-    place : of its class below `tribodyn.hbm`, such as "continuation.curve.CurveRules"
+    place : of its class below `tribodyn.hbm`, such as "continuation.curve_segment.CurveRules"
     """
     name, _, kind = place.rpartition(".")
     module = import_module(f"tribodyn.hbm.{name}")

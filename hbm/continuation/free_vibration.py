@@ -12,25 +12,21 @@ Source  extended periodic motion concept: Krack 2015, Computers & Structures 154
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-import scipy.linalg as sla
 
-from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import SEPARATES, ContactCycle
+from tribodyn.hbm.continuation.bordered_modes import Bordered, DenseBordered, DiagonalBordered, StuckModes
 from tribodyn.hbm.krylov import gmres
-from tribodyn.hbm.linear.stuck_modes import stuck_modes
 from tribodyn.refusal import Refusal
 
 FEW = 120  # lowest modes among which the reference mode of a turning or a flown-about structure is looked for
-PROPORTIONAL = 1e-6  # of the damping of two modes: less between them is rounding
 
 
 @dataclass(frozen=True)
-class Point:
+class ModePoint:
     """x (n_pair, c, n_coeff), omega, zeta at amplitude a, and what they give.
 
     coordinates : (n_contact * n_coeff + 3,) the same, scaled
@@ -47,81 +43,6 @@ class Point:
     eta: np.ndarray
     residual: np.ndarray
     factors: list[Bordered]
-
-
-class Bordered(Protocol):
-    """[D, r; l, 0] of one harmonic, or [D, 0; 0, 1] where nothing borders it; solves for rhs (n + 1,)."""
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray: ...
-
-
-class DenseBordered:
-    """With a full D (n, n); border, left : r, l (n,), l = r^H by default."""
-
-    def __init__(self, d: np.ndarray, border: np.ndarray, corner: float, left: np.ndarray | None = None):
-        left = border.conj() if left is None else left
-        self._factor = sla.lu_factor(np.block([[d, border[:, None]], [left[None], np.array([[corner]])]]))
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution (n + 1,)."""
-        return sla.lu_solve(self._factor, rhs)
-
-
-class DiagonalBordered:
-    """With a diagonal D (n,), as proportional damping has it; one of its entries may vanish where r l is largest."""
-
-    def __init__(self, d: np.ndarray, border: np.ndarray, corner: float, left: np.ndarray | None = None):
-        self._d, self._r, self._corner = d, border, corner
-        self._left = border.conj() if left is None else left
-        self._pivot = int(np.abs(border * self._left).argmax())
-        with np.errstate(divide="ignore", invalid="ignore"):
-            self._inverse = 1.0 / d
-        if not corner:
-            self._inverse[self._pivot] = 0.0
-            ratio = d[self._pivot] / self._left[self._pivot]
-            self._scale = border[self._pivot] + ratio * (np.abs(border) ** 2 * self._inverse).sum()
-            self._ratio = ratio
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution (n + 1,)."""
-        out = np.empty(len(rhs), complex)
-        force, wanted = rhs[:-1], rhs[-1]
-        if self._corner:
-            out[:-1], out[-1] = force * self._inverse, wanted / self._corner
-            return out
-        k, r, left = self._pivot, self._r, self._left
-        others = force * self._inverse
-        missing = (force[k] - self._ratio * (wanted - left @ others)) / self._scale
-        out[:-1] = others - r * self._inverse * missing
-        out[k] = (wanted - left @ out[:-1] + left[k] * out[k]) / left[k]
-        out[-1] = missing
-        return out
-
-
-class Modes:
-    """All modes of the stuck structure that a harmonic sees.
-
-    lam : (n,) squared frequencies; held : the same for static loads; U, O : (n_contact, n), (n_output, n) shapes
-    damping, flow : (n, n) what multiplies the velocity, and circulatory forces or None
-    proportional : whether nothing couples the modes
-    """
-
-    def __init__(self, system: SecondOrderSystem, b: np.ndarray, k: np.ndarray, outputs: tuple[str, ...]):
-        mass = np.asarray(system.mass)
-        stuck = np.asarray(system.stiffness) + b.conj().T @ (k[:, None] * b)
-        self.lam, self.shapes, free = stuck_modes(stuck, mass)
-        self.held = np.where(free, np.inf, self.lam)  # static loads in equilibrium do not move what nothing holds
-        self.U = b @ self.shapes
-        self.UH = self.U.conj().T
-        self.O = np.array([system.outputs[name] @ self.shapes for name in outputs])
-        rate, flow = system.velocity_matrix, system.circulatory
-        left = self.shapes.conj().T
-        self.damping = np.zeros_like(mass) if rate is None else left @ np.asarray(rate) @ self.shapes
-        self.flow = None if flow is None else left @ np.asarray(flow) @ self.shapes
-        size = np.abs(np.diag(self.damping))
-        apart = np.abs(self.damping - np.diag(np.diag(self.damping)))
-        small = PROPORTIONAL * np.sqrt(np.outer(size, size)) + PROPORTIONAL * 1e-6 * size.max(initial=0.0)
-        self.proportional = flow is None and bool((apart <= small).all())
 
 
 class FreeVibration:
@@ -152,12 +73,12 @@ class FreeVibration:
         if not names or (output is not None and output not in names):
             raise Refusal(f"no output '{output}' to measure the amplitude: the model has {', '.join(names) or 'none'}")
         self.k = balance.compliance.k
-        made: dict[int, Modes] = {}
-        self.modes: list[Modes] = []
+        made: dict[int, StuckModes] = {}
+        self.modes: list[StuckModes] = []
         for h in self.basis.harmonics:
             system, b = model.at_harmonic(h)
             if id(system) not in made:
-                made[id(system)] = Modes(system, np.asarray(b), self.k, names)
+                made[id(system)] = StuckModes(system, np.asarray(b), self.k, names)
             self.modes.append(made[id(system)])
         self.one_system = len(made) == 1
         self.first = self.basis.harmonics.index(1)
@@ -231,7 +152,7 @@ class FreeVibration:
         apart = solution.state.cycle.status & SEPARATES > 0
         return solution.state.x, np.repeat(apart, solution.state.x.shape[1])
 
-    def first_guess(self, a: float) -> Point:
+    def first_guess(self, a: float) -> ModePoint:
         """The reference mode about the static equilibrium."""
         x = self.rest.copy()
         shape = (self.modes[self.first].U @ self.reference).reshape(x.shape[:2])
@@ -240,7 +161,7 @@ class FreeVibration:
         x[:, :, cosine + 1] -= a * shape.imag
         return self.at(x, self.reference_omega, self.reference_damping, a)
 
-    def at(self, x: np.ndarray, omega: float, zeta: float, a: float) -> Point:
+    def at(self, x: np.ndarray, omega: float, zeta: float, a: float) -> ModePoint:
         """Everything at x (n_pair, c, n_coeff), frequency, damping ratio and modal amplitude."""
         flat = x.reshape(self._shape) / self._units(a)
         return self.evaluate(np.concatenate([flat.ravel(), [np.log(omega), zeta, np.log(a)]]))
@@ -260,7 +181,7 @@ class FreeVibration:
         units = self._units(a)
         return np.tile((units / np.maximum(units, units[-1])) ** 2, len(self.k))
 
-    def evaluate(self, coordinates: np.ndarray) -> Point:
+    def evaluate(self, coordinates: np.ndarray) -> ModePoint:
         """Everything at one point."""
         omega, a = (float(np.exp(c)) for c in coordinates[[-3, -1]])
         zeta = float(coordinates[-2])
@@ -287,7 +208,7 @@ class FreeVibration:
         if self.basis.has_static:
             move[:, 0] -= self.base
         residual = self._residual(a, flat - move, mismatch + self.driving(omega, zeta, a))
-        return Point(coordinates, a, x, omega, zeta, cycle, eta, residual, factors)
+        return ModePoint(coordinates, a, x, omega, zeta, cycle, eta, residual, factors)
 
     def _modal(self, force: np.ndarray) -> np.ndarray:
         """Modal forces (n, n_harmonic) of contact forces (n_contact, n_harmonic)."""
@@ -326,7 +247,9 @@ class FreeVibration:
         relative = mismatch * self.push / (self.reference_omega**2 * a)
         return np.concatenate([(x / scale).ravel(), [relative.real, relative.imag]])
 
-    def correction(self, p: Point, normal: np.ndarray, tolerance: float, most: int, along: float = 0.0) -> np.ndarray:
+    def correction(
+        self, p: ModePoint, normal: np.ndarray, tolerance: float, most: int, along: float = 0.0
+    ) -> np.ndarray:
         """Newton direction for the coordinates to the hyperplane normal to `normal`, `along` of it away from p."""
         jac = p.cycle.jacobian
         assert jac is not None
@@ -344,7 +267,7 @@ class FreeVibration:
 
         return gmres(product, np.append(-p.residual, along / size), tolerance, most)[0]
 
-    def _slopes(self, p: Point) -> tuple[np.ndarray, ...]:
+    def _slopes(self, p: ModePoint) -> tuple[np.ndarray, ...]:
         """Derivatives of the residual at fixed x by the logarithm of omega, by zeta and by the logarithm of a."""
         h = np.asarray(self.basis.harmonics)
         damped = np.stack([m.damping @ p.eta[:, i] for i, m in enumerate(self.modes)], axis=1)
@@ -361,6 +284,6 @@ class FreeVibration:
             found.append(self._residual(p.a, -self._moved(eta), mismatch + more))
         return tuple(found)
 
-    def outputs(self, p: Point) -> np.ndarray:
+    def outputs(self, p: ModePoint) -> np.ndarray:
         """(n_output, n_coeff) response of the observed outputs [m]."""
         return self.basis.to_real(np.stack([m.O @ p.eta[:, i] for i, m in enumerate(self.modes)], axis=1))

@@ -19,7 +19,7 @@ from tribodyn.hbm.continuation.resonance_peak import AtPeak
 
 
 @dataclass(frozen=True)
-class PeakRules:
+class HighestPeakRules:
     """Which peaks are refined, and when one is met."""
 
     tried: int = 3  # peaks that are refined, the highest first
@@ -29,7 +29,7 @@ class PeakRules:
     least_doubt: float = 5e-3  # of a height foreseen
 
 
-RULES = PeakRules()
+RULES = HighestPeakRules()
 
 
 def vertex(omega: np.ndarray, heights: np.ndarray) -> tuple[float, float]:

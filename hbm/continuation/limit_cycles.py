@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
+from tribodyn.hbm.continuation.free_vibration import FreeVibration, ModePoint
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, newton_on, walk
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd
 from tribodyn.hbm.stability import floquet
@@ -44,12 +44,12 @@ class LimitCycle:
     omega: float
     response: np.ndarray
     state: State
-    point: Point
+    point: ModePoint
     moved: float | None = None
     growth: float | None = None
 
     @property
-    def stays(self) -> bool | None:
+    def is_stable(self) -> bool | None:
         """Whether nothing beside it grows in time, as far as multipliers tell; None where it is not known."""
         return None if self.growth is None else self.growth < floquet.RULES.growth
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
+from tribodyn.hbm.continuation.free_vibration import FreeVibration, ModePoint
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
@@ -106,7 +106,7 @@ class Backbone:
         return self.omega**2 * self.first_harmonic
 
 
-_Solved = tuple[Point, Outcome[SolveEnd], int]
+_Solved = tuple[ModePoint, Outcome[SolveEnd], int]
 
 
 @single
@@ -210,7 +210,7 @@ def _turned_back(
     return missed if return_way else found
 
 
-def newton_on(problem: FreeVibration, point: Point, normal: np.ndarray, options: NewtonOptions) -> _Solved:
+def newton_on(problem: FreeVibration, point: ModePoint, normal: np.ndarray, options: NewtonOptions) -> _Solved:
     """The point of the curve in the hyperplane through a guess."""
     error = float(np.linalg.norm(point.residual))
     for step in range(options.max_steps):

@@ -34,7 +34,7 @@ SLIDING_STEPS = 400  # of Newton on the whole way to its own friction
 
 
 @dataclass(frozen=True)
-class Rules:
+class StiffeningRules:
     """How far the contact is softened, and when the end is a solution; see docs/accuracy/ablations.md.
 
     decades : by which the springs are softened at most
@@ -58,7 +58,7 @@ class Rules:
     force_known: float = 1e-5
 
 
-RULES = Rules()
+RULES = StiffeningRules()
 
 
 @single

@@ -14,7 +14,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import bordered, parameter
 from tribodyn.hbm.continuation.bordered import Direction, Metric
-from tribodyn.hbm.continuation.folds import FoldOptions
+from tribodyn.hbm.continuation.fold_curve import FoldOptions
 from tribodyn.hbm.derivatives.adjoint_gradient import CycleNumber, Gradient
 from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives, PointSlopes, derivatives_at, point_slopes

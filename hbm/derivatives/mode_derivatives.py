@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
+from tribodyn.hbm.continuation.free_vibration import FreeVibration, ModePoint
 from tribodyn.hbm.continuation.nonlinear_modes import newton_on
 from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives
@@ -22,7 +22,7 @@ from tribodyn.hbm.threads import single
 @single
 def at_mode(
     problem: FreeVibration,
-    point: Point,
+    point: ModePoint,
     changes: Iterable[ParameterChange],
     options: NewtonOptions | None = None,
     modal: bool = True,

@@ -9,15 +9,15 @@ import numpy as np
 from tribodyn.hbm.quantity import ModeQuantity
 
 if TYPE_CHECKING:
-    from tribodyn.hbm.continuation.free_vibration import Point
+    from tribodyn.hbm.continuation.free_vibration import ModePoint
 
 
-def value(point: Point) -> float:
+def value(point: ModePoint) -> float:
     """Damping ratio."""
     return point.zeta
 
 
-def tangent(point: Point, change: np.ndarray) -> float:
+def tangent(point: ModePoint, change: np.ndarray) -> float:
     """Change of the ratio with that of the unknowns."""
     return float(change[-2])
 

@@ -9,15 +9,15 @@ import numpy as np
 from tribodyn.hbm.quantity import ModeQuantity
 
 if TYPE_CHECKING:
-    from tribodyn.hbm.continuation.free_vibration import Point
+    from tribodyn.hbm.continuation.free_vibration import ModePoint
 
 
-def value(point: Point) -> float:
+def value(point: ModePoint) -> float:
     """Frequency [Hz]."""
     return point.omega / (2 * np.pi)
 
 
-def tangent(point: Point, change: np.ndarray) -> float:
+def tangent(point: ModePoint, change: np.ndarray) -> float:
     """Change of the frequency with that of the unknowns, where it counts in shares of itself."""
     return float(point.omega / (2 * np.pi) * change[-3])
 

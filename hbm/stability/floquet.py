@@ -45,7 +45,7 @@ class MultiplierRules:
 RULES = MultiplierRules()
 
 
-def exponents(balance: HarmonicBalance, state: State, options: Options | None = None) -> np.ndarray:
+def floquet_exponents(balance: HarmonicBalance, state: State, options: Options | None = None) -> np.ndarray:
     """Floquet exponents of the motion that time integration finds from a balance state.
 
     Returns (n,) complex [1/s], without those of sliders that never move: any position of theirs is an equilibrium
@@ -61,7 +61,7 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
 
 
-def largest(balance: HarmonicBalance, state: State, options: Options | None = None) -> float:
+def largest_multiplier(balance: HarmonicBalance, state: State, options: Options | None = None) -> float:
     """Modulus of the largest multiplier of the periodic motion near a balance state.
 
     Sliders that never move do not count, and a force that holds a mean displacement stays as it is. Of a large model,
@@ -71,12 +71,12 @@ def largest(balance: HarmonicBalance, state: State, options: Options | None = No
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
     if _size(stepper) <= RULES.dense:
-        growth = exponents(balance, state, options).real * 2 * np.pi / state.omega
+        growth = floquet_exponents(balance, state, options).real * 2 * np.pi / state.omega
         return float(np.exp(growth.max(initial=-np.inf)))
     return _by_differences(stepper, state, options)[0]
 
 
-def leaves(balance: HarmonicBalance, state: State, options: Options | None = None) -> bool:
+def is_unstable(balance: HarmonicBalance, state: State, options: Options | None = None) -> bool:
     """Whether the periodic motion near a balance state is left: a multiplier is above 1.
 
     Of a large model it is that of differences. Where sliders just reach their limit these have a kink, and what seems
@@ -87,7 +87,7 @@ def leaves(balance: HarmonicBalance, state: State, options: Options | None = Non
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
     if _size(stepper) <= RULES.dense:
-        return largest(balance, state, options) > 1 + RULES.growth
+        return largest_multiplier(balance, state, options) > 1 + RULES.growth
     modulus, direction, period = _by_differences(stepper, state, options)
     if modulus <= 1 + RULES.growth:
         return False
@@ -95,7 +95,7 @@ def leaves(balance: HarmonicBalance, state: State, options: Options | None = Non
     return any(push(PeriodSearch(stepper, plain, False), period, 8, s * direction).away for s in (1.0, -1.0))
 
 
-def stays(balance: HarmonicBalance, state: State, found: Verification | None, options: Options) -> tuple[bool, str]:
+def is_stable(balance: HarmonicBalance, state: State, found: Verification | None, options: Options) -> tuple[bool, str]:
     """Whether no perturbation of the motion near a balance state grows, and the method that says so.
 
     found : the state beside time integration, which may have come to another motion, or to none; None: not compared
@@ -105,7 +105,7 @@ def stays(balance: HarmonicBalance, state: State, found: Verification | None, op
     same = found is not None and found.motion.periodic and found.contact <= SAME
     if same and not balance.model.is_wave:
         with suppress(ValueError):
-            return not leaves(balance, state, options), MULTIPLIERS
+            return not is_unstable(balance, state, options), MULTIPLIERS
     return stability(balance, state).stable, HILL
 
 

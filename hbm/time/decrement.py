@@ -19,7 +19,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import compiled_law
-from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
+from tribodyn.hbm.continuation.free_vibration import FreeVibration, ModePoint
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_step
@@ -81,7 +81,7 @@ class _Marched:
         n = problem.basis.n_samples
         self._angle = 2 * np.pi * np.arange(1, n + 1) / n
 
-    def rate(self, p: Point, x_slope: np.ndarray, eta_slope: np.ndarray, omega_slope: float) -> float:
+    def rate(self, p: ModePoint, x_slope: np.ndarray, eta_slope: np.ndarray, omega_slope: float) -> float:
         """The decrement over 2 pi at one point of the backbone."""
         problem, basis = self._problem, self._problem.basis
         start, eta = basis.functions(np.zeros(())), basis.to_real(p.eta)

@@ -17,10 +17,10 @@ from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation import bordered, parameter
 from tribodyn.hbm.continuation.bordered import Direction, Metric
+from tribodyn.hbm.continuation.curve_stepper import CurveStepper
 from tribodyn.hbm.continuation.methods import arc_length, natural
 from tribodyn.hbm.continuation.methods.arc_length import Options
 from tribodyn.hbm.continuation.parameter import Parameter
-from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -249,7 +249,7 @@ def test_it_says_where_it_ends():
     impatient = arc_length.follow(high, 4.0, 0.2, Options(patience=5))
     messages, _, furthest = str(impatient.end).removesuffix(" Hz").rpartition(" ")
     assert messages.endswith("5 points brought it hardly further than")
-    assert float(furthest) == pytest.approx(impatient.frequency.min(), rel=arc_length.Rules.headway)
+    assert float(furthest) == pytest.approx(impatient.frequency.min(), rel=arc_length.ArcLengthRules.headway)
     assert impatient.frequency.argmin() + 6 <= len(impatient.omega) < len(back.omega)
     with pytest.raises(ValueError, match="start and stop are the same"):
         arc_length.follow(balance, 2.0, 2.0)
@@ -279,13 +279,13 @@ def test_an_unsolved_start_is_said(monkeypatch):
 
 def test_a_gap_in_the_curve_is_stepped_over_and_named(monkeypatch):
     """The walk is made to lose the curve once; both folds behind the gap are found all the same."""
-    advance, calls = arc_length.Stepper.advance, []
+    advance, calls = arc_length.CurveStepper.advance, []
 
     def lose_it_once(stepper):
         calls.append(stepper)
         return [] if len(calls) == 5 else advance(stepper)
 
-    monkeypatch.setattr(arc_length.Stepper, "advance", lose_it_once)
+    monkeypatch.setattr(arc_length.CurveStepper, "advance", lose_it_once)
     duffing = Duffing()
     branch = arc_length.follow(duffing.balance(), 0.5, 5.0)
     assert str(branch.end).startswith("reached")
@@ -305,8 +305,8 @@ def test_a_walk_that_always_lands_astray_with_steps_that_do_not_get_shorter_ends
         stepper._here = stepper.segments[index].start
         del stepper.segments[index:]
 
-    monkeypatch.setattr(Stepper, "arrives", lambda *given: False)
-    monkeypatch.setattr(Stepper, "rewind", same_again)
+    monkeypatch.setattr(CurveStepper, "arrives", lambda *given: False)
+    monkeypatch.setattr(CurveStepper, "rewind", same_again)
     branch = arc_length.follow(Duffing().balance(), 0.5, 0.6)
     assert went_back
     assert str(branch.end).endswith("the curve jumps to another branch there")

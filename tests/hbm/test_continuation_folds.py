@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.helpers.continuation_models import Duffing, Lifting
-from tribodyn.hbm.continuation import curve, parameter
+from tribodyn.hbm.continuation import curve_segment, parameter
 from tribodyn.hbm.continuation.bordered import Direction, Metric
-from tribodyn.hbm.continuation.folds import FoldOptions, track_fold
+from tribodyn.hbm.continuation.fold_curve import FoldOptions, track_fold
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.newton import NewtonOptions
 
@@ -88,7 +88,7 @@ def test_it_refuses_what_has_no_fold(duffing_branch):
 
 def test_a_fold_whose_points_rounding_holds_in_place_is_found_in_few_solves(duffing_branch, monkeypatch):
     """Solves that are accurate to 3e-3 only: the tangent of each has the same sign, however often it is asked."""
-    exact, rows, solves = curve.bordered.correct, [], []
+    exact, rows, solves = curve_segment.bordered.correct, [], []
 
     def rounded(path, guess, border, metric, options):
         solves.append(guess.p)
@@ -108,10 +108,10 @@ def test_a_fold_whose_points_rounding_holds_in_place_is_found_in_few_solves(duff
     ends = []
     for at in place:
         solution, value = exact(path, at, direction, metric, newton)
-        tangent = curve.bordered.tangent(path, value, solution.state, direction, metric, newton, 1e-6)
-        ends.append(curve.CurvePoint.of(value, solution, tangent))
-    monkeypatch.setattr(curve.bordered, "correct", rounded)
-    fold = curve.locate_fold(path, curve.Segment(*ends, metric), newton, 1e-9)
+        tangent = curve_segment.bordered.tangent(path, value, solution.state, direction, metric, newton, 1e-6)
+        ends.append(curve_segment.CurvePoint.of(value, solution, tangent))
+    monkeypatch.setattr(curve_segment.bordered, "correct", rounded)
+    fold = curve_segment.locate_fold(path, curve_segment.Segment(*ends, metric), newton, 1e-9)
     assert fold is not None
     assert len(solves) < 20
     np.testing.assert_allclose(fold.value, duffing_branch.omega[i], rtol=1e-7)

@@ -122,7 +122,7 @@ def test_multipliers_while_the_force_stays_are_those_by_hill() -> None:
     balance = held(12.0, 9, 4e-5, friction=0.0)
     state = solved(balance)
     hill = np.abs(np.exp(exponents.stability(balance, state).exponents * 2 * np.pi / OMEGA))
-    multipliers = np.abs(np.exp(floquet.exponents(balance, state, Options(STEPS)) * 2 * np.pi / OMEGA))
+    multipliers = np.abs(np.exp(floquet.floquet_exponents(balance, state, Options(STEPS)) * 2 * np.pi / OMEGA))
     np.testing.assert_allclose(np.sort(hill)[-4:], np.sort(multipliers)[-4:], rtol=0.01)
 
 
@@ -132,9 +132,9 @@ def test_what_drives_a_motion_away_in_time_is_seen(monkeypatch: pytest.MonkeyPat
     for force, height, stable in ((1.5, 4e-5, True), (30.0, HEIGHT, False)):
         balance = held(force, 9, height)
         state, options = solved(balance), Options(STEPS, tolerance=1e-9)
-        whole = np.exp(floquet.exponents(balance, state, options).real.max() * 2 * np.pi / OMEGA)
+        whole = np.exp(floquet.floquet_exponents(balance, state, options).real.max() * 2 * np.pi / OMEGA)
         assert (whole < 1) == stable
-        assert floquet.largest(balance, state, options) == pytest.approx(whole, rel=0.2 if stable else 0.02)
+        assert floquet.largest_multiplier(balance, state, options) == pytest.approx(whole, rel=0.2 if stable else 0.02)
 
 
 def test_a_push_decides_where_sliders_just_reach_their_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,12 +142,12 @@ def test_a_push_decides_where_sliders_just_reach_their_limit(monkeypatch: pytest
     model = prescribe(two_bodies(), PLATFORM, "height", support=4e5)
     kink = problem(model, HEIGHT, 6.0, (0.0, 1.0, -1e-5), tuple(range(8)))
     options = Options(STEPS, tolerance=1e-9)
-    whole = floquet.largest(kink, solved(kink), options)
+    whole = floquet.largest_multiplier(kink, solved(kink), options)
     monkeypatch.setattr(floquet, "RULES", replace(floquet.RULES, dense=0))
     assert whole < 0.9
-    assert floquet.largest(kink, solved(kink), options) > 1.1
+    assert floquet.largest_multiplier(kink, solved(kink), options) > 1.1
     for balance, leaves in ((kink, False), (held(12.0, 7, 4e-5), True), (held(30.0, 7), True)):
-        assert floquet.leaves(balance, solved(balance), options) == leaves
+        assert floquet.is_unstable(balance, solved(balance), options) == leaves
 
 
 def test_life_in_time_is_that_of_many_harmonics() -> None:

@@ -14,7 +14,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.continuation.free_vibration import DenseBordered, DiagonalBordered
+from tribodyn.hbm.continuation.bordered_modes import DenseBordered, DiagonalBordered
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis

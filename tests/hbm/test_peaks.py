@@ -18,8 +18,8 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.curve_peaks import with_peaks
 from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
-from tribodyn.hbm.continuation.peaks import with_peaks
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis

@@ -21,7 +21,8 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import exponents
-from tribodyn.hbm.stability.exponents import Stability, mark, stability
+from tribodyn.hbm.stability.branch_stability import stability_along
+from tribodyn.hbm.stability.exponents import Stability, stability
 from tribodyn.hbm.stability.floquet import monodromy
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options, TimeStepper
@@ -115,7 +116,7 @@ def test_folds_of_a_lifting_mass_are_marked_where_the_branch_turns():
     branch = arc_length.follow(balance, 150.0, 260.0)
     assert str(branch.end).startswith("reached")
     assert len(branch.folds) == 2
-    marks = mark(balance, branch)
+    marks = stability_along(balance, branch)
     assert [m.kind for m in marks.bifurcations] == ["fold", "fold"]
     for bifurcation, turn in zip(marks.bifurcations, branch.folds, strict=True):
         assert bifurcation.position == pytest.approx(turn, abs=1.0)
@@ -135,11 +136,11 @@ def test_a_branch_in_another_parameter_is_marked_with_it():
     balance = lifting_mass()
     load = parameter.load(balance, 200.0)
     branch = arc_length.follow(load, 0.2, 1.5)
-    marks = mark(load, branch)
+    marks = stability_along(load, branch)
     assert len(marks.stable) == len(branch.omega)
     assert len(marks.bifurcations) == len(branch.folds)
     with pytest.raises(ValueError, match="followed in the load factor"):
-        mark(balance, branch)
+        stability_along(balance, branch)
 
 
 def test_names_and_refusals():

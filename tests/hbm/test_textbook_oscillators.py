@@ -18,7 +18,7 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.stability.exponents import mark
+from tribodyn.hbm.stability.branch_stability import stability_along
 from tribodyn.reduction.model import ReducedModel
 
 SLIP_FORCE, KT = 2.0, 3.0
@@ -103,7 +103,7 @@ def test_impact_oscillator_doubles_its_period_where_its_exact_flow_says():
     model = oscillator(1.0, 1.0, zeta, "n")
     balance = HarmonicBalance.of(model, joint, basis, Excitation.of({}, {1: {"force": 1.0}}), 5.0)
     branch = arc_length.follow(balance, 1.9, 4.5)
-    result = mark(balance, branch)
+    result = stability_along(balance, branch)
     assert [b.kind for b in result.bifurcations] == ["flip", "flip"]
 
     def flow(k, omega, time):
@@ -152,7 +152,7 @@ def test_a_nonlinear_energy_sink_loses_its_period_where_a_complex_pair_of_multip
     basis, loads = HarmonicBasis((1, 3, 5), 32), Excitation.of(harmonic={1: {"force": force}})
     balance = HarmonicBalance.of(model, joint, basis, loads, 1.5)
     branch = arc_length.follow(balance, 0.9, 1.02)
-    result = mark(balance, branch)
+    result = stability_along(balance, branch)
     assert [b.kind for b in result.bifurcations] == ["Neimark-Sacker"]
 
     inverse = np.diag([1.0, 1.0 / light])

@@ -17,7 +17,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.hbm.stability import floquet
-from tribodyn.hbm.stability.floquet import HILL, MULTIPLIERS, stays
+from tribodyn.hbm.stability.floquet import HILL, MULTIPLIERS, is_stable
 from tribodyn.hbm.time import mean_motion, time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.period_search import Period, PeriodSearch, Pushed, push
@@ -161,8 +161,8 @@ def test_a_periodic_motion_is_followed_and_one_that_a_push_drives_away_is_left()
     periodic = time_integration.integrate(flips, FLIPS_AT, state, Options(128))
     assert periodic.periodic
     assert abs(left.amplitude[0] / np.sqrt(2 * periodic.outputs[0].var()) - 1) > 1e-3
-    assert stays(flips, state, verify(flips, state, Options(128)), Options(128)) == (False, MULTIPLIERS)
-    assert stays(flips, state, None, Options(128)) == (False, HILL)
+    assert is_stable(flips, state, verify(flips, state, Options(128)), Options(128)) == (False, MULTIPLIERS)
+    assert is_stable(flips, state, None, Options(128)) == (False, HILL)
 
 
 @pytest.mark.parametrize(("finest", "after", "left"), [(128, 64, False), (256, 64, True), (128, 8, True)])
@@ -282,9 +282,9 @@ def test_the_largest_multiplier_without_the_monodromy_matrix(monkeypatch: pytest
     options = Options(64, tolerance=1e-9)
     flips = three_pairs(friction=0.0, static=30.0, shaker=60.0, top=15)
     unstable = newton.solve_from_rest(flips, FLIPS_AT).state
-    whole = [floquet.largest(b, s, options) for b, s in ((balance, state), (flips, unstable))]
+    whole = [floquet.largest_multiplier(b, s, options) for b, s in ((balance, state), (flips, unstable))]
     monkeypatch.setattr(floquet, "RULES", replace(floquet.RULES, dense=0))
-    found = [floquet.largest(b, s, options) for b, s in ((balance, state), (flips, unstable))]
+    found = [floquet.largest_multiplier(b, s, options) for b, s in ((balance, state), (flips, unstable))]
     assert found[0] == pytest.approx(whole[0], rel=0.2)  # any value below 1 does
     assert max(found[0], whole[0]) < 1 < whole[1]
     assert found[1] == pytest.approx(whole[1], rel=0.01)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, WearEnd
-from tribodyn.hbm.stability.exponents import BranchStability
+from tribodyn.hbm.stability.branch_stability import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.result import (

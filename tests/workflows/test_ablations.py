@@ -6,17 +6,17 @@ from dataclasses import fields
 from importlib import import_module
 
 from proof import ablations
-from tribodyn.hbm.continuation import curve
+from tribodyn.hbm.continuation import curve_segment
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 
 
 def test_a_neutral_value_acts_and_is_taken_back():
-    before = curve.RULES
-    with ablations.without("continuation.curve.CurveRules", "fold_turn", 0.0):
-        assert curve.RULES.fold_turn == 0.0
-        assert curve.RULES.largest_slant == before.largest_slant
-    assert curve.RULES is before
-    assert curve.CurveRules() == before
+    before = curve_segment.RULES
+    with ablations.without("continuation.curve_segment.CurveRules", "fold_turn", 0.0):
+        assert curve_segment.RULES.fold_turn == 0.0
+        assert curve_segment.RULES.largest_slant == before.largest_slant
+    assert curve_segment.RULES is before
+    assert curve_segment.CurveRules() == before
     with ablations.without("continuation.resonance_peak.AtPeak", "max_refined", 1):
         assert AtPeak("tip", 1.0, 2.0).max_refined == 1
     assert AtPeak("tip", 1.0, 2.0).max_refined == 3
@@ -31,6 +31,6 @@ def test_every_rule_that_is_listed_is_a_field_with_another_default():
 
 
 def test_a_rule_that_finds_hidden_folds_changes_a_branch_problem():
-    with ablations.without("continuation.curve.CurveRules", "fold_turn", 0.0):
+    with ablations.without("continuation.curve_segment.CurveRules", "fold_turn", 0.0):
         there = ablations.outcomes([18], [])
     assert there != ablations.outcomes([18], [])

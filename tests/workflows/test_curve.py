@@ -12,7 +12,7 @@ from tests.helpers.command import leave
 from tests.helpers.matrix_scene import matrix_folder
 from tribodyn.hbm.continuation.harmonic_choice import estimate, widened
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.hbm.stability.exponents import mark
+from tribodyn.hbm.stability.branch_stability import stability_along
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress
@@ -63,7 +63,7 @@ def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: py
     assert marks is not None
     assert bounds is not None
     file = read(str(folder / "own.toml"), [*QUICK, "loads.harmonic.shaker.value=12 N"])
-    repeated = mark(modelling.build(file, Progress()).balance, frf)
+    repeated = stability_along(modelling.build(file, Progress()).balance, frf)
     assert np.array_equal(marks.stable, repeated.stable)
     height = frf.amplitude("response")
     assert np.all(bounds.amplitude_low <= height * (1 + 1e-9))

@@ -59,11 +59,11 @@ def test_every_wave_that_flutters_has_a_limit_cycle_or_a_reason(case: str) -> No
     kept_waves = set()
     for index, (cycles, reason) in result.cycles.items():
         assert cycles or reason
-        assert all(item.stays is not None and item.moved is not None for item in cycles)
+        assert all(item.is_stable is not None and item.moved is not None for item in cycles)
         balance = replace(flutter.in_flow(wheel, index), load_factor=0.0)
         problem = FreeVibration(balance, None, "response")
         row = balance.compliance.output_names.index("response")
-        for cycle in (item for item in cycles if item.stays and abs(item.moved or 0.0) < WITHIN):
+        for cycle in (item for item in cycles if item.is_stable and abs(item.moved or 0.0) < WITHIN):
             kept_waves.add(index)
             coordinates = cycle.point.coordinates.copy()
             coordinates[-1] += np.log(0.95)

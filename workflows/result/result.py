@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.stability.exponents import BranchStability
+from tribodyn.hbm.stability.branch_stability import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.summary import summary

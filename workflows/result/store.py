@@ -22,7 +22,7 @@ import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd, End, Outcome, SolveEnd, WearEnd
-from tribodyn.hbm.stability.exponents import BranchStability
+from tribodyn.hbm.stability.branch_stability import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.facts import Facts, Stage

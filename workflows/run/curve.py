@@ -9,7 +9,7 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import control, harmonic_choice, peaks, residual_shear
+from tribodyn.hbm.continuation import control, curve_peaks, harmonic_choice, residual_shear
 from tribodyn.hbm.continuation.branch import Branch, BranchPoint, amplitude
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.methods import arc_length
@@ -62,12 +62,12 @@ def follow_response(
     named = "method" in asked.model_fields_set and asked.method_name != "adaptive"
     as_swept = named or "sweep" in asked.model_fields_set
     if folds and branch.ended is BranchEnd.JUMPED and not as_swept:
-        rules = arc_length.Rules(max_gaps=0)  # a curve with gaps does not lead from fold to fold
+        rules = arc_length.ArcLengthRules(max_gaps=0)  # a curve with gaps does not lead from fold to fold
         round_folds = arc_length.Options(rules=rules, newton=settings.newton_options(scene))
         whole = arc_length.follow(balance, *ends, round_folds)
         if whole.arrived:
             branch = replace(whole, end=whole.end.kind.say(f"{whole.end.detail} by arc length: a sweep jumps"))
-    return peaks.with_peaks(balance, branch, settings.peak_of(scene))
+    return curve_peaks.with_peaks(balance, branch, settings.peak_of(scene))
 
 
 def choose_harmonics(

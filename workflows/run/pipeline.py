@@ -11,7 +11,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.stability.branch_stability import stability_along
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
@@ -100,7 +100,7 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Pro
     assert frf is not None
     if scene.response.stability and result.stability is None:
         with progress.track("stability") as advance:
-            marks = exponents.mark(balance, frf, on_point=lambda done, of: advance(done / of, ""))
+            marks = stability_along(balance, frf, on_point=lambda done, of: advance(done / of, ""))
             result = replace(result, stability=marks)
     if scene.response.bounds and result.bounds is None:
         with progress.track("bounds of residual shear") as advance:

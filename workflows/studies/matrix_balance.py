@@ -27,7 +27,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import Outcome, SolveEnd
-from tribodyn.hbm.stability import exponents as floquet
+from tribodyn.hbm.stability import branch_stability
 from tribodyn.hbm.time import time_integration as time, verify
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.wear.history import WearHistory, WearRow
@@ -262,9 +262,9 @@ class HertzBalance:
         branch: Branch = module.follow(problem, HZ * start, HZ * stop, method_options)
         return driven(problem, branch) if control == "amplitude" else branch
 
-    def stability(self, branch: Branch) -> floquet.BranchStability:
+    def stability(self, branch: Branch) -> branch_stability.BranchStability:
         """Stability of every point of a response of this balance, and its bifurcations, by Hill's method."""
-        return floquet.mark(self.problem, branch)
+        return branch_stability.stability_along(self.problem, branch)
 
     def nonlinear_mode(
         self, start: float, stop: float, mode: int = 0, output: str | None = None, points: int = 40

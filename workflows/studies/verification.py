@@ -15,7 +15,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.stability.floquet import stays
+from tribodyn.hbm.stability.floquet import is_stable
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time import verify as march
 from tribodyn.hbm.time.stepper import Options
@@ -232,7 +232,7 @@ def held_against(
         with progress.stage("time integration"):
             options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS)
             integration = march.verify(balance, solution.state, options)
-            stable, reason = stays(balance, solution.state, integration, options)
+            stable, reason = is_stable(balance, solution.state, integration, options)
             left_alone = None
             if not stable or not integration.motion.periodic:
                 left_alone = leave_alone(balance, target, solution.state, LEFT_ALONE, options)

@@ -27,7 +27,7 @@ from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
-class Rules:
+class AdaptiveRules:
     """When a step is taken back, and when the response has jumped; see docs/accuracy/ablations.md.
 
     least_error_share : of the miss of extrapolation that counts as error of interpolation. On a smooth curve the share
@@ -61,7 +61,7 @@ class Options:
     """Shortest step, relative to the range; a response that is not found in it, or changes abruptly, has jumped."""
     max_points: int = number(default=5000, low=2)
     """Points after which to end."""
-    rules: Rules = field(default_factory=Rules, kw_only=True)
+    rules: AdaptiveRules = field(default_factory=AdaptiveRules, kw_only=True)
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
     guess: np.ndarray | None = field(default=None, kw_only=True)
     """(n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default."""

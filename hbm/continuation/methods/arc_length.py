@@ -21,9 +21,9 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder, OnPoint
-from tribodyn.hbm.continuation.curve import CurvePoint, Segment
+from tribodyn.hbm.continuation.curve_segment import CurvePoint, Segment
+from tribodyn.hbm.continuation.curve_stepper import CurveStepper
 from tribodyn.hbm.continuation.parameter import Parameter
-from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.continuation.stiffening import solve_along_friction, solve_along_stiffness
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
@@ -32,7 +32,7 @@ from tribodyn.refusal import Refusal
 
 
 @dataclass(frozen=True)
-class Rules:
+class ArcLengthRules:
     """What a walk does where the curve ends, turns into itself or brings nothing; see docs/accuracy/ablations.md.
 
     gap_steps : of the parameter over a gap in the curve, shares of its range, tried in turn; a longer one could miss a
@@ -84,7 +84,7 @@ class Options:
     bounds: tuple[float, float] | None = field(default=None, kw_only=True)
     guess: np.ndarray | None = field(default=None, kw_only=True)
     patience: int | None = field(default=None, kw_only=True)
-    rules: Rules = field(default_factory=Rules, kw_only=True)
+    rules: ArcLengthRules = field(default_factory=ArcLengthRules, kw_only=True)
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -170,7 +170,9 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
         return first
     full, loads = balance.load_factor, balance.excitation
     odd = loads.base is None and all(h % 2 or h == 0 for h, _ in loads.loads)
-    ramp_options = Options(newton=options, patience=Rules.ramp_patience, bounds=(-full, full) if odd else (0.0, full))
+    ramp_options = Options(
+        newton=options, patience=ArcLengthRules.ramp_patience, bounds=(-full, full) if odd else (0.0, full)
+    )
     ramp = follow(parameter.load(balance, omega), 0.0, full, ramp_options)
     if abs(ramp.parameter[-1]) == full:
         half_later = (-1.0) ** balance.basis.order if ramp.parameter[-1] < 0 else 1.0
@@ -198,7 +200,7 @@ class _Walk:
         self.builder = BranchBuilder(path)
         self.builder.add(start, first)
         if first.converged:
-            self._stepper = Stepper(path, options, first, start, stop)
+            self._stepper = CurveStepper(path, options, first, start, stop)
         self._first: CurvePoint | None = None
         self._size = float(np.linalg.norm(self.builder.x[0]))
         self._rows = [1]  # points in the branch before each segment
@@ -262,7 +264,7 @@ class _Walk:
             if solution.converged:
                 self._jumps.append(value)
                 self.builder.add(value, solution)
-                self._stepper = Stepper(self._path, self._options, solution, value, value + sense * self._reach)
+                self._stepper = CurveStepper(self._path, self._options, solution, value, value + sense * self._reach)
                 self._rows, self._first = [len(self.builder.value)], None
                 return True
         return False

@@ -27,7 +27,7 @@ EXTRAPOLATION_DEGREE = 2  # higher ones amplify the kinks of the contact
 
 
 @dataclass(frozen=True)
-class Rules:
+class NaturalRules:
     """How a step that fails is made all the same; see docs/accuracy/ablations.md.
 
     least_spacing : of the points extrapolated from, in steps: closer ones amplify what Newton leaves
@@ -53,7 +53,7 @@ class Options:
     """Equidistant values, ends included; `response.points` of a scene by default."""
     refinements: int = number(default=6, low=0)
     """Times that a step which fails, or does not lead back, may be halved."""
-    rules: Rules = field(default_factory=Rules, kw_only=True)
+    rules: NaturalRules = field(default_factory=NaturalRules, kw_only=True)
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -188,7 +188,7 @@ def _by_arc_length(
     return solution
 
 
-def predict(builder: BranchBuilder, value: float, least_spacing: float = Rules.least_spacing) -> np.ndarray:
+def predict(builder: BranchBuilder, value: float, least_spacing: float = NaturalRules.least_spacing) -> np.ndarray:
     """Extrapolation of the last points to a value of the parameter: (n_pair, n_component, n_coeff) [m].
 
     Points closer together than half of the step, as halved steps leave them, would blow up their differences; those

@@ -134,7 +134,7 @@ class Accuracy:
         lines += [
             f"  {MICRO * one.amplitude:9.2f} um  {'stable' if one.stable else 'unstable':8} by Hill "
             f"(growth {one.growth:+7.2f} /s), after {one.periods} periods in time {MICRO * one.in_time:9.2f} um: "
-            f"{'stays' if one.stays else 'leaves'}"
+            f"{'stays' if one.is_stable else 'leaves'}"
             for one in self.solutions
         ]
         return "\n".join([*lines, str(self.picture)])

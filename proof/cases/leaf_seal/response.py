@@ -14,7 +14,7 @@ from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.stability.exponents import BranchStability, mark as mark_stability
+from tribodyn.hbm.stability.branch_stability import BranchStability, stability_along
 from tribodyn.hbm.wear.laws.impact import loading_work
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.modelling import build
@@ -45,7 +45,7 @@ class LeafResponse:
     @cached_property
     def stability(self) -> BranchStability:
         """Stability along the curve, by Hill's method."""
-        return mark_stability(self.balance, self.branch)
+        return stability_along(self.balance, self.branch)
 
     def state(self, point: int) -> State:
         """The solved state of a point of the curve."""

@@ -1,7 +1,7 @@
 """The resonance peak of a scene, or a fold of its response, followed while a second number changes.
 
 The peak is found by a scan of the response range once, then each value starts from its neighbour's; a fold is found by
-arc length once, then followed along its own line (hbm.continuation.folds), round the cusps where two folds meet.
+arc length once, then followed along its own line (hbm.continuation.fold_curve), round the cusps where two folds meet.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
-from tribodyn.hbm.continuation.folds import FoldOptions, track_fold
+from tribodyn.hbm.continuation.fold_curve import FoldOptions, track_fold
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.parameter import Parameter

@@ -155,10 +155,10 @@ def of_scene(file: SceneFile, start: float | None = None, stop: float | None = N
 
 
 def _in_time(cycle: LimitCycle) -> str:
-    if cycle.stays is None:
+    if cycle.is_stable is None:
         return ""
     neighbour = (
-        "what is beside it dies away" if cycle.stays else f"what is beside it grows by {cycle.growth:.2%} a period"
+        "what is beside it dies away" if cycle.is_stable else f"what is beside it grows by {cycle.growth:.2%} a period"
     )
     return f"; in time its amplitude moves by {cycle.moved:+.2%} and {neighbour}"
 

@@ -16,7 +16,7 @@ from tribodyn.hbm.continuation import bordered, parameter
 from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
 from tribodyn.hbm.continuation.branch import Branch, BranchPoint
-from tribodyn.hbm.continuation.curve import CurvePoint, Segment
+from tribodyn.hbm.continuation.curve_segment import CurvePoint, Segment
 from tribodyn.hbm.continuation.highest_peak import vertex
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.peak_refinement import NoPeak
@@ -27,7 +27,7 @@ from tribodyn.hbm.threads import single
 
 
 @dataclass(frozen=True)
-class PeakRules:
+class CurvePeakRules:
     """How peaks of a curve are refined.
 
     tried : maxima of a curve, the highest foreseen first
@@ -42,7 +42,7 @@ class PeakRules:
     tangent: float = 1e-8
 
 
-RULES = PeakRules()
+RULES = CurvePeakRules()
 
 
 @dataclass(frozen=True)

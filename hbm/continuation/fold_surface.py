@@ -16,15 +16,13 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import bordered
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
-from tribodyn.hbm.continuation.branch import amplitude
-from tribodyn.hbm.continuation.curve import CurvePoint
+from tribodyn.hbm.continuation.curve_segment import CurvePoint
+from tribodyn.hbm.continuation.curve_stepper import CurveStepper
 from tribodyn.hbm.continuation.methods.arc_length import Options
 from tribodyn.hbm.continuation.parameter import FREQUENCY, Parameter
-from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
-from tribodyn.hbm.threads import single
-from tribodyn.refusal import Refusal, SolverFailure
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.refusal import SolverFailure
 
 
 @dataclass(frozen=True)
@@ -57,36 +55,12 @@ class FoldOptions:
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
 
-@dataclass(frozen=True)
-class FoldCurve:
-    """A line of folds in the order it was followed.
-
-    parameter_name : what was changed; parameter : (n_point,) its values; omega : (n_point,) of the folds [rad/s]
-    output_names; response : (n_point, n_output, n_coeff) [m]; contact : (n_point, n_contact, n_coeff) [m]
-    cusps : indices of the points next to which the parameter turns back: two folds meet there and vanish
-    end : why and where it ends; its text is a sentence
-    """
-
-    parameter_name: str
-    parameter: np.ndarray
-    omega: np.ndarray
-    output_names: tuple[str, ...]
-    response: np.ndarray
-    contact: np.ndarray
-    cusps: tuple[int, ...]
-    end: Outcome[BranchEnd]
-
-    def amplitude(self, output: str) -> np.ndarray:
-        """(n_point,) vibration amplitude of an output at the folds [m]."""
-        return amplitude(self.response[:, self.output_names.index(output)])
-
-
 class NoFold(SolverFailure):
     """No fold was found near a place."""
 
 
 @dataclass(frozen=True)
-class _Fold:
+class FoldPoint:
     """A fold with the direction in which its line continues.
 
     value : of the parameter; solution : at the fold; along : unit tangent of the response curve
@@ -105,66 +79,7 @@ class _Fold:
         return Direction(self.solution.state.flat, self.solution.state.omega)
 
 
-@single
-def track_fold(
-    path: Parameter,
-    start: float,
-    stop: float,
-    omega: float,
-    x: np.ndarray,
-    options: FoldOptions | None = None,
-) -> FoldCurve:
-    """Follow a fold of the frequency response from `start` of a parameter towards `stop`.
-
-    path : the second parameter, such as `parameter.load(balance, omega)`; its own frequency is not used
-    omega, x (n_pair, n_component, n_coeff) : the fold at `start`, or near it, as a Branch lists it [rad/s], [m]
-    Returns the line of folds; it may turn back at a cusp and then ends where it passes `start` or `stop`
-    Raises  ValueError where there is no fold near the place given
-    """
-    options = options or FoldOptions()
-    if path.omega is None:
-        raise Refusal("a fold is followed against a second parameter, such as the load, not against the frequency")
-    if start == stop:
-        raise Refusal(f"start and stop are the same, {path.say(start)}: there is no fold to follow")
-    surface = _Surface(path, options, omega, abs(stop - start))
-    flat = x.reshape(-1, x.shape[-1])
-    try:
-        here = surface.first(start, Direction(flat, omega), float(np.sign(stop - start)))
-    except NoFold as reason:
-        raise Refusal(f"no fold near {omega / (2 * np.pi):.6g} Hz at {path.say(start)}: {reason}") from None
-    line, step = [here], options.step
-    end: Outcome[BranchEnd] | None = None
-    low, high = min(start, stop), max(start, stop)
-    while end is None:
-        if len(line) >= options.max_points:
-            end = BranchEnd.ENDED.say(f" {path.say(here.value)}: {options.max_points} points were allowed")
-            break
-        there, trouble = None, ""
-        while there is None and step >= options.min_step:
-            try:
-                there = surface.ahead(here, step)
-            except NoFold as reason:
-                step, trouble = 0.5 * step, str(reason)
-        if there is None:
-            end = BranchEnd.ENDED.say(f" {path.say(here.value)}: {trouble}")
-            break
-        bound = low if there.value < low else high if there.value > high else None
-        if bound is not None:
-            share = (bound - here.value) / (there.value - here.value)
-            guess = here.place + (there.place - here.place) * share
-            try:
-                there = surface.at(bound, guess, here)
-                end = (BranchEnd.TURNED_BACK if bound == start else BranchEnd.REACHED).say(f" {path.say(bound)}")
-            except NoFold as reason:
-                end = BranchEnd.ENDED.say(f" {path.say(here.value)}: {reason}")
-                break
-        line.append(there)
-        step = float(np.clip(surface.next_step(here, there, step), options.min_step, options.max_step))
-        here = there
-    return surface.curve(line, end)
-
-
-class _Surface:
+class SolutionSurface:
     """Solutions over frequency and parameter, and the scalar that vanishes at folds."""
 
     def __init__(self, path: Parameter, options: FoldOptions, omega: float, span: float):
@@ -181,7 +96,7 @@ class _Surface:
         balance = self._path.make(value)
         return Parameter(FREQUENCY, lambda _: balance, None)
 
-    def first(self, value: float, guess: Direction, sense: float) -> _Fold:
+    def first(self, value: float, guess: Direction, sense: float) -> FoldPoint:
         """The fold nearest to a guess (x, omega) at a value, with its line towards `sense`; raises NoFold."""
         metric = self._metric(guess.x, self._path.make(value))
         along = self._null(self._response(value), guess, metric)
@@ -196,9 +111,9 @@ class _Surface:
         shares = (-slopes[1], slopes[0]) if abs(scalar) <= self._options.residual and slopes[0] != 0 else (0.0, 1.0)
         sign = -1.0 if shares[1] * sense < 0 else 1.0
         tangent = along * shares[0] + across * shares[1]
-        return self._unit(_Fold(value, solution, along, tangent, shares[1]), metric, sign)
+        return self._unit(FoldPoint(value, solution, along, tangent, shares[1]), metric, sign)
 
-    def ahead(self, here: _Fold, step: float) -> _Fold:
+    def ahead(self, here: FoldPoint, step: float) -> FoldPoint:
         """The next fold of the line: by Newton, or where kinks forbid that by search at a value; raises NoFold."""
         metric = self._metric(here.place.x, self._path.make(here.value))
         value, guess = here.value + step * here.change, here.place + here.tangent * step
@@ -212,7 +127,7 @@ class _Surface:
             pass
         return self.at(value, guess, here)
 
-    def at(self, value: float, guess: Direction, here: _Fold) -> _Fold:
+    def at(self, value: float, guess: Direction, here: FoldPoint) -> FoldPoint:
         """The fold at a value, next to the fold `here` on its line; raises NoFold."""
         metric = self._metric(here.place.x, self._path.make(here.value))
         reach = 2 * self._length(metric, guess - here.place, value - here.value)
@@ -221,9 +136,9 @@ class _Surface:
         if value == here.value or self._length(metric, moved, value - here.value) > reach:
             raise NoFold(f"the next fold, at {self._path.say(value)}, lies on another line")
         assert point.solution is not None
-        return self._unit(_Fold(value, point.solution, point.tangent, moved, value - here.value), metric, 1.0)
+        return self._unit(FoldPoint(value, point.solution, point.tangent, moved, value - here.value), metric, 1.0)
 
-    def _newton_fold(self, value: float, guess: Direction, along: Direction) -> _Fold:
+    def _newton_fold(self, value: float, guess: Direction, along: Direction) -> FoldPoint:
         """Newton for the fold near a guess (x, omega), normal to the line of folds; raises NoFold."""
         row = np.zeros(2)
         for trial in range(self._options.trials):
@@ -247,7 +162,7 @@ class _Surface:
                 row = line
             if abs(scalar) <= self._options.residual:
                 tangent = along * float(line[0]) + across * float(line[1])
-                return _Fold(value, solution, along, tangent, float(line[1]))
+                return FoldPoint(value, solution, along, tangent, float(line[1]))
             matrix = np.array([slopes, row])
             if abs(np.linalg.det(matrix)) < 1e-12 * size:
                 break
@@ -306,7 +221,7 @@ class _Surface:
     def _length(self, metric: Metric, moved: Direction, change: float) -> float:
         return float(np.hypot(metric.norm(moved), change / self._span))
 
-    def _unit(self, fold: _Fold, metric: Metric, sign: float) -> _Fold:
+    def _unit(self, fold: FoldPoint, metric: Metric, sign: float) -> FoldPoint:
         """The fold with its direction of unit length, turned round where the sign is negative."""
         factor = sign / self._length(metric, fold.tangent, fold.change)
         return replace(fold, tangent=fold.tangent * factor, change=fold.change * factor)
@@ -317,7 +232,9 @@ class _Surface:
         solution = self._solved(response, guess, along, metric)
         omega = solution.state.omega
         options = Options(step=self._options.search_step, width=1.0, newton=self._options.newton)
-        ways = [Stepper(response, options, solution, omega, omega + self._width, along * sign) for sign in (1.0, -1.0)]
+        ways = [
+            CurveStepper(response, options, solution, omega, omega + self._width, along * sign) for sign in (1.0, -1.0)
+        ]
         for _ in range(self._options.search_steps):
             for way in ways:
                 for part in way.advance():
@@ -325,24 +242,8 @@ class _Surface:
                         return part.end
         raise NoFold(f"the response has no fold any more at {self._path.say(value)}")
 
-    def next_step(self, here: _Fold, there: _Fold, step: float) -> float:
+    def next_step(self, here: FoldPoint, there: FoldPoint, step: float) -> float:
         """The step after one that went from here to there, by the turn of the line."""
         metric = self._metric(there.place.x, self._path.make(there.value))
         turned = self._length(metric, there.tangent - here.tangent, there.change - here.change)
         return step * float(np.clip(0.25 / max(turned, 1e-9), 0.5, 2.0))
-
-    def curve(self, line: list[_Fold], end: Outcome[BranchEnd]) -> FoldCurve:
-        """The result."""
-        value = np.array([f.value for f in line])
-        balance = self._path.make(line[0].value)
-        turn = np.diff(value)
-        return FoldCurve(
-            self._path.name,
-            value,
-            np.array([f.solution.state.omega for f in line]),
-            balance.compliance.output_names,
-            np.stack([self._path.make(f.value).outputs(f.solution.state) for f in line]),
-            np.stack([f.solution.state.flat for f in line]),
-            tuple(int(i) for i in np.flatnonzero(turn[1:] * turn[:-1] < 0) + 1),
-            end,
-        )

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribodyn.hbm.continuation import bordered, curve
+from tribodyn.hbm.continuation import bordered, curve_segment
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
-from tribodyn.hbm.continuation.curve import CurvePoint, Segment, locate_fold
+from tribodyn.hbm.continuation.curve_segment import CurvePoint, Segment, locate_fold
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import Solution
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class StepRules:
+class CurveStepRules:
     """How long the steps along a curve are; see docs/accuracy/ablations.md."""
 
     # the characteristic length falls to this share per point where the vibration gets small
@@ -33,10 +33,10 @@ class StepRules:
     fold_reach: float = 2.0
 
 
-RULES = StepRules()
+RULES = CurveStepRules()
 
 
-class Stepper:
+class CurveStepper:
     """The point reached and the step to come.
 
     first : the solution at `start`; the walk sets out in the direction of `stop`, or of the heading where one is given
@@ -101,7 +101,7 @@ class Stepper:
         step = self._step
         while step >= self._options.min_step:
             trial = self._straight(step)
-            if trial is None or trial.angle > curve.RULES.kink_angle:
+            if trial is None or trial.angle > curve_segment.RULES.kink_angle:
                 trial = self._round_corner(step, trial) or trial
             pieces = None if trial is None else self._fitting(trial, step)
             if trial is not None and pieces is not None:
@@ -131,7 +131,7 @@ class Stepper:
     def _fitting(self, trial: Segment, step: float) -> list[Segment] | None:
         """The pieces of a step that is short for the curve, or turns at a corner whose legs are straight and meet."""
         stray = self._metric.norm(trial.end.place - self._ahead(step))
-        if trial.angle <= curve.RULES.kink_angle and stray <= RULES.largest_miss * step:
+        if trial.angle <= curve_segment.RULES.kink_angle and stray <= RULES.largest_miss * step:
             pieces = self._pieces(trial, RULES.max_halvings)
             if pieces is None:
                 self.trouble = f"the curve jumps to another branch at every step down to {step:.1e}"
@@ -153,7 +153,7 @@ class Stepper:
         """
         if halvings == 0 or not part.doubtful:
             return [part]
-        if part.slant > 0.5 * curve.RULES.kink_angle:
+        if part.slant > 0.5 * curve_segment.RULES.kink_angle:
             return None
         solution, value = bordered.correct(self._path, part.at(0.5), part.along, part.metric, self._newton)
         tangent = self._tangent(value, solution, part.along) if solution.converged else None
@@ -174,7 +174,7 @@ class Stepper:
         if tangent is None:
             return True
         way = Segment(part.start, CurvePoint.of(value, solution, tangent), part.metric)
-        if way.length < self._options.min_step or way.angle > curve.RULES.kink_angle:
+        if way.length < self._options.min_step or way.angle > curve_segment.RULES.kink_angle:
             return True
         return self._pieces(way, RULES.max_halvings) is not None
 
@@ -204,7 +204,7 @@ class Stepper:
             if tangent is None:
                 continue
             segment = Segment(here, CurvePoint.of(value, solution, tangent), metric)
-            if curve.RULES.kink_angle < segment.angle < np.pi - 1e-3 - 2 * step:
+            if curve_segment.RULES.kink_angle < segment.angle < np.pi - 1e-3 - 2 * step:
                 return segment
         return None
 
@@ -230,7 +230,9 @@ class Stepper:
         for piece in pieces:
             if not piece.turns:
                 continue
-            if careful and curve.RULES.turn_at_fold < piece.angle <= curve.RULES.kink_angle:  # tangents far apart
+            if (
+                careful and curve_segment.RULES.turn_at_fold < piece.angle <= curve_segment.RULES.kink_angle
+            ):  # tangents far apart
                 return None
             fold = locate_fold(self._path, piece, self._options.newton, self._options.fold_tolerance)
             if fold is not None:
@@ -247,7 +249,7 @@ class Stepper:
         self._metric = self._measure(segment.end.place.x)
         self._here = replace(segment.end, tangent=self._metric.unit(segment.end.tangent))
         factor = 2.0 ** np.clip((o.newton_target - segment.end.solution.steps) / 2, -1, 2)
-        if segment.angle > curve.RULES.kink_angle:
+        if segment.angle > curve_segment.RULES.kink_angle:
             self._bend = None
         else:
             self._bend = (last.end.tangent - last.start.tangent) * (1.0 / last.length)
