@@ -65,13 +65,13 @@ class Bound:
     @property
     def sentence(self) -> str:
         """Errors, the settings that gave them, and what is missed."""
-        good = [f"{known(q).label} {self.errors[q]:.2g}" for q, why in self.reasons.items() if not why]
-        bad = [f"{known(q).label} ({why})" for q, why in self.reasons.items() if why]
+        good = [f"{known(q).label} {self.errors[q]:.2g}" for q, reason in self.reasons.items() if not reason]
+        bad = [f"{known(q).label} ({reason})" for q, reason in self.reasons.items() if reason]
         settings = f"with {', '.join(self.overrides)}" if self.overrides else "with the scene as it is"
-        said = f"error bound {self.wanted.error:g} {settings}, after {self.rounds} runs"
-        said += f"; met: {', '.join(good)}" if good else ""
-        said += f"; not met: {', '.join(bad)}" if bad else ""
-        return said + (f"; could not be refined: {', '.join(self.left)}" if self.left else "")
+        text = f"error bound {self.wanted.error:g} {settings}, after {self.rounds} runs"
+        text += f"; met: {', '.join(good)}" if good else ""
+        text += f"; not met: {', '.join(bad)}" if bad else ""
+        return text + (f"; could not be refined: {', '.join(self.left)}" if self.left else "")
 
 
 def parsed(text: str) -> Wanted:
@@ -87,11 +87,11 @@ def parsed(text: str) -> Wanted:
     if not 0 < error < 1:
         raise Refusal(f'--accuracy "{text}": give an error above 0 and below 100 %, such as "1 %"')
     labels = {load(name).label: name for name in names_with_error()}
-    asked = tuple(re.split(r", and |, | and ", names)) if names else ()
-    for name in asked:
+    labels_given = tuple(re.split(r", and |, | and ", names)) if names else ()
+    for name in labels_given:
         if name not in labels:
             raise Refusal(f'--accuracy "{text}": after "of" expected one of {", ".join(labels)}, got "{name}"')
-    return Wanted(error, tuple(labels[name] for name in dict.fromkeys(asked)))
+    return Wanted(error, tuple(labels[name] for name in dict.fromkeys(labels_given)))
 
 
 def to_accuracy(
@@ -104,9 +104,9 @@ def to_accuracy(
     Returns the result of the last round, and whether the bound is met
     Raises  ValueError for an accuracy that means nothing, and what the runs raise
     """
-    wanted, rounds = parsed(accuracy), rounds or Rounds()
+    request, rounds = parsed(accuracy), rounds or Rounds()
     always = {"verdict.enabled": "true"}
-    if wanted.quantities and not set(wanted.quantities) & {q.name for q in with_error(WearQuantity)}:
+    if request.quantities and not set(request.quantities) & {q.name for q in with_error(WearQuantity)}:
         always["wear"] = ""
     added: dict[str, str] = {}
     for number in range(1, rounds.most + 1):
@@ -114,12 +114,14 @@ def to_accuracy(
         result = run(current, number)
         found = result.verdict
         assert found is not None
-        of = wanted.quantities or tuple(name for name, one in found.statements.items() if one.value is not None)
+        of = request.quantities or tuple(
+            name for name, statement in found.statements.items() if statement.value is not None
+        )
         if not of:
             raise SolverFailure(f"{file.name} has no error: {next(iter(found.statements.values())).reason}")
-        finer = {name: _finer(current, name, rounds.finer) for name in _large(found, wanted, of, rounds.share)}
-        left = tuple(name for name, texts in finer.items() if not texts)
-        bound = _bound(found, wanted, of, added, left, number)
+        finer = {name: _finer(current, name, rounds.finer) for name in _large(found, request, of, rounds.share)}
+        unrefined = tuple(name for name, texts in finer.items() if not texts)
+        bound = _bound(found, request, of, added, unrefined, number)
         say(f"round {number}: {bound.sentence}")
         if bound.met or not any(finer.values()):
             break
@@ -128,24 +130,26 @@ def to_accuracy(
 
 
 def _bound(
-    found: Verdict, wanted: Wanted, of: Sequence[str], added: dict[str, str], left: tuple[str, ...], number: int
+    verdict: Verdict, request: Wanted, of: Sequence[str], added: dict[str, str], unrefined: tuple[str, ...], number: int
 ) -> Bound:
     errors, reasons = dict[str, float | None](), dict[str, str]()
     for name in of:
-        one = found.statements[name]
-        errors[name], reasons[name] = (one.error, "") if one.stated else (None, one.reason or one.status)
+        statement = verdict.statements[name]
+        errors[name], reasons[name] = (
+            (statement.error, "") if statement.stated else (None, statement.reason or statement.status)
+        )
         error = errors[name]
-        if error is not None and error > wanted.error:
+        if error is not None and error > request.error:
             reasons[name] = f"its error is {error:.2g}"
-    return Bound(wanted, errors, reasons, tuple(f"{k}={v}" for k, v in added.items()), left, number)
+    return Bound(request, errors, reasons, tuple(f"{k}={v}" for k, v in added.items()), unrefined, number)
 
 
-def _large(found: Verdict, wanted: Wanted, of: Sequence[str], share: float) -> list[str]:
+def _large(verdict: Verdict, request: Wanted, of: Sequence[str], share: float) -> list[str]:
     """Refinements that change a quantity which is asked for much, the largest first."""
-    rows = [row for row in found.changes if row.quantity in of and row.refinement != Refinement.COMBINED]
+    rows = [row for row in verdict.changes if row.quantity in of and row.refinement != Refinement.COMBINED]
     sizes = [(float("inf") if row.relative is None else row.relative, row.refinement) for row in rows]
-    large = [one for one in sizes if DEFAULT.factor(found.ratio) * one[0] > share * wanted.error]
-    return list(dict.fromkeys(refinement for _, refinement in sorted(large, key=lambda one: -one[0])))
+    large = [change for change in sizes if DEFAULT.factor(verdict.ratio) * change[0] > share * request.error]
+    return list(dict.fromkeys(refinement for _, refinement in sorted(large, key=lambda change: -change[0])))
 
 
 def _finer(file: SceneFile, refinement: str, factor: float) -> tuple[str, ...]:

@@ -48,19 +48,21 @@ class ChangeTable:
     worn_ratio: float | None = None
     last: OperatingState | None = None
 
-    def add(self, refinement: Refinement, values: Values, refined: Values, how: str) -> None:
+    def add(self, refinement: Refinement, values: Values, refined: Values, text: str) -> None:
         """What a refinement changed."""
         for name, value in values.items():
             change = relative_change(value, refined[name])
-            self.rows.append(MeasuredChange(refinement, name, value, refined[name], change, how))
+            self.rows.append(MeasuredChange(refinement, name, value, refined[name], change, text))
 
-    def refuse(self, refinement: Refinement, why: str, kind: type[StatedQuantity] = CycleQuantity) -> None:
+    def refuse(self, refinement: Refinement, reason: str, kind: type[StatedQuantity] = CycleQuantity) -> None:
         """A refinement that was not measured, for all quantities of a kind."""
-        self.rows += [MeasuredChange(refinement, q.name, None, None, None, why) for q in with_error(kind)]
+        self.rows += [MeasuredChange(refinement, q.name, None, None, None, reason) for q in with_error(kind)]
 
-    def estimate(self, refinement: Refinement, quantities: Sequence[StatedQuantity], relative: float, how: str) -> None:
+    def estimate(
+        self, refinement: Refinement, quantities: Sequence[StatedQuantity], relative: float, text: str
+    ) -> None:
         """A relative change that was estimated without a second solution."""
-        self.rows += [MeasuredChange(refinement, q.name, None, None, relative, how) for q in quantities]
+        self.rows += [MeasuredChange(refinement, q.name, None, None, relative, text) for q in quantities]
 
 
 def measure_changes(
@@ -73,14 +75,14 @@ def measure_changes(
     except NOT_SOLVED as refusal:
         table.why = str(refusal)
         return table
-    finer, ratio, why = finer_scene(file, first, result, limits)
+    finer, ratio, reason = finer_scene(file, first, result, limits)
     if finer is None:
-        _refine_without_mesh(file, first, why, table, say)
+        _refine_without_mesh(file, first, reason, table, say)
     else:
         _refine_step_by_step(file, finer, ratio, first, table, say)
     _add_estimates(file, model, first, table, result, limits)
     if result.wear_steps and file.scene.wear is not None:
-        _refine_wear(file, finer, why, first, table, result, limits)
+        _refine_wear(file, finer, reason, first, table, result, limits)
     return table
 
 
@@ -93,7 +95,7 @@ def finer_scene(
     """
     contact = first.balance.contact.stiffness.size
     coefficients = 2 * first.refined_top(limits) + 1
-    why = ""
+    reason = ""
     for ratio in (*limits.ratios, 1 / limits.coarser):
         try:
             finer, actual = refine.mesh(file, ratio)
@@ -103,12 +105,12 @@ def finer_scene(
             break  # an imported mesh can only be cut
         dofs, unknowns = actual**3 * result.facts.full_dofs, actual**2 * contact * coefficients
         if dofs > limits.max_dofs:
-            why = f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {limits.max_dofs:g}"
+            reason = f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {limits.max_dofs:g}"
         elif unknowns > limits.max_unknowns:
-            why = f"the refined balance has some {unknowns:.2g} unknowns, above the limit of {limits.max_unknowns:g}"
+            reason = f"the refined balance has some {unknowns:.2g} unknowns, above the limit of {limits.max_unknowns:g}"
         else:
             return refine.modes(finer, limits.modes) or finer, actual, ""
-    return None, 1.0, why
+    return None, 1.0, reason
 
 
 def _refine_step_by_step(
@@ -118,34 +120,34 @@ def _refine_step_by_step(
     """Modes, mesh, harmonics, each on top of the one before; the last is the combined refinement."""
     values = (_with_more_modes(file, first, table, say) or first).values
     say(f"a mesh with {ratio:.2g} times the elements")
-    how = f"{ratio:.3g} times the elements along every edge"
+    text = f"{ratio:.3g} times the elements along every edge"
     harmonics = first.balance.basis.harmonics
     try:
         state = operating_states.unworn_state(finer, modelling.build(finer, Progress(), harmonics), first.site)
     except NOT_SOLVED as refusal:
-        table.refuse(Refinement.MESH, f"{how}: {refusal}")
-        table.refuse(Refinement.COMBINED, f"{how}: {refusal}")
+        table.refuse(Refinement.MESH, f"{text}: {refusal}")
+        table.refuse(Refinement.COMBINED, f"{text}: {refusal}")
         return
-    table.add(Refinement.MESH, values, state.values, how)
+    table.add(Refinement.MESH, values, state.values, text)
     last = _with_more_harmonics(state, table, say)
     if last is None:
         table.refuse(Refinement.COMBINED, table.rows[-1].how)
         return
     table.ratio, table.last = ratio, last
-    how += f", more modes, harmonics 0 to {first.refined_top()}"
-    table.add(Refinement.COMBINED, first.values, last.values, how)
+    text += f", more modes, harmonics 0 to {first.refined_top()}"
+    table.add(Refinement.COMBINED, first.values, last.values, text)
 
 
 def _refine_without_mesh(
-    file: SceneFile, first: OperatingState, why: str, table: ChangeTable, say: Callable[[str], None]
+    file: SceneFile, first: OperatingState, reason: str, table: ChangeTable, say: Callable[[str], None]
 ) -> None:
     """What can be refined where the mesh cannot, as `why` says: all that there is of a scene of matrices."""
     last = _with_more_harmonics(_with_more_modes(file, first, table, say) or first, table, say)
     if last is None or not isinstance(file.scene, MatrixScene):
-        table.refuse(Refinement.COMBINED, why if last else table.rows[-1].how)
+        table.refuse(Refinement.COMBINED, reason if last else table.rows[-1].how)
     else:
-        how = f"more modes, harmonics 0 to {first.refined_top()}"
-        table.add(Refinement.COMBINED, first.values, last.values, how)
+        text = f"more modes, harmonics 0 to {first.refined_top()}"
+        table.add(Refinement.COMBINED, first.values, last.values, text)
 
 
 def _with_more_modes(
@@ -175,14 +177,14 @@ def _with_more_harmonics(
     state: OperatingState, table: ChangeTable, say: Callable[[str], None]
 ) -> OperatingState | None:
     """A state with more harmonics, followed from its own solution."""
-    how = f"harmonics 0 to {state.refined_top()}"
-    say(how)
+    text = f"harmonics 0 to {state.refined_top()}"
+    say(text)
     try:
         refined = operating_states.with_more_harmonics(state, state.refined_top())
     except NOT_SOLVED as refusal:
-        table.refuse(Refinement.HARMONICS, f"{how}: {refusal}")
+        table.refuse(Refinement.HARMONICS, f"{text}: {refusal}")
         return None
-    table.add(Refinement.HARMONICS, state.values, refined.values, how)
+    table.add(Refinement.HARMONICS, state.values, refined.values, text)
     return refined
 
 
@@ -205,13 +207,13 @@ def _add_estimates(
     if result.wear.in_time.any():  # scatter changes the cycles, not the depth of a contact that is worn through
         table.estimate(Refinement.MOTION, durations, result.wear.scatter, "standard error of means in time")
         problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
-        aside = abs(left_aside(problem, result.wear, limits.searched_rows))
-        how = "periodic motions that the irregular one did not take"
-        table.estimate(Refinement.OTHER_MOTION, durations, aside, how)
+        difference = abs(left_aside(problem, result.wear, limits.searched_rows))
+        text = "periodic motions that the irregular one did not take"
+        table.estimate(Refinement.OTHER_MOTION, durations, difference, text)
 
 
 def _refine_wear(
-    file: SceneFile, finer: SceneFile | None, why: str, first: OperatingState, table: ChangeTable, result: Result,
+    file: SceneFile, finer: SceneFile | None, reason: str, first: OperatingState, table: ChangeTable, result: Result,
     limits: RefinementLimits,
 ) -> None:  # fmt: skip
     """Quantities of the whole wear on another mesh, with more modes, harmonics and wear steps.
@@ -231,27 +233,27 @@ def _refine_wear(
     no_mesh = isinstance(file.scene, MatrixScene)
     ratio = 1.0 if no_mesh else table.ratio or limits.ratios[0]
     if no_mesh and work > limits.max_wear:
-        how = f"finer wear takes work above the limit of {limits.max_wear:g}"
-        table.refuse(Refinement.COMBINED, how, WearQuantity)
+        text = f"finer wear takes work above the limit of {limits.max_wear:g}"
+        table.refuse(Refinement.COMBINED, text, WearQuantity)
         return
     if no_mesh:
         finer = refine.modes(file, limits.modes) or file
     elif finer is None or (ratio > 1 and work * ratio**2 > limits.max_wear):
         finer, ratio = refine.mesh(file, 1 / limits.coarser)
         if ratio >= 1:
-            how = why or "the mesh is imported and can only be cut"
-            table.refuse(Refinement.COMBINED, how, WearQuantity)
+            text = reason or "the mesh is imported and can only be cut"
+            table.refuse(Refinement.COMBINED, text, WearQuantity)
             return
         finer = refine.modes(finer, limits.modes) or finer
     steps = limits.wear_steps if ratio >= 1 else 1.0
     refined = refine.wear(refine.harmonics(finer, top), steps)
-    how = "" if no_mesh else f"{ratio:.3g} times the elements along every edge, "
-    how += f"more modes, harmonics 0 to {top}" + (f", {steps:g} times the wear steps" if steps > 1 else "")
+    text = "" if no_mesh else f"{ratio:.3g} times the elements along every edge, "
+    text += f"more modes, harmonics 0 to {top}" + (f", {steps:g} times the wear steps" if steps > 1 else "")
     try:
         start = table.last if ratio == table.ratio else None
         refined_values = wear_values.wear_through(refined, modelling.build(refined, Progress()), start)
     except NOT_SOLVED as refusal:
-        table.refuse(Refinement.COMBINED, f"{how}: {refusal}", WearQuantity)
+        table.refuse(Refinement.COMBINED, f"{text}: {refusal}", WearQuantity)
         return
     table.worn_ratio = None if no_mesh else ratio
-    table.add(Refinement.COMBINED, values, refined_values, how)
+    table.add(Refinement.COMBINED, values, refined_values, text)

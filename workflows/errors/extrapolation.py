@@ -42,16 +42,18 @@ def limit_of(size: Sequence[float], value: Sequence[float]) -> Limit:
     last = value[-1]
     if not np.isfinite(size[-1]):
         return Limit(last, float("nan"), 0.0)
-    groups = [[v for s, v in zip(size, value, strict=True) if s == one] for one in dict.fromkeys(size)][-3:]
-    scatter = next((float(np.ptp(some)) for some in reversed(groups) if len(some) > 1), 0.0)
-    v = np.array([some[0] for some in groups])
+    groups = [[v for s, v in zip(size, value, strict=True) if s == group_size] for group_size in dict.fromkeys(size)][
+        -3:
+    ]
+    scatter = next((float(np.ptp(group)) for group in reversed(groups) if len(group) > 1), 0.0)
+    v = np.array([group[0] for group in groups])
     last = float(v[-1])
     if len(v) == 1:
         return Limit(last, float("nan"), float("inf"))
     h = 1 / np.maximum(list(dict.fromkeys(size))[-3:], SMALLEST)
     steps = np.diff(v)
-    near = np.abs(steps) <= ROUNDING * abs(last)
-    if near[-1] and (near.all() or len(v) == 3) and not scatter:
+    is_constant = np.abs(steps) <= ROUNDING * abs(last)
+    if is_constant[-1] and (is_constant.all() or len(v) == 3) and not scatter:
         return Limit(last, float("nan"), float(abs(steps[-1] / last)))
     if len(v) == 2:
         return Limit(last, float("nan"), float(abs(steps[0] / last) * h[1] / (h[0] - h[1])))
@@ -59,8 +61,8 @@ def limit_of(size: Sequence[float], value: Sequence[float]) -> Limit:
         ratio = steps[0] / steps[1]
         if ratio > 0 and (order := _order(h, ratio)) >= ORDERS[0]:
             p = min(order, ORDERS[1])
-            rest = steps[1] * h[2] ** p / (h[1] ** p - h[2] ** p)
-            return Limit(float(last + rest), order, float(SAFETY * abs(rest / (last + rest))))
+            remainder = steps[1] * h[2] ** p / (h[1] ** p - h[2] ** p)
+            return Limit(float(last + remainder), order, float(SAFETY * abs(remainder / (last + remainder))))
         if ratio < -1:
             return Limit(last, float("nan"), float(abs(steps[1] / last)))
     return Limit(last, float("nan"), float(np.ptp(np.concatenate(groups)) / abs(last)))

@@ -80,7 +80,7 @@ def _statement(
     if not sampled and table.first is not None and isinstance(table.first.site, AtFrequency):
         return Statement(value, 0.0, None, Status.REPORTED, "given by the scene")
     rows = [row for row in table.rows if row.quantity == quantity.name]
-    error, why = total_error(rows, table.worn_ratio if wears else table.ratio, limits)
+    error, reason_unknown = total_error(rows, table.worn_ratio if wears else table.ratio, limits)
     dominated = dominating(rows)
     if wears and comparison is None and result.wear is not None:
         unstable = result.wear.unstable_share or 0.0  # what wears there instead is not known
@@ -92,7 +92,7 @@ def _statement(
         if status is not None:
             return Statement(value, error, dominated, status, reason)
     if error is None:
-        return Statement(value, None, dominated, Status.NOT_KNOWN, why)
+        return Statement(value, None, dominated, Status.NOT_KNOWN, reason_unknown)
     if error > limits.largest:
         return Statement(value, error, dominated, Status.TOO_LARGE, "")
     return Statement(value, error, dominated, Status.REPORTED, "measured on this scene")

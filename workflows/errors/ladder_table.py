@@ -167,7 +167,7 @@ def _operating_state(file: SceneFile, model: Model) -> OperatingState:
 
 
 def measure_ladders(
-    scene: str, names: Sequence[str], overrides: Sequence[str], say: Callable[[str], None], most: int
+    scene: str, names: Sequence[str], overrides: Sequence[str], say: Callable[[str], None], n_settings: int
 ) -> LadderTables:
     """Measure ladders of a scene, all that it has where none is named.
 
@@ -196,7 +196,7 @@ def measure_ladders(
 
     def rows(ladder: Ladder) -> list[LadderRow]:
         rows = []
-        for setting in ladder.settings[:most]:
+        for setting in ladder.settings[:n_settings]:
             try:
                 row = solve(with_setting(ladder, setting), ladder.wears(setting))
             except Refusal as refusal:  # such as more interface modes than there are contact DOFs
@@ -210,8 +210,8 @@ def measure_ladders(
 
     def scene_setting(ladder: Ladder) -> str:
         table = with_setting(ladder, None).scene
-        same = (setting for setting in ladder.settings if with_setting(ladder, setting).scene == table)
-        return next((setting.label for setting in same), "")
+        matches = (setting for setting in ladder.settings if with_setting(ladder, setting).scene == table)
+        return next((setting.label for setting in matches), "")
 
     tables = tuple(table_of(ladder, rows(ladder), scene_setting(ladder)) for ladder in ladders)
     return LadderTables(plain.name, (*study.base, *overrides), reference.seconds, tables)

@@ -74,7 +74,7 @@ class LadderTable(Table):
 
     def named(self, name: str) -> Ladder:
         """The ladder with its name."""
-        settings = (Setting(size, one) for size, one in zip(self.sizes, self.set, strict=True))
+        settings = (Setting(size, overrides) for size, overrides in zip(self.sizes, self.set, strict=True))
         return Ladder(name, tuple(settings), self.base, self.worn_up_to)
 
 
@@ -101,16 +101,16 @@ def ladders_of(scene: Scene, study: Study, names: Sequence[str] = ()) -> tuple[L
 
     Raises  ValueError for one that the scene does not have
     """
-    known = {name: table.named(name) for name, table in study.ladders.items()}
+    available = {name: table.named(name) for name, table in study.ladders.items()}
     for name, settings in _of_any(scene):
         if len(settings) > 1:
             up_to = WORN_TOP if name == "harmonics" else math.inf
-            known.setdefault(name, Ladder(name, tuple(settings), worn_up_to=up_to))
-    missing = [name for name in names if name not in known]
+            available.setdefault(name, Ladder(name, tuple(settings), worn_up_to=up_to))
+    missing = [name for name in names if name not in available]
     if missing:
-        raise Refusal(f"--setting {missing[0]}: the scene has {', '.join(known)}")
-    chosen = [known[name] for name in names or known]
-    return tuple(replace(one, worn_up_to=0.0) if one.name in study.unworn else one for one in chosen)
+        raise Refusal(f"--setting {missing[0]}: the scene has {', '.join(available)}")
+    chosen = [available[name] for name in names or available]
+    return tuple(replace(ladder, worn_up_to=0.0) if ladder.name in study.unworn else ladder for ladder in chosen)
 
 
 def _of_any(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
@@ -122,8 +122,8 @@ def _of_any(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
         elif scene.reduction.cutoff:
             yield "modes", _numbers("reduction.cutoff", [factor * scene.reduction.cutoff for factor in CUTOFFS])
         if scene.wheel is None:
-            whole = Setting(EXACT, ("reduction.interface_modes=",))
-            yield "interface_rank", [*_numbers("reduction.interface_modes", RANKS), whole]
+            exact = Setting(EXACT, ("reduction.interface_modes=",))
+            yield "interface_rank", [*_numbers("reduction.interface_modes", RANKS), exact]
     yield from _of_harmonics(scene)
     yield "newton", [Setting(1 / value, (f"solver.tolerance={value:g}",)) for value in NEWTON]
     if scene.wears:
@@ -134,9 +134,9 @@ def _of_any(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
 def _of_harmonics(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
     needed = {load.harmonic for load in scene.loads.harmonic.values()} | set(scene.harmonics.kept[:1]) & {0}
     first = 0 if 0 in needed or scene.harmonics.automatic else 1
-    more = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
+    sampling = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
     tops = [top for top in TOPS if top >= max(needed, default=1)]
-    yield "harmonics", [Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *more)) for top in tops]
+    yield "harmonics", [Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *sampling)) for top in tops]
     if all(hasattr(contact_law.load(contact.law_name), "located") for contact in scene.joints.values()):
         top = max(scene.harmonics.kept, default=1)
         sampled = [

@@ -37,10 +37,12 @@ def mesh(file: SceneFile, ratio: float) -> tuple[SceneFile, float]:
     """
     tables = _meshed(file)
     try:
-        new = [_rescaled(key, table, file.folder, ratio) for key, table in tables.items()]
+        rescaled = [_rescaled(key, table, file.folder, ratio) for key, table in tables.items()]
     except Given:
         return file.changed(*(f"{key}.halved={table.halved + 1}" for key, table in tables.items())), HALVED
-    return file.changed(*(text for texts, _ in new for text in texts)), 1 / float(np.mean([size for _, size in new]))
+    return file.changed(*(text for texts, _ in rescaled for text in texts)), 1 / float(
+        np.mean([size for _, size in rescaled])
+    )
 
 
 def modes(file: SceneFile, factor: float) -> SceneFile | None:

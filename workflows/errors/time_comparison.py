@@ -70,7 +70,7 @@ def changes_along_wear(
     """
     wear = result.wear
     assert wear is not None
-    how = "motions in time compared with those of the balance"
+    text = "motions in time compared with those of the balance"
     rows = [row for row in (0, *operating_states.later_rows(result)) if not wear.in_time[row]]
     if not rows or values_of_result(result) is None:
         return []
@@ -80,11 +80,11 @@ def changes_along_wear(
         refined = [operating_states.with_more_harmonics(state, state.refined_top(limits)) for state in states]
         differences = wear_differences([compare(state) for state in refined], result)
     except (Refusal, SolverFailure) as failure:  # a motion that is not stationary, a row that is not solved again
-        how += f": {failure}"
+        text += f": {failure}"
     changes = []
     for quantity in with_error(WearQuantity):
         relative = None if differences is None else differences[quantity.error is not ErrorKind.DURATION]
-        changes.append(MeasuredChange(Refinement.OTHER_MOTION, quantity.name, None, None, relative, how))
+        changes.append(MeasuredChange(Refinement.OTHER_MOTION, quantity.name, None, None, relative, text))
     return changes
 
 

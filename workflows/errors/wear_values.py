@@ -17,8 +17,8 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 def values_of(worn: WornContact) -> Values | None:
     """Quantity -> its value; None where one has none, as where no life has ended."""
     values = {quantity.name: quantity.value(worn) for quantity in with_error(WearQuantity)}
-    known = {name: value for name, value in values.items() if value is not None}
-    return known if len(known) == len(values) else None
+    complete = {name: value for name, value in values.items() if value is not None}
+    return complete if len(complete) == len(values) else None
 
 
 def values_of_result(result: Result) -> Values | None:

@@ -88,7 +88,7 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
     if frf is None:
         return []
     names, force = terms(result.harmonics), result.driving_force
-    found = []
+    datasets = []
     for position, output in enumerate(frf.output_names):
         for h in (h for h in result.harmonics if h):
             a, b = (frf.response[:, position, names.index(f"{letter}{h}")] for letter in "ab")
@@ -101,8 +101,8 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
             if kind == Function.FRF:
                 entry |= {"orddenom_spec_data_type": DataKind.EXCITATION, "orddenom_axis_lab": "force"}
                 entry |= {"orddenom_axis_units_lab": "N"}
-            found.append(entry)
-    return found
+            datasets.append(entry)
+    return datasets
 
 
 def _histories(result: Result) -> list[dict[str, Any]]:
@@ -118,22 +118,24 @@ def _histories(result: Result) -> list[dict[str, Any]]:
 
 def _loops(result: Result) -> list[dict[str, Any]]:
     """Displacement and force over a period of the pair that moves most, in each kept state and component."""
-    kept, patch = result.loops, result.patch
-    if kept is None:
+    stored, patch = result.loops, result.patch
+    if stored is None:
         return []
-    found = []
-    phase = 2 * np.pi * np.arange(kept.force.shape[-1]) / kept.force.shape[-1]
-    for at, row in enumerate(kept.row):
-        pair = int(np.argmax(np.ptp(kept.displacement[at], axis=-1).max(axis=-1)))
+    datasets = []
+    phase = 2 * np.pi * np.arange(stored.force.shape[-1]) / stored.force.shape[-1]
+    for at, row in enumerate(stored.row):
+        pair = int(np.argmax(np.ptp(stored.displacement[at], axis=-1).max(axis=-1)))
         for c, component in enumerate(patch.components):
-            for what, values, kind, unit in (
-                ("displacement", kept.displacement, DataKind.DISPLACEMENT, "m"),
-                ("force", kept.force, DataKind.FORCE, "N"),
+            for quantity_name, values, kind, unit in (
+                ("displacement", stored.displacement, DataKind.DISPLACEMENT, "m"),
+                ("force", stored.force, DataKind.FORCE, "N"),
             ):  # fmt: skip
-                text = f"state {row}, pair {pair}, {component}, {what}"
+                text = f"state {row}, pair {pair}, {component}, {quantity_name}"
                 y = values[at, pair, c]
-                found.append(function(Function.TIME, text, "phase", DataKind.TIME, "rad", phase, kind, unit, y, pair))
-    return found
+                datasets.append(
+                    function(Function.TIME, text, "phase", DataKind.TIME, "rad", phase, kind, unit, y, pair)
+                )
+    return datasets
 
 
 def function(
@@ -156,23 +158,23 @@ def function(
 
 def tables(result: Result) -> dict[str, Table]:
     """The tables that a result has data for, by name; columns of a table have one length."""
-    found: dict[str, Table] = {}
+    tables_by_name: dict[str, Table] = {}
     if result.response is not None:
-        found["response"] = response(result)
+        tables_by_name["response"] = response(result)
     if result.references is not None:
         r = result.references
-        found["references"] = {"frequency_Hz": r.omega / (2 * np.pi), "free_m": r.free, "stuck_m": r.stuck}
+        tables_by_name["references"] = {"frequency_Hz": r.omega / (2 * np.pi), "free_m": r.free, "stuck_m": r.stuck}
     if result.stability is not None:
         s = result.stability
-        found["bifurcations"] = {
+        tables_by_name["bifurcations"] = {
             "frequency_Hz": s.omega / (2 * np.pi),
             "position": s.position,
             "kind": np.array(s.kinds, dtype=str),
         }
-    found["pairs"] = pairs(result)
+    tables_by_name["pairs"] = pairs(result)
     if result.wear is not None and len(result.wear.cycles):
-        found["wear"] = wear(result)
-        found["wear_of_pairs"] = wear_of_pairs(result)
+        tables_by_name["wear"] = wear(result)
+        tables_by_name["wear_of_pairs"] = wear_of_pairs(result)
     if result.worn is not None:
         count = result.worn.omega.shape[1]
         flat = {
@@ -180,11 +182,11 @@ def tables(result: Result) -> dict[str, Table]:
             "frequency_Hz": result.worn.omega.ravel() / (2 * np.pi),
             "amplitude_m": result.worn.amplitude.ravel(),
         }
-        there = np.isfinite(flat["frequency_Hz"])
-        found["worn_responses"] = {name: column[there] for name, column in flat.items()}
+        is_solved = np.isfinite(flat["frequency_Hz"])
+        tables_by_name["worn_responses"] = {name: column[is_solved] for name, column in flat.items()}
     if result.loops is not None:
-        found["loops"] = loops(result)
-    return found
+        tables_by_name["loops"] = loops(result)
+    return tables_by_name
 
 
 def response(result: Result) -> Table:
@@ -278,15 +280,15 @@ def wear_of_pairs(result: Result) -> Table:
 
 def loops(result: Result) -> Table:
     """Hysteresis loops, one line for each kept state, pair, component and instant."""
-    kept, patch = result.loops, result.patch
-    assert kept is not None
-    shape = kept.displacement.shape
+    stored, patch = result.loops, result.patch
+    assert stored is not None
+    shape = stored.displacement.shape
     at, pair, component, sample = (index.ravel() for index in np.indices(shape))
     return {
-        "row": kept.row[at],
+        "row": stored.row[at],
         "pair": pair,
         "component": np.array(patch.components, dtype=str)[component],
         "phase_rad": 2 * np.pi * sample / shape[-1],
-        "displacement_m": kept.displacement.ravel(),
-        "force_N": kept.force.ravel(),
+        "displacement_m": stored.displacement.ravel(),
+        "force_N": stored.force.ravel(),
     }

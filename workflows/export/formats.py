@@ -34,13 +34,13 @@ def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:
     """M, K, C (n, n), B (n_contact, n), loads and outputs by name as a harmonic sees them; complex for a wheel."""
     model.require_masters("an export of matrices")
     system, B = model.at_harmonic(harmonic)
-    found = {"M": dense(system.mass), "K": dense(system.stiffness), "B": dense(B)}
+    matrices = {"M": dense(system.mass), "K": dense(system.stiffness), "B": dense(B)}
     if system.damping is not None:
-        found["C"] = dense(system.damping)
-    found |= {f"load_{name}": dense(vector) for name, vector in system.loads.items()}
-    found |= {f"output_{name}": dense(vector) for name, vector in system.outputs.items()}
+        matrices["C"] = dense(system.damping)
+    matrices |= {f"load_{name}": dense(vector) for name, vector in system.loads.items()}
+    matrices |= {f"output_{name}": dense(vector) for name, vector in system.outputs.items()}
     i = model.interface
-    return found | {
+    return matrices | {
         "contact_area": i.area,
         "contact_gap": i.gap,
         "contact_points": i.points,
@@ -51,17 +51,19 @@ def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:
 def write_npz(result: Result, folder: Path) -> list[Path]:
     """reduced.npz, that a scene's [model] reads again."""
     model, path = reduced_model(result), folder / "reduced.npz"
-    found = arrays(model)
+    matrices = arrays(model)
     if 0 in result.harmonics and not model.has_one_system:
         static = arrays(model, 0)
-        found |= {f"{name}_harmonic_0": static[name] for name in ("M", "K", "C", "B") if name in static}
-    np.savez_compressed(path, components=np.array(model.interface.components), **found)  # type: ignore[arg-type]
+        matrices |= {f"{name}_harmonic_0": static[name] for name in ("M", "K", "C", "B") if name in static}
+    np.savez_compressed(path, components=np.array(model.interface.components), **matrices)  # type: ignore[arg-type]
     return [path]
 
 
-def _symmetric(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _symmetric(matrices: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """M, K, C without the rounding of their reduction, so that they come back bit for bit."""
-    return found | {name: (found[name] + found[name].conj().T) / 2 for name in ("M", "K", "C") if name in found}
+    return matrices | {
+        name: (matrices[name] + matrices[name].conj().T) / 2 for name in ("M", "K", "C") if name in matrices
+    }
 
 
 def write_matlab(result: Result, folder: Path) -> list[Path]:
@@ -75,17 +77,17 @@ def write_matlab(result: Result, folder: Path) -> list[Path]:
 def write_op4(result: Result, folder: Path) -> list[Path]:
     """reduced.op4, with M, K, C, B, AREA, GAP, LOADS and OUTPUTS in binary, and reduced.json, which names columns."""
     model = reduced_model(result)
-    found = _symmetric(arrays(model))
-    held: dict[str, np.ndarray] = {name: found[name] for name in ("M", "K", "C", "B") if name in found}
-    held |= {"AREA": found["contact_area"][:, None], "GAP": found["contact_gap"][:, None]}
+    matrices = _symmetric(arrays(model))
+    blocks: dict[str, np.ndarray] = {name: matrices[name] for name in ("M", "K", "C", "B") if name in matrices}
+    blocks |= {"AREA": matrices["contact_area"][:, None], "GAP": matrices["contact_gap"][:, None]}
     about: dict[str, Any] = {"components": model.interface.components, "units": "SI"}
     about["contact"] = "x = B q, row pair * n_component + component"
     for kind in ("load", "output"):
-        names = [name for name in found if name.startswith(f"{kind}_")]
+        names = [name for name in matrices if name.startswith(f"{kind}_")]
         about[f"{kind}s"] = [name.removeprefix(f"{kind}_") for name in names]
         if names:
-            held[f"{kind}s".upper()] = np.column_stack([found[name] for name in names])
-    nastran_matrix.write_op4(folder / "reduced.op4", held)
+            blocks[f"{kind}s".upper()] = np.column_stack([matrices[name] for name in names])
+    nastran_matrix.write_op4(folder / "reduced.op4", blocks)
     (folder / "reduced.json").write_text(json.dumps(about, indent=2), encoding="utf-8")
     return [folder / "reduced.op4", folder / "reduced.json"]
 
@@ -97,15 +99,15 @@ def write_abaqus(result: Result, folder: Path) -> list[Path]:
     Raises  ValueError for the complex matrices of a wheel
     """
     model, written, called = reduced_model(result), [], []
-    found = _symmetric(arrays(model))
-    if np.iscomplexobj(found["K"]):
+    matrices = _symmetric(arrays(model))
+    if np.iscomplexobj(matrices["K"]):
         raise Refusal("abaqus: the matrices of a wheel are complex, which Abaqus does not take; export npz")
     words = {"K": "STIFFNESS", "M": "MASS", "C": "VISCOUS DAMPING"}
     for name in words:
-        if name not in found:
+        if name not in matrices:
             continue
         path = folder / f"reduced_{name}.inp"
-        lower = np.tril(found[name])
+        lower = np.tril(matrices[name])
         rows, columns = np.nonzero(lower)
         with path.open("w", encoding="ascii") as file:
             for i, j in zip(rows, columns, strict=True):
@@ -114,7 +116,7 @@ def write_abaqus(result: Result, folder: Path) -> list[Path]:
         called.append(name)
     top = folder / "reduced.inp"
     lines = ["*HEADING", f"reduced model of {result.provenance['scene_name']}, SI units", "*NODE, NSET=COORDINATES"]
-    lines += [f"{i + 1}, {float(i)}, 0., 0." for i in range(len(found["K"]))]
+    lines += [f"{i + 1}, {float(i)}, 0., 0." for i in range(len(matrices["K"]))]
     for name in called:
         lines.append(f"*MATRIX INPUT, NAME={name}, INPUT=reduced_{name}.inp, TYPE=SYMMETRIC")
     lines.append("*MATRIX ASSEMBLE, " + ", ".join(f"{words[name]}={name}" for name in called))
@@ -138,16 +140,16 @@ FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
 }
 
 
-def write(result: Result, wanted: Sequence[str], folder: Path, mesh_ending: str = ".xdmf") -> list[Path]:
+def write(result: Result, names: Sequence[str], folder: Path, mesh_ending: str = ".xdmf") -> list[Path]:
     """Write a result in some formats, each into a folder of its name; returns the files to open.
 
     Raises  ValueError: a format that is not known, or that cannot hold this result
     """
-    for name in wanted:
+    for name in names:
         if name not in FORMATS:
             raise Refusal(f"--to {name}: no such format; there are {', '.join(FORMATS)}")
     written = []
-    for name in dict.fromkeys(wanted):
+    for name in dict.fromkeys(names):
         place = folder / name
         place.mkdir(parents=True, exist_ok=True)
         if name == "mesh":

@@ -171,9 +171,9 @@ def part_grid(result: Result, state: State) -> Any:
     grid = grid_of(part, part.points + moved)
     grid.point_data["worn_off"] = moved
     depth, contact = np.zeros(len(part.points)), np.zeros(len(part.points), np.int8)
-    for one in meetings:
-        for number, face in enumerate(one.faces):
-            depth[face.nodes] = face.share * (face.weights @ state.depth[one.pairs])
+    for meeting in meetings:
+        for number, face in enumerate(meeting.faces):
+            depth[face.nodes] = face.share * (face.weights @ state.depth[meeting.pairs])
             contact[face.nodes] = number + 1
     grid.point_data["depth_on_this_face"], grid.point_data["face"] = depth, contact
     if state.field is not None and result.fields is not None:
@@ -224,9 +224,9 @@ def _series(folder: Path, name: str, times: Sequence[float], make: Sequence[Call
         "<Collection>",
     ]
     for i, (time, data) in enumerate(zip(times, make, strict=True)):
-        found = data()
-        path = place / f"{name}_{i:04d}{'.vtp' if type(found).__name__ == 'PolyData' else '.vtu'}"
-        found.save(path)
+        grid = data()
+        path = place / f"{name}_{i:04d}{'.vtp' if type(grid).__name__ == 'PolyData' else '.vtu'}"
+        grid.save(path)
         lines.append(f'<DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{path.name}")}/>')
     listing = folder / f"{name}.pvd"
     listing.write_text("\n".join([*lines, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")

@@ -30,12 +30,12 @@ LIFT = 2e-3  # of the patch, by which the colours of a face lie above it
 
 def charts(results: Sequence[tuple[str, Result]]) -> dict[str, Chart]:
     """Charts by title, each with the curves of all results that have them."""
-    found = {
+    charts_by_title = {
         "Response": _response(results),
         **_wear(results),
         "Hysteresis": _loops(results),
     }
-    return {title: chart for title, chart in found.items() if chart["data"]}
+    return {title: chart for title, chart in charts_by_title.items() if chart["data"]}
 
 
 def _chart(data: list[Chart], x: str, y: str, log: bool = False) -> Chart:
@@ -55,8 +55,8 @@ def _chart(data: list[Chart], x: str, y: str, log: bool = False) -> Chart:
     return {"data": data, "layout": layout}
 
 
-def _line(name: str, x: np.ndarray, y: np.ndarray, **more: Any) -> Chart:
-    return {"type": "scatter", "mode": "lines", "name": name, "x": plain(x), "y": plain(y), **more}
+def _line(name: str, x: np.ndarray, y: np.ndarray, **options: Any) -> Chart:
+    return {"type": "scatter", "mode": "lines", "name": name, "x": plain(x), "y": plain(y), **options}
 
 
 def plain(values: np.ndarray, digits: int = 7) -> list[Any]:
@@ -74,16 +74,16 @@ def _response(results: Sequence[tuple[str, Result]]) -> Chart:
         linear, frf = result.references, result.response
         if linear is not None:
             hertz = linear.omega / (2 * np.pi)
-            more: Chart = {"visible": True if number == 0 else "legendonly"}
+            options: Chart = {"visible": True if number == 0 else "legendonly"}
             for label, height, dash in (("free", linear.free, "dash"), ("stuck", linear.stuck, "dot")):
                 style = {"dash": dash, "color": GREY if label == "free" else INK, "width": 1}
-                data.append(_line(f"{name}: {label}", hertz, 1e3 * height, line=style, **more))
+                data.append(_line(f"{name}: {label}", hertz, 1e3 * height, line=style, **options))
         if frf is not None:
             good = frf.converged
             for k, output in enumerate(frf.output_names):
                 height = np.where(good, 1e3 * frf.amplitude(output), np.nan)
-                more = {"line": {"color": color}} if k == 0 else {"visible": "legendonly"}
-                data.append(_line(f"{name}: {output}", frf.frequency, height, **more))
+                options = {"line": {"color": color}} if k == 0 else {"visible": "legendonly"}
+                data.append(_line(f"{name}: {output}", frf.frequency, height, **options))
             if result.stability is not None:
                 height = np.where(good & ~result.stability.stable, 1e3 * frf.amplitude(frf.output_names[0]), np.nan)
                 data.append(_line(f"{name}: unstable", frf.frequency, height, line={"color": "#d55e00", "width": 4}))
@@ -148,47 +148,56 @@ def solid(result: Result) -> dict[str, Any] | None:
     meetings = meetings_of(result)
     size = float(np.sqrt(patch.area.sum()))
     factor = wear_scale(patch, np.stack([state.depth for state in states]))
-    found: dict[str, Any] = {"worn": result.wear is not None, "factor": factor}
+    data: dict[str, Any] = {"worn": result.wear is not None, "factor": factor}
     nodes, offset = np.zeros(0, int), None
     points = patch.points if part is None else part.points
-    found["extent"] = plain(np.ptp(points, axis=0) / np.ptp(points, axis=0).max())
+    data["extent"] = plain(np.ptp(points, axis=0) / np.ptp(points, axis=0).max())
     towards, up = looking(result)
-    found["camera"] = [plain(1.9 * towards / np.linalg.norm(towards)), plain(up)]
+    data["camera"] = [plain(1.9 * towards / np.linalg.norm(towards)), plain(up)]
     if part is not None:
         nodes, triangles = _surface(result)
         offset = explosion_offsets(result)
-        found["body"] = {
+        data["body"] = {
             "xyz": plain(1e3 * part.points[nodes].T, 6),
             "ijk": triangles.T.tolist(),
             "apart": plain(1e3 * offset[nodes].T, 5) if offset.any() else None,
         }
     sides = [
-        (one.pairs, one.patch, face.points, face.outward, face.share, None if offset is None else offset[face.nodes[0]])
-        for one in meetings
-        for face in one.faces
+        (
+            meeting.pairs,
+            meeting.patch,
+            face.points,
+            face.outward,
+            face.share,
+            None if offset is None else offset[face.nodes[0]],
+        )
+        for meeting in meetings
+        for face in meeting.faces
     ] or [(slice(0, len(patch.area)), patch, patch.points, patch.frames[:, 2], 0.5, None)]
-    found["sides"] = [
+    data["sides"] = [
         {
             "pairs": np.arange(len(patch.area))[pairs].tolist(),
-            "ijk": np.concatenate([own.faces[:, [0, k, k + 1]] for k in range(1, own.faces.shape[1] - 1)]).T.tolist(),
-            "apart": None if moved is None else plain(1e3 * moved, 5),
+            "ijk": np.concatenate(
+                [patch_of_side.faces[:, [0, k, k + 1]] for k in range(1, patch_of_side.faces.shape[1] - 1)]
+            ).T.tolist(),
+            "apart": None if offset_of_side is None else plain(1e3 * offset_of_side, 5),
         }
-        for pairs, own, _, _, _, moved in sides
+        for pairs, patch_of_side, _, _, _, offset_of_side in sides
     ]
-    found["states"] = []
+    data["states"] = []
     for state in states:
         entry: dict[str, Any] = {"label": state.label, "fields": _fields(result, state)}
         if part is not None:
-            moved = factor * worn_off(meetings, state.depth, len(part.points))[nodes]
-            there = np.flatnonzero(moved.any(axis=1))
-            entry["moved"] = [there.tolist(), plain(1e3 * (part.points[nodes][there] + moved[there]), 6)]
+            offset_of_side = factor * worn_off(meetings, state.depth, len(part.points))[nodes]
+            moving = np.flatnonzero(offset_of_side.any(axis=1))
+            entry["moved"] = [moving.tolist(), plain(1e3 * (part.points[nodes][moving] + offset_of_side[moving]), 6)]
         entry["faces"] = [
             plain(1e3 * (at + (LIFT * size - factor * share * state.depth[pairs, None]) * outward).T, 6)
             for pairs, _, at, outward, share, _ in sides
         ]
-        found["states"].append(entry)
-    found["status"] = {int(bits): [status_name(bits, patch.components), color] for bits, (_, color) in STATUS.items()}
-    return found
+        data["states"].append(entry)
+    data["status"] = {int(bits): [status_name(bits, patch.components), color] for bits, (_, color) in STATUS.items()}
+    return data
 
 
 def _states(result: Result) -> list[State]:
@@ -200,18 +209,18 @@ def _states(result: Result) -> list[State]:
 
 
 def _fields(result: Result, state: State) -> dict[str, list[Any]]:
-    found: dict[str, list[Any]] = {}
+    fields: dict[str, list[Any]] = {}
     if result.wear is not None or state.pressure is None:
-        found["total wear depth / µm"] = plain(1e6 * state.depth, 5)
+        fields["total wear depth / µm"] = plain(1e6 * state.depth, 5)
     if state.pressure is not None:
-        found["mean pressure / MPa"] = plain(1e-6 * state.pressure, 5)
+        fields["mean pressure / MPa"] = plain(1e-6 * state.pressure, 5)
     if result.wear is not None and len(result.wear.cycles):
-        found["friction work per cycle and area / J/m²"] = plain(
+        fields["friction work per cycle and area / J/m²"] = plain(
             result.wear.energy[state.number] / result.patch.area, 5
         )
     if state.status is not None:
-        found["status"] = [int(bits) for bits in state.status]
-    return found
+        fields["status"] = [int(bits) for bits in state.status]
+    return fields
 
 
 def _surface(result: Result) -> tuple[np.ndarray, np.ndarray]:
@@ -222,15 +231,15 @@ def _surface(result: Result) -> tuple[np.ndarray, np.ndarray]:
     grid.point_data["body"] = bodies(part)
     shell = grid.extract_surface(nonlinear_subdivision=1, algorithm="dataset_surface").triangulate()
     shell = shell.compute_normals(consistent_normals=True, auto_orient_normals=True, split_vertices=False)
-    near = _nearest(part.points, bodies(part), np.asarray(shell.points), np.asarray(shell.point_data["body"]))
-    nodes, where = np.unique(near, return_inverse=True)
+    nearest = _nearest(part.points, bodies(part), np.asarray(shell.points), np.asarray(shell.point_data["body"]))
+    nodes, where = np.unique(nearest, return_inverse=True)
     return nodes, where[shell.faces.reshape(-1, 4)[:, 1:]]
 
 
 def _nearest(mesh: np.ndarray, body: np.ndarray, points: np.ndarray, of: np.ndarray) -> np.ndarray:
     """For each point the nearest node of the mesh that is of the same body."""
-    found = np.zeros(len(points), int)
+    nearest = np.zeros(len(points), int)
     for number in np.unique(np.round(of)):
-        own, here = np.flatnonzero(body == number), np.round(of) == number
-        found[here] = own[cKDTree(mesh[own]).query(points[here])[1]]
-    return found
+        mesh_nodes, of_body = np.flatnonzero(body == number), np.round(of) == number
+        nearest[of_body] = mesh_nodes[cKDTree(mesh[mesh_nodes]).query(points[of_body])[1]]
+    return nearest

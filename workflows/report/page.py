@@ -30,7 +30,7 @@ from tribodyn.workflows.result.result import Result
 HEADING = "part"  # the picture that heads the page
 DPI = 110  # of the figures on the page
 LARGEST = 15e6  # bytes of a page
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 
 
 def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
@@ -45,31 +45,31 @@ def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
     if len(named) > 1:
         parts.append(_section("Side by side", _comparison(named), "compare"))
     for number, (name, result, path) in enumerate(results):
-        more = f"{name}: " if len(named) > 1 else ""
-        parts.append(_section(f"{more}summary", _summary(result), f"verdict-{number}"))
+        prefix = f"{name}: " if len(named) > 1 else ""
+        parts.append(_section(f"{prefix}summary", _summary(result), f"verdict-{number}"))
         if data["solids"][number] is not None:
-            parts.append(_section(f"{more}worn part", _viewer(number), f"part-{number}"))
+            parts.append(_section(f"{prefix}worn part", _viewer(number), f"part-{number}"))
         if number == 0:
             holders = "".join(map(_chart_holder, data["charts"]))
             parts.append(_section("Curves", '<div class="grid">' + holders + "</div>", "curves"))
-        parts.append(_section(f"{more}method and assumptions", _method(result), f"method-{number}"))
-        parts.append(_section(f"{more}inspection of the part and model", _inspection(result), f"inspection-{number}"))
-        parts.append(_section(f"{more}measured changes", _changes(result), f"changes-{number}"))
-        parts.append(_section(f"{more}figures", _figures(result), f"figures-{number}"))
+        parts.append(_section(f"{prefix}method and assumptions", _method(result), f"method-{number}"))
+        parts.append(_section(f"{prefix}inspection of the part and model", _inspection(result), f"inspection-{number}"))
+        parts.append(_section(f"{prefix}measured changes", _changes(result), f"changes-{number}"))
+        parts.append(_section(f"{prefix}figures", _figures(result), f"figures-{number}"))
         parts.append(
-            _section(f"{more}scene", f"<pre>{escape(result.provenance['scene_text'])}</pre>", f"scene-{number}")
+            _section(f"{prefix}scene", f"<pre>{escape(result.provenance['scene_text'])}</pre>", f"scene-{number}")
         )
-        parts.append(_section(f"{more}provenance", _provenance(result, path), f"provenance-{number}"))
+        parts.append(_section(f"{prefix}provenance", _provenance(result, path), f"provenance-{number}"))
     return _html(title, "\n".join(parts), data)
 
 
 def part_alone(result: Result) -> str:
     """A page of the worn part alone, empty where it has no faces to show or plotly is missing."""
-    found = solid(result)
-    if found is None:
+    data = solid(result)
+    if data is None:
         return ""
     try:
-        return _html(result.provenance["scene_name"], _viewer(0), {"charts": {}, "solids": [found]})
+        return _html(result.provenance["scene_name"], _viewer(0), {"charts": {}, "solids": [data]})
     except ValueError:
         return ""
 
@@ -77,9 +77,9 @@ def part_alone(result: Result) -> str:
 def _html(title: str, body: str, data: dict[str, Any]) -> str:
     script = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     plotly = str(package("plotly.offline").get_plotlyjs()).replace("</script", "<\\/script")
-    return (HERE / "page.html").read_text(encoding="utf-8").format(
-        title=escape(title), style=(HERE / "page.css").read_text(encoding="utf-8"), body=body,
-        plotly=plotly, data=script, script=(HERE / "page.js").read_text(encoding="utf-8"),
+    return (FOLDER / "page.html").read_text(encoding="utf-8").format(
+        title=escape(title), style=(FOLDER / "page.css").read_text(encoding="utf-8"), body=body,
+        plotly=plotly, data=script, script=(FOLDER / "page.js").read_text(encoding="utf-8"),
     )  # fmt: skip
 
 
@@ -117,8 +117,8 @@ def _head(named: Sequence[tuple[str, Result]]) -> str:
 
 
 def _title(result: Result) -> str:
-    found = re.search(r'^title\s*=\s*"([^"]+)"', result.provenance["scene_text"], re.MULTILINE)
-    return found.group(1) if found else result.provenance["scene_name"]
+    match = re.search(r'^title\s*=\s*"([^"]+)"', result.provenance["scene_text"], re.MULTILINE)
+    return match.group(1) if match else result.provenance["scene_name"]
 
 
 def _table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
@@ -145,7 +145,7 @@ def _method(result: Result) -> str:
     scene, facts = result.scene, result.facts
     laws = ", ".join(sorted({contact.law for contact in scene.joints.values()}))
     wear = None if scene.wear is None else scene.wear.law
-    said = [
+    sentences = [
         f"The structure is linear: {facts.full_dofs} degrees of freedom with small displacements and linear elasticity"
         + (f", reduced to {facts.model_dofs}" if facts.model_dofs != facts.full_dofs else "") + ".",
         f"Its contact has {facts.contact_pairs} pairs of the law {laws}. The motion is a sum of the harmonics "
@@ -153,7 +153,7 @@ def _method(result: Result) -> str:
         f"Wear follows the law {wear}, in steps of many cycles." if wear and result.wear_steps else "",
         "Friction, stiffness and wear coefficient are inputs: their scatter is in none of the errors.",
     ]  # fmt: skip
-    return f"<p>{escape(' '.join(filter(None, said)))}</p>"
+    return f"<p>{escape(' '.join(filter(None, sentences)))}</p>"
 
 
 def _number(value: Any) -> str:
@@ -166,9 +166,9 @@ def _comparison(named: Sequence[tuple[str, Result]]) -> str:
     rows = []
     for label in dict.fromkeys(label for table in tables for label in table):
         first: Any
-        first, *others = (table.get(label) for table in tables)
+        first, *values = (table.get(label) for table in tables)
         cells = [_number(first)]
-        for value in others:
+        for value in values:
             comparable = value is not None and first not in (None, 0)
             cells.append(_number(value) + (f" ({value / first - 1:+.2%})" if comparable else ""))
         rows.append((label, *cells))
@@ -180,9 +180,9 @@ def _headlines(result: Result) -> dict[str, Any]:
     answers = [answer for answer in answers_of(result) if answer.quantity.headline and not answer.joint]
     table: dict[str, Any] = {}
     for answer in answers:
-        unit, when = answer.quantity.unit, answer.when
+        unit, moment = answer.quantity.unit, answer.when
         if answer.value is not None:
-            table[f"{answer.quantity.title}{unit and f' / {unit}'}{when and f', {when}'}"] = answer.value
+            table[f"{answer.quantity.title}{unit and f' / {unit}'}{moment and f', {moment}'}"] = answer.value
     facts = result.facts
     sizes = {"contact pairs": facts.contact_pairs, "DOFs of the model": facts.model_dofs, "seconds": facts.seconds}
     return table | sizes
@@ -203,10 +203,10 @@ def _inspection(result: Result) -> str:
     for key, label in names.items():
         value = table.get(key)
         if value is not None:
-            many = getattr(value, "ndim", 0) > 0
-            if many and not len(value):
+            is_array = getattr(value, "ndim", 0) > 0
+            if is_array and not len(value):
                 continue
-            shown = ", ".join(_number(v) for v in np.asarray(value).tolist()[:6]) if many else _number(value)
+            shown = ", ".join(_number(v) for v in np.asarray(value).tolist()[:6]) if is_array else _number(value)
             rows.append((label, shown))
     rows.append(("area of the contact / mm²", f"{1e6 * result.patch.area.sum():.5g}"))
     return _table(rows)
@@ -266,10 +266,10 @@ def _viewer(number: int) -> str:
     )
 
 
-def _files(given: Mapping[str, str]) -> list[Path]:
+def _files(provenance: Mapping[str, str]) -> list[Path]:
     """The files beside a scene that its text or its changes name, as far as they still are there."""
-    folder = Path(given.get("folder", "."))
-    named = re.findall(r'"([^"\n]+)"', f"{given['scene_text']}\n{given.get('overrides', '')}")
+    folder = Path(provenance.get("folder", "."))
+    named = re.findall(r'"([^"\n]+)"', f"{provenance['scene_text']}\n{provenance.get('overrides', '')}")
     return [folder / name for name in sorted(set(named)) if "." in name and (folder / name).is_file()]
 
 

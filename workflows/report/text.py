@@ -46,15 +46,15 @@ def brief(result: Result) -> list[str]:
 
 def _model_lines(result: Result) -> list[str]:
     facts = result.facts
-    full, model, around = facts.full_dofs, facts.model_dofs, facts.around
+    full, model, wheel = facts.full_dofs, facts.model_dofs, facts.around
     pieces = [f"{full} DOFs" if full == model else f"{full} DOFs reduced to {model}"]
     pieces.append(f"{facts.contact_pairs} node pairs in contact")
-    if around is not None:
-        pieces.append(f"{around.sectors} sectors, engine order {around.engine_order}")
+    if wheel is not None:
+        pieces.append(f"{wheel.sectors} sectors, engine order {wheel.engine_order}")
     if result.harmonics:
         pieces.append(f"harmonics {', '.join(map(str, result.harmonics))}")
     modes = {"open": facts.open_frequencies[:3].tolist(), "stuck": facts.stuck_frequencies[:3].tolist()}
-    spectra = [f"{how} {_hertz(lowest)}" for how, lowest in modes.items() if lowest]
+    spectra = [f"{condition} {_hertz(lowest)}" for condition, lowest in modes.items() if lowest]
     return ["; ".join(pieces), *([f"modes with the contact {', '.join(spectra)}"] if spectra else [])]
 
 
@@ -83,15 +83,19 @@ def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
     words = {PEAK: "peak", FIRST: place, LAST: place, STABLE: "stable point"}
     suffix = {FIRST: ", before wear" if result.wear_steps else "", LAST: ", at the end of wear"}
     lines = []
-    for when, word in words.items():
-        own = [answer for answer in answers if answer.when == when and not answer.joint]
-        if not own or (when == LAST and not result.wear_steps) or (when == STABLE and not _is_unstable(result)):
+    for moment, word in words.items():
+        cycle_answers = [answer for answer in answers if answer.when == moment and not answer.joint]
+        if (
+            not cycle_answers
+            or (moment == LAST and not result.wear_steps)
+            or (moment == STABLE and not _is_unstable(result))
+        ):
             continue
-        frequency, *others = own
-        values = [_value(frequency), *(f"{answer.quantity.label} {_value(answer)}" for answer in others)]
+        frequency, *following = cycle_answers
+        values = [_value(frequency), *(f"{answer.quantity.label} {_value(answer)}" for answer in following)]
         if (order := order_of_line(result)) is not None and frequency.value is not None:
             values.insert(1, f"{60 * frequency.value / order:.{frequency.quantity.digits}g} rpm")
-        lines.append(f"{word:{WIDTH}}{', '.join(values)}{suffix.get(when, '')}")
+        lines.append(f"{word:{WIDTH}}{', '.join(values)}{suffix.get(moment, '')}")
     return lines
 
 
@@ -168,7 +172,7 @@ def warnings(result: Result) -> Iterator[str]:
     if result.wear is not None:
         yield from _wear_warnings(result)
     cycles = cycles_of(result)
-    highest = max((cycles[when][0].amplitude for when in (FIRST, LAST) if when in cycles), default=0.0)
+    highest = max((cycles[moment][0].amplitude for moment in (FIRST, LAST) if moment in cycles), default=0.0)
     if highest > LARGEST_BEND * size_of(result):
         yield (
             f"{measured(highest, 'm')} on a part of {measured(size_of(result), 'm')} is beyond the linear model: it "
@@ -191,8 +195,8 @@ def _wear_warnings(result: Result) -> Iterator[str]:
         yield f"from {measured(wear.cycles[row], 'cycles')} on maps, loops and films are of the last balance solved"
     for row in wear.jumps:
         previous, following = (measured(hertz, "Hz", 4) for hertz in wear.frequency[row : row + 2])
-        when = measured(wear.cycles[row + 1], "cycles")
-        yield f"at {when} the response jumped from {previous} to {following}, where another resonance dominates"
+        cycles_text = measured(wear.cycles[row + 1], "cycles")
+        yield f"at {cycles_text} the response jumped from {previous} to {following}, where another resonance dominates"
 
 
 def lines(result: Result) -> Lines:

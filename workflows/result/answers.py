@@ -96,7 +96,7 @@ def cycles_of(result: Result) -> dict[str, tuple[SolvedCycle, str]]:
         if curve is not None and not why and not wears_at_peak(result):
             cycles[PEAK] = peak, ""
         rows = {FIRST: 0, LAST: len(wear.omega) - 1}
-        cycles |= {when: (_cycle_at(result, wear, row), "") for when, row in rows.items()}
+        cycles |= {moment: (_cycle_at(result, wear, row), "") for moment, row in rows.items()}
     elif curve is not None:
         cycles[FIRST] = peak, why
     if curve is not None and result.stability is not None:
@@ -144,17 +144,17 @@ def _of_cycles(result: Result) -> Iterator[Answer]:
     cycles = cycles_of(result)
     statements = _statements(result)
     for quantity in every(CycleQuantity):
-        values = {when: quantity.value(cycle) for when, (cycle, _) in cycles.items()}
+        values = {moment: quantity.value(cycle) for moment, (cycle, _) in cycles.items()}
         if all(value is None for value in values.values()):
             yield Answer(quantity, "", FIRST, None)
-        for when, value in values.items():
+        for moment, value in values.items():
             if value is not None:
-                statement = statements.get(quantity.name) if when == FIRST else None
-                yield Answer(quantity, "", when, value, statement, why=cycles[when][1])
+                statement = statements.get(quantity.name) if moment == FIRST else None
+                yield Answer(quantity, "", moment, value, statement, why=cycles[moment][1])
         for joint in _joints(result) if quantity.by_joint else ():
-            for when in (FIRST, LAST):
-                if when in cycles and cycles[when][0].joints is not None:
-                    yield Answer(quantity, joint, when, quantity.value(cycles[when][0].of_joint(joint)))
+            for moment in (FIRST, LAST):
+                if moment in cycles and cycles[moment][0].joints is not None:
+                    yield Answer(quantity, joint, moment, quantity.value(cycles[moment][0].of_joint(joint)))
 
 
 def _of_wear(result: Result) -> Iterator[Answer]:

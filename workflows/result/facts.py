@@ -95,23 +95,23 @@ class Facts:
 
     def table(self) -> dict[str, Any]:
         """name -> value of all that applies, those of the wheel among them: what a result file and exports keep."""
-        found = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in ("around", "joints")}
-        found["harmonics"] = np.array(self.harmonics, dtype=np.int64)
+        values = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in ("around", "joints")}
+        values["harmonics"] = np.array(self.harmonics, dtype=np.int64)
         if self.around is not None:
-            found |= vars(self.around)
+            values |= vars(self.around)
         if self.joints:
-            found["joints"] = json.dumps({name: [pairs.start, pairs.stop] for name, pairs in self.joints.items()})
-        return {name: value for name, value in found.items() if value is not None}
+            values["joints"] = json.dumps({name: [pairs.start, pairs.stop] for name, pairs in self.joints.items()})
+        return {name: value for name, value in values.items() if value is not None}
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Facts:
         """The facts in a table as of `table`; what else is in it is ignored."""
         plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in table.items()}
-        known = {item.name: plain[item.name] for item in fields(cls) if item.name in plain}
-        if "harmonics" in known:
-            known["harmonics"] = tuple(int(h) for h in np.atleast_1d(known["harmonics"]))
-        for name in {"open_frequencies", "stuck_frequencies"} & known.keys():
-            known[name] = np.atleast_1d(known[name])
+        values = {item.name: plain[item.name] for item in fields(cls) if item.name in plain}
+        if "harmonics" in values:
+            values["harmonics"] = tuple(int(h) for h in np.atleast_1d(values["harmonics"]))
+        for name in {"open_frequencies", "stuck_frequencies"} & values.keys():
+            values[name] = np.atleast_1d(values[name])
         if "sectors" in plain:
-            known["around"] = Around(plain["sectors"], plain["engine_order"], np.asarray(plain["axis"], float))
-        return cls(**known)
+            values["around"] = Around(plain["sectors"], plain["engine_order"], np.asarray(plain["axis"], float))
+        return cls(**values)

@@ -12,7 +12,11 @@ import numpy as np
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 COUNTED = {9: " billion", 6: " million", 0: ""}
 BLOCKS = "▁▂▃▄▅▆▇█"
-UNKNOWN, USUAL, MOST = 2, 3, 6  # digits of a value whose error was looked for in vain, of one without, at the most
+UNKNOWN, DEFAULT_DIGITS, LARGEST_DIGITS = (
+    2,
+    3,
+    6,
+)  # digits of a value whose error was looked for in vain, of one without, at the most
 
 
 def write_columns(columns: Mapping[str, Any], path: Path) -> None:
@@ -28,14 +32,14 @@ def named_lines(values: Iterable[tuple[str, str]], width: int = 14) -> list[str]
     return [f"{name:{width}} {value}" for name, value in values]
 
 
-def digits(error: float | None, default: int = USUAL) -> int:
+def digits(error: float | None, default: int = DEFAULT_DIGITS) -> int:
     """Significant digits of a value with a relative error: the last one is about as uncertain as the error says."""
     if error is None or not np.isfinite(error):
         return default
-    return MOST if error <= 0 else int(np.clip(1 + np.ceil(-np.log10(error)), UNKNOWN, MOST))
+    return LARGEST_DIGITS if error <= 0 else int(np.clip(1 + np.ceil(-np.log10(error)), UNKNOWN, LARGEST_DIGITS))
 
 
-def rounded(value: float, count: int = USUAL) -> str:
+def rounded(value: float, count: int = DEFAULT_DIGITS) -> str:
     """A number with so many significant digits and no exponent; thousands apart from 10 000 on."""
     if not np.isfinite(value) or value == 0:
         return f"{value:g}"
@@ -44,7 +48,7 @@ def rounded(value: float, count: int = USUAL) -> str:
     return f"{shown:,.{max(places, 0)}f}".replace(",", " " if abs(shown) >= 1e4 else "")
 
 
-def measured(value: float, unit: str, count: int = USUAL) -> str:
+def measured(value: float, unit: str, count: int = DEFAULT_DIGITS) -> str:
     """A quantity in SI with a prefix: 0.951 mm, 796 Hz, 7.38 kN, 2240 mm³, 22 million cycles.
 
     unit : m, m2 and m3 are given in mm, mm² and mm³, small lengths in µm; Hz without a prefix below 10 kHz

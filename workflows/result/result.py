@@ -70,14 +70,14 @@ class Patch:
         """
         if self.in_one_plane:
             return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
-        placed, top, of = np.zeros((len(self.points), 2)), 0.0, self.face_of
-        own = [self._alone(of == face) for face in range(of.max() + 1)]
-        space = 0.2 * min(float(np.ptp(face[:, 1])) for face in own)
-        for face, points in enumerate(own):
+        positions, top, of = np.zeros((len(self.points), 2)), 0.0, self.face_of
+        faces = [self._alone(of == face) for face in range(of.max() + 1)]
+        space = 0.2 * min(float(np.ptp(face[:, 1])) for face in faces)
+        for face, points in enumerate(faces):
             points[:, 1] += top - points[:, 1].min()
             top = float(points[:, 1].max()) + space
-            placed[of == face] = points
-        return placed - (placed.min(axis=0) + placed.max(axis=0)) / 2
+            positions[of == face] = points
+        return positions - (positions.min(axis=0) + positions.max(axis=0)) / 2
 
     @property
     def face_of(self) -> np.ndarray:
@@ -101,13 +101,13 @@ class Patch:
 
     def of(self, pairs: slice) -> Patch:
         """The patch of some pairs alone, with the faces that lie between them."""
-        kept = np.arange(len(self.points))[pairs]
+        numbers = np.arange(len(self.points))[pairs]
         number = np.full(len(self.points), -1)
-        number[kept] = np.arange(len(kept))
+        number[numbers] = np.arange(len(numbers))
         faces = number[self.faces]
         by_pair = ("nodes", "points", "frames", "area", "gap", "free_deflection")
-        own = {name: getattr(self, name)[pairs] for name in by_pair}
-        return replace(self, faces=faces[(faces >= 0).all(axis=1)], **own)
+        arrays = {name: getattr(self, name)[pairs] for name in by_pair}
+        return replace(self, faces=faces[(faces >= 0).all(axis=1)], **arrays)
 
     def shares(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Cut every face into one quadrangle for each of its corners, to show what has one value for each pair.

@@ -55,8 +55,8 @@ def has_states(result: Result) -> bool:
 def state_of(result: Result, number: int) -> State:
     """The state of a wear row, or of a point of the response curve where nothing wears."""
     patch = result.patch
-    held = [] if result.fields is None else result.fields.row.tolist()
-    field = held.index(number) if number in held else None
+    rows = [] if result.fields is None else result.fields.row.tolist()
+    field = rows.index(number) if number in rows else None
     if result.wear is not None and len(result.wear.cycles):
         wear = result.wear
         last = number == len(wear.cycles) - 1 and wear.cycles_in_step[number] == 0
@@ -131,11 +131,14 @@ def instant_status(result: Result, at: int) -> np.ndarray:
     largest = max(float(np.abs(normal).max()), 1e-300)
     limit = slip_limits(result, normal)
     if np.isfinite(limit).any() and tangential:
-        near = limit - 1e3 * CLOSE * np.abs(limit) - CLOSE * largest
-        along, both = np.abs(force[:, tangential]).max(axis=1), np.linalg.norm(force[:, tangential], axis=1)
+        slip_force = limit - 1e3 * CLOSE * np.abs(limit) - CLOSE * largest
+        largest_component, resultant = (
+            np.abs(force[:, tangential]).max(axis=1),
+            np.linalg.norm(force[:, tangential], axis=1),
+        )
         # where the limit holds for each direction alone, both together may pass it: then they are no sign of slip
-        planar = ~(both > limit + 1e3 * CLOSE * largest).any(axis=1, keepdims=True)
-        status = np.where(np.where(planar, both, along) >= near, SLIPS, status)
+        planar = ~(resultant > limit + 1e3 * CLOSE * largest).any(axis=1, keepdims=True)
+        status = np.where(np.where(planar, resultant, largest_component) >= slip_force, SLIPS, status)
     return np.where(normal <= CLOSE * largest, SEPARATES, status)
 
 

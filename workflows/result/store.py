@@ -60,18 +60,18 @@ def replacing(path: Path) -> Iterator[Path]:
 
     The operating system renames at once or not at all.
     """
-    new = path.with_name(f"{path.name}.{os.getpid()}.new")
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.new")
     try:
-        yield new
-        os.replace(new, path)
+        yield temporary
+        os.replace(temporary, path)
     finally:
-        new.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def _arrays(of: Mapping[str, str]) -> Arrays:
     """Arrays of a group from dimensions -> "array array:unit", both as words."""
-    said = ((dimensions, word.partition(":")) for dimensions, words in of.items() for word in words.split())
-    return {name: (tuple(dimensions.split()), unit) for dimensions, (name, _, unit) in said}
+    entries = ((dimensions, word.partition(":")) for dimensions, words in of.items() for word in words.split())
+    return {name: (tuple(dimensions.split()), unit) for dimensions, (name, _, unit) in entries}
 
 
 # group -> (type, its arrays); what is not an array is an attribute of the group
@@ -118,8 +118,8 @@ def save(path: Path, result: Result) -> None:
         content = file.id.get_file_image()
     head = MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
     try:
-        with replacing(path) as new:
-            new.write_bytes(head.ljust(USER_BLOCK, b"\0") + content)
+        with replacing(path) as temporary:
+            temporary.write_bytes(head.ljust(USER_BLOCK, b"\0") + content)
     except OSError as error:
         raise ResultError(f'the result cannot be written to "{path}": {error.strerror or error}') from error
 
@@ -196,11 +196,11 @@ def _write_array(
         data.dims[axis].attach_scale(scales[dimension])
 
 
-Held = Result | str | os.PathLike[str]
+ResultSource = Result | str | os.PathLike[str]
 """A result, or where one is: its folder, or the file result.h5 itself."""
 
 
-def held(result: Held) -> Result:
+def held(result: ResultSource) -> Result:
     """A result that is given, or read from where it is; raises ResultError."""
     return result if isinstance(result, Result) else load(result)
 

@@ -61,7 +61,8 @@ def numbers(result: Result) -> dict[str, Any]:
         },
         "open_frequencies": facts.open_frequencies.tolist(),
         "stuck_frequencies": facts.stuck_frequencies.tolist(),
-        "verdict": {name: asdict(one) | {"stated": one.stated} for name, one in statements.items()} or None,
+        "verdict": {name: asdict(statement) | {"stated": statement.stated} for name, statement in statements.items()}
+        or None,
         "changes": [] if verdict is None else [asdict(change) for change in verdict.changes],
     }
 
@@ -85,8 +86,8 @@ def _curve(result: Result) -> dict[str, Any]:
         return table | dict.fromkeys(names) | {"fold_frequencies": []}
     output, worn = curve.output_names[0], result.wear is not None and len(result.wear.omega) > 0
     table["response_end"] = str(curve.end)
-    given = worn or curve.parameter_name != FREQUENCY
-    table["peak_at_end"] = None if given else curve.peak(output) is None
+    is_fixed = worn or curve.parameter_name != FREQUENCY
+    table["peak_at_end"] = None if is_fixed else curve.peak(output) is None
     table["jumped"] = curve.ended is BranchEnd.JUMPED
     table["fold_frequencies"] = [float(curve.frequency[i]) for i in curve.folds]
     if marks is None:
