@@ -8,7 +8,7 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, WearEnd
 from tribodyn.hbm.stability.branch_stability import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
-from tribodyn.workflows.result.facts import Facts, Stage
+from tribodyn.workflows.result.model_facts import ModelFacts, Stage
 from tribodyn.workflows.result.result import (
     Fields,
     Loops,
@@ -112,7 +112,9 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     return Result(
         provenance={"scene_name": "beam", "scene_text": file.text},
         scene=file.scene,
-        facts=Facts(seconds=12.5, delta_max=5e-3, unknowns=9 * n_pair, model_dofs=3 * n_pair + 17, harmonics=(0, 1)),
+        facts=ModelFacts(
+            seconds=12.5, delta_max=5e-3, unknowns=9 * n_pair, model_dofs=3 * n_pair + 17, harmonics=(0, 1)
+        ),
         stage=Stage.COMPLETE,
         patch=where,
         part=part,

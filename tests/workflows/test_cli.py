@@ -19,8 +19,8 @@ from tests.helpers.synthetic_result import result
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.workflows.command.main import BAD_INPUT, INTERRUPTED, READER_LEFT, guard
 from tribodyn.workflows.report import text
-from tribodyn.workflows.result import readable, store, summary
-from tribodyn.workflows.result.facts import Stage
+from tribodyn.workflows.result import number_format, store, summary
+from tribodyn.workflows.result.model_facts import Stage
 from tribodyn.workflows.studies.many.run_task import numbers_of
 
 ROOT = Path(__file__).parents[2]
@@ -163,19 +163,19 @@ def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     ],
 )
 def test_a_number_has_the_digits_that_its_error_allows(value: float, unit: str, error: float, shown: str) -> None:
-    assert readable.measured(value, unit, readable.digits(error)) == shown
-    last = 10.0 ** (np.floor(np.log10(abs(value) or 1)) + 1 - readable.digits(error))
+    assert number_format.measured(value, unit, number_format.digits(error)) == shown
+    last = 10.0 ** (np.floor(np.log10(abs(value) or 1)) + 1 - number_format.digits(error))
     assert last <= 10 * error * (abs(value) or 1)
 
 
 def test_a_sparkline_has_its_highest_block_at_the_resonance():
     x = np.linspace(2.0, 4.0, 400)
-    line = readable.sparkline(x, 1 / np.abs(3.3**2 - x**2 + 0.1j), 10)
+    line = number_format.sparkline(x, 1 / np.abs(3.3**2 - x**2 + 0.1j), 10)
     assert line.index("█") == 6
     assert (line.count("█"), len(line)) == (1, 10)
     assert "▁" in line
-    assert readable.sparkline(np.array([1.0]), np.array([0.0]), 10).strip() == "▁"
-    assert readable.sparkline(x[::-1], x[::-1], 4)[-1] == "█"
+    assert number_format.sparkline(np.array([1.0]), np.array([0.0]), 10).strip() == "▁"
+    assert number_format.sparkline(x[::-1], x[::-1], 4)[-1] == "█"
 
 
 def test_what_is_beyond_the_linear_model_is_warned_of() -> None:

@@ -13,8 +13,8 @@ from scipy.io import savemat
 import tribodyn as td
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.export import formats
-from tribodyn.workflows.export.curves import DataKind, Function, function
-from tribodyn.workflows.result.readable import write_columns
+from tribodyn.workflows.export.result_tables import DataKind, Function, function
+from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.studies.measured import measurement, reading
 from tribodyn.workflows.studies.measured.measurement import Run
 

@@ -17,11 +17,11 @@ from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.quantity import names_with_error
 from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.errors import accuracy, change_table, judgement, operating_states, refine
-from tribodyn.workflows.errors.accuracy import Bound
+from tribodyn.workflows.errors.accuracy import ErrorBound
 from tribodyn.workflows.errors.operating_states import relative_change, with_more_harmonics
 from tribodyn.workflows.errors.refinement_limits import DEFAULT
 from tribodyn.workflows.errors.time_comparison import (
-    TimeComparison,
+    MotionDifference,
     changes_along_wear,
     compare,
     is_checked,
@@ -219,7 +219,7 @@ def stated(result: td.Result, unstable: float) -> None:
 def test_what_time_integration_finds_decides_what_is_reported(
     changes: dict[str, object], status: Status | None
 ) -> None:
-    one = TimeComparison(0.0, np.ones(2), np.ones(2), {"energy": 0.001}, 0.0, 0.0)
+    one = MotionDifference(0.0, np.ones(2), np.ones(2), {"energy": 0.001}, 0.0, 0.0)
     assert replace(one, **changes).judge("energy", 0.01)[0] == status  # type: ignore[arg-type]
 
 
@@ -235,7 +235,7 @@ def test_a_life_is_off_by_the_mean_of_its_states(steepness: float) -> None:
     wear.depth = np.cumsum(worn, axis=0) - worn
     result = cast(td.Result, SimpleNamespace(wear=wear))
     share, here = np.array([0.6, 0.4]), (0, *operating_states.later_rows(result))
-    found = [TimeComparison(cycles[i], (1 + off[i]) * share, share, {}, 0.0, 0.0) for i in here]
+    found = [MotionDifference(cycles[i], (1 + off[i]) * share, share, {}, 0.0, 0.0) for i in here]
     life_in_time = np.sum(np.diff(done) * (1 + off) / rate)
     assert wear_differences(found, result) == (pytest.approx(1 - taken.sum() / life_in_time, rel=0.06), 0.0)
     scattered = [replace(one, error=0.02) for one in found]
@@ -299,14 +299,14 @@ def test_the_verdict_is_kept(small: td.Result, tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def reached(tmp_path_factory: pytest.TempPathFactory) -> tuple[td.Result, Bound, Path]:
+def reached(tmp_path_factory: pytest.TempPathFactory) -> tuple[td.Result, ErrorBound, Path]:
     """The beam without wear, to 20 % of its preload and peak frequency."""
     folder = tmp_path_factory.mktemp("accuracy")
     result, bound = td.run_to_accuracy("beam", "20 % of peak frequency, preload", folder, overrides=TINY)
     return result, bound, folder
 
 
-def test_a_bound_is_what_the_last_run_measured(reached: tuple[td.Result, Bound, Path]) -> None:
+def test_a_bound_is_what_the_last_run_measured(reached: tuple[td.Result, ErrorBound, Path]) -> None:
     result, bound, folder = reached
     assert bound.met, bound.sentence
     said = result.summary()["verdict"]
@@ -317,7 +317,7 @@ def test_a_bound_is_what_the_last_run_measured(reached: tuple[td.Result, Bound, 
     assert sorted(path.name for path in (folder / "rounds").iterdir()) == [str(n) for n in range(1, bound.rounds + 1)]
 
 
-def test_a_resumed_search_repeats_no_round(reached: tuple[td.Result, Bound, Path]) -> None:
+def test_a_resumed_search_repeats_no_round(reached: tuple[td.Result, ErrorBound, Path]) -> None:
     result, bound, folder = reached
     before = {path: path.stat().st_mtime_ns for path in folder.glob("rounds/*/result.h5")}
     again = td.run_to_accuracy("beam", "20 % of peak frequency, preload", folder, overrides=TINY, resume=True)
@@ -338,7 +338,7 @@ def made(changes: dict[str, dict[str, float | None]]) -> Verdict:
     return Verdict(said, tuple(table), 2.0, 0.0)
 
 
-def search(wanted: str, verdicts: list[Verdict]) -> tuple[Bound, list[tuple[str, ...]]]:
+def search(wanted: str, verdicts: list[Verdict]) -> tuple[ErrorBound, list[tuple[str, ...]]]:
     """A search whose runs have given verdicts; returns the overrides of every round, too."""
     asked: list[tuple[str, ...]] = []
 

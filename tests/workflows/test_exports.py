@@ -23,9 +23,9 @@ from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
 from tribodyn.reduction import foreign
 from tribodyn.reduction.nastran_matrix import read_op4
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.export import curves, formats, vtk
+from tribodyn.workflows.export import formats, result_tables, vtk
 from tribodyn.workflows.pictures import exploded
-from tribodyn.workflows.result import faces, states, store
+from tribodyn.workflows.result import contact_states, faces, store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
@@ -64,7 +64,7 @@ def test_pandas_reads_every_table_with_all_digits(tmp_path: Path) -> None:
     given = result()
     for path in formats.write(given, ["csv"], tmp_path):
         read = pd.read_csv(path)
-        wanted = curves.tables(given)[path.stem]
+        wanted = result_tables.tables(given)[path.stem]
         assert list(read.columns) == list(wanted)
         for name, column in wanted.items():
             np.testing.assert_array_equal(read[name].to_numpy(), column)
@@ -163,7 +163,7 @@ def test_the_contact_over_a_cycle_has_forces_and_status_of_its_instants(series: 
         np.einsum("pcx,px->pc", patch.frames, moved), loops.displacement[1, :, :, sample], atol=1e-15
     )
     status = vtk_to_numpy(fields.GetArray("status_now"))
-    np.testing.assert_array_equal(status, states.instant_status(given, 1)[:, sample])
+    np.testing.assert_array_equal(status, contact_states.instant_status(given, 1)[:, sample])
 
 
 def test_vtk_itself_reads_the_worn_part(series: Path) -> None:
@@ -329,7 +329,7 @@ def test_status_at_an_instant_is_that_of_the_force() -> None:
     force[0, 0] = [[0, 4, -5, 0], [0, 4, 0, 0], [10, 10, 10, 0]]  # mu = 0.5: sticks, sticks (5.7 in all), slips, open
     force[0, 1:, 2] = 10.0
     force[0, 2, 0] = 1.0
-    status = states.instant_status(
+    status = contact_states.instant_status(
         replace(given, loops=replace(loops, row=loops.row[:1], displacement=force, force=force)), 0
     )
     np.testing.assert_array_equal(status[0], [1, 1, 2, 4])
@@ -354,7 +354,7 @@ def test_every_named_contact_slips_at_its_own_friction() -> None:
         facts=replace(given.facts, joints=joints),
         loops=replace(given.loops, row=given.loops.row[:1], displacement=force, force=force),
     )
-    status = states.instant_status(several, 0)
+    status = contact_states.instant_status(several, 0)
     assert (status[:4] == 1).all()
     assert (status[4:6] == 2).all()
     assert (status[6:] == 1).all()

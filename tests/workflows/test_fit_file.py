@@ -17,7 +17,7 @@ from tests.helpers.fits import fit_by_differences, plain, predict
 from tests.helpers.pages import ROOT, fences
 from tests.helpers.structures import BLOCKS
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.result.readable import write_columns
+from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress

@@ -12,7 +12,7 @@ import pytest
 
 import tribodyn as td
 from tribodyn.hbm import quantity
-from tribodyn.workflows.export import curves
+from tribodyn.workflows.export import result_tables
 from tribodyn.workflows.report import charts, page, text
 from tribodyn.workflows.result.verdict import Refinement
 from tribodyn.workflows.studies.many.run_task import numbers_of
@@ -87,7 +87,7 @@ def test_its_error_is_measured(result: td.Result) -> None:
 def test_it_stands_in_report_and_exports(result: td.Result) -> None:
     assert "Velocity amplitude" in charts.charts([("beam", result)])
     assert "velocity amplitude / m/s, first" in page._headlines(result)
-    np.testing.assert_allclose(curves.wear(result)[f"{NAME}_m/s"][0], expected(result))
+    np.testing.assert_allclose(result_tables.wear(result)[f"{NAME}_m/s"][0], expected(result))
 
 
 def test_it_is_a_column_of_studies(result: td.Result) -> None:

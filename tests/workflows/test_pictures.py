@@ -31,7 +31,7 @@ from tribodyn.workflows.pictures import (
 )
 from tribodyn.workflows.pictures.film import CycleFilm, WearFilm
 from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, RED, STATUS
-from tribodyn.workflows.result.states import shown_states
+from tribodyn.workflows.result.contact_states import shown_states
 
 COARSE = 60  # dots per inch: what is drawn is the same, in a tenth of the time
 

@@ -18,7 +18,7 @@ from tests.helpers.killed_runs import SPENT, go_on
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.facts import Stage
+from tribodyn.workflows.result.model_facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import summary
 from tribodyn.workflows.run import checkpoint, full_fields, modelling, pipeline, references

@@ -17,7 +17,7 @@ import pytest
 from tests.helpers.synthetic_result import result
 from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.facts import Around, Stage
+from tribodyn.workflows.result.model_facts import Around, Stage
 
 WRITER = """
 import sys

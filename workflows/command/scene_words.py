@@ -14,7 +14,7 @@ from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.command.word import QUIET, Flag, Json, Overrides, make_room, word
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.readable import named_lines
+from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import console_progress

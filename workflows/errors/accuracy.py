@@ -35,7 +35,7 @@ class Rounds:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class AccuracyRequest:
     """error : relative; quantities : that are named, none for all that the scene has."""
 
     error: float
@@ -43,18 +43,19 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Bound:
+class ErrorBound:
     """What was asked for and what the last round measured.
 
     errors : by quantity, None where not known; reasons : by quantity, why the bound is not met, empty where it is
-    overrides : that the rounds have added; left : refinements that contribute and could not be made; rounds : runs made
+    overrides : that the rounds have added; unrefined : refinements that contribute and could not be made
+    rounds : runs made
     """
 
-    wanted: Wanted
+    wanted: AccuracyRequest
     errors: dict[str, float | None]
     reasons: dict[str, str]
     overrides: tuple[str, ...]
-    left: tuple[str, ...]
+    unrefined: tuple[str, ...]
     rounds: int
 
     @property
@@ -71,10 +72,10 @@ class Bound:
         text = f"error bound {self.wanted.error:g} {settings}, after {self.rounds} runs"
         text += f"; met: {', '.join(good)}" if good else ""
         text += f"; not met: {', '.join(bad)}" if bad else ""
-        return text + (f"; could not be refined: {', '.join(self.left)}" if self.left else "")
+        return text + (f"; could not be refined: {', '.join(self.unrefined)}" if self.unrefined else "")
 
 
-def parsed(text: str) -> Wanted:
+def parsed(text: str) -> AccuracyRequest:
     """A wanted accuracy such as "1 %" or "1 % of life and peak frequency".
 
     Raises  ValueError with one sentence
@@ -91,12 +92,12 @@ def parsed(text: str) -> Wanted:
     for name in labels_given:
         if name not in labels:
             raise Refusal(f'--accuracy "{text}": after "of" expected one of {", ".join(labels)}, got "{name}"')
-    return Wanted(error, tuple(labels[name] for name in dict.fromkeys(labels_given)))
+    return AccuracyRequest(error, tuple(labels[name] for name in dict.fromkeys(labels_given)))
 
 
 def to_accuracy(
     file: SceneFile, accuracy: str, run: Runner, say: Callable[[str], None], rounds: Rounds | None = None
-) -> tuple[Result, Bound]:
+) -> tuple[Result, ErrorBound]:
     """Run a scene with finer and finer settings until its verdict's errors are below the wanted one.
 
     accuracy : as `parsed` reads it; nothing is worn where quantities are named and depth and life are not among them
@@ -130,10 +131,11 @@ def to_accuracy(
 
 
 def _bound(
-    verdict: Verdict, request: Wanted, of: Sequence[str], added: dict[str, str], unrefined: tuple[str, ...], number: int
-) -> Bound:
+    verdict: Verdict, request: AccuracyRequest, quantities: Sequence[str], added: dict[str, str],
+    unrefined: tuple[str, ...], number: int,
+) -> ErrorBound:  # fmt: skip
     errors, reasons = dict[str, float | None](), dict[str, str]()
-    for name in of:
+    for name in quantities:
         statement = verdict.statements[name]
         errors[name], reasons[name] = (
             (statement.error, "") if statement.stated else (None, statement.reason or statement.status)
@@ -141,10 +143,10 @@ def _bound(
         error = errors[name]
         if error is not None and error > request.error:
             reasons[name] = f"its error is {error:.2g}"
-    return Bound(request, errors, reasons, tuple(f"{k}={v}" for k, v in added.items()), unrefined, number)
+    return ErrorBound(request, errors, reasons, tuple(f"{k}={v}" for k, v in added.items()), unrefined, number)
 
 
-def _large(verdict: Verdict, request: Wanted, of: Sequence[str], share: float) -> list[str]:
+def _large(verdict: Verdict, request: AccuracyRequest, of: Sequence[str], share: float) -> list[str]:
     """Refinements that change a quantity which is asked for much, the largest first."""
     rows = [row for row in verdict.changes if row.quantity in of and row.refinement != Refinement.COMBINED]
     sizes = [(float("inf") if row.relative is None else row.relative, row.refinement) for row in rows]

@@ -36,14 +36,14 @@ NOT_SOLVED = (Refusal, SolverFailure)
 class ChangeTable:
     """Rows as they are measured.
 
-    first : state of the scene before wear, None without one, as `why` says
+    first : state of the scene before wear, None without one, as `reason` says
     ratio : of the refined mesh, None where that was not solved; worn_ratio : of the mesh of the refined wear run
     last : the state of the combined refinement on that mesh
     """
 
     rows: list[MeasuredChange] = field(default_factory=list)
     first: OperatingState | None = None
-    why: str = ""
+    reason: str = ""
     ratio: float | None = None
     worn_ratio: float | None = None
     last: OperatingState | None = None
@@ -73,7 +73,7 @@ def measure_changes(
     try:
         first = table.first = operating_states.first_state(file, model.balance, result)
     except NOT_SOLVED as refusal:
-        table.why = str(refusal)
+        table.reason = str(refusal)
         return table
     finer, ratio, reason = finer_scene(file, first, result, limits)
     if finer is None:
@@ -131,7 +131,7 @@ def _refine_step_by_step(
     table.add(Refinement.MESH, values, state.values, text)
     last = _with_more_harmonics(state, table, say)
     if last is None:
-        table.refuse(Refinement.COMBINED, table.rows[-1].how)
+        table.refuse(Refinement.COMBINED, table.rows[-1].description)
         return
     table.ratio, table.last = ratio, last
     text += f", more modes, harmonics 0 to {first.refined_top()}"
@@ -141,10 +141,10 @@ def _refine_step_by_step(
 def _refine_without_mesh(
     file: SceneFile, first: OperatingState, reason: str, table: ChangeTable, say: Callable[[str], None]
 ) -> None:
-    """What can be refined where the mesh cannot, as `why` says: all that there is of a scene of matrices."""
+    """What can be refined where the mesh cannot, as `reason` says: all that there is of a scene of matrices."""
     last = _with_more_harmonics(_with_more_modes(file, first, table, say) or first, table, say)
     if last is None or not isinstance(file.scene, MatrixScene):
-        table.refuse(Refinement.COMBINED, reason if last else table.rows[-1].how)
+        table.refuse(Refinement.COMBINED, reason if last else table.rows[-1].description)
     else:
         text = f"more modes, harmonics 0 to {first.refined_top()}"
         table.add(Refinement.COMBINED, first.values, last.values, text)

@@ -17,7 +17,7 @@ from tribodyn.workflows.errors import time_comparison
 from tribodyn.workflows.errors.change_table import ChangeTable, measure_changes
 from tribodyn.workflows.errors.operating_states import OperatingState
 from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimits
-from tribodyn.workflows.errors.time_comparison import TimeComparison
+from tribodyn.workflows.errors.time_comparison import MotionDifference
 from tribodyn.workflows.result.answers import worn_contact
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import MeasuredChange, Refinement, Statement, Status, Verdict
@@ -52,7 +52,7 @@ def judge(
     return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock, table.worn_ratio)
 
 
-def _compare(state: OperatingState) -> TimeComparison | str | None:
+def _compare(state: OperatingState) -> MotionDifference | str | None:
     """The state before wear in time; why that is not stationary; None without an equation in time."""
     try:
         return time_comparison.compare(state)
@@ -71,7 +71,7 @@ def _value(quantity: StatedQuantity, table: ChangeTable, result: Result) -> floa
 
 
 def _statement(
-    quantity: StatedQuantity, value: float | None, table: ChangeTable, comparison: TimeComparison | str | None,
+    quantity: StatedQuantity, value: float | None, table: ChangeTable, comparison: MotionDifference | str | None,
     result: Result, limits: RefinementLimits,
 ) -> Statement:  # fmt: skip
     if value is None:
@@ -99,7 +99,7 @@ def _statement(
 
 
 def _judged_in_time(
-    comparison: TimeComparison | str, quantity: StatedQuantity, error: float | None
+    comparison: MotionDifference | str, quantity: StatedQuantity, error: float | None
 ) -> tuple[Status | None, str]:
     if isinstance(comparison, str):
         return Status.UNSETTLED, comparison
@@ -118,7 +118,7 @@ def total_error(
         return [row.relative or 0.0 for row in rows if row.refinement in refinements]
 
     needed = (Refinement.COMBINED, Refinement.OTHER_MOTION)
-    unknown = [row.how for row in rows if row.relative is None and row.refinement in needed]
+    unknown = [row.description for row in rows if row.relative is None and row.refinement in needed]
     if unknown or not sizes(Refinement.COMBINED):
         return None, (*unknown, "no refinement was measured")[0]
     least = max(sizes(Refinement.MOTION, Refinement.WEAR_STEPS), default=0.0)
@@ -140,7 +140,7 @@ def dominating(rows: Sequence[MeasuredChange]) -> str | None:
 
 def _why_absent(quantity: StatedQuantity, table: ChangeTable, result: Result) -> str:
     if isinstance(quantity, CycleQuantity):
-        return table.why or "no state was solved"
+        return table.reason or "no state was solved"
     if result.wear is None or not result.wear_steps:
         return "nothing was worn"
     if result.wear.ended.survived and quantity.error is ErrorKind.DURATION:

@@ -58,7 +58,7 @@ class Ladder:
         return self.worn_up_to > 0 and not setting.size > self.worn_up_to
 
 
-class LadderTable(Table):
+class LadderInput(Table):
     """A ladder as a study has it: sizes, and as many lists of overrides."""
 
     sizes: Annotated[tuple[Number, ...], Field(min_length=1)]
@@ -86,7 +86,7 @@ class Study(Table):
     """
 
     base: tuple[str, ...] = ()
-    ladders: dict[str, LadderTable] = Field(default_factory=dict)
+    ladders: dict[str, LadderInput] = Field(default_factory=dict)
     unworn: tuple[str, ...] = ()
 
 

@@ -29,7 +29,7 @@ NEGLIGIBLE = 1e-12  # share of a work that counts as none
 
 
 @dataclass(frozen=True)
-class TimeComparison:
+class MotionDifference:
     """A state of the balance compared with the motion in time.
 
     cycles : of the state; balance, in_time : (n_pair,) friction work of either motion per period [J]
@@ -88,7 +88,7 @@ def changes_along_wear(
     return changes
 
 
-def wear_differences(comparisons: Sequence[TimeComparison], result: Result) -> tuple[float, float]:
+def wear_differences(comparisons: Sequence[MotionDifference], result: Result) -> tuple[float, float]:
     """How far the work of motions in time changes durations and depths of a wear run, relative.
 
     A depth takes more / less cycles in the ratio of both works, so that a life is off by the mean over its cycles; a
@@ -118,7 +118,7 @@ def _share(work: np.ndarray, pair: int) -> float:
     return float(work[pair] / work.sum()) if work.sum() > 0 else 0.0
 
 
-def compare(state: OperatingState) -> TimeComparison:
+def compare(state: OperatingState) -> MotionDifference:
     """Follow a state in time until it is stationary, a wave in all sectors.
 
     Raises  Refusal where the model has no equation in time; SolverFailure where the motion is not stationary
@@ -143,4 +143,4 @@ def compare(state: OperatingState) -> TimeComparison:
             size = max(abs(in_time), least)
             differences[quantity.name] = abs(value - in_time) / size if size > 0 else float(value != 0)
     work = np.maximum(balance.energy(solved), 0.0), np.maximum(energy, 0.0)
-    return TimeComparison(state.cycles, *work, differences, means.error, means.spread)
+    return MotionDifference(state.cycles, *work, differences, means.error, means.spread)

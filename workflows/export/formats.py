@@ -14,7 +14,7 @@ from tribodyn.fem.system import dense
 from tribodyn.reduction import nastran_matrix
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.export import curves, vtk
+from tribodyn.workflows.export import result_tables, vtk
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
@@ -126,9 +126,9 @@ def write_abaqus(result: Result, folder: Path) -> list[Path]:
 
 FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
     "vtk": ("series for ParaView over wear and over a cycle (.pvd, .vtu, .vtp)", vtk.write_vtk),
-    "csv": ("every curve and history as a table", curves.write_csv),
-    "mat": ("the same tables as structs for MATLAB", curves.write_mat),
-    "uff": ("universal file, dataset 58, for tools of measured data", curves.write_uff),
+    "csv": ("every curve and history as a table", result_tables.write_csv),
+    "mat": ("the same tables as structs for MATLAB", result_tables.write_mat),
+    "uff": ("universal file, dataset 58, for tools of measured data", result_tables.write_uff),
     "mesh": (
         "worn part with its fields (.xdmf; another format with --mesh-ending)",
         lambda r, f: vtk.write_mesh(r, f / "part.xdmf"),

@@ -17,9 +17,9 @@ from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.view import cycle, grid_of, polygons, swing
+from tribodyn.workflows.result.contact_states import ContactState, instant_status, over_a_cycle, shown_states, state_of
 from tribodyn.workflows.result.faces import meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import State, instant_status, over_a_cycle, shown_states, state_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -84,7 +84,7 @@ def _has(result: Result, name: str) -> bool:
     return result.part is not None if name == "part" else len(result.patch.faces) > 0
 
 
-def _cycle(result: Result, state: State, folder: Path) -> list[Path]:
+def _cycle(result: Result, state: ContactState, folder: Path) -> list[Path]:
     """The series over one period of a state; time is the share of the period."""
     written, times = [], (np.arange(INSTANTS) / INSTANTS).tolist()
     if state.field is not None and result.part is not None:
@@ -158,7 +158,7 @@ def patch_fields(result: Result, row: int | None = None) -> pv.PolyData:
     return contact_surface(result, state_of(result, rows[-1] if row is None else row))
 
 
-def part_grid(result: Result, state: State) -> Any:
+def part_grid(result: Result, state: ContactState) -> Any:
     """The worn part as a pyvista grid of one state.
 
     Point data: worn_off (n_node, 3) [m]; depth_on_this_face [m]; face, of the contact, 1, 2 or 0; Fourier coefficients
@@ -187,7 +187,7 @@ def part_grid(result: Result, state: State) -> Any:
     return grid
 
 
-def contact_surface(result: Result, state: State) -> Any:
+def contact_surface(result: Result, state: ContactState) -> Any:
     """Body 1's face of the contact as a pyvista surface: fields at its pairs and their means on its faces.
 
     depth, gap with it [m]; area [m2]; pressure [Pa], mean over the cycle; energy_per_cycle [J]; normal; status, bits of

@@ -31,8 +31,8 @@ from tribodyn.workflows.pictures.theme import (
     STATUS,
     STYLE,
 )
+from tribodyn.workflows.result.contact_states import instant_status, over_a_cycle, shown_states
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import instant_status, over_a_cycle, shown_states
 
 AT_ONCE = (STICKS, SLIPS, SEPARATES)  # what a pair can do at an instant
 

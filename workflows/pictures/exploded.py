@@ -14,9 +14,9 @@ from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_u
 from tribodyn.workflows.pictures.opened import FieldPaint
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.theme import BODIES, LAYOUT, PRESSURE_MAP, STYLE, WEAR_MAP
+from tribodyn.workflows.result.contact_states import shown_states
 from tribodyn.workflows.result.faces import bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Result
-from tribodyn.workflows.result.states import shown_states
 
 
 @dataclass(frozen=True)

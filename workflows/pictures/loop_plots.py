@@ -16,8 +16,8 @@ from tribodyn.workflows.pictures.figures import (
     length_unit,
 )
 from tribodyn.workflows.pictures.theme import BLUE, STYLE
+from tribodyn.workflows.result.contact_states import state_of
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import state_of
 
 
 def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:

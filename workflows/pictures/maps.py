@@ -25,8 +25,8 @@ from tribodyn.workflows.pictures.figures import (
     titled,
 )
 from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
+from tribodyn.workflows.result.contact_states import shown_cycles, shown_states, state_of
 from tribodyn.workflows.result.result import Patch, Result
-from tribodyn.workflows.result.states import shown_cycles, shown_states, state_of
 
 Row = tuple[str, Sequence[tuple[str, np.ndarray]]]
 """A row of maps: colour map, and for each column the label of its scale and the values (n_pair,)."""

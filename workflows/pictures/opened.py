@@ -14,9 +14,9 @@ from tribodyn.extras import package
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
 from tribodyn.workflows.pictures.theme import BODY, BODY_2, EDGE, LAYOUT, STATUS
 from tribodyn.workflows.pictures.view import grid_of, polygons
+from tribodyn.workflows.result.contact_states import ContactState
 from tribodyn.workflows.result.faces import Face, Meeting, bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
-from tribodyn.workflows.result.states import State
 
 AXES = ("t1", "t2", "n")
 MARGIN = 0.35  # of the size of the patch, what is shown around it
@@ -49,7 +49,7 @@ class OpenedContact:
         across = "body 2" if len(self.contact.faces) > 1 else "ground"
         return f"{f'contact {self.contact.name}'.strip().replace('_', ' ')}: body 1 in front, {across} behind"
 
-    def restrict(self, state: State) -> State:
+    def restrict(self, state: ContactState) -> ContactState:
         """A state, of this contact's pairs."""
         return state.of(self.contact.pairs)
 

@@ -14,8 +14,8 @@ from tribodyn.workflows.pictures.figures import (
 from tribodyn.workflows.pictures.loop_plots import has_friction, hysteresis
 from tribodyn.workflows.pictures.response_plots import controlled, output_amplitudes, response
 from tribodyn.workflows.pictures.wear_plots import COURSES
+from tribodyn.workflows.result.contact_states import has_states
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import has_states
 
 
 def draw(result: Result, folder: Path, formats: Sequence[str] = ("png",), dpi: int | None = None) -> list[Path]:

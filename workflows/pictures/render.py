@@ -16,9 +16,9 @@ from tribodyn.workflows.pictures import exploded, maps, offscreen, opened as boo
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.theme import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.result.contact_states import ContactState, has_states, shown_states
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import State, has_states, shown_states
 from tribodyn.workflows.result.summary import LARGEST_BEND, size_of
 
 
@@ -123,7 +123,9 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
     return figure
 
 
-def _painted(contact: book.OpenedContact, state: State, name: str, wear: float) -> tuple[View, tuple[Any, ...] | None]:
+def _painted(
+    contact: book.OpenedContact, state: ContactState, name: str, wear: float
+) -> tuple[View, tuple[Any, ...] | None]:
     """The opened contact showing one quantity of a state, and the scale bar that goes with it."""
     if name == "status":
         none = np.zeros(len(state.depth), int)
@@ -197,19 +199,19 @@ class MovingPart:
         worn = f", depth × {self.wear:g}" if self.result.wear is not None else ""
         return f"drawn: static × {self.rest_scale:g}, vibration × {scale:g}{worn}"
 
-    def terms(self, state: State) -> np.ndarray:
+    def terms(self, state: ContactState) -> np.ndarray:
         assert self.result.fields is not None
         assert state.field is not None
         return np.asarray(self.result.fields.displacement[state.field])
 
-    def swing(self, state: State) -> np.ndarray:
+    def swing(self, state: ContactState) -> np.ndarray:
         return drawing.swing(self.terms(state), self.result.harmonics)
 
-    def amplitude(self, state: State) -> np.ndarray:
+    def amplitude(self, state: ContactState) -> np.ndarray:
         """(n_node,) largest distance from the mean position over the cycle [m]."""
         return np.asarray(np.linalg.norm(drawing.cycle(self.terms(state), self.result.harmonics), axis=1).max(axis=1))
 
-    def points(self, state: State, motion: np.ndarray) -> np.ndarray:
+    def points(self, state: ContactState, motion: np.ndarray) -> np.ndarray:
         """(n_node, 3) where wear, rest and a motion (n_node, 3) bring the nodes, as drawn [m]."""
         static = self.rest_scale * drawing.at_rest(self.terms(state), self.result.harmonics)
         return np.asarray(

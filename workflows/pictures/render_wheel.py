@@ -22,9 +22,9 @@ from tribodyn.workflows.pictures.figures import heading, length_unit, named, sca
 from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, with_room
 from tribodyn.workflows.pictures.theme import BLUE, INK, LAYOUT, MOTION_MAP, ORANGE, STYLE
-from tribodyn.workflows.result.facts import Around
+from tribodyn.workflows.result.contact_states import shown_states
+from tribodyn.workflows.result.model_facts import Around
 from tribodyn.workflows.result.result import PartMesh, Result
-from tribodyn.workflows.result.states import shown_states
 
 
 class BladeSurface:

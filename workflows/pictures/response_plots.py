@@ -19,8 +19,8 @@ from tribodyn.workflows.pictures.figures import (
 )
 from tribodyn.workflows.pictures.theme import BLUE, CYCLE, GREY, INK, ORANGE, RED, WEAR_MAP
 from tribodyn.workflows.pictures.wear_plots import cycle_unit, with_gaps
+from tribodyn.workflows.result.contact_states import shown_cycles
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import shown_cycles
 from tribodyn.workflows.result.summary import order_of_line
 
 BIFURCATIONS = {"fold": "o", "flip": "s", "Neimark-Sacker": "D"}  # markers

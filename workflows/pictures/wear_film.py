@@ -30,9 +30,9 @@ from tribodyn.workflows.pictures.theme import (
 )
 from tribodyn.workflows.pictures.view import wear_scale
 from tribodyn.workflows.pictures.wear_plots import cycle_axis
+from tribodyn.workflows.result.contact_states import ContactState, shown_cycles, state_of
 from tribodyn.workflows.result.faces import Meeting
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import State, shown_cycles, state_of
 
 ROOT = 1 / 3  # power of the scale of pressure: the first pressures are many times the last
 PANELS = ("depth", "status", "pressure")
@@ -97,11 +97,11 @@ class WearFilm:
             show(axes, image, self.contact.camera, book.AXES, corner)
             axes.set_title(" ")
 
-    def _shot(self, state: State, name: str) -> np.ndarray:
+    def _shot(self, state: ContactState, name: str) -> np.ndarray:
         view = self.contact.view(state.depth, self.scale, self._paint(state, name))
         return shoot(view, self.contact.camera, LAYOUT.film_contact)
 
-    def _paint(self, state: State, name: str) -> book.Paint:
+    def _paint(self, state: ContactState, name: str) -> book.Paint:
         if name == "status":
             return book.StatusPaint(np.zeros(len(state.depth), int) if state.status is None else state.status)
         if name == "depth":
@@ -124,7 +124,7 @@ def _most_worn(result: Result, rows: np.ndarray) -> Meeting:
     return max(book.contacts(result), key=lambda contact: float(volume[contact.pairs].sum()))
 
 
-def _pressure(state: State) -> np.ndarray:
+def _pressure(state: ContactState) -> np.ndarray:
     return np.zeros(len(state.depth)) if state.pressure is None else state.pressure
 
 

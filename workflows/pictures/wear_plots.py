@@ -21,8 +21,8 @@ from tribodyn.workflows.pictures.figures import (
     titled,
 )
 from tribodyn.workflows.pictures.theme import BLUE, GREEN, ORANGE, RED, STATUS
+from tribodyn.workflows.result.contact_states import shown_cycles
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import shown_cycles
 
 
 def wear(result: Result, quantity: str = "depth") -> Figure:

@@ -16,10 +16,10 @@ from tribodyn.workflows.pictures.theme import CYCLE, GREY, INK, STATUS
 from tribodyn.workflows.pictures.view import grid_of, looking, wear_scale
 from tribodyn.workflows.pictures.wear_plots import with_gaps
 from tribodyn.workflows.result.answers import histories_of
+from tribodyn.workflows.result.contact_states import ContactState, shown_states, state_of
 from tribodyn.workflows.result.faces import bodies, meetings_of, worn_off
-from tribodyn.workflows.result.readable import axis_unit
+from tribodyn.workflows.result.number_format import axis_unit
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import State, shown_states, state_of
 
 Chart = dict[str, Any]
 
@@ -200,7 +200,7 @@ def solid(result: Result) -> dict[str, Any] | None:
     return data
 
 
-def _states(result: Result) -> list[State]:
+def _states(result: Result) -> list[ContactState]:
     """Rows of the wear history, evenly chosen where there are many, or the peaks of a response that does not wear."""
     if result.wear is None or not len(result.wear.cycles):
         return shown_states(result)
@@ -208,7 +208,7 @@ def _states(result: Result) -> list[State]:
     return [state_of(result, int(row)) for row in np.unique(np.linspace(0, last, MOST_STATES).round().astype(int))]
 
 
-def _fields(result: Result, state: State) -> dict[str, list[Any]]:
+def _fields(result: Result, state: ContactState) -> dict[str, list[Any]]:
     fields: dict[str, list[Any]] = {}
     if result.wear is not None or state.pressure is None:
         fields["total wear depth / µm"] = plain(1e6 * state.depth, 5)

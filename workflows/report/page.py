@@ -180,7 +180,7 @@ def _headlines(result: Result) -> dict[str, Any]:
     answers = [answer for answer in answers_of(result) if answer.quantity.headline and not answer.joint]
     table: dict[str, Any] = {}
     for answer in answers:
-        unit, moment = answer.quantity.unit, answer.when
+        unit, moment = answer.quantity.unit, answer.moment
         if answer.value is not None:
             table[f"{answer.quantity.title}{unit and f' / {unit}'}{moment and f', {moment}'}"] = answer.value
     facts = result.facts
@@ -221,11 +221,11 @@ def _changes(result: Result) -> str:
             e["refinement"],
             e["quantity"],
             "not known" if e["relative"] is None else text.percent(e["relative"]),
-            e["how"],
+            e["description"],
         )
         for e in entries
     ]
-    return _table(rows, ("refinement", "quantity", "relative change", "how"))
+    return _table(rows, ("refinement", "quantity", "relative change", "description"))
 
 
 def _figures(result: Result) -> str:

@@ -16,8 +16,8 @@ from tribodyn.workflows.result.answers import (
     cycles_of,
     wears_at_peak,
 )
-from tribodyn.workflows.result.facts import Stage
-from tribodyn.workflows.result.readable import UNKNOWN, digits, measured, rounded
+from tribodyn.workflows.result.model_facts import Stage
+from tribodyn.workflows.result.number_format import UNKNOWN, digits, measured, rounded
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import LARGEST_BEND, order_of_line, size_of
 from tribodyn.workflows.result.verdict import Refinement, Statement, Status
@@ -84,7 +84,7 @@ def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
     suffix = {FIRST: ", before wear" if result.wear_steps else "", LAST: ", at the end of wear"}
     lines = []
     for moment, word in words.items():
-        cycle_answers = [answer for answer in answers if answer.when == moment and not answer.joint]
+        cycle_answers = [answer for answer in answers if answer.moment == moment and not answer.joint]
         if (
             not cycle_answers
             or (moment == LAST and not result.wear_steps)
@@ -125,7 +125,7 @@ def _wear_lines(answers: Sequence[Answer]) -> list[str]:
     """A line for each number of the wear, and for each of the first named contacts."""
     wear = [answer for answer in answers if isinstance(answer.quantity, WearQuantity)]
     lines = [
-        f"{answer.quantity.label:{WIDTH}}{_value(answer)}{f', {answer.why}' if answer.why else ''}"
+        f"{answer.quantity.label:{WIDTH}}{_value(answer)}{f', {answer.reason}' if answer.reason else ''}"
         for answer in sorted(wear, key=lambda answer: answer.quantity.rank)
         if not answer.joint
     ]
@@ -167,7 +167,7 @@ def warnings(result: Result) -> Iterator[str]:
     if table["jumped"]:
         yield 'the sweep jumped: behind the fold its peak may be higher; see response.method "arc_length"'
     if table["peak_is_stable"] is False and not result.wear_steps:
-        stable = any(answer.when == STABLE for answer in answers_of(result))
+        stable = any(answer.moment == STABLE for answer in answers_of(result))
         yield f"this peak is unstable, no vibration remains there{'' if stable else '; no point is stable'}"
     if result.wear is not None:
         yield from _wear_warnings(result)
@@ -211,7 +211,7 @@ def lines(result: Result) -> Lines:
         if value not in (None, [], {})
     ]
     for change in changes:
-        relative = change["how"] if change["relative"] is None else percent(change["relative"])
+        relative = change["description"] if change["relative"] is None else percent(change["relative"])
         rows.append((f"{change['refinement']}: {change['quantity']}", relative))
     return rows
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tribodyn.workflows.result.result import Result
 
 FIRST, LAST, PEAK, STABLE, RUN = "first", "last", "peak", "stable", ""
-"""When: before wear (at the peak of a response that does not wear), at the end of wear; at the peak of the response
+"""Moments: before wear (at the peak of a response that does not wear), at the end of wear; at the peak of the response
 where wear is taken at another frequency; at its highest stable point; of the whole run."""
 EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 
@@ -40,30 +40,30 @@ EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 class Answer:
     """One number of a result.
 
-    joint : named contact that it is of, empty for the whole; when : FIRST, LAST, PEAK, STABLE or RUN
+    joint : named contact that it is of, empty for the whole; moment : FIRST, LAST, PEAK, STABLE or RUN
     value : None where there is none; error : what the verdict says of it, None without
     derivative : key of the scene -> d value / d key, where these were computed
-    why : what a reader should know, such as where a life ends, or why this is no peak; empty for nothing
+    reason : what a reader should know, such as where a life ends, or why this is no peak; empty for nothing
     """
 
     quantity: StatedQuantity
     joint: str
-    when: str
+    moment: str
     value: float | None
     error: Statement | None = None
     derivative: Mapping[str, float] = field(default_factory=dict)
-    why: str = ""
+    reason: str = ""
 
     @property
     def column(self) -> str:
         """Its name in a table, such as "peak_frequency_first", "life", "depth of shroud"."""
-        name = f"{self.quantity.name}_{self.when}" if self.when else self.quantity.name
+        name = f"{self.quantity.name}_{self.moment}" if self.moment else self.quantity.name
         return f"{name} of {self.joint}" if self.joint else name
 
     @property
     def is_peak(self) -> bool:
         """Whether it is no number of a cycle at an end of the response, which is no peak."""
-        return not (isinstance(self.quantity, CycleQuantity) and self.why)
+        return not (isinstance(self.quantity, CycleQuantity) and self.reason)
 
 
 def answers_of(result: Result) -> tuple[Answer, ...]:
@@ -72,14 +72,15 @@ def answers_of(result: Result) -> tuple[Answer, ...]:
 
 
 def values_by_name(answers: Sequence[Answer]) -> dict[str, float | dict[str, float] | None]:
-    """Name -> value of a whole run, or {when: value} of its cycles; None where there is none."""
+    """Name -> value of a whole run, or {moment: value} of its cycles; None where there is none."""
     table: dict[str, float | dict[str, float] | None] = {}
     for answer in answers:
-        if answer.when and answer.value is not None:
-            moments = table.get(answer.quantity.name)
-            table[answer.quantity.name] = {**(moments if isinstance(moments, dict) else {}), answer.when: answer.value}
-        elif not answer.when or answer.quantity.name not in table:
-            table[answer.quantity.name] = answer.value
+        name, value = answer.quantity.name, answer.value
+        if answer.moment and value is not None:
+            moments = table.get(name)
+            table[name] = {**(moments if isinstance(moments, dict) else {}), answer.moment: value}
+        elif not answer.moment or name not in table:
+            table[name] = value
     return table
 
 
@@ -90,15 +91,15 @@ def cycles_of(result: Result) -> dict[str, tuple[SolvedCycle, str]]:
     if curve is not None:
         output = curve.output_names[0]
         best, basis = int(np.argmax(curve.height(output))), _basis(result)
-        why = curve.no_peak(output) if curve.parameter_name == FREQUENCY else ""
+        no_peak = curve.no_peak(output) if curve.parameter_name == FREQUENCY else ""
         peak = SolvedCycle.at_point(curve, best, basis)
     if wear is not None and len(wear.omega):
-        if curve is not None and not why and not wears_at_peak(result):
+        if curve is not None and not no_peak and not wears_at_peak(result):
             cycles[PEAK] = peak, ""
         rows = {FIRST: 0, LAST: len(wear.omega) - 1}
         cycles |= {moment: (_cycle_at(result, wear, row), "") for moment, row in rows.items()}
     elif curve is not None:
-        cycles[FIRST] = peak, why
+        cycles[FIRST] = peak, no_peak
     if curve is not None and result.stability is not None:
         height = np.where(curve.converged & result.stability.stable, curve.amplitude(output), -1.0)
         if height.max() >= 0:
@@ -150,7 +151,7 @@ def _of_cycles(result: Result) -> Iterator[Answer]:
         for moment, value in values.items():
             if value is not None:
                 statement = statements.get(quantity.name) if moment == FIRST else None
-                yield Answer(quantity, "", moment, value, statement, why=cycles[moment][1])
+                yield Answer(quantity, "", moment, value, statement, reason=cycles[moment][1])
         for joint in _joints(result) if quantity.by_joint else ():
             for moment in (FIRST, LAST):
                 if moment in cycles and cycles[moment][0].joints is not None:
@@ -164,7 +165,7 @@ def _of_wear(result: Result) -> Iterator[Answer]:
             contact = worn.of_joint(joint) if worn is not None and joint else worn
             value = None if contact is None else quantity.value(contact)
             remark = quantity.remark(contact) if contact is not None and quantity.remark and value is not None else ""
-            yield Answer(quantity, joint, RUN, value, None if joint else statements.get(quantity.name), why=remark)
+            yield Answer(quantity, joint, RUN, value, None if joint else statements.get(quantity.name), reason=remark)
 
 
 def _of_curve(result: Result) -> Iterator[Answer]:

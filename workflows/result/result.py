@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.stability.branch_stability import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
-from tribodyn.workflows.result.facts import Facts, Stage
+from tribodyn.workflows.result.model_facts import ModelFacts, Stage
 from tribodyn.workflows.result.summary import summary
 from tribodyn.workflows.result.verdict import Verdict
 from tribodyn.workflows.scene.schema import MeshScene, Scene
@@ -210,7 +210,7 @@ class Result:
 
     provenance: Mapping[str, str]
     scene: Scene
-    facts: Facts
+    facts: ModelFacts
     stage: Stage
     patch: Patch
     part: PartMesh | None = None

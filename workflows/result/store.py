@@ -25,7 +25,7 @@ from tribodyn.hbm.outcome import BranchEnd, End, Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.stability.branch_stability import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.result.facts import Facts, Stage
+from tribodyn.workflows.result.model_facts import ModelFacts, Stage
 from tribodyn.workflows.result.result import (
     Fields,
     Loops,
@@ -200,7 +200,7 @@ ResultSource = Result | str | os.PathLike[str]
 """A result, or where one is: its folder, or the file result.h5 itself."""
 
 
-def held(result: ResultSource) -> Result:
+def result_of(result: ResultSource) -> Result:
     """A result that is given, or read from where it is; raises ResultError."""
     return result if isinstance(result, Result) else load(result)
 
@@ -247,7 +247,7 @@ def load(path: str | os.PathLike[str]) -> Result:
             return Result(
                 provenance=provenance,
                 scene=scene_file.from_json(provenance.pop("scene")),
-                facts=Facts.of(facts | {"joints": joints}),
+                facts=ModelFacts.of(facts | {"joints": joints}),
                 stage=Stage[str(file.attrs["stage"])],
                 verdict=Verdict.of(json.loads(verdict)) if verdict else None,
                 **parts,

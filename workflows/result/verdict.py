@@ -41,7 +41,7 @@ class MeasuredChange:
 
     value, refined : of the quantity, in its unit, before and after the refinement; None where there is none
     relative : change over the refined value, or an estimate of it; None where it was not measured
-    how : what was refined, or why it was not measured
+    description : what was refined, or why it was not measured
     """
 
     refinement: str
@@ -49,7 +49,7 @@ class MeasuredChange:
     value: float | None
     refined: float | None
     relative: float | None
-    how: str
+    description: str
 
 
 @dataclass(frozen=True)

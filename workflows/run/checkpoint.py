@@ -15,7 +15,7 @@ from filelock import FileLock, Timeout
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.facts import Facts
+from tribodyn.workflows.result.model_facts import ModelFacts
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -30,7 +30,7 @@ class Clock:
     """Seconds of computing, those of an interrupted run included: on the wall, and of the processor."""
 
     def __init__(self, earlier: Result | None):
-        self._before = Facts() if earlier is None else earlier.facts
+        self._before = ModelFacts() if earlier is None else earlier.facts
         self._start, self._processor = time.perf_counter(), _processor()
 
     def seconds(self) -> float:

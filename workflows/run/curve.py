@@ -17,7 +17,7 @@ from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.workflows.result.readable import measured, sparkline
+from tribodyn.workflows.result.number_format import measured, sparkline
 from tribodyn.workflows.result.result import Result, ShearBounds, WornResponses
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.progress import Advance

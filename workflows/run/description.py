@@ -18,7 +18,7 @@ from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.threads import usable
 from tribodyn.reduction.model import Reduction
 from tribodyn.version import package_version
-from tribodyn.workflows.result.facts import Around, Facts, Stage
+from tribodyn.workflows.result.model_facts import Around, ModelFacts, Stage
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.content import digests
@@ -45,7 +45,7 @@ def described(
     wears = file.scene.wear is not None
     free = free_deflection(balance) if wears else np.full(i.n_pair, np.nan)
     patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free)
-    facts = Facts(
+    facts = ModelFacts(
         full_dofs=reduced.n_full,
         model_dofs=reduced.system.n_dof,
         contact_pairs=i.n_pair,

@@ -14,8 +14,8 @@ from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.stability.branch_stability import stability_along
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.facts import Stage
-from tribodyn.workflows.result.readable import measured
+from tribodyn.workflows.result.model_facts import Stage
+from tribodyn.workflows.result.number_format import measured
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, modelling, references, sanity_checks, settings, wear_run
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in

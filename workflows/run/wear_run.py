@@ -17,7 +17,7 @@ from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.hbm.wear.wear_rule import RuleSettings, WearRule
-from tribodyn.workflows.result.facts import Stage
+from tribodyn.workflows.result.model_facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import references, settings
 from tribodyn.workflows.run.checkpoint import Keeper

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 from tribodyn.workflows.pictures.figures import save
 from tribodyn.workflows.pictures.offscreen import RenderingUnavailable
-from tribodyn.workflows.result.readable import write_columns
+from tribodyn.workflows.result.number_format import write_columns
 
 
 def write_files(

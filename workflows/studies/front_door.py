@@ -9,11 +9,11 @@ from typing import Literal
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors import accuracy as errors
-from tribodyn.workflows.errors.accuracy import Bound
+from tribodyn.workflows.errors.accuracy import ErrorBound
 from tribodyn.workflows.errors.judgement import with_verdict
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.store import Held
+from tribodyn.workflows.result.store import ResultSource
 from tribodyn.workflows.run import checkpoint, modelling, pipeline, planning
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress, Report, reporter
@@ -33,7 +33,7 @@ def plan(source: Source, overrides: Overrides = ()) -> planning.Plan:
 
 
 def picture(source: Source, path: AnyPath, overrides: Overrides = ()) -> Path:
-    """Draw a scene before it is run: bodies, contacts in colour, what is held, loads as arrows; its path.
+    """Draw a scene before it is run: bodies, contacts in colour, what is result_of, loads as arrows; its path.
 
     Raises  SceneError: the scene has no mesh, or asks for what cannot be; RenderingUnavailable
     """
@@ -92,7 +92,7 @@ def run_to_accuracy(
     overrides: Overrides = (),
     progress: Report = None,
     resume: bool = False,
-) -> tuple[Result, Bound]:
+) -> tuple[Result, ErrorBound]:
     """Run a scene with finer and finer settings until its own verdict's errors are below the wanted one.
 
     accuracy : such as "1 %", "1 % of energy and peak frequency"
@@ -159,14 +159,14 @@ def animate(
     return film(result, folder, over, row, formats, images, dpi, *factors)
 
 
-def export(result: Held, to: Sequence[str], folder: AnyPath, mesh_ending: str = ".xdmf") -> list[Path]:
+def export(result: ResultSource, to: Sequence[str], folder: AnyPath, mesh_ending: str = ".xdmf") -> list[Path]:
     """Write a result in the formats of other programs, each into a folder of its name; the files written.
 
     to : of vtk, csv, mat, uff, mesh, npz, matlab, op4, abaqus; mesh_ending : format of the mesh
     """
     from tribodyn.workflows.export import formats
 
-    return list(formats.write(store.held(result), to, Path(folder), mesh_ending))
+    return list(formats.write(store.result_of(result), to, Path(folder), mesh_ending))
 
 
 def report(results: Sequence[AnyPath], path: AnyPath) -> Path:

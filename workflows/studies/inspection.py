@@ -20,7 +20,7 @@ from tribodyn.geometry.sources import foreign_file as sources
 from tribodyn.geometry.sources.deck import Deck
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import groups as group_pictures
-from tribodyn.workflows.result.readable import named_lines
+from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.run import deck_materials, decks, modelling, sanity_checks
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file

@@ -14,7 +14,7 @@ from tribodyn.geometry import height_map_files
 from tribodyn.geometry.asperities import Asperities, identify
 from tribodyn.geometry.height_map import HeightMap, mirrored
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.result.readable import named_lines
+from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
 from tribodyn.workflows.studies.study_result import StudyResult
 

@@ -25,7 +25,7 @@ from tribodyn.hbm.wear.history import WearRow
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
-from tribodyn.workflows.result.readable import named_lines
+from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.failure import SolveFailed

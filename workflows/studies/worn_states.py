@@ -19,7 +19,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.theme import BLUE, GREEN, ORANGE
 from tribodyn.workflows.result.provenance import rebuilt
-from tribodyn.workflows.result.store import Held, held
+from tribodyn.workflows.result.store import ResultSource, result_of
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
@@ -116,7 +116,7 @@ class WornStates(StudyResult):
 
 
 def verify(
-    result: Held,
+    result: ResultSource,
     at: Frequency | None = None,
     *,
     row: int | None = None,
@@ -135,7 +135,7 @@ def verify(
     Raises  ValueError: the result has no such row, no wear run or no solution to start from; SolveFailed: no balance
         solution
     """
-    result, report = held(result), reporter(progress)
+    result, report = result_of(result), reporter(progress)
     if states is not None and (at is not None or row is not None):
         raise Refusal("expected one of --states, and --at with --row")
     if states is not None and result.wear is None:

@@ -19,7 +19,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.maps import backbone_maps
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE
-from tribodyn.workflows.result.readable import named_lines
+from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter

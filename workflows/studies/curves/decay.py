@@ -21,7 +21,7 @@ from tribodyn.hbm.time.ring_down import RingDown
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
-from tribodyn.workflows.result.readable import named_lines
+from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter

@@ -19,7 +19,7 @@ from tribodyn.extras import package
 from tribodyn.hbm.time.ring_down import from_decay
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.export.curves import DataKind, Function
+from tribodyn.workflows.export.result_tables import DataKind, Function
 from tribodyn.workflows.scene.fields import parsed_direction, unknown_key
 from tribodyn.workflows.scene.units import parse_unit, to_si
 from tribodyn.workflows.studies.measured.measurement import OUTPUT, Kind, Measurement, Run

@@ -21,7 +21,7 @@ from tribodyn.workflows.pictures import film
 from tribodyn.workflows.pictures.figures import axes_of, length_unit
 from tribodyn.workflows.pictures.render_wheel import MistunedWheelFilm, WheelState
 from tribodyn.workflows.pictures.theme import WEAR_MAP
-from tribodyn.workflows.result.facts import Around
+from tribodyn.workflows.result.model_facts import Around
 from tribodyn.workflows.run import references, settings, wear_run
 from tribodyn.workflows.run.description import part_mesh
 from tribodyn.workflows.run.progress import Report, reporter

@@ -30,7 +30,7 @@ from tribodyn.reduction.sector_reduction import ReducedSector
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED
-from tribodyn.workflows.result.readable import write_columns
+from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.failure import SolveFailed

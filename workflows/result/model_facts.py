@@ -43,7 +43,7 @@ class Around:
 
 
 @dataclass(frozen=True)
-class Facts:
+class ModelFacts:
     """What was modelled and how long it took; None is what does not apply to a model.
 
     full_dofs, model_dofs : before and after the reduction; contact_pairs; unknowns : of a balance solve
@@ -104,7 +104,7 @@ class Facts:
         return {name: value for name, value in values.items() if value is not None}
 
     @classmethod
-    def of(cls, table: Mapping[str, Any]) -> Facts:
+    def of(cls, table: Mapping[str, Any]) -> ModelFacts:
         """The facts in a table as of `table`; what else is in it is ignored."""
         plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in table.items()}
         values = {item.name: plain[item.name] for item in fields(cls) if item.name in plain}

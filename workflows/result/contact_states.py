@@ -17,7 +17,7 @@ CLOSE = 1e-9  # of the largest force: what counts as none, and as being on the f
 
 
 @dataclass(frozen=True)
-class State:
+class ContactState:
     """One vibrating state of the contact.
 
     label : what a reader calls it; number : row of the wear history, or point of the response curve
@@ -35,14 +35,14 @@ class State:
     pressure: np.ndarray | None
     field: int | None
 
-    def of(self, pairs: slice) -> State:
+    def of(self, pairs: slice) -> ContactState:
         """The same state of some pairs alone."""
         status = None if self.status is None else self.status[pairs]
         pressure = None if self.pressure is None else self.pressure[pairs]
         return replace(self, depth=self.depth[pairs], status=status, pressure=pressure)
 
 
-def shown_states(result: Result) -> list[State]:
+def shown_states(result: Result) -> list[ContactState]:
     """The states that pictures show: of the wear history, else the peaks of the response curve."""
     return [state_of(result, int(number)) for number in result.shown_rows()]
 
@@ -52,7 +52,7 @@ def has_states(result: Result) -> bool:
     return (result.wear is not None and len(result.wear.cycles) > 0) or result.loops is not None
 
 
-def state_of(result: Result, number: int) -> State:
+def state_of(result: Result, number: int) -> ContactState:
     """The state of a wear row, or of a point of the response curve where nothing wears."""
     patch = result.patch
     rows = [] if result.fields is None else result.fields.row.tolist()
@@ -62,7 +62,7 @@ def state_of(result: Result, number: int) -> State:
         last = number == len(wear.cycles) - 1 and wear.cycles_in_step[number] == 0
         count = f"{counted(float(wear.cycles[number]))} cycles"
         label = "unworn" if number == 0 else f"end, {count}" if last else f"after {count}"
-        return State(
+        return ContactState(
             label,
             number,
             float(wear.omega[number]),
@@ -81,7 +81,7 @@ def state_of(result: Result, number: int) -> State:
         if "n" in patch.components:
             pressure = result.loops.force[at, :, patch.components.index("n")].mean(axis=-1) / patch.area
     none = np.zeros(len(patch.area))
-    return State(f"{omega / (2 * np.pi):.4g} Hz", number, omega, 0.0, none, status, pressure, field)
+    return ContactState(f"{omega / (2 * np.pi):.4g} Hz", number, omega, 0.0, none, status, pressure, field)
 
 
 def shown_cycles(wear: WearHistory) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from tribodyn.extras import package
 from tribodyn.hbm.quantity import StatedQuantity
 from tribodyn.workflows.result.answers import histories_of
-from tribodyn.workflows.result.readable import write_columns
+from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.result.result import Result
 
 Table = Mapping[str, np.ndarray]
