@@ -18,7 +18,7 @@ from functools import lru_cache
 import numba
 import numpy as np
 
-from tribodyn.hbm.contact import located as transitions
+from tribodyn.hbm.contact import jenkins_cycle
 from tribodyn.hbm.contact.asperity import Asperity, heights, pressure, tangential_ratio
 from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.contact.laws import jenkins
@@ -246,7 +246,7 @@ def _add_located(made, active, x, basis, force, slope, by_deepest, status):
     own = np.ascontiguousarray(made.sliders[pair, spring])
     elements = made.elements(pair, spring)
     moved, friction = np.ascontiguousarray(x[pair]), made.friction[pair]
-    each = transitions.cycle(moved, elements, own, basis, slope is not None, friction=friction)
+    each = jenkins_cycle.cycle(moved, elements, own, basis, slope is not None, friction=friction)
     force += _by_pair(each.force, pair, n_pair)
     np.bitwise_or.at(status, pair, each.status & ~SEPARATES)
     # the deepest spring is the last to let go: only where it opens the pair does

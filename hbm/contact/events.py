@@ -23,7 +23,7 @@ import numpy as np
 
 from tribodyn.hbm.contact.compiled_law import pointer
 from tribodyn.hbm.contact.contact_law import SEPARATES, ContactCycle, ContactParameters
-from tribodyn.hbm.contact.located import POINTS, WEIGHTS
+from tribodyn.hbm.contact.segment_integrals import POINTS, WEIGHTS
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import SolverFailure
 

@@ -6,7 +6,7 @@ from hypothesis import given, strategies as st
 
 from tests.helpers.contact_draws import CLOSED_FORMS, HARMONICS, draw, law_id, law_numbers
 from tests.helpers.random_problems import cases
-from tribodyn.hbm.contact import aft, contact_law, located
+from tribodyn.hbm.contact import aft, contact_law, jenkins_cycle, segment_integrals, trigonometric
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -271,9 +271,9 @@ def test_a_touch_of_a_thousandth_of_the_cycle_is_known_to_many_digits(stiffness:
 )
 def test_no_root_is_missed(coefficients, harmonics):
     c, hs = np.array(coefficients), np.array(harmonics)
-    grid = located._grid(harmonics)
+    grid = trigonometric.cell_grid(harmonics)
     out = np.empty(4 * hs[-1] + 16)
-    roots = out[: located._roots(c, hs, grid, np.empty(3 * grid.shape[1] // 4), out, 0)]
+    roots = out[: trigonometric.roots(c, hs, grid, np.empty(3 * grid.shape[1] // 4), out, 0)]
     assert len(roots) <= 2 * hs[-1]
     assert np.all(np.diff(roots) >= 0)
     basis = HarmonicBasis((0, *harmonics), 32)
@@ -290,8 +290,9 @@ def test_without_numba_the_kernels_give_the_same(monkeypatch):
     law = contact_law.load("jenkins")
     x, p, memory = draw("jenkins", ("t1", "n"), WITH_STATIC, 4, seed=24)
     compiled = aft.cycle(law, x, p, WITH_STATIC, memory)
-    for kernel in [n for n in vars(located) if hasattr(getattr(located, n), "py_func")]:
-        monkeypatch.setattr(located, kernel, getattr(located, kernel).py_func)
+    for module in (jenkins_cycle, segment_integrals, trigonometric):
+        for kernel in [name for name, value in vars(module).items() if hasattr(value, "py_func")]:
+            monkeypatch.setattr(module, kernel, getattr(module, kernel).py_func)
     plain = aft.cycle(law, x, p, WITH_STATIC, memory)
     np.testing.assert_allclose(plain.force, compiled.force, atol=1e-14)
     np.testing.assert_allclose(plain.jacobian, compiled.jacobian, atol=1e-13)

@@ -12,8 +12,9 @@ import numba
 import numpy as np
 
 from tribodyn.declarations import number
-from tribodyn.hbm.contact import located as transitions
+from tribodyn.hbm.contact import jenkins_cycle
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.contact.trigonometric import compiled
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
@@ -75,7 +76,7 @@ def located(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle with its transitions located between samples."""
-    return transitions.cycle(x, parameters, memory, basis, jacobian, friction=parameters.numbers["friction"])
+    return jenkins_cycle.cycle(x, parameters, memory, basis, jacobian, friction=parameters.numbers["friction"])
 
 
 def cycle(
@@ -106,7 +107,7 @@ def _cycle(x, p, memory, phi, product, single, force, jac, status):
         status[i] = element(k, p[i, 4], p[i, 3], memory[i], x[i], phi, product, single, force[i], own, kind, slider)
 
 
-@transitions.compiled
+@compiled
 def element(k, mu, gap, memory, x, phi, product, single, force, jac, kind, slider):
     """The cycle of one element; writes its force (n_component, n_samples), adds to its Jacobian, returns the bits.
 
@@ -133,7 +134,7 @@ def element(k, mu, gap, memory, x, phi, product, single, force, jac, kind, slide
     return bits
 
 
-@transitions.compiled
+@compiled
 def _add_normal(kn, n_open, N, product, t, jac):
     """d N / d v : k_n while closed."""
     n_time = N.size
@@ -156,7 +157,7 @@ def _add_normal(kn, n_open, N, product, t, jac):
                 jac[o + a, o + b] += kn * (product[j, a, b] - product[start, a, b])
 
 
-@transitions.compiled
+@compiled
 def _march(kt, mu, w, u, N, T, kind, slider):
     """One slider over its periodic cycle: force T, kind of every sample and slider position after it.
 
@@ -187,7 +188,7 @@ def _march(kt, mu, w, u, N, T, kind, slider):
     return origin, sense
 
 
-@transitions.compiled
+@compiled
 def _add_tangential(kt, slope, kind, origin, sense, c, t, phi, product, single, want, jac):
     """The status bits of one slider and, if wanted, d T / d u and d T / d v, one segment after the other.
 

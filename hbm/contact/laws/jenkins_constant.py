@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from tribodyn.declarations import number
-from tribodyn.hbm.contact import located as transitions
+from tribodyn.hbm.contact import jenkins_cycle
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -66,4 +66,4 @@ def located(
 ) -> ContactCycle:
     """The periodic cycle with its transitions located between samples."""
     friction, load = parameters.numbers["friction"], parameters.numbers["normal_load"]
-    return transitions.cycle(x, parameters, memory, basis, jacobian, friction=friction, normal_load=load)
+    return jenkins_cycle.cycle(x, parameters, memory, basis, jacobian, friction=friction, normal_load=load)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numba
 
-from tribodyn.hbm.contact import located as transitions
+from tribodyn.hbm.contact import jenkins_cycle
 from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 
 COMPONENTS = (("n",),)
 LINEAR_WHERE_STUCK = True
 
-located = transitions.cycle
+located = jenkins_cycle.cycle
 
 
 def n_state(components: tuple[str, ...]) -> int:
