@@ -142,13 +142,13 @@ class HarmonicBalance:
         return replace(self, contact=contact)
 
     def simpler(self) -> HarmonicBalance | None:
-        """The same problem with the laws that its own name for a first guess, `SIMPLER`; None where none does."""
-        laws = [getattr(joint.module, "SIMPLER", joint.law) for joint in self.contact.joints]
+        """The same problem with the laws that its own name for a first guess, `SIMPLER_LAW`; None where none does."""
+        laws = [getattr(joint.module, "SIMPLER_LAW", joint.law) for joint in self.contact.joints]
         if laws == [joint.law for joint in self.contact.joints]:
             return None
         joints = tuple(replace(j, law=law) for j, law in zip(self.contact.joints, laws, strict=True))
         simpler = self.with_contact(replace(self.contact, joints=joints))
-        return simpler.with_samples(self.basis.n_samples, simpler.contact.locates)
+        return simpler.with_samples(self.basis.n_samples, simpler.contact.is_event_based)
 
     def with_memory(self, memory: np.ndarray) -> HarmonicBalance:
         """The same problem from another start of the load path."""

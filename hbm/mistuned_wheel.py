@@ -99,7 +99,7 @@ class MistunedWheel:
         one = self.wave
         # to a balance it is what a ContactCompliance is; what needs matrices of a harmonic is refused by the model
         compliance = cast(ContactCompliance, MistunedCompliance(self.alike, one.basis, deviation))
-        joints = one.contact.repeated(self.n_sectors)
+        joints = one.contact.repeat(self.n_sectors)
         if change is not None:
             size = one.contact.n_pair
             joints = tuple(change(joint, joint.rows // size) for joint in joints)

@@ -52,8 +52,8 @@ def memory(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
     found = np.zeros((balance.contact.n_pair, balance.contact.n_state))
     for joint in balance.contact.joints:
         own = x[np.ix_(joint.rows, balance.contact.columns(joint))]
-        if hasattr(joint.module, "rested"):
-            found[joint.rows, : joint.n_state] = joint.module.rested(own, joint.parameters)
+        if hasattr(joint.module, "memory_at_rest"):
+            found[joint.rows, : joint.n_state] = joint.module.memory_at_rest(own, joint.parameters)
         elif joint.n_state == len(joint.parameters.tangential):  # the positions of its sliders
             found[joint.rows, : joint.n_state] = own[:, joint.parameters.tangential]
     return found
@@ -62,7 +62,7 @@ def memory(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
 def tangents(balance: HarmonicBalance, x: np.ndarray) -> dict[str, np.ndarray]:
     """Springs (n_pair, n_component) [N/m] at rest in x, of the joints whose springs follow from their own numbers."""
     contact, basis = balance.contact, balance.basis
-    own = [joint for joint in contact.joints if getattr(joint.module, "OWN_STIFFNESS", False)]
+    own = [joint for joint in contact.joints if getattr(joint.module, "STIFFNESS_FROM_NUMBERS", False)]
     if not own:
         return {}
     still = np.zeros((*x.shape, basis.n_coeff))

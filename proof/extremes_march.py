@@ -54,7 +54,7 @@ def march_checks(balance: HarmonicBalance, state: State) -> list[MarchCheck]:
 
 def _checks_at(balance: HarmonicBalance, state: State, fine: int) -> list[MarchCheck]:
     force, doubt, work, work_doubt = _marched(balance, state, fine)
-    p = balance.contact.only("this check").parameters
+    p = balance.contact.single("this check").parameters
     across = np.linalg.norm(state.x, axis=2)
     across[:, -1] += np.abs(p.gap)
     spring = p.stiffness * across  # [N] what adds up to a force, and rounds
@@ -179,7 +179,7 @@ class _Law:
 
     @classmethod
     def of(cls, balance: HarmonicBalance) -> _Law:
-        p = balance.contact.only("this check").parameters
+        p = balance.contact.single("this check").parameters
         return cls(p.stiffness[:, :-1], p.stiffness[:, -1], p.numbers["friction"], p.gap, balance.memory)
 
     def extended(self) -> _Law:

@@ -7,10 +7,10 @@ from types import ModuleType
 import numba
 import numpy as np
 
-from tribodyn.hbm.contact import contact_law, events
+from tribodyn.hbm.contact import contact_law, event_cycle
 from tribodyn.hbm.contact.compiled_law import pointer
 from tribodyn.hbm.contact.contact_law import ContactCycle, ContactParameters
-from tribodyn.hbm.contact.events import CycleNotPeriodic
+from tribodyn.hbm.contact.event_cycle import CycleNotPeriodic
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 
@@ -41,14 +41,14 @@ def cycle(
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
     if basis.transitions == "located":
-        if not contact_law.locates(law):
-            name = contact_law.called(law)
+        if not contact_law.is_event_based(law):
+            name = contact_law.name_of(law)
             raise Refusal(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
-        own = getattr(law, "located", None)
+        own = getattr(law, "event_based_cycle", None)
         arguments = x, parameters, memory, basis, jacobian
-        return events.cycle(law, *arguments) if own is None else own(*arguments)
-    if hasattr(law, "cycle"):
-        return law.cycle(x, parameters, memory, basis, jacobian)
+        return event_cycle.cycle(law, *arguments) if own is None else own(*arguments)
+    if hasattr(law, "sampled_cycle"):
+        return law.sampled_cycle(x, parameters, memory, basis, jacobian)
     return march(law, x, parameters, memory, basis, jacobian)
 
 
@@ -88,8 +88,6 @@ def history(
     """
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
-    if hasattr(law, "history"):
-        return law.history(x, parameters, memory, basis)
     every = 1 if basis.transitions == "sampled" else -(-PLOT_SAMPLES // basis.n_samples)
     fine = HarmonicBasis(basis.harmonics, every * basis.n_samples)
     samples = fine.to_time(x)

@@ -192,7 +192,7 @@ class Bed:
         return sticks, (self.peak + self.parameters.gap)[:, None] < self.touch
 
 
-def sliders(
+def slider_positions(
     x: np.ndarray, parameters: ContactParameters, friction: np.ndarray, memory: np.ndarray, basis: HarmonicBasis
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the sliders of all springs over the periodic cycle x (n_pair, n_component, n_coeff), and their load.

@@ -1,8 +1,7 @@
-"""Joints: where a structure touches, each with its own contact law and that law's own parameters.
+"""Joints: contacts of a structure, each with its contact law and the parameters of that law.
 
-A reduced model has one contact map. Its rows run pair by pair, component by component, and each joint covers some of
-the pairs. A joint whose law sees only some of the components of the interface has zero springs and no force in the
-others.
+A reduced model has one contact interface. Its rows run pair by pair, component by component, and each joint covers some
+of the pairs. A joint whose law sees only some of the components has zero springs and no force in the others.
 """
 
 from __future__ import annotations
@@ -71,9 +70,9 @@ class Joint:
 
 
 def joint_transitions(joints: Joint | Sequence[Joint]) -> str:
-    """How forces of these joints are taken best: "located" where all their laws can, else "sampled"."""
-    every = [joints] if isinstance(joints, Joint) else joints
-    return "located" if all(contact_law.locates(joint.module) for joint in every) else "sampled"
+    """The more accurate transitions for these joints: "located" where all laws are event-based, else "sampled"."""
+    sequence = [joints] if isinstance(joints, Joint) else joints
+    return "located" if all(contact_law.is_event_based(joint.module) for joint in sequence) else "sampled"
 
 
 @dataclass(frozen=True)
@@ -92,74 +91,77 @@ class JointSet:
     def of(cls, model: ReducedModel, joints: Joint | Sequence[Joint]) -> JointSet:
         """The joints of a model.
 
-        Raises  ValueError where they do not share out its pairs, there is no such law, it does not serve the
+        Raises  Refusal where a pair belongs to no joint or to two, there is no such law, it does not serve the
             components, or one of its numbers is missing, unknown or out of its limits
         """
-        given = (joints,) if isinstance(joints, Joint) else tuple(joints)
-        if not given:
+        sequence = (joints,) if isinstance(joints, Joint) else tuple(joints)
+        if not sequence:
             raise Refusal("a harmonic balance needs at least one joint")
         components, n_pair = tuple(model.interface.components), model.interface.n_pair
-        names = [joint.name for joint in given]
+        names = [joint.name for joint in sequence]
         if len(set(names)) < len(names):
             raise Refusal(f"the joints need different names, got {', '.join(names)}")
-        placed, owners = [], np.zeros(n_pair, int)
-        for joint in given:
-            whole = slice(None) if joint.pairs is None else joint.pairs
+        members, owners = [], np.zeros(n_pair, int)
+        for joint in sequence:
+            indices = slice(None) if joint.pairs is None else joint.pairs
             try:
-                pairs = np.arange(n_pair)[whole]
+                pairs = np.arange(n_pair)[indices]
             except IndexError:
                 raise Refusal(f"joint '{joint.name}' has pairs beyond the {n_pair} of the contact") from None
             if len(pairs) != joint.parameters.n_pair:
                 raise Refusal(
                     f"joint '{joint.name}' covers {len(pairs)} pairs and has parameters of {joint.parameters.n_pair}"
                 )
-            seen = joint.parameters.components
-            if [c for c in components if c in seen] != list(seen):
-                raise Refusal(f"joint '{joint.name}' has components {seen}, the contact has {components}")
+            modelled = joint.parameters.components
+            if [c for c in components if c in modelled] != list(modelled):
+                raise Refusal(f"joint '{joint.name}' has components {modelled}, the contact has {components}")
             np.add.at(owners, pairs, 1)
-            placed.append(replace(joint, pairs=pairs, parameters=contact_law.checked(joint.law, joint.parameters)))
+            members.append(replace(joint, pairs=pairs, parameters=contact_law.complete(joint.law, joint.parameters)))
         if np.any(owners != 1):
             pair = int(np.flatnonzero(owners != 1)[0])
             raise Refusal(f"pair {pair} of the contact belongs to {owners[pair]} joints: each needs exactly one")
-        return cls(components, n_pair, tuple(placed))
+        return cls(components, n_pair, tuple(members))
 
     @cached_property
-    def _alone(self) -> Joint | None:
-        """The one joint that covers all pairs in their order with all components, where it is so: nothing is copied."""
+    def _single(self) -> Joint | None:
+        """The joint that covers all pairs in their order with all components, if there is one: nothing is copied."""
         joint = self.joints[0]
-        whole = len(self.joints) == 1 and joint.parameters.components == self.components
-        return joint if whole and np.array_equal(joint.rows, np.arange(self.n_pair)) else None
+        is_single = len(self.joints) == 1 and joint.parameters.components == self.components
+        return joint if is_single and np.array_equal(joint.rows, np.arange(self.n_pair)) else None
 
-    def only(self, needed_by: str) -> Joint:
-        """The joint that is the whole contact; raises ValueError where there are several, or it sees a part of it."""
-        if self._alone is None:
-            raise Refusal(f"{needed_by} serves one joint that covers the whole contact: this one has several laws")
-        return self._alone
+    def single(self, user: str) -> Joint:
+        """The joint that is all of the contact; refuses several joints, or one that covers a part of it.
 
-    def merged(self, needed_by: str) -> Joint:
-        """One joint that covers all pairs in their order, where every joint has the same law and all components.
-
-        Raises  ValueError where they differ
+        user : what needs it, for the sentence
         """
-        if self._alone is not None:
-            return self._alone
+        if self._single is None:
+            raise Refusal(f"{user} serves one joint that covers the whole contact: this one has several laws")
+        return self._single
+
+    def merge(self, user: str) -> Joint:
+        """One joint that covers all pairs in their order; refuses joints of several laws, or of some components.
+
+        user : what needs it, for the sentence
+        """
+        if self._single is not None:
+            return self._single
         first = self.joints[0]
-        alike = all(
+        has_one_law = all(
             joint.law == first.law
             and joint.parameters.components == self.components
-            and joint.parameters.tail is None
+            and joint.parameters.tabulation is None
             and tuple(joint.parameters.numbers) == tuple(first.parameters.numbers)
             for joint in self.joints
         )
-        if not alike:
-            return self.only(needed_by)
+        if not has_one_law:
+            return self.single(user)
 
-        def gathered(name: str) -> np.ndarray:
-            return self.gathered(lambda joint: joint.parameters.numbers[name])
+        def values(name: str) -> np.ndarray:
+            return self._gather(lambda joint: joint.parameters.numbers[name])
 
-        numbers = {name: gathered(name) for name in first.parameters.numbers}
-        whole = replace(first.parameters, stiffness=self.stiffness, gap=self.gap, numbers=numbers)
-        return replace(first, name=needed_by, parameters=whole, pairs=np.arange(self.n_pair))
+        numbers = {name: values(name) for name in first.parameters.numbers}
+        parameters = replace(first.parameters, stiffness=self.stiffness, gap=self.gap, numbers=numbers)
+        return replace(first, name=user, parameters=parameters, pairs=np.arange(self.n_pair))
 
     def columns(self, joint: Joint) -> np.ndarray:
         """Positions of a joint's components among those of the interface."""
@@ -167,9 +169,9 @@ class JointSet:
 
     @cached_property
     def stiffness(self) -> np.ndarray:
-        """(n_pair, n_component) contact springs [N/m], zero in components that a joint does not see."""
-        if self._alone is not None:
-            return self._alone.parameters.stiffness
+        """(n_pair, n_component) contact springs [N/m], zero in components that a joint does not model."""
+        if self._single is not None:
+            return self._single.parameters.stiffness
         k = np.zeros((self.n_pair, len(self.components)))
         for joint in self.joints:
             k[np.ix_(joint.rows, self.columns(joint))] = joint.parameters.stiffness
@@ -178,8 +180,8 @@ class JointSet:
     @cached_property
     def gap(self) -> np.ndarray:
         """(n_pair,) opening of the unloaded pairs [m]."""
-        alone = self._alone
-        return self.gathered(lambda joint: joint.parameters.gap) if alone is None else alone.parameters.gap
+        single = self._single
+        return self._gather(lambda joint: joint.parameters.gap) if single is None else single.parameters.gap
 
     def number(self, role: Role) -> np.ndarray:
         """(n_pair,) the laws' numbers with a role, zero in joints whose law has none."""
@@ -188,9 +190,9 @@ class JointSet:
             name = joint.name_of(role)
             return np.zeros(len(joint.rows)) if name is None else joint.parameters.numbers[name]
 
-        return self.gathered(value)
+        return self._gather(value)
 
-    def gathered(self, value: Callable[[Joint], np.ndarray]) -> np.ndarray:
+    def _gather(self, value: Callable[[Joint], np.ndarray]) -> np.ndarray:
         """(n_pair,) a value of every pair, joint by joint."""
         out = np.zeros(self.n_pair)
         for joint in self.joints:
@@ -203,12 +205,12 @@ class JointSet:
         return any(joint.has_friction for joint in self.joints)
 
     @cached_property
-    def sees(self) -> np.ndarray:
-        """(n_pair, n_component) whether the law of a pair sees a component."""
-        seen = np.zeros((self.n_pair, len(self.components)), bool)
+    def has_component(self) -> np.ndarray:
+        """(n_pair, n_component) whether the law of a pair models a component."""
+        result = np.zeros((self.n_pair, len(self.components)), bool)
         for joint in self.joints:
-            seen[np.ix_(joint.rows, self.columns(joint))] = True
-        return seen
+            result[np.ix_(joint.rows, self.columns(joint))] = True
+        return result
 
     @property
     def tangential(self) -> list[int]:
@@ -221,31 +223,31 @@ class JointSet:
         return max(joint.n_state for joint in self.joints)
 
     @property
-    def locates(self) -> bool:
+    def is_event_based(self) -> bool:
         """Whether every law locates its transitions between samples."""
         return joint_transitions(self.joints) == "located"
 
     def joint(self, name: str) -> Joint:
-        """The joint of this name; raises ValueError with the names that there are."""
+        """The joint of a name; refuses an unknown name with a list of those that there are."""
         for joint in self.joints:
             if joint.name == name:
                 return joint
         raise Refusal(f"no joint '{name}': there are {', '.join(joint.name for joint in self.joints)}")
 
     def by_joint(self, of_pairs: np.ndarray) -> dict[str, np.ndarray]:
-        """Values (n_pair, ...) of all pairs, joint by joint; for status, energy, forces, wear."""
+        """Values (n_pair, ...) of all pairs, joint by joint."""
         return {joint.name: of_pairs[joint.rows] for joint in self.joints}
 
     def with_gap(self, gap: np.ndarray) -> JointSet:
-        """The same with another gap (n_pair,) [m]."""
+        """The joints with another gap (n_pair,) [m]."""
         return self._with(lambda joint: replace(joint.parameters, gap=gap[joint.rows]))
 
     def with_parameters(self, change: Callable[[ContactParameters], ContactParameters]) -> JointSet:
-        """The same with the parameters of every joint changed."""
+        """The joints with changed parameters."""
         return self._with(lambda joint: change(joint.parameters))
 
     def with_friction_scaled(self, factor: float) -> JointSet:
-        """The same with the limit of friction of every pair multiplied by a factor."""
+        """The joints whose limits of friction are multiplied by a factor."""
         return replace(self, joints=tuple(joint.with_friction_scaled(factor) for joint in self.joints))
 
     def _with(self, parameters: Callable[[Joint], ContactParameters]) -> JointSet:
@@ -255,23 +257,23 @@ class JointSet:
         """Periodic contact cycle of all pairs, each by the law of its joint.
 
         x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start of the load path
-        Raises  ValueError where the basis asks for located transitions and a law does not locate them
+        Raises  Refusal where the basis has located transitions and a law does not locate them
         """
-        one = self._alone
-        if one is not None:
-            return aft.cycle(one.module, x, one.parameters, basis, memory, jacobian)
+        single = self._single
+        if single is not None:
+            return aft.cycle(single.module, x, single.parameters, basis, memory, jacobian)
         n_pair, n_comp, n_coeff = x.shape
         width = n_comp * n_coeff
         force, status = np.zeros_like(x), np.zeros(n_pair, np.int64)
         slope = np.zeros((n_pair, width, width)) if jacobian else None
         for joint in self.joints:
-            rows, seen = joint.rows, self.columns(joint)
-            own = np.ascontiguousarray(x[np.ix_(rows, seen)])
+            rows, columns = joint.rows, self.columns(joint)
+            joint_x = np.ascontiguousarray(x[np.ix_(rows, columns)])
             start = np.ascontiguousarray(memory[rows, : joint.n_state])
-            part = aft.cycle(joint.module, own, joint.parameters, basis, start, jacobian)
-            force[np.ix_(rows, seen)], status[rows] = part.force, part.status
+            part = aft.cycle(joint.module, joint_x, joint.parameters, basis, start, jacobian)
+            force[np.ix_(rows, columns)], status[rows] = part.force, part.status
             if slope is not None:
-                at = (seen[:, None] * n_coeff + np.arange(n_coeff)).ravel()
+                at = (columns[:, None] * n_coeff + np.arange(n_coeff)).ravel()
                 slope[np.ix_(rows, at, at)] = part.jacobian
         return ContactCycle(force, slope, status)
 
@@ -280,9 +282,9 @@ class JointSet:
 
         Arguments as for `cycle`; see `hbm.contact.aft.history`
         """
-        one = self._alone
-        if one is not None:
-            return aft.history(one.module, x, one.parameters, basis, memory)
+        single = self._single
+        if single is not None:
+            return aft.history(single.module, x, single.parameters, basis, memory)
         force = np.zeros((*x.shape[:2], basis.n_samples))
         for joint in self.joints:
             force[np.ix_(joint.rows, self.columns(joint))] = self.history_of(joint, x, basis, memory)[1]
@@ -291,29 +293,29 @@ class JointSet:
     def history_of(
         self, joint: Joint, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The same of the pairs of one joint, over the components that its law sees."""
-        own = np.ascontiguousarray(x[np.ix_(joint.rows, self.columns(joint))])
+        """Periodic displacement and force of the pairs of one joint, over the components of its law."""
+        joint_x = np.ascontiguousarray(x[np.ix_(joint.rows, self.columns(joint))])
         start = np.ascontiguousarray(memory[joint.rows, : joint.n_state])
-        return aft.history(joint.module, own, joint.parameters, basis, start)
+        return aft.history(joint.module, joint_x, joint.parameters, basis, start)
 
-    def repeated(self, copies: int) -> tuple[Joint, ...]:
-        """The joints of so many copies of the contact, one after the other, as all sectors of a wheel have them."""
+    def repeat(self, copies: int) -> tuple[Joint, ...]:
+        """The joints of several copies of the contact in a row, such as all sectors of a wheel have."""
         starts = self.n_pair * np.arange(copies)[:, None]
         joints = []
         for joint in self.joints:
-            again = np.tile(np.arange(len(joint.rows)), copies)
-            parameters = joint.parameters.taken(again)
+            parameters = joint.parameters.subset(np.tile(np.arange(len(joint.rows)), copies))
             joints.append(replace(joint, parameters=parameters, pairs=(starts + joint.rows).ravel()))
         return tuple(joints)
 
-    def taken(self, pairs: np.ndarray) -> JointSet:
-        """The contact of some of the pairs, in the order given."""
+    def subset(self, pairs: np.ndarray) -> JointSet:
+        """The joints of some of the pairs, in this order."""
         order = np.full(self.n_pair, -1)
         order[pairs] = np.arange(len(pairs))
         joints = []
         for joint in self.joints:
-            kept = np.flatnonzero(order[joint.rows] >= 0)
-            kept = kept[np.argsort(order[joint.rows][kept])]
-            if len(kept):
-                joints.append(replace(joint, parameters=joint.parameters.taken(kept), pairs=order[joint.rows][kept]))
+            chosen = np.flatnonzero(order[joint.rows] >= 0)
+            chosen = chosen[np.argsort(order[joint.rows][chosen])]
+            if len(chosen):
+                places = order[joint.rows][chosen]
+                joints.append(replace(joint, parameters=joint.parameters.subset(chosen), pairs=places))
         return JointSet(self.components, len(pairs), tuple(joints))

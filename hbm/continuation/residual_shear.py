@@ -118,7 +118,7 @@ def stuck(balance: HarmonicBalance, state: State) -> np.ndarray:
     linear = balance.contact.stiffness[:, t, None] * state.x[:, t, 1:]
     error = np.abs(state.cycle.force[:, t, 1:] - linear).max(axis=2)
     held = error <= SPRING_DEVIATION * np.abs(balance.contact.stiffness[:, t, None] * state.x[:, t]).max()
-    return held & balance.contact.sees[:, t]
+    return held & balance.contact.has_component[:, t]
 
 
 @single

@@ -25,7 +25,7 @@ def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[com
     None for a law without a memory, on which nothing depends, or with much of it
     Raises  ValueError for several laws
     """
-    joint = balance.contact.merged("stability")
+    joint = balance.contact.merge("stability")
     parameters, memory = joint.parameters, balance.memory
     if not 0 < memory.shape[1] <= MOST_MEMORY:
         return None

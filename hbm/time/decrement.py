@@ -71,7 +71,7 @@ class _Marched:
 
     def __init__(self, problem: FreeVibration):
         balance = problem.balance
-        joint = balance.contact.merged("the decrement of a free decay")
+        joint = balance.contact.merge("the decrement of a free decay")
         components = joint.parameters.components
         normal = components.index("n") if "n" in components else -1
         self._contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, np.zeros((1, 1)))

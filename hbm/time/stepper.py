@@ -124,7 +124,7 @@ class TimeStepper:
         compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
         symmetric = system.gyroscopic is None and system.circulatory is None
         A = np.ascontiguousarray(0.5 * (compliance + compliance.T) if symmetric else compliance.T)
-        joint = balance.contact.merged("time integration")
+        joint = balance.contact.merge("time integration")
         packed, gap, components = joint.parameters.packed(), joint.parameters.gap, joint.parameters.components
         normal = components.index("n") if "n" in components else -1
         self.law = compiled_law.pointer(joint.module.step)
@@ -136,7 +136,7 @@ class TimeStepper:
         """The same for a balance that differs in its gaps alone."""
         other = copy(self)
         other.balance = balance
-        parameters = balance.contact.merged("time integration").parameters
+        parameters = balance.contact.merge("time integration").parameters
         other.contact = self.contact._replace(p=parameters.packed(), gap=parameters.gap)
         return other
 

@@ -19,7 +19,7 @@ def unroll(balance: HarmonicBalance, highest: float) -> HarmonicBalance:
     load = waves.on_wheel(balance.excitation, wave.engine_order, wave.n_sectors, n)
     whole = HarmonicBalance.of(
         unrolled(wave, highest),
-        balance.contact.repeated(n),
+        balance.contact.repeat(n),
         balance.basis,
         load,
         balance.omega_max,

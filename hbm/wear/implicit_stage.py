@@ -225,7 +225,7 @@ class WearingBalance:
         made = []
         for share, balance, part in zip(self.shares, self.balances, parts, strict=True):
             x = part[pairs]
-            contact = balance.contact.taken(pairs).with_gap(balance.contact.gap[pairs] + depth[pairs])
+            contact = balance.contact.subset(pairs).with_gap(balance.contact.gap[pairs] + depth[pairs])
             cycle = contact.cycle(x, balance.basis, balance.memory[pairs])
             t = contact.tangential
             assert cycle.jacobian is not None

@@ -117,10 +117,10 @@ class Exposure:
     def _sliders(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions (n_pair, n_slider, n_tangential, n_samples) [m], loads (n_pair, n_slider, n_samples) [N]."""
         joint, balance = self.joint, self.balance
-        if hasattr(joint.module, "sliders"):
+        if hasattr(joint.module, "slider_positions"):
             own = self.state.x[np.ix_(joint.rows, balance.contact.columns(joint))]
             memory = balance.memory[joint.rows, : joint.n_state]
-            slider, normal = joint.module.sliders(own, joint.parameters, memory, balance.basis)
+            slider, normal = joint.module.slider_positions(own, joint.parameters, memory, balance.basis)
             return slider, normal
         x, f = self.history
         t = self.components.index("n")

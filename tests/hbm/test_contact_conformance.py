@@ -39,9 +39,8 @@ EVERY_LAW = pytest.mark.parametrize(("name", "components"), LAWS, ids=law_id)
 FRICTION = pytest.mark.parametrize(
     ("name", "components"), [(name, c) for name, c in LAWS if contact_law.load(name).n_state(c) > 0], ids=law_id
 )
-EVERY_FAST_LAW = pytest.mark.parametrize(
-    ("name", "components"), [(name, c) for name, c in LAWS if hasattr(contact_law.load(name), "cycle")], ids=law_id
-)
+FAST = [(name, components) for name, components in LAWS if hasattr(contact_law.load(name), "sampled_cycle")]
+EVERY_FAST_LAW = pytest.mark.parametrize(("name", "components"), FAST, ids=law_id)
 
 
 def transitions_of(name, components):
@@ -64,7 +63,7 @@ def test_the_laws_of_the_tests_are_among_them():
     law = str(TEST_LAWS / "slip_force.py")
     assert (law, ("t1", "t2")) in EVENT_BASED
     assert [(number.name, number.role) for number in contact_law.declared(law)] == [("strength", "slip_force")]
-    assert not {"cycle", "located"} & set(vars(contact_law.load(law)))
+    assert not {"sampled_cycle", "event_based_cycle"} & set(vars(contact_law.load(law)))
 
 
 @EVERY_LAW
@@ -129,12 +128,12 @@ def test_fast_cycle_equals_the_marched_one_to_rounding(name, components):
         for n_samples in (15, 128):
             basis = HarmonicBasis(harmonics, n_samples)
             x, parameters, memory = draw(name, components, basis, 100, seed=5)
-            fast = law.cycle(x, parameters, memory, basis)
+            fast = law.sampled_cycle(x, parameters, memory, basis)
             slow = aft.march(law, x, parameters, memory, basis)
             np.testing.assert_allclose(fast.force, slow.force, atol=1e-13)
             np.testing.assert_allclose(fast.jacobian, slow.jacobian, atol=1e-13)
             np.testing.assert_array_equal(fast.status, slow.status)
-            assert law.cycle(x, parameters, memory, basis, jacobian=False).jacobian is None
+            assert law.sampled_cycle(x, parameters, memory, basis, jacobian=False).jacobian is None
 
 
 @FRICTION
@@ -372,5 +371,5 @@ def test_names_and_components():
     with pytest.raises(ValueError, match="no contact law 'glue': there are"):
         contact_law.load("glue")
     with pytest.raises(ValueError, match="'unilateral' has components \\(n\\), not"):
-        contact_law.checked("unilateral", ContactParameters.of(("t1", "n"), [[1.0, 1.0]]))
+        contact_law.complete("unilateral", ContactParameters.of(("t1", "n"), [[1.0, 1.0]]))
     assert contact_law.load("unilateral").n_state(("n",)) == 0

@@ -18,13 +18,13 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 
 def one_asperity(**numbers: float) -> ContactParameters:
     inputs = {"friction": MU, "young": YOUNG, "poisson": POISSON, "radius": RADIUS, "deepest": 2e-6, **numbers}
-    return contact_law.checked("rough", ContactParameters.of(ALL, np.ones((1, 3)), table=[[0.0, 1.0]], **inputs))
+    return contact_law.complete("rough", ContactParameters.of(ALL, np.ones((1, 3)), table=[[0.0, 1.0]], **inputs))
 
 
 def face(n_pair: int = 1, components: tuple[str, ...] = ALL, friction: float = 0.03) -> ContactParameters:
     springs = np.ones((n_pair, len(components)))
     built = ContactParameters.of(components, springs, table=FACE, friction=friction, area=2e-6, **STEEL)
-    return contact_law.checked("rough", built)
+    return contact_law.complete("rough", built)
 
 
 def pressed(parameters: ContactParameters, deepest: float) -> tuple[np.ndarray, np.ndarray]:
@@ -65,7 +65,7 @@ def test_a_loop_loses_what_mindlin_and_deresiewicz_found():
     parameters, basis = one_asperity(), HarmonicBasis((0, 1), 128, "located")
     x = np.zeros((1, 3, 3))
     x[0, 2, 0], x[0, 0, 1] = d, amplitude
-    memory = rough.rested(np.array([[0.0, 0.0, d]]), parameters)
+    memory = rough.memory_at_rest(np.array([[0.0, 0.0, d]]), parameters)
     cycle = aft.cycle(rough, x, parameters, basis, memory)
     assert float(basis.work_per_cycle(cycle.force[0, 0], x[0, 0])) == pytest.approx(lost, rel=5e-3)
     assert cycle.status[0] == STICKS | SLIPS
@@ -125,7 +125,7 @@ def test_the_cycle_is_the_one_that_marching_reaches(components):
     x = moving(n_pair, len(components), basis, 1)
     values = np.zeros((n_pair, len(components)))
     values[:, -1] = 8e-6
-    memory = rough.rested(values, parameters)
+    memory = rough.memory_at_rest(values, parameters)
     fast = aft.cycle(rough, x, parameters, basis, memory)
     slow = aft.march(rough, x, parameters, memory, basis)
     np.testing.assert_allclose(fast.force, slow.force, atol=1e-12 * np.abs(fast.force).max())
@@ -140,7 +140,7 @@ def test_the_located_jacobian_equals_differences(deepest):
     basis, n_pair = HarmonicBasis((0, 1, 2), 48, "located"), 8
     parameters = face(n_pair)
     x = moving(n_pair, 3, basis, 2)
-    memory = rough.rested(np.tile([0.0, 0.0, deepest], (n_pair, 1)), parameters)
+    memory = rough.memory_at_rest(np.tile([0.0, 0.0, deepest], (n_pair, 1)), parameters)
     jac = aft.cycle(rough, x, parameters, basis, memory).jacobian
     size = np.abs(jac).max(axis=(1, 2))
     for column in range(15):
@@ -154,7 +154,7 @@ def test_the_located_jacobian_equals_differences(deepest):
 def test_the_memory_and_its_slopes_are_those_of_a_step():
     parameters = face()
     p = parameters.packed()[0]
-    state = rough.rested(np.array([[1e-8, -2e-8, 9e-6]]), parameters)[0]
+    state = rough.memory_at_rest(np.array([[1e-8, -2e-8, 9e-6]]), parameters)[0]
     for x in ([3e-8, 2e-8, 8.9e-6], [1e-6, -1e-8, 9.1e-6]):
 
         def advance(z):
@@ -178,7 +178,7 @@ def test_a_pair_beyond_its_gap_is_open_and_the_contact_at_rest_has_no_shear():
     parameters, basis = face(2), HarmonicBasis((0, 1), 32)
     x = np.zeros((2, 3, 3))
     x[:, :2, 0], x[0, 2, 0], x[1, 2, 0] = 3e-7, -1e-6, 9e-6
-    memory = rough.rested(x[:, :, 0], parameters)
+    memory = rough.memory_at_rest(x[:, :, 0], parameters)
     cycle = aft.cycle(rough, x, parameters, basis, memory)
     assert cycle.status[0] == SEPARATES
     assert not cycle.force[0].any()
@@ -187,7 +187,7 @@ def test_a_pair_beyond_its_gap_is_open_and_the_contact_at_rest_has_no_shear():
 
 def test_the_springs_at_a_pressure_carry_it():
     built = ContactParameters.of(ALL, np.ones((1, 3)), table=FACE, friction=0.03, area=2e-6, pressure=5e6, **STEEL)
-    parameters = contact_law.checked("rough", built)
+    parameters = contact_law.complete("rough", built)
     kt, _, kn = rough.springs(parameters)[0]
     deepest = np.linspace(5e-6, 2e-5, 4000)
     p = parameters.packed().repeat(len(deepest), axis=0)
@@ -200,13 +200,13 @@ def test_the_springs_at_a_pressure_carry_it():
 def test_a_law_without_its_table_or_with_a_wrong_one_is_one_sentence():
     built = ContactParameters.of(ALL, np.ones((1, 3)), friction=0.03, **STEEL)
     with pytest.raises(ValueError, match="needs its table of asperities: columns gap in m and"):
-        contact_law.checked("rough", built)
+        contact_law.complete("rough", built)
     for table, words in (([[0.0, 1.0, 2.0]], "two columns"), ([[1e-6, 1.0], [0.0, 1.0]], "must rise")):
         wrong = ContactParameters.of(ALL, np.ones((1, 3)), table=np.array(table), friction=0.03, **STEEL)
         with pytest.raises(ValueError, match=words):
-            contact_law.checked("rough", wrong)
+            contact_law.complete("rough", wrong)
     with pytest.raises(ValueError, match="takes no table"):
-        contact_law.checked("jenkins", ContactParameters.of(ALL, np.ones((1, 3)), table=FACE, friction=0.1))
+        contact_law.complete("jenkins", ContactParameters.of(ALL, np.ones((1, 3)), table=FACE, friction=0.1))
 
 
 @pytest.mark.slow
@@ -218,8 +218,8 @@ def test_an_evaluation_costs_so_many_of_jenkins(swing: float, capsys: pytest.Cap
     x = np.zeros((n, 3, basis.n_coeff))
     x[:, 2, 0] = rng.uniform(5e-6, 9e-6, n)
     springs = ContactParameters.of(ALL, np.full((n, 3), 1e7), friction=MU)
-    laws = [("rough", face(n)), ("jenkins", contact_law.checked("jenkins", springs))]
-    memory = [rough.rested(x[:, :, 0], laws[0][1]), np.zeros((n, 2))]
+    laws = [("rough", face(n)), ("jenkins", contact_law.complete("jenkins", springs))]
+    memory = [rough.memory_at_rest(x[:, :, 0], laws[0][1]), np.zeros((n, 2))]
     x[:, :, 1:3] += swing * rng.normal(size=(n, 3, 2)) * np.array([1.0, 0.3, 0.3])[:, None]
     cost = []
     for (name, parameters), start in zip(laws, memory, strict=True):

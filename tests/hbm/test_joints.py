@@ -36,7 +36,7 @@ ALL = ("t1", "t2", "n")
 def split(balance: HarmonicBalance, parts: list[np.ndarray]) -> HarmonicBalance:
     """The same balance with its one joint cut into several."""
     whole = balance.contact.joints[0]
-    joints = [Joint(f"part {i}", whole.law, whole.parameters.taken(p), p) for i, p in enumerate(parts)]
+    joints = [Joint(f"part {i}", whole.law, whole.parameters.subset(p), p) for i, p in enumerate(parts)]
     return HarmonicBalance.of(balance.model, joints, balance.basis, balance.excitation, balance.omega_max)
 
 
@@ -184,7 +184,7 @@ def test_joints_share_out_the_pairs() -> None:
         HarmonicBalance.of(balance.model, joints, balance.basis, balance.excitation, balance.omega_max)
 
     def part(name: str, *pairs: int) -> Joint:
-        return Joint(name, "jenkins", whole.parameters.taken(np.array(pairs)), np.array(pairs))
+        return Joint(name, "jenkins", whole.parameters.subset(np.array(pairs)), np.array(pairs))
 
     with pytest.raises(ValueError, match="pair 3 of the contact belongs to 0 joints"):
         made(part("a", 0, 1, 2))

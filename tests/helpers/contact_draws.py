@@ -23,8 +23,8 @@ LAWS = [
     if not hasattr(contact_law.load(name), "TABLE")
     for components in contact_law.load(name).COMPONENTS
 ]
-EVENT_BASED = [(name, components) for name, components in LAWS if contact_law.locates(contact_law.load(name))]
-CLOSED_FORMS = [(name, components) for name, components in LAWS if hasattr(contact_law.load(name), "located")]
+EVENT_BASED = [(name, components) for name, components in LAWS if contact_law.is_event_based(contact_law.load(name))]
+CLOSED_FORMS = [(name, components) for name, components in LAWS if hasattr(contact_law.load(name), "event_based_cycle")]
 HARMONICS = [(0, 1), (0, 1, 2, 3), (1, 3), (0, 1, 5)]
 
 

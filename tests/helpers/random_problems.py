@@ -19,7 +19,7 @@ from tests.helpers.contact_draws import EVENT_BASED, LAWS, law_numbers
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import contact_law
+from tribodyn.hbm.contact import aft, contact_law
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.excitation import Excitation
@@ -195,7 +195,8 @@ def contact_forces(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
     if hasattr(law, "chord"):
         step, start = law.chord, np.concatenate([start, start, joint.parameters.gap[:, None]], axis=1)
     if basis.transitions == "located":
-        return law.located(x, joint.parameters, balance.memory, basis, False).force.reshape(n_pair * n_comp, -1)
+        force = aft.cycle(law, x, joint.parameters, basis, balance.memory, jacobian=False).force
+        return force.reshape(n_pair * n_comp, -1)
     angle = 2 * np.pi * np.arange(basis.n_samples) / basis.n_samples
     columns = [np.ones_like(angle)] if 0 in basis.harmonics else []
     for h in basis.harmonics:

@@ -218,11 +218,11 @@ def test_a_law_of_ones_own_locates_its_transitions_unless_it_says_otherwise(scen
     parameters = ContactParameters.of(("t1", "t2", "n"), np.ones((1, 3)), friction=0.3)
     assert joint_transitions(Joint("contact", text, parameters)) == "located"
     by_samples = scene.parent / "my_samples.py"
-    by_samples.write_text(Path(text).read_text() + "\nBY_SAMPLES = True\n")
+    by_samples.write_text(Path(text).read_text() + "\nSAMPLES_ONLY = True\n")
     joint = Joint("contact", str(by_samples), parameters)
     assert joint_transitions(joint) == "sampled"
     with pytest.raises(ValueError, match="'my_samples' does not locate its transitions: take transitions = 'sampled'"):
-        aft.cycle(joint.module, np.ones((1, 3, 3)), contact_law.checked(joint.law, parameters), basis)
+        aft.cycle(joint.module, np.ones((1, 3, 3)), contact_law.complete(joint.law, parameters), basis)
 
 
 @pytest.mark.parametrize("name", [n for n in contact_law.names() if not hasattr(contact_law.load(n), "TABLE")])
@@ -236,7 +236,7 @@ def test_every_number_of_a_contact_law_changes_its_force(name: str) -> None:
     def force(**changed: float) -> np.ndarray:
         numbers = {number.name: 0.3 for number in declared} | changed
         parameters = ContactParameters.of(components, np.ones((8, len(components))), **numbers)
-        return aft.cycle(law, x, contact_law.checked(name, parameters), basis).force
+        return aft.cycle(law, x, contact_law.complete(name, parameters), basis).force
 
     for number in declared:
         assert number.unit is not None

@@ -137,7 +137,7 @@ def _of_harmonics(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
     sampling = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
     tops = [top for top in TOPS if top >= max(needed, default=1)]
     yield "harmonics", [Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *sampling)) for top in tops]
-    if all(hasattr(contact_law.load(contact.law_name), "located") for contact in scene.joints.values()):
+    if all(hasattr(contact_law.load(contact.law_name), "event_based_cycle") for contact in scene.joints.values()):
         top = max(scene.harmonics.kept, default=1)
         sampled = [
             Setting(n, (f"harmonics.samples={n}", 'harmonics.transitions="sampled"')) for n in SAMPLES if n > 2 * top

@@ -23,7 +23,7 @@ def sampling_error(balance: HarmonicBalance, omega: float, x: np.ndarray) -> flo
     relative to the vibration there, inf where Newton finds none, from rest neither.
     """
     n_samples = max(FINER * balance.basis.n_samples, FEWEST_SAMPLES)
-    fine = balance.with_samples(n_samples, balance.contact.locates)
+    fine = balance.with_samples(n_samples, balance.contact.is_event_based)
     state, start = balance.evaluate(omega, x, jacobian=False), fine.evaluate(omega, x, jacobian=False)
     residual = newton.relative_residual(start, fine.x_lin(omega))
     options = NewtonOptions()

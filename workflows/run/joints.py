@@ -28,10 +28,10 @@ def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
     for name, pairs in joint_pairs(scene, reduced).items():
         contact = scene.joints[name]
         module = contact_law.load(contact.law_name)
-        if getattr(module, "OWN_STIFFNESS", False):
+        if getattr(module, "STIFFNESS_FROM_NUMBERS", False):
             seen = [interface.components.index(c) for c in contact.components]
             own = parameters_of(contact, interface, pairs, np.ones((len(interface.area[pairs]), len(seen))))
-            k[pairs, seen] = module.springs(contact_law.checked(contact.law_name, own))
+            k[pairs, seen] = module.springs(contact_law.complete(contact.law_name, own))
             continue
         tangential, normal = joint_stiffness(scene, contact)
         total = {"t1": tangential, "t2": tangential, "n": normal}

@@ -31,7 +31,7 @@ def check_names(scene: Scene, own_files: bool = True) -> None:
     """
     for contact in scene.joints.values():
         if own_files or not is_file(contact.law):
-            contact_law.check_components(contact.law_name, contact.components)
+            contact_law.require_components(contact.law_name, contact.components)
     if own_files or not is_file(scene.response.method):
         response_options(scene)
     if scene.wear is not None and (own_files or not is_file(scene.wear.law)):

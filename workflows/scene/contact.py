@@ -138,7 +138,7 @@ class ContactTable(LawTable):
         """Whether the stiffness follows from something else than its two numbers."""
         if is_file(self.law) and self._own is None:  # of a result: it was checked when the scene was read
             return self.tangential_stiffness is None and self.normal_stiffness is None
-        return bool(declarations.constant(self.law_file, "OWN_STIFFNESS"))
+        return bool(declarations.constant(self.law_file, "STIFFNESS_FROM_NUMBERS"))
 
 
 class FaceContact(ContactTable, stage=PART):

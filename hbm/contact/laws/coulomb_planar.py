@@ -32,9 +32,9 @@ from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCy
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("t1", "t2", "n"),)
-BY_SAMPLES = True
+SAMPLES_ONLY = True
 LINEAR_WHERE_STUCK = True
-SIMPLER = "jenkins"
+SIMPLER_LAW = "jenkins"
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _slip(creep, limit, w, p, f, dfx, dfs, dsx, dss):
             dss[c, b] = (1.0 if b == c else 0.0) - dsx[c, b]
 
 
-def cycle(
+def sampled_cycle(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle at the samples of the basis, the slider followed exactly along the chords between them.
@@ -143,7 +143,7 @@ def cycle(
     jac = spring[..., None] * np.eye(spring.shape[1]) if jacobian else None
     touching = np.concatenate([memory, memory, parameters.gap[:, None]], axis=1)  # without shear, wherever x(0) is
     law = cast(ModuleType, SimpleNamespace(step=chord))
-    found = march(law, x[moving], parameters.taken(moving), touching[moving], basis, jacobian)
+    found = march(law, x[moving], parameters.subset(moving), touching[moving], basis, jacobian)
     force[moving], status[moving] = found.force, found.status
     if jac is not None:
         jac[moving] = found.jacobian

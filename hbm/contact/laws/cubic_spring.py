@@ -14,7 +14,7 @@ from tribodyn.declarations import number
 from tribodyn.hbm.contact.contact_law import STICKS
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "t2"), ("t1", "n"), ("t2", "n"), ("t1",), ("t2",), ("n",))
-BY_SAMPLES = True
+SAMPLES_ONLY = True
 
 
 @dataclass(frozen=True)

@@ -72,14 +72,14 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
     return bits
 
 
-def located(
+def event_based_cycle(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle with its transitions located between samples."""
     return jenkins_cycle.cycle(x, parameters, memory, basis, jacobian, friction=parameters.numbers["friction"])
 
 
-def cycle(
+def sampled_cycle(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle at the samples of the basis, with the Jacobian in closed form between transitions.

@@ -61,7 +61,7 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
     return bits
 
 
-def located(
+def event_based_cycle(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle with its transitions located between samples."""

@@ -34,7 +34,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
-OWN_STIFFNESS = True  # its springs follow from its own numbers
+STIFFNESS_FROM_NUMBERS = True  # its springs follow from its own numbers
 TABLE = ("gap in m", "asperities per m2 and per m of gap, or per m2 where there is one row")
 
 FRICTION, POISSON = 4, 7  # places in a packed row
@@ -64,7 +64,7 @@ class Parameters:
     """Deepest approach that is tabulated; the largest gap of the table by default."""
 
 
-def tabulated(parameters: ContactParameters) -> np.ndarray:
+def tabulate(parameters: ContactParameters) -> np.ndarray:
     """(n_pair, ...) what every packed row ends with: deepest tabulated approach [m], then the table of its bed."""
     if parameters.table is None:
         raise Refusal("contact law 'rough' needs its table of asperities: columns " + " and ".join(TABLE))
@@ -99,11 +99,11 @@ def springs(parameters: ContactParameters) -> np.ndarray:
     return np.stack([stiff if c == "n" else ratio * stiff for c in parameters.components], axis=1)
 
 
-def sliders(
+def slider_positions(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of the sliders of all springs over a cycle and their load, see `bed_cycle.sliders`."""
-    return bed_cycle.sliders(x, parameters, parameters.numbers["friction"], memory, basis)
+    """Positions of the sliders of all springs over a cycle and their load, see `bed_cycle.slider_positions`."""
+    return bed_cycle.slider_positions(x, parameters, parameters.numbers["friction"], memory, basis)
 
 
 def n_state(components: tuple[str, ...]) -> int:
@@ -111,7 +111,7 @@ def n_state(components: tuple[str, ...]) -> int:
     return 1 + SPRINGS * (len(components) - 1)
 
 
-def rested(x: np.ndarray, parameters: ContactParameters) -> np.ndarray:
+def memory_at_rest(x: np.ndarray, parameters: ContactParameters) -> np.ndarray:
     """Memory (n_pair, n_state) of a contact without shear at the displacement x (n_pair, n_component) [m]."""
     deepest = np.maximum(x[:, -1] - parameters.gap, 0.0)
     return np.concatenate([deepest[:, None], np.repeat(x[:, :-1], SPRINGS, axis=1)], axis=1)
@@ -176,14 +176,14 @@ def step(x, s, p, f, dfx, dfs, dsx, dss):
     return bits if f[n] > 0.0 else SEPARATES
 
 
-def cycle(
+def sampled_cycle(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle at the samples of the basis; see `_cycle`."""
     return bed_cycle.cycle(x, parameters, parameters.numbers["friction"], memory, basis, jacobian, located=False)
 
 
-def located(
+def event_based_cycle(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle with the transitions of every spring and the deepest approach located between samples."""

@@ -14,7 +14,7 @@ from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 COMPONENTS = (("n",),)
 LINEAR_WHERE_STUCK = True
 
-located = jenkins_cycle.cycle
+event_based_cycle = jenkins_cycle.cycle
 
 
 def n_state(components: tuple[str, ...]) -> int:

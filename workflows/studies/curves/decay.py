@@ -211,7 +211,7 @@ def _reached(mode: Backbone) -> Backbone:
 
 def _marked(balance: HarmonicBalance, mode: Backbone) -> HarmonicBalance | None:
     """The balance of faces that have swung as in the last point of a mode, None where that leaves no mark."""
-    if balance.at_rest is None or not all(hasattr(joint.module, "rested") for joint in balance.contact.joints):
+    if balance.at_rest is None or not all(hasattr(joint.module, "memory_at_rest") for joint in balance.contact.joints):
         return None
     x = mode.contact[-1].reshape(*balance.at_rest.shape, -1)
     deepest = balance.at_rest.copy()

@@ -98,7 +98,7 @@ class Wheel:
         model = model.with_damping(partial(modelling.damping_matrix, self.scene, springs))
         load = on_wheel(wave_balance.excitation, wheel.engine_order, self.n_sectors)
         return HarmonicBalance.of(
-            model, wave_balance.contact.repeated(self.n_sectors), wave_balance.basis, load, wave_balance.omega_max
+            model, wave_balance.contact.repeat(self.n_sectors), wave_balance.basis, load, wave_balance.omega_max
         )
 
     def at_speed(self, speed: float) -> Wheel:
