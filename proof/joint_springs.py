@@ -23,7 +23,7 @@ from tribodyn.reduction.prescribed import hold
 from tribodyn.reduction.relative import relative
 from tribodyn.workflows.run import joints, modelling
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.solution import Output
+from tribodyn.workflows.scene.solution_tables import Output
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import impact
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.workflows.result.result import Patch, References, Result
-from tribodyn.workflows.run import curve, references, settings, wear_run
+from tribodyn.workflows.run import references, response_curve, settings, wear_run
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.settings import OUTPUT
@@ -51,7 +51,7 @@ def worn(balance: HarmonicBalance, depth: np.ndarray) -> HarmonicBalance:
 
 def follow_response(file: SceneFile, balance: HarmonicBalance) -> Branch:
     """The response over the scene's range by the scene's method, as far as it goes, see `Branch.end`."""
-    return curve.follow_response(file.scene, balance)
+    return response_curve.follow_response(file.scene, balance)
 
 
 def follow_arc_length(file: SceneFile, balance: HarmonicBalance) -> Branch:

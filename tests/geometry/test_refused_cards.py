@@ -9,7 +9,7 @@ import pytest
 from tests.helpers.small_decks import ENDING, bricks, frequencies, straight
 from tribodyn.geometry.sources import foreign_file
 from tribodyn.workflows.run import decks
-from tribodyn.workflows.scene.structure import DeckTable
+from tribodyn.workflows.scene.structure_tables import DeckTable
 
 BAR = bricks((2, 1, 1), straight) + ENDING.replace(", ORIENTATION=OWN", "")
 CARDS = {

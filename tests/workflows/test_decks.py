@@ -13,7 +13,7 @@ from tribodyn.fem.factor import factorise
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part
 from tribodyn.workflows.pictures import view
-from tribodyn.workflows.run import bodies, modelling, planning
+from tribodyn.workflows.run import modelling, planning, scene_assembly
 from tribodyn.workflows.run.description import part_mesh
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import convergence
@@ -105,7 +105,7 @@ def test_hexahedra_of_first_order_may_stay_what_they_are(tmp_path: Path) -> None
     assert drawn.kind == "hexahedron"
     assert view.grid_of(drawn).volume == pytest.approx(4e-6, rel=1e-9)
     file = scene_file.parse(asked + 'elements = "linear_reduced"\n' + REST, "scene.toml", (), tmp_path)
-    notes = [note for deck in bodies.of_decks(file.scene, tmp_path).values() for note in deck.notes]
+    notes = [note for deck in scene_assembly.carried_decks(file.scene, tmp_path).values() for note in deck.notes]
     assert not any("second order" in note for note in notes)
 
 
@@ -121,7 +121,7 @@ def test_an_equation_of_a_deck_holds(tmp_path: Path) -> None:
 def test_what_is_not_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "lap.inp").write_text(TEXT)
     file = scene_file.parse(DECK + 'use = ["supports"]\n' + REST, "scene.toml", (), tmp_path)
-    notes = [note for deck in bodies.of_decks(file.scene, tmp_path).values() for note in deck.notes]
+    notes = [note for deck in scene_assembly.carried_decks(file.scene, tmp_path).values() for note in deck.notes]
     said = "; ".join(notes)
     for clause in ("*PLASTIC", "1 of its ties that use leaves", "1 of its pressures that", "points RP, which carry"):
         assert clause in said, clause

@@ -17,10 +17,10 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.run import references, settings, varying, wear_run
+from tribodyn.workflows.run import parameter_variation, references, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.parameter_variation import ParameterVariation, geometry_keys, keys
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.varying import Varying, geometry_keys, keys
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.response_derivatives import of_summary
 
@@ -82,16 +82,16 @@ def test_the_law_of_similarity_holds_of_lengths():
 def test_rows_of_studies_go_by_lengths_whose_mesh_stays_the_same(monkeypatch):
     """One that the mesh does not follow takes nothing from the others."""
     without = (*COARSE["beam"], "wear=", "verdict.enabled=false")
-    file, moved = scene_file.read("beam", without), Varying.nodes_moved
+    file, moved = scene_file.read("beam", without), ParameterVariation.nodes_moved
 
     def refused(self, key):
         if key == "geometry.height":
             raise NoDerivative("another mesh")
         return moved(self, key)
 
-    monkeypatch.setattr(Varying, "nodes_moved", refused)
+    monkeypatch.setattr(ParameterVariation, "nodes_moved", refused)
     wanted = ["geometry.length", "geometry.height", "contact.friction"]
-    found = of_summary(Varying(file, Progress()), td.run("beam", overrides=without), wanted)
+    found = of_summary(ParameterVariation(file, Progress()), td.run("beam", overrides=without), wanted)
     assert {key for _, key in found} == {"geometry.length", "contact.friction"}
     along = td.studies.derivatives(file, only=("geometry.length",)).derivatives
     assert found["peak_frequency_first", "geometry.length"] == pytest.approx(along.slopes[0, 0], rel=1e-6)
@@ -115,7 +115,7 @@ def test_the_law_of_similarity_holds_of_a_life():
 )
 def test_a_length_whose_mesh_does_not_stay_the_same_is_refused(name, change, key, sentence):
     """Beside a limit there is no part; heights of a measured face are other ones where its nodes move."""
-    varying = Varying(scene_file.read(name, (*COARSE[name], change)), Progress())
+    varying = ParameterVariation(scene_file.read(name, (*COARSE[name], change)), Progress())
     with pytest.raises(NoDerivative, match=sentence):
         varying.nodes_moved(key)
 
@@ -130,7 +130,8 @@ def test_a_scene_with_another_value_is_the_one_that_would_be_read(name):
     file = scene_file.read(name)
     for key, value in keys(file.scene).items():
         other = 1.01 * value
-        assert varying._with(file.scene, key.split("."), other) == file.changed(f"{key}={other!r}").scene, key
+        changed = file.changed(f"{key}={other!r}").scene
+        assert parameter_variation._with(file.scene, key.split("."), other) == changed, key
 
 
 @pytest.mark.slow
@@ -179,7 +180,7 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, ste
 
     def solved(key, factor):
         with limited(1):
-            balance = Varying(file.changed(f"{key}={value[key] * factor!r}"), Progress()).model.balance
+            balance = ParameterVariation(file.changed(f"{key}={value[key] * factor!r}"), Progress()).model.balance
             there = cycle_derivatives.at_frequency(balance, fixed.state, "response", ())
             return there.values, cycle_derivatives.at_peak(balance, along.state, "response", ()).values
 
@@ -245,7 +246,7 @@ def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
     def again(factor):
         changed = file.changed(f"damping.modal={value['damping.modal'] * factor!r}")
         with limited(1):
-            balance = Varying(changed, Progress()).model.balance
+            balance = ParameterVariation(changed, Progress()).model.balance
             return fold_derivatives.at_fold(balance, found.derivatives.state, ()).values[0]
 
     difference = (again(1 + h) - again(1 - h)) / (2 * h) / found.derivatives.values[0]
@@ -306,7 +307,7 @@ def test_derivatives_of_the_blades_life_are_those_of_its_steps_taken_again(site,
     file, key, share = scene_file.read("blade", (*BLADE, *changes)), "contact.friction", 0.3
 
     def varying(factor=1.0):
-        return Varying(file.changed(f"{key}={0.5 * factor!r}"), Progress())
+        return ParameterVariation(file.changed(f"{key}={0.5 * factor!r}"), Progress())
 
     def problem_of(factor):
         return exactly(wear_run.wear_problem(file.scene, file.folder, varying(factor).model.balance, share), **site)

@@ -30,7 +30,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.structure import NamedContact
+from tribodyn.workflows.scene.structure_tables import NamedContact
 
 SMALL = (
     "verdict.enabled=false",

@@ -29,7 +29,7 @@ from tribodyn.workflows.result.verdict import MeasuredChange, Refinement
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.references import delta_max
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.loads import StaticLoad
+from tribodyn.workflows.scene.load_tables import StaticLoad
 
 BASIS = HarmonicBasis((0, 1, 2, 3), 64)
 

@@ -22,7 +22,7 @@ import tribodyn as td
 from tests.helpers import dying
 from tests.helpers.command import leave
 from tribodyn.hbm.linear import compliance
-from tribodyn.workflows.run import kept, modelling
+from tribodyn.workflows.run import model_cache, modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.many import parameter_space, pool, run_task, study_file, study_pictures
@@ -171,7 +171,7 @@ def test_runs_that_share_their_linear_side_give_what_each_gives_by_itself(monkey
         expansion(self, *arguments)
 
     monkeypatch.setattr(compliance.Expansion, "__init__", counted)
-    with kept.at_hand():
+    with model_cache.memory_cache():
         assert [solve(task).numbers for task in tasks] == alone
     assert len(made) == 4  # the first, other springs, other damping, and back: not for friction and loads
 

@@ -18,7 +18,7 @@ from tribodyn.workflows.errors.extrapolation import Limit, limit_of
 from tribodyn.workflows.errors.ladders import Ladder, Setting, ladders_of, study_of
 from tribodyn.workflows.errors.operating_states import OperatingState
 from tribodyn.workflows.errors.wear_values import wear_through
-from tribodyn.workflows.run import curve, memory, modelling
+from tribodyn.workflows.run import memory, modelling, response_curve
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -162,7 +162,7 @@ def _operating_state(file: SceneFile, model: Model) -> OperatingState:
     """Where the scene wears, or the peak of its response, found as a run finds it."""
     if file.scene.wear is not None:
         return operating_states.unworn_state(file, model)
-    branch = curve.follow_response(file.scene, model.balance)
+    branch = response_curve.follow_response(file.scene, model.balance)
     return operating_states.state_at_peak(file.scene, model.balance, branch)
 
 

@@ -20,7 +20,7 @@ from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimits
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import curve, modelling, settings
+from tribodyn.workflows.run import modelling, response_curve, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
@@ -64,7 +64,7 @@ class PeakOfCurve:
 
     def solve(self, balance: HarmonicBalance) -> OperatingPoint:
         """Follow the curve of a contact as the run does. Raises NoPeak, SolveFailed."""
-        branch = curve.follow_response(self.scene, balance)
+        branch = response_curve.follow_response(self.scene, balance)
         if not branch.converged[-1]:
             raise SolveFailed(f"the frequency response {branch.end}")
         return highest_point(branch, balance)

@@ -9,10 +9,10 @@ import numpy as np
 from tribodyn.geometry import parts
 from tribodyn.geometry.sources import cad
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.body import Geometry
+from tribodyn.workflows.scene.part_tables import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
-from tribodyn.workflows.scene.structure import BodyTable, DeckTable
+from tribodyn.workflows.scene.structure_tables import BodyTable, DeckTable
 from tribodyn.workflows.scene.wear import Wear, WearStep
 
 HALVED = 2.0  # ratio of element sizes where every element of a given mesh is cut into eight

@@ -17,7 +17,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.model_facts import ModelFacts
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.scene.content import digests
+from tribodyn.workflows.scene.file_digests import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.scene_values import scene_values
 from tribodyn.workflows.scene.schema import Scene

@@ -9,7 +9,7 @@ from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.geometry.height_map import centred, facing_gap, onto_nodes
 from tribodyn.geometry.map_repair import prepare
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import kept
+from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.scene.contact_numbers import faces
 from tribodyn.workflows.scene.scene_file import SceneFile
 
@@ -42,7 +42,7 @@ def surface_gap(file: SceneFile, interface: ContactInterface) -> tuple[np.ndarra
             repairs += prepared.repairs
         return heights, tuple(repairs)
 
-    heights, repairs = kept.heights(file, nodes, made)
+    heights, repairs = model_cache.cached_heights(file, nodes, made)
     return facing_gap(heights[0], heights[1], surfaces.mating_height), repairs
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from tribodyn.fem.material import Anisotropic, AnyMaterial, Material, Orthotropic
 from tribodyn.geometry.sources import deck
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.structure import DeckTable as Table
+from tribodyn.workflows.scene.structure_tables import DeckTable as Table
 
 
 def material(

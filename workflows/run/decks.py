@@ -26,7 +26,7 @@ from tribodyn.geometry.sources import added_nodes, deck, face_rules, foreign_fil
 from tribodyn.geometry.sources.directions import Directions
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run.deck_materials import material
-from tribodyn.workflows.scene.structure import EVERYTHING, DeckTable as Table
+from tribodyn.workflows.scene.structure_tables import EVERYTHING, DeckTable as Table
 
 UNITS = {metres: name for name, (metres, _) in foreign_file.UNITS.items()}
 ALL_AXES = (0, 1, 2, 3, 4, 5)

@@ -21,7 +21,7 @@ from tribodyn.version import package_version
 from tribodyn.workflows.result.model_facts import Around, ModelFacts, Stage
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 from tribodyn.workflows.run.references import delta_max, free_deflection
-from tribodyn.workflows.scene.content import digests
+from tribodyn.workflows.scene.file_digests import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 

@@ -16,7 +16,7 @@ from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import bodies, decks
+from tribodyn.workflows.run import decks, scene_assembly
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
 
@@ -68,12 +68,13 @@ def elastic(scene: Scene, face: str) -> tuple[float, float]:
     Raises  ValueError where it is orthotropic or of several materials
     """
     assert isinstance(scene, MeshScene)
-    solid = None if scene.material is None else bodies.solid(scene.material)
+    solid = None if scene.material is None else scene_assembly.make_material(scene.material)
     if scene.material is None:
         body = scene.bodies.get(face.partition(".")[0])
         if body is None:
             raise Refusal(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
-        solid = None if not isinstance(body.material, str) else bodies.solid(scene.materials[body.material])
+        name = body.material
+        solid = scene_assembly.make_material(scene.materials[name]) if isinstance(name, str) else None
     if not isinstance(solid, Material):
         raise Refusal(f"the punch on '{face}' needs a body of one isotropic material: give its stiffness")
     return solid.E, solid.nu

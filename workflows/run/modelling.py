@@ -32,23 +32,23 @@ from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.reduction.prescribed import hold
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import (
-    bodies,
-    curve,
     joints,
-    kept,
     matrix_model,
     memory,
+    model_cache,
     part_reduction,
+    response_curve,
+    scene_assembly,
     settings,
 )
 from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.sanity_checks import check_size
-from tribodyn.workflows.scene.loads import StaticLoad
+from tribodyn.workflows.scene.load_tables import StaticLoad
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
-from tribodyn.workflows.scene.solution import HIGHEST
+from tribodyn.workflows.scene.solution_tables import HIGHEST
 
 if TYPE_CHECKING:
     from tribodyn.fem.bolts import Bolt
@@ -112,7 +112,7 @@ def part_of(file: SceneFile, progress: Progress) -> Part:
         with progress.stage("mass and stiffness"):
             return make_part(file.mesh_scene, mesh, node_sets, file.folder)
 
-    return kept.part(file, made)
+    return model_cache.cached_part(file, made)
 
 
 def plain_of(file: SceneFile, part: Part) -> ReducedModel:
@@ -124,12 +124,12 @@ def plain_of(file: SceneFile, part: Part) -> ReducedModel:
         memory.check(part.system.n_dof, wanted.solver, shapes + (wanted.modes or 0))
         return plain_model(file.mesh_scene, part)
 
-    return kept.reduction(file, part, made)
+    return model_cache.cached_reduction(file, part, made)
 
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
-    whole = bodies.assembly(file.mesh_scene, file.folder, folder)
+    whole = scene_assembly.assembly(file.mesh_scene, file.folder, folder)
     return whole, whole.node_sets
 
 
@@ -146,7 +146,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
     }
     if scene.wheel is not None and scene.wheel.speed:
         loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
-    joined = bodies.joined(scene, folder or Path())
+    joined = scene_assembly.connections(scene, folder or Path())
     loads |= joined.loads
     rods = shanks(scene, mesh, node_sets)
     loads |= rods
@@ -179,9 +179,9 @@ def shanks(scene: MeshScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> 
     """The shanks of the bolts of a scene, which are loads, springs and outputs."""
     if not scene.bolts:
         return {}
-    from tribodyn.workflows.run import tightening  # only bolts need it
+    from tribodyn.workflows.run import bolt_tightening  # only bolts need it
 
-    return tightening.rods(scene, mesh, node_sets)
+    return bolt_tightening.rods(scene, mesh, node_sets)
 
 
 def with_surfaces(file: SceneFile, part: Part) -> tuple[Part, tuple[str, ...]]:
@@ -271,10 +271,11 @@ class Problem:
         """The problem of a scene, its bolts tightened."""
         made, bolts = joints.make_joints(scene, reduced), {}
         if isinstance(scene, MeshScene) and scene.bolts and part is not None:
-            from tribodyn.workflows.run import tightening  # only bolts need it
+            from tribodyn.workflows.run import bolt_tightening  # only bolts need it
 
-            alone = tightening.BoltsAlone(reduced, made, scene.harmonics.samples, settings.highest_frequency(scene))
-            bolts = tightening.tightened(scene, shanks(scene, part.mesh, part.node_sets), alone)
+            top = settings.highest_frequency(scene)
+            alone = bolt_tightening.BoltsAlone(reduced, made, scene.harmonics.samples, top)
+            bolts = bolt_tightening.tightened(scene, shanks(scene, part.mesh, part.node_sets), alone)
         return cls(scene, part, reduced, made, bolts)
 
     def balance(self, harmonics: tuple[int, ...], like: HarmonicBalance | None = None) -> HarmonicBalance:
@@ -302,7 +303,7 @@ class Problem:
         if wanted.tolerance is not None:
             options = replace(options, tolerance=wanted.tolerance)
         first = self.balance(tuple(sorted({0, 1} | {load.harmonic for load in self.scene.loads.harmonic.values()})))
-        return curve.choose_harmonics(first, settings.peak_of(self.scene), options)
+        return response_curve.choose_harmonics(first, settings.peak_of(self.scene), options)
 
 
 def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: tuple[int, ...] = ()) -> Model:
@@ -310,7 +311,7 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     problem = Problem.of(scene, part, reduced)
     choice = problem.choice() if scene.harmonics.automatic and not chosen else None
     harmonics = scene.harmonics.kept or chosen or (choice.harmonics if choice else ())
-    final = kept.beside(lambda like: problem.balance(harmonics, like))
+    final = model_cache.cached_balance(lambda like: problem.balance(harmonics, like))
     if part is not None and isinstance(scene, MeshScene) and scene.other_speeds:
         final = replace(final, at_speed=_at_speeds(scene, part, harmonics))
     return Model(part, final.model, final, choice)

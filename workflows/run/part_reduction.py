@@ -20,7 +20,7 @@ from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.residual_flexibility import residual_flexibility
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import bodies, joints
+from tribodyn.workflows.run import joints, scene_assembly
 from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 BOLTS = "bolts."  # begins the names of outputs that are elongations of bolts
@@ -29,7 +29,7 @@ MOST_MASTERS = 3000  # contact DOFs up to which all of them remain coordinates b
 
 def material(scene: MeshScene, mesh: Any = None) -> Any:
     """What the part is made of, or what every body of an assembly is made of."""
-    return mesh.material if scene.material is None else bodies.solid(scene.material)
+    return mesh.material if scene.material is None else scene_assembly.make_material(scene.material)
 
 
 def components(scene: Scene) -> tuple[str, ...]:

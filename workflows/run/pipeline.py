@@ -17,7 +17,7 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.result.model_facts import Stage
 from tribodyn.workflows.result.number_format import measured
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import curve, modelling, references, sanity_checks, settings, wear_run
+from tribodyn.workflows.run import modelling, references, response_curve, sanity_checks, settings, wear_run
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
@@ -62,7 +62,7 @@ def run(
         keep(result)
         if result.response is None:
             with progress.track("frequency response") as advance:
-                frf = curve.follow_response(scene, model.balance, None if row_only else advance)
+                frf = response_curve.follow_response(scene, model.balance, None if row_only else advance)
             linear = None
             if not row_only:
                 with progress.stage("linear references"):
@@ -84,10 +84,10 @@ def run(
             with progress.track("responses of the worn contact") as advance:
 
                 def again(worn: HarmonicBalance) -> Branch:
-                    return curve.follow_response(scene, worn, folds=False)
+                    return response_curve.follow_response(scene, worn, folds=False)
 
                 count = scene.wear.responses
-                curves = curve.worn_responses(result, model.balance, count, again, advance)
+                curves = response_curve.worn_responses(result, model.balance, count, again, advance)
                 result = keep(replace(result, worn=curves))
         if judge is not None and scene.verdict.enabled and scene.response.control == "force":
             result = judge(file, model, result, progress)
@@ -104,7 +104,7 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Pro
             result = replace(result, stability=marks)
     if scene.response.bounds and result.bounds is None:
         with progress.track("bounds of residual shear") as advance:
-            bounds = curve.shear_bounds(balance, frf, settings.OUTPUT, settings.newton_options(scene), advance)
+            bounds = response_curve.shear_bounds(balance, frf, settings.OUTPUT, settings.newton_options(scene), advance)
             result = replace(result, bounds=bounds)
     return result
 

@@ -20,7 +20,7 @@ from tribodyn.hbm.wear.wear_rule import StepCost
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.relative import body_1_dofs
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import bodies, matrix_model, memory as memory_use
+from tribodyn.workflows.run import matrix_model, memory as memory_use, scene_assembly
 from tribodyn.workflows.run.modelling import make_mesh
 from tribodyn.workflows.run.part_reduction import components, contacts, without_masters
 from tribodyn.workflows.run.sanity_checks import check_opening
@@ -118,7 +118,7 @@ def plan(file: SceneFile) -> Plan:
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
-        joined = bodies.joined(built, file.folder)
+        joined = scene_assembly.connections(built, file.folder)
         remarks = _openings(built, mesh, node_sets, joined)
         free = free_dofs(3 * nodes, joined.clamps, node_sets)
         full = len(free)
@@ -160,7 +160,9 @@ def plan(file: SceneFile) -> Plan:
     )
 
 
-def _openings(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], joined: bodies.Joined) -> list[str]:
+def _openings(
+    scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], joined: scene_assembly.Connections
+) -> list[str]:
     """Remarks on tied faces, and on those in contact whose gap is that of the geometry, that lie apart.
 
     Raises  ValueError for constraints that the run refuses

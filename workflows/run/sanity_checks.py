@@ -20,7 +20,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.geometry.mesh import facts
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.result.summary import LARGEST_BEND
-from tribodyn.workflows.run import bodies, matrix_model, part_reduction
+from tribodyn.workflows.run import matrix_model, part_reduction, scene_assembly
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
@@ -110,7 +110,7 @@ def notes(file: SceneFile, part: Part) -> Iterator[str]:
     """What was done to the files of a scene, and what of them is not used."""
     scene = file.mesh_scene
     yield from (note for body in part.mesh.bodies for note in body.notes)
-    for deck in bodies.of_decks(scene, file.folder).values():
+    for deck in scene_assembly.carried_decks(scene, file.folder).values():
         yield from deck.notes
 
 

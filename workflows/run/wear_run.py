@@ -27,7 +27,7 @@ from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Advance
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
-from tribodyn.workflows.scene.structure import NamedContact
+from tribodyn.workflows.scene.structure_tables import NamedContact
 from tribodyn.workflows.scene.wear import JointWearTable
 
 KEEPING = 0.01  # share of the time that goes into writing steps: a kill loses as many as take 100 times one writing

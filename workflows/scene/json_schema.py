@@ -20,8 +20,8 @@ from tribodyn.workflows.scene.fields import IN_UNIT
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.own import LawTable
 from tribodyn.workflows.scene.schema import MeshScene
-from tribodyn.workflows.scene.solution import PartResponse
-from tribodyn.workflows.scene.structure import NamedContact
+from tribodyn.workflows.scene.solution_tables import PartResponse
+from tribodyn.workflows.scene.structure_tables import NamedContact
 
 OWN_FILE = r"\.py$"
 

@@ -47,10 +47,10 @@ class SceneFile:
     @property
     def word(self) -> str:
         """By what a command knows it: the name of a scene that comes with the program, the path of another one."""
-        return self.name if self.comes_along else str(self.folder / f"{self.name}.toml")
+        return self.name if self.is_shipped else str(self.folder / f"{self.name}.toml")
 
     @property
-    def comes_along(self) -> bool:
+    def is_shipped(self) -> bool:
         """Whether it is a scene that comes with the program."""
         return self.folder.resolve().parent == CASES.resolve()
 

@@ -18,17 +18,16 @@ from pydantic import (
 )
 
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.body import Geometry, SolidMaterial
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
 from tribodyn.workflows.scene.contact_numbers import takes_asperities, with_asperities, with_numbers_when_hot
 from tribodyn.workflows.scene.fields import (
     Table,
     unknown_key,
 )
-from tribodyn.workflows.scene.loads import HarmonicLoad, Loads, Motion, Prescribed, SpringTable, StaticLoad
+from tribodyn.workflows.scene.load_tables import HarmonicLoad, Loads, Motion, Prescribed, SpringTable, StaticLoad
 from tribodyn.workflows.scene.own import folder_of
-from tribodyn.workflows.scene.sectors import FlowTable, Mistuning, WheelTable, operating_line
-from tribodyn.workflows.scene.solution import (
+from tribodyn.workflows.scene.part_tables import Geometry, SolidMaterial
+from tribodyn.workflows.scene.solution_tables import (
     Damping,
     Harmonics,
     NonlinearMode,
@@ -41,7 +40,7 @@ from tribodyn.workflows.scene.solution import (
     VerdictOptions,
 )
 from tribodyn.workflows.scene.stages import DRAW, LOADS, REDUCTION, SceneStage
-from tribodyn.workflows.scene.structure import (
+from tribodyn.workflows.scene.structure_tables import (
     GROUND,
     BodyTable,
     BoltTable,
@@ -53,6 +52,7 @@ from tribodyn.workflows.scene.structure import (
     TieTable,
 )
 from tribodyn.workflows.scene.wear import Wear
+from tribodyn.workflows.scene.wheel_tables import FlowTable, Mistuning, WheelTable, operating_line
 
 CENTRIFUGAL = "centrifugal"
 MODES = 20  # of a scene that says nothing of its reduction

@@ -31,10 +31,10 @@ from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.theme import CYCLE, GREY
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import curve, pipeline, settings, wear_run
+from tribodyn.workflows.run import pipeline, response_curve, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.parameter_variation import STEP, ParameterVariation, geometry_keys, keys, moves_nodes
 from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.run.varying import STEP, Varying, geometry_keys, keys, moves_nodes
 from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import Scene
@@ -235,7 +235,7 @@ def _of_scene(
 ) -> ResponseDerivatives:
     """Of a scene that was read; at : frequency [Hz], or the amplitude of a mode [m]; wanted : key -> value; without :
     see `_changes`."""
-    varying = Varying(file, report, OF_MODE if of == "mode" else STEP)
+    varying = ParameterVariation(file, report, OF_MODE if of == "mode" else STEP)
     balance, clock = varying.model.balance, process_time()
     find: Callable[[Iterator[ParameterChange]], Derivatives]
     if of == "mode":
@@ -247,7 +247,7 @@ def _of_scene(
         find = partial(_of_life, varying, worn, values=values)
     else:
         with report.track("frequency response") as advance:
-            branch = curve.follow_response(file.scene, balance, advance)
+            branch = response_curve.follow_response(file.scene, balance, advance)
         pipeline.check_branch(branch)
         find = partial(of_branch, file.scene, balance, branch, at=at, fold=of == "fold")
     solved = process_time()
@@ -272,7 +272,7 @@ Advance = Callable[[float, str], None]
 
 
 def _changes(
-    varying: Varying, values: Mapping[str, float], advance: Advance, without: dict[str, str] | None
+    varying: ParameterVariation, values: Mapping[str, float], advance: Advance, without: dict[str, str] | None
 ) -> Iterator[ParameterChange]:
     """Of every key but those of wear laws; one without a derivative goes into `without`, where that is given."""
     for i, (key, value) in enumerate(values.items()):
@@ -286,7 +286,9 @@ def _changes(
             without[key] = str(reason)
 
 
-def _of_mode(varying: Varying, mode: Backbone, changes: Iterator[ParameterChange], modal: bool) -> Derivatives:
+def _of_mode(
+    varying: ParameterVariation, mode: Backbone, changes: Iterator[ParameterChange], modal: bool
+) -> Derivatives:
     """At the last point of a backbone."""
     if mode.end.kind is not BranchEnd.REACHED:
         raise NoDerivative(f"the backbone {mode.end}")
@@ -303,7 +305,7 @@ def _share(scene: Scene) -> float:
 
 
 def _of_life(
-    varying: Varying, worn: WearHistory, changes: Iterator[ParameterChange], values: Mapping[str, float]
+    varying: ParameterVariation, worn: WearHistory, changes: Iterator[ParameterChange], values: Mapping[str, float]
 ) -> Derivatives:
     scene, by_key = varying.scene, wear_run.law_numbers(varying.scene)
     problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
@@ -337,7 +339,9 @@ def of_branch(
     return take(balance, state, output, changes, wear_run.coefficients(scene), options)
 
 
-def of_summary(varying: Varying, result: Result, names_of_keys: Sequence[str]) -> dict[tuple[str, str], float]:
+def of_summary(
+    varying: ParameterVariation, result: Result, names_of_keys: Sequence[str]
+) -> dict[tuple[str, str], float]:
     """Derivatives of numbers of a finished run, of its first state and its life, by some keys of its scene.
 
     Returns (number, key) -> d number / d key, SI units, as far as these are exact

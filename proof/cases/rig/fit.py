@@ -24,7 +24,7 @@ from proof.cases.rig.model import TIED, Rig, check
 from proof.cases.rig.published import LIFE_MEASURED, OPEN, PRELOAD, STUCK, TABLE_5_3, WORK
 from proof.cases.rig.wear import RigWear, wear_down
 from tests.helpers.fits import fit_by_differences as identify
-from tribodyn.workflows.run import kept
+from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
 from tribodyn.workflows.studies.fits.identification import FitParameter, Identification, MeasuredNumber
@@ -76,7 +76,7 @@ def fit_column(scene: str, overrides: Sequence[str] = ()) -> Identification:
 def fit_height(rig: Rig) -> Identification:
     """Platform height to the published preload."""
     parameter = FitParameter("platform", 5e-6, 50e-6, (rig.height,), "m")
-    with kept.at_hand():
+    with model_cache.memory_cache():
         return identify(
             [parameter],
             [MeasuredNumber("preload", PRELOAD, "N")],
@@ -92,7 +92,7 @@ def fit_damping(rig: Rig) -> Identification:
         damped = rig.with_damping(values["modal damping"])
         return np.array([max(damped.with_force(force).cycle().energy, 1e-9) for force in TABLE_5_3])
 
-    with kept.at_hand():
+    with model_cache.memory_cache():
         return identify([FitParameter("modal damping", 0.005, 0.06, (0.01, 0.03), "-")], measured, energies)
 
 

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import kept, modelling
+from tribodyn.workflows.run import model_cache, modelling
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
@@ -73,7 +73,7 @@ def best(file: SceneFile, task: FitTables, progress: Progress) -> Fit:
     scene_values = {name: value_of(file.mesh_scene, table.keys[0]) for name, table in task.parameters.items()}
     defined = {name: value for name, value in scene_values.items() if value is not None}
     initial = defined if len(defined) == len(scene_fit.parameters) else None
-    with threadpool_limits(1), kept.at_hand():
+    with threadpool_limits(1), model_cache.memory_cache():
         identification = fit(
             scene_fit.parameters,
             scene_fit.measured,
@@ -110,7 +110,7 @@ def posterior(
         for name, target in tables.parameters.items()
         if target.prior is not None
     }
-    with threadpool_limits(1), kept.at_hand():
+    with threadpool_limits(1), model_cache.memory_cache():
         return posteriors.sample(
             scene_fit.parameters,
             scene_fit.measured,

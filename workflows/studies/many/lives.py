@@ -18,7 +18,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
-from tribodyn.workflows.scene.loads import StaticLoad
+from tribodyn.workflows.scene.load_tables import StaticLoad
 from tribodyn.workflows.scene.matrix_scene import DofLoad
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.scene_values import smooth_numbers

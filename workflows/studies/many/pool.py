@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 
 from tribodyn.extras import package
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import kept
+from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun
 
@@ -93,7 +93,7 @@ def _begin() -> None:
     """In every process of the pool: processes and threads do not multiply, and none outlives the study."""
     gc.freeze()  # what is imported is looked through no more
     threadpool_limits(1)
-    _always.enter_context(kept.at_hand())
+    _always.enter_context(model_cache.memory_cache())
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

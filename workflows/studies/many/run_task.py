@@ -19,10 +19,10 @@ from tribodyn.workflows.errors.judgement import with_verdict
 from tribodyn.workflows.result.answers import answers_of
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.parameter_variation import ParameterVariation
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.varying import Varying
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.content import digests
+from tribodyn.workflows.scene.file_digests import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies import response_derivatives
 
@@ -92,7 +92,7 @@ def solve(task: StudyRun) -> RunRow:
             result = pipeline.run(file, None, Progress(), row_only=True, judge=with_verdict)
             numbers = numbers_of(result)
             if task.slopes and not numbers.get("peak_at_end"):
-                slopes = response_derivatives.of_summary(Varying(file, Progress()), result, task.slopes)
+                slopes = response_derivatives.of_summary(ParameterVariation(file, Progress()), result, task.slopes)
                 numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
         except Exception as error:  # the other runs go on
             return ended(*outcome_of(error))

@@ -12,7 +12,7 @@ import tomli_w
 
 from tribodyn.hbm.threads import limited, usable
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import kept
+from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
@@ -153,7 +153,7 @@ def finish(
 
 
 def _in_this_process(tasks: Sequence[Work], solve: Callable[[Work], RunRow]) -> Iterator[RunRow]:
-    with limited(1), kept.at_hand():
+    with limited(1), model_cache.memory_cache():
         yield from map(solve, tasks)
 
 

@@ -10,7 +10,7 @@ from scipy.interpolate import PchipInterpolator
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.time.decrement import decrement
-from tribodyn.workflows.run import curve, modelling
+from tribodyn.workflows.run import modelling, response_curve
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -94,7 +94,7 @@ def _response(file: SceneFile, model: modelling.Model, output: str, run: Run, pr
     _, scale = driving_load(file.scene)
     level = float(run.force[run.amplitude.argmax()])
     with progress.track(f"response, {run.name}") as advance:
-        branch = curve.follow_response(file.scene, model.balance.with_load(level / abs(scale)), advance)
+        branch = response_curve.follow_response(file.scene, model.balance.with_load(level / abs(scale)), advance)
     if branch.converged.sum() < 2:
         raise SolveFailed(f"the response beside {run.name} {branch.end}")
     at_level = replace(run, displacement=run.displacement * (level / run.force))

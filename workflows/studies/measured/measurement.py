@@ -20,7 +20,7 @@ import numpy as np
 
 from tribodyn.fem.part import Part
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.loads import HarmonicLoad
+from tribodyn.workflows.scene.load_tables import HarmonicLoad
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import Scene
 

@@ -39,8 +39,8 @@ from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
+from tribodyn.workflows.scene.wheel_tables import Mistuning
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, outcome_of
 from tribodyn.workflows.studies.many.study_runs import Runner, finish
 from tribodyn.workflows.studies.study_result import StudyResult

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.structures import BLOCKS, STACK
-from tribodyn.workflows.run import kept, modelling, pipeline
+from tribodyn.workflows.run import model_cache, modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_values import values_through
@@ -210,17 +210,17 @@ def test_the_longest_unused_goes_and_what_is_too_large_is_not_kept(
     for path in entries(tmp_path / "kept"):
         age = 1 if path in first else 2
         os.utime(path, (age, age))
-    monkeypatch.setattr(kept, "ROOM", 4.0 * first[-1].stat().st_size)
+    monkeypatch.setattr(model_cache, "ROOM", 4.0 * first[-1].stat().st_size)
     built()  # is used again, so that the other one is the longest unused
     for young in (212, 213):
         built(f"material.young={young} GPa")
-    assert sum(path.stat().st_size for path in entries(tmp_path / "kept")) <= kept.ROOM
+    assert sum(path.stat().st_size for path in entries(tmp_path / "kept")) <= model_cache.ROOM
     made.clear()
     built()
     assert made == []
     built(stiffer)
     assert made
-    monkeypatch.setattr(kept, "ROOM", 1e3)
+    monkeypatch.setattr(model_cache, "ROOM", 1e3)
     made.clear()
     for _ in range(2):
         built("geometry.n_length=6")
@@ -240,9 +240,9 @@ def test_two_at_once_make_it_once(made: list[str]) -> None:
 def test_where_entries_lie(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("TRIBODYN_CACHE")
-    assert kept.folder() == tmp_path / "tribodyn"
+    assert model_cache.cache_folder() == tmp_path / "tribodyn"
     monkeypatch.setenv("TRIBODYN_CACHE", "off")
-    assert kept.folder() is None
+    assert model_cache.cache_folder() is None
 
 
 def test_another_temperature_of_a_contact_reduces_nothing() -> None:

@@ -21,7 +21,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.run import bodies
+from tribodyn.workflows.run import scene_assembly
 from tribodyn.workflows.run.part_reduction import BOLTS
 from tribodyn.workflows.scene.schema import MeshScene
 
@@ -43,7 +43,7 @@ def rods(scene: MeshScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> di
         if table.state == "locked":
             stiffness = table.stiffness or 0.0
             if table.diameter is not None and table.material is not None:
-                solid = bodies.solid(scene.materials[table.material])
+                solid = scene_assembly.make_material(scene.materials[table.material])
                 if not isinstance(solid, Material):
                     raise Refusal(f"bolts.{name}: its material is orthotropic; give an isotropic one or stiffness")
                 stiffness = solid.E * np.pi * table.diameter**2 / 4 / rod.length(mesh, node_sets)

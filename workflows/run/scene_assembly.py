@@ -23,11 +23,11 @@ from tribodyn.geometry.placement import overlap, rotation
 from tribodyn.geometry.sources import cad, face_rules
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import decks
-from tribodyn.workflows.scene import structure
-from tribodyn.workflows.scene.body import Meshed, SolidMaterial
-from tribodyn.workflows.scene.loads import SpringTable
+from tribodyn.workflows.scene import structure_tables
+from tribodyn.workflows.scene.load_tables import SpringTable
+from tribodyn.workflows.scene.part_tables import Meshed, SolidMaterial
 from tribodyn.workflows.scene.schema import MeshScene
-from tribodyn.workflows.scene.structure import AXES
+from tribodyn.workflows.scene.structure_tables import AXES
 
 Noted = tuple[Any, dict[str, np.ndarray], tuple[str, ...]]
 """A mesh, its node sets, and sentences on what was done to its file and is not used of it."""
@@ -52,7 +52,7 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
         assert scene.material is not None
         mesh, node_sets, notes = _read(scene.geometry, folder, scratch / "mesh.msh")
         mesh, node_sets = subdivision.subdivide(mesh, node_sets, scene.geometry.halved)
-        bodies = [Body("", mesh, node_sets, solid(scene.material), notes)]
+        bodies = [Body("", mesh, node_sets, make_material(scene.material), notes)]
     else:
         bodies = []
         for name, table in scene.bodies.items():
@@ -63,7 +63,7 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
             except ValueError as trouble:
                 raise Refusal(f"bodies.{name}: {trouble}") from None
         _apart(bodies)
-    brought = of_decks(scene, folder)
+    brought = carried_decks(scene, folder)
     bodies += [body for deck in brought.values() for body in deck.bodies]
     points = {name: list(place) for deck in brought.values() for name, place in deck.points.items()}
     whole = Assembly(bodies)
@@ -86,13 +86,13 @@ def _apart(bodies: Sequence[Body]) -> None:
             )
 
 
-def of_decks(scene: MeshScene, folder: Path) -> dict[str, decks.CarriedDeck]:
+def carried_decks(scene: MeshScene, folder: Path) -> dict[str, decks.CarriedDeck]:
     """What the decks of a scene bring, by their names; raises ValueError as `decks.structure` does."""
-    materials = {name: solid(table) for name, table in scene.materials.items()} if scene.decks else {}
+    materials = {name: make_material(table) for name, table in scene.materials.items()} if scene.decks else {}
     return {name: decks.structure(name, table, materials, folder) for name, table in scene.decks.items()}
 
 
-def _placed(table: structure.BodyTable, folder: Path, path: Path) -> Noted:
+def _placed(table: structure_tables.BodyTable, folder: Path, path: Path) -> Noted:
     mesh, node_sets, notes = _read(table, folder, path, _sizes(table))
     if table.volume is not None:
         mesh, node_sets = placement.extract_volume(mesh, node_sets, table.volume)
@@ -106,7 +106,7 @@ def _placed(table: structure.BodyTable, folder: Path, path: Path) -> Noted:
     return placement.place(mesh, 1.0, turn, shift + np.array(table.translation)), node_sets, notes
 
 
-def _sizes(table: structure.BodyTable) -> cad.Sizes | None:
+def _sizes(table: structure_tables.BodyTable) -> cad.Sizes | None:
     """Sizes of elements in the unit of a CAD file, of which only the body's own solid is meshed; None for others.
 
     Raises  ValueError where sizes are asked of a file that is a mesh already
@@ -121,13 +121,13 @@ def _sizes(table: structure.BodyTable) -> cad.Sizes | None:
     return cad.Sizes(table.size and table.size / table.unit, faces=faces, only=table.volume)
 
 
-def _material(table: structure.BodyTable, materials: Mapping[str, SolidMaterial]) -> Materials:
+def _material(table: structure_tables.BodyTable, materials: Mapping[str, SolidMaterial]) -> Materials:
     if isinstance(table.material, str):
-        return solid(materials[table.material])
-    return {volume: solid(materials[name]) for volume, name in table.material.items()}
+        return make_material(materials[table.material])
+    return {volume: make_material(materials[name]) for volume, name in table.material.items()}
 
 
-def solid(table: SolidMaterial) -> AnyMaterial:
+def make_material(table: SolidMaterial) -> AnyMaterial:
     """The material of a table of a scene."""
     if isinstance(table.young, tuple):
         assert isinstance(table.poisson, tuple)
@@ -141,7 +141,7 @@ def solid(table: SolidMaterial) -> AnyMaterial:
     return Material(table.young, table.poisson, table.density, table.expansion, reduced)
 
 
-def _middle(whole: Assembly, table: structure.CouplingTable) -> list[float]:
+def _middle(whole: Assembly, table: structure_tables.CouplingTable) -> list[float]:
     if table.point is not None:
         return list(table.point)
     if table.face in whole.boundaries:
@@ -153,7 +153,7 @@ def _middle(whole: Assembly, table: structure.CouplingTable) -> list[float]:
 
 
 @dataclass
-class Joined:
+class Connections:
     """What holds, joins and weighs the bodies of a scene: its own, and what its decks bring, these with their loads."""
 
     clamps: list[Clamp] = field(default_factory=list)
@@ -163,13 +163,13 @@ class Joined:
     loads: dict[str, Load] = field(default_factory=dict)
 
 
-def joined(scene: MeshScene, folder: Path) -> Joined:
-    """What holds and joins the bodies of a scene, whose files are in `folder`; raises ValueError as `of_decks` does."""
-    found = Joined(springs=[spring(table) for table in scene.springs.values()])
+def connections(scene: MeshScene, folder: Path) -> Connections:
+    """What holds and joins the bodies of a scene, whose files are in `folder`; raises Refusal as `carried_decks`."""
+    found = Connections(springs=[make_spring(table) for table in scene.springs.values()])
     held: dict[str, Meshed] = {} if scene.geometry is None else {"": scene.geometry}
     held |= {f"{name}.": body for name, body in scene.bodies.items()}
     _of_structure(scene, found)
-    for name, deck in of_decks(scene, folder).items():
+    for name, deck in carried_decks(scene, folder).items():
         found.clamps += deck.clamps
         found.constraints += deck.constraints
         found.springs += deck.springs
@@ -181,12 +181,12 @@ def joined(scene: MeshScene, folder: Path) -> Joined:
     return found
 
 
-def spring(table: SpringTable) -> Spring:
+def make_spring(table: SpringTable) -> Spring:
     """The spring of a table of a scene."""
     return Spring(table.group, table.direction, table.stiffness, table.opposite)
 
 
-def _of_structure(scene: MeshScene, found: Joined) -> None:
+def _of_structure(scene: MeshScene, found: Connections) -> None:
     """Ties, couplings with what of their points is held, links and lumped masses."""
     found.constraints += [Tie(f"ties.{name}", t.first, t.second, t.reach) for name, t in scene.ties.items()]
     coupled: dict[str, RigidCoupling | DistributedCoupling] = {}

@@ -30,7 +30,7 @@ from tribodyn.hbm.threads import limited, usable
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.version import package_version
 from tribodyn.workflows.run import joints, part_reduction
-from tribodyn.workflows.scene.content import code, digests, files_named
+from tribodyn.workflows.scene.file_digests import code, digests, files_named
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.scene_values import values_through
 from tribodyn.workflows.scene.schema import MeshScene
@@ -47,7 +47,7 @@ _last: ContextVar[dict[str, Any] | None] = ContextVar("tribodyn_last", default=N
 
 
 @contextmanager
-def at_hand() -> Iterator[None]:
+def memory_cache() -> Iterator[None]:
     """Within it the last part, reduction and balance stay in memory too, for scenes that differ little."""
     before = _last.set({})
     try:
@@ -56,7 +56,7 @@ def at_hand() -> Iterator[None]:
         _last.reset(before)
 
 
-def beside(make: Callable[[HarmonicBalance | None], HarmonicBalance]) -> HarmonicBalance:
+def cached_balance(make: Callable[[HarmonicBalance | None], HarmonicBalance]) -> HarmonicBalance:
     """A problem made beside the last one, whose linear side it may have, where that stays in memory."""
     last = _last.get()
     if last is None:
@@ -65,13 +65,13 @@ def beside(make: Callable[[HarmonicBalance | None], HarmonicBalance]) -> Harmoni
     return made
 
 
-def part(file: SceneFile, make: Callable[[], Part]) -> Part:
+def cached_part(file: SceneFile, make: Callable[[], Part]) -> Part:
     """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
     scene = file.mesh_scene
     return _kept(file, "part", (values_through(scene, PART), _kinds_of_loads(scene)), make)
 
 
-def reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) -> ReducedModel:
+def cached_reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) -> ReducedModel:
     """The reduction of a part, not damped, with nothing prescribed: as it is kept, else made and kept.
 
     It does not depend on the gaps, which are those of the part.
@@ -90,13 +90,13 @@ def _kinds_of_loads(scene: MeshScene) -> list[str]:
     return [load.kind for load in (*scene.loads.static.values(), *scene.loads.harmonic.values())]
 
 
-def heights(file: SceneFile, nodes: np.ndarray, make: Callable[[], T]) -> T:
+def cached_heights(file: SceneFile, nodes: np.ndarray, make: Callable[[], T]) -> T:
     """Heights of measured faces at contact nodes, whatever the mating height: as they are kept, else made and kept."""
     surfaces = file.mesh_scene.model_dump(include={"surfaces"}, exclude={"surfaces": {"mating_height"}})
     return _kept(file, "heights", (surfaces, nodes.tobytes()), make)
 
 
-def folder() -> Path | None:
+def cache_folder() -> Path | None:
     """Where entries lie, None where nothing is kept."""
     given = os.environ.get(FOLDER)
     if given is not None:
@@ -113,7 +113,7 @@ def _key(file: SceneFile, early: dict[str, Any], *more: object) -> str:
     What a file of Python code reads, or one that includes others, is not known; the program's own code is in CODE.
     """
     named = files_named(early, file.folder)
-    if not file.comes_along and any(_reads_others(path, path.stat().st_mtime_ns) for path in named.values()):
+    if not file.is_shipped and any(_reads_others(path, path.stat().st_mtime_ns) for path in named.values()):
         return ""
     versions = (platform.python_version(), platform.machine(), *map(package_version, PACKAGES))
     own = (early, digests(early, file.folder), usable(file.scene.solver.threads), CODE, versions, more)
@@ -127,7 +127,7 @@ def _reads_others(path: Path, changed: int) -> bool:
 
 def _kept(file: SceneFile, what: str, own: tuple[Any, ...], make: Callable[[], T]) -> T:
     """own : what it is made of, its tables first."""
-    room, last = folder(), _last.get()
+    room, last = cache_folder(), _last.get()
     if last is not None and what in last and last[what][0] == own:
         found: T = last[what][1]
         return found

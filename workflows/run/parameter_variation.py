@@ -22,18 +22,18 @@ from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel, Reduction
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
-from tribodyn.workflows.run import bodies, joints, matrix_model, modelling, part_reduction
+from tribodyn.workflows.run import joints, matrix_model, modelling, part_reduction, scene_assembly
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.body import Meshed, SolidMaterial
 from tribodyn.workflows.scene.contact import ContactTable
-from tribodyn.workflows.scene.loads import SpringTable, Vibrates
+from tribodyn.workflows.scene.load_tables import SpringTable, Vibrates
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
+from tribodyn.workflows.scene.part_tables import Meshed, SolidMaterial
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.scene_values import SceneValue, smooth_numbers
 from tribodyn.workflows.scene.schema import MeshScene, Scene
-from tribodyn.workflows.scene.sectors import WheelTable
 from tribodyn.workflows.scene.stages import CONTACT, REDUCTION
-from tribodyn.workflows.scene.structure import BoltTable
+from tribodyn.workflows.scene.structure_tables import BoltTable
+from tribodyn.workflows.scene.wheel_tables import WheelTable
 
 if TYPE_CHECKING:
     from tribodyn.reduction.sector_reduction import ReducedSector
@@ -63,7 +63,7 @@ def moves_nodes(number: SceneValue) -> bool:
     return isinstance(number.table, Meshed)
 
 
-class Varying:
+class ParameterVariation:
     """A scene with its model, and what a step of each of its numbers makes of it."""
 
     def __init__(self, file: SceneFile, progress: Progress, step: float = STEP):
@@ -304,7 +304,7 @@ class Varying:
         assert part is not None
         own = part.system
         if self.file.mesh_scene.material is not None and isinstance(number.table, SpringTable):
-            spring = bodies.spring(number.table)
+            spring = scene_assembly.make_spring(number.table)
             change = part.restricted(spring.matrix(part.mesh, part.node_sets))
             still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
             return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
