@@ -99,9 +99,9 @@ class Asperities:
         if not gap.max() > 0:
             raise Refusal("all summits are at one height: they have no density of gaps")
         at = gap / gap.max() * (rows - 1)
-        left = np.minimum(at.astype(int), rows - 2)
-        share = at - left
-        count = np.bincount(left, 1 - share, rows) + np.bincount(left + 1, share, rows)
+        remaining = np.minimum(at.astype(int), rows - 2)
+        share = at - remaining
+        count = np.bincount(remaining, 1 - share, rows) + np.bincount(remaining + 1, share, rows)
         width = np.full(rows, gap.max() / (rows - 1))
         width[[0, -1]] /= 2
         return np.column_stack([np.linspace(0, gap.max(), rows), count / (self.area * width)])
@@ -129,10 +129,10 @@ def identify(
             rough = split(rough, cutoff)[1]
         faces.append(centred(split(rough, shortest)[0] if shortest is not None else rough))
         repairs += changed
-    both = faces[0] if len(faces) == 1 else _sum(*faces)
-    height, curvature = summits(both)
-    area = float(np.prod([step * (n - 2) for step, n in zip(both.spacing, both.z.shape, strict=True)]))
-    return Asperities(height, curvature, area, moments(both), tuple(repairs))
+    both_faces = faces[0] if len(faces) == 1 else _sum(*faces)
+    height, curvature = summits(both_faces)
+    area = float(np.prod([step * (n - 2) for step, n in zip(both_faces.spacing, both_faces.z.shape, strict=True)]))
+    return Asperities(height, curvature, area, moments(both_faces), tuple(repairs))
 
 
 def _sum(first: HeightMap, second: HeightMap) -> HeightMap:
@@ -161,22 +161,22 @@ def summits(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     if not np.isfinite(z).all():
         raise Refusal(f"{surface.name}: it has points without height: fill the holes before summits are looked for")
     inner = z[1:-1, 1:-1]
-    found = inner > _highest_neighbour(z)
-    count = int(found.sum())
+    is_summit = inner > _highest_neighbour(z)
+    count = int(is_summit.sum())
     if count < LIMITS.summits:
         raise Refusal(
             f"{surface.name}: {count} summits are too few for statistics, {LIMITS.summits} are wanted: "
             "measure a larger area"
         )
     bend_x, bend_y = _bends(surface)
-    return inner[found] - z.mean(), -0.5 * (bend_x + bend_y)[found]
+    return inner[is_summit] - z.mean(), -0.5 * (bend_x + bend_y)[is_summit]
 
 
 def _highest_neighbour(z: np.ndarray) -> np.ndarray:
     """Largest of the eight heights around each inner point (nx - 2, ny - 2)."""
-    around = np.ones((3, 3), bool)
-    around[1, 1] = False
-    return np.asarray(maximum_filter(z, footprint=around)[1:-1, 1:-1])
+    neighbours = np.ones((3, 3), bool)
+    neighbours[1, 1] = False
+    return np.asarray(maximum_filter(z, footprint=neighbours)[1:-1, 1:-1])
 
 
 def _refuse_steps(surface: HeightMap) -> None:
@@ -205,6 +205,6 @@ def moments(surface: HeightMap) -> Moments:
 def _bends(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     """Second derivatives along x and y at the inner points (nx - 2, ny - 2) [1/m]."""
     z, (dx, dy) = surface.z, surface.spacing
-    along = (z[2:, 1:-1] - 2 * z[1:-1, 1:-1] + z[:-2, 1:-1]) / dx**2
+    axis = (z[2:, 1:-1] - 2 * z[1:-1, 1:-1] + z[:-2, 1:-1]) / dx**2
     across = (z[1:-1, 2:] - 2 * z[1:-1, 1:-1] + z[1:-1, :-2]) / dy**2
-    return along, across
+    return axis, across

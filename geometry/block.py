@@ -59,12 +59,12 @@ def build(parameters: Parameters, path: str | Path) -> None:
         sides |= {"u-": "x_min"} if start == 0.0 else {}
         sides |= {"u+": "x_max"} if end == p.length else {}
         parts.append(blocks.Block(x, across, up, "block", sides))
-    made = blocks.body(parts)
+    joined = blocks.body(parts)
     if padded:
         empty = np.empty((0, 9), dtype=int)
-        whole = {
-            f"z_{side}": np.concatenate([made.surfaces.get(f"z_{side}", empty), made.surfaces[f"pad_{side}"]])
+        cells = {
+            f"z_{side}": np.concatenate([joined.surfaces.get(f"z_{side}", empty), joined.surfaces[f"pad_{side}"]])
             for side in ("min", "max")
         }
-        made = replace(made, surfaces={**made.surfaces, **whole})
-    blocks.write(path, made)
+        joined = replace(joined, surfaces={**joined.surfaces, **cells})
+    blocks.write(path, joined)

@@ -73,8 +73,8 @@ def repair(surface: HeightMap, expected_size: tuple[float, float] | None = None)
     """The map without spikes and holes, levelled, and what was changed; arguments and errors as of `prepare`."""
     check(surface, expected_size)
     without_spikes, spikes = remove_outliers(surface)
-    whole, holes = fill_holes(without_spikes)
-    return level(whole), (*spikes, *holes)
+    filled, holes = fill_holes(without_spikes)
+    return level(filled), (*spikes, *holes)
 
 
 def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> None:
@@ -89,16 +89,16 @@ def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) 
         if not LIMITS.smallest <= side <= LIMITS.largest:
             raise Refusal(f"{name}: it is {side:g} m long in {axis}: give the lateral unit, 1e-6 for micrometres")
     if expected_size is not None:
-        for axis, side, wanted in zip("xy", surface.size, expected_size, strict=True):
-            if not 0.98 * wanted <= side <= 5 * wanted:
+        for axis, side, expected in zip("xy", surface.size, expected_size, strict=True):
+            if not 0.98 * expected <= side <= 5 * expected:
                 raise Refusal(
-                    f"{name}: it covers {side:g} m in {axis} but the contact {wanted:g} m: are map and unit right?"
+                    f"{name}: it covers {side:g} m in {axis} but the contact {expected:g} m: are map and unit right?"
                 )
     slopes = [np.abs(np.diff(surface.z, axis=axis)) / step for axis, step in enumerate(surface.spacing)]
-    known = np.concatenate([slope[np.isfinite(slope)] for slope in slopes])
-    if known.size and np.median(known) > LIMITS.steepest:
+    finite_slopes = np.concatenate([slope[np.isfinite(slope)] for slope in slopes])
+    if finite_slopes.size and np.median(finite_slopes) > LIMITS.steepest:
         raise Refusal(
-            f"{name}: its median slope is {np.median(known):.3g}, steeper than any machined face: "
+            f"{name}: its median slope is {np.median(finite_slopes):.3g}, steeper than any machined face: "
             "give the height unit, such as 1e-6 for micrometres"
         )
     span = np.nanmax(surface.z) - np.nanmin(surface.z)
@@ -147,26 +147,26 @@ def fill_holes(surface: HeightMap) -> tuple[HeightMap, list[str]]:
         )
     number = np.full(holes.shape, -1)
     number[holes] = np.arange(count)
-    diagonal, known = np.zeros(count), np.zeros(count)
+    diagonal, rim_heights = np.zeros(count), np.zeros(count)
     rows, columns, values = [], [], []
     for axis, step in enumerate(surface.spacing):
         for side in (1, -1):
             middle = [slice(None), slice(None)]
-            beside = [slice(None), slice(None)]
-            middle[axis], beside[axis] = (slice(None, -1), slice(1, None))[::side]
+            neighbours = [slice(None), slice(None)]
+            middle[axis], neighbours[axis] = (slice(None, -1), slice(1, None))[::side]
             inner = holes[tuple(middle)]
-            row, neighbour = number[tuple(middle)][inner], number[tuple(beside)][inner]
+            row, neighbour = number[tuple(middle)][inner], number[tuple(neighbours)][inner]
             weight = 1 / step**2
             diagonal[row] += weight
             inside = neighbour >= 0
             rows.append(row[inside])
             columns.append(neighbour[inside])
             values.append(np.full(inside.sum(), -weight))
-            known[row[~inside]] += weight * surface.z[tuple(beside)][inner][~inside]
+            rim_heights[row[~inside]] += weight * surface.z[tuple(neighbours)][inner][~inside]
     at = (np.concatenate(rows), np.concatenate(columns))
     laplace = sp.coo_matrix((np.concatenate(values), at), shape=(count, count))
     z = surface.z.copy()
-    z[holes] = spsolve((laplace + sp.diags(diagonal)).tocsc(), known)
+    z[holes] = spsolve((laplace + sp.diags(diagonal)).tocsc(), rim_heights)
     return replace(surface, z=z), [
         f"{surface.name}: {count} points without height ({100 * count / holes.size:.2g} %) were filled from their rim"
     ]

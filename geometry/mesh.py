@@ -40,8 +40,8 @@ def read_with_notes(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, 
         raise Refusal(f"mesh file '{path}' has {lost[0]}")
     quality(body.mesh)
     kinds = [f.name for f in fields(Deck) if getattr(raw.deck, f.name)]
-    left = [f"its {', '.join(kinds)}: bring it as [decks.NAME] to use them"] if kinds else []
-    unused = [f"not used: {clause}" for clause in (*raw.unused, *lost, *left)]
+    deck_note = [f"its {', '.join(kinds)}: bring it as [decks.NAME] to use them"] if kinds else []
+    unused = [f"not used: {clause}" for clause in (*raw.unused, *lost, *deck_note)]
     return (
         body.mesh,
         body.node_sets,
@@ -119,19 +119,19 @@ def facts(mesh: Any, density: np.ndarray | None = None) -> MeshFacts:
 
     Raises  Refusal: an element is inverted or degenerate
     """
-    found = quality(mesh)
+    worst_quality = quality(mesh)
     X, w = get_quadrature(mesh.elem.refdom, 5)
     mapping = mesh.mapping()
     weight = np.abs(mapping.detDF(X)) * w
     x = mapping.F(X)
     volume = float(weight.sum())
-    worst = mesh.p[:, mesh.t[:, found.worst_element]].mean(axis=1)
+    worst = mesh.p[:, mesh.t[:, worst_quality.worst_element]].mean(axis=1)
     heavy = weight if density is None else weight * density[:, None]
     total = float(heavy.sum())
     centre = np.einsum("ieq,eq->i", x, heavy) / total
     mass = None if density is None else total
     points = mesh.doflocs
-    return MeshFacts(points.min(axis=1), points.max(axis=1), volume, centre, found.scaled_jacobian, worst, mass)
+    return MeshFacts(points.min(axis=1), points.max(axis=1), volume, centre, worst_quality.scaled_jacobian, worst, mass)
 
 
 def area(mesh: Any, facets: np.ndarray) -> float:

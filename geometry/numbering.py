@@ -24,8 +24,8 @@ QUAD_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
 
 
 def _reference(corners: np.ndarray, *supports: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    beyond = [corners[list(support)].mean(axis=0) for group in supports for support in group]
-    return np.vstack([corners, *beyond])
+    offset = [corners[list(support)].mean(axis=0) for group in supports for support in group]
+    return np.vstack([corners, *offset])
 
 
 REFERENCE_POINTS = {

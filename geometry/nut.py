@@ -41,10 +41,10 @@ def build(parameters: Parameters, path: str | Path) -> None:
     z = np.linspace(0.0, p.height, p.n_height + 1)
     bore, seat = rings.circle(p.bore / 2), rings.circle(p.seat_diameter / 2)
     ends = {"w-": "seat", "w+": "top"}
-    made = blocks.body(
+    joined = blocks.body(
         [
             rings.ring(bore, seat, p.n_around, 1, z, "nut", {"v-": "bore", "w+": "top"}),
             rings.ring(seat, rings.hexagon(p.flats), p.n_around, 1, z, "nut", ends),
         ]
     )
-    blocks.write(path, made)
+    blocks.write(path, joined)

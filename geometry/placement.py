@@ -11,7 +11,7 @@ import skfem
 
 from tribodyn.refusal import Refusal
 
-MOST = 1000  # elements of a body that are looked at
+MAX_SAMPLES = 1000  # elements of a body that are looked at
 SHARE = 0.01  # of them inside another body, from which on the two overlap: a press fit reaches into no middle
 BLOCK = 2_000_000  # points times triangles at once
 
@@ -47,45 +47,45 @@ def extract_volume(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) 
     elements = np.sort(volumes[volume])
     corners, t = np.unique(mesh.t[:, elements], return_inverse=True)
     first = skfem.MeshTet1 if mesh.elem.refdom.nnodes == 4 else skfem.MeshHex1
-    own = type(mesh).from_mesh(first(np.ascontiguousarray(mesh.p[:, corners]), t.reshape(mesh.t.shape[0], -1)))
-    locations = own.doflocs.copy()
-    old = mesh.dofs.element_dofs[:, elements]
-    new = own.dofs.element_dofs
-    locations[:, new] = mesh.doflocs[:, old]
+    extracted = type(mesh).from_mesh(first(np.ascontiguousarray(mesh.p[:, corners]), t.reshape(mesh.t.shape[0], -1)))
+    locations = extracted.doflocs.copy()
+    mesh_dofs = mesh.dofs.element_dofs[:, elements]
+    extracted_dofs = extracted.dofs.element_dofs
+    locations[:, extracted_dofs] = mesh.doflocs[:, mesh_dofs]
     number = np.full(mesh.doflocs.shape[1], -1)
-    number[old] = new
+    number[mesh_dofs] = extracted_dofs
     place = np.full(mesh.p.shape[1], -1)
     place[corners] = np.arange(len(corners))
-    facets = {tuple(sorted(facet)): i for i, facet in enumerate(own.facets.T.tolist())}
+    facets = {tuple(sorted(facet)): i for i, facet in enumerate(extracted.facets.T.tolist())}
     boundaries = {}
     for name, group in (mesh.boundaries or {}).items():
         inside = [facets.get(tuple(sorted(facet))) for facet in place[mesh.facets[:, group]].T.tolist()]
-        found = np.array([i for i in inside if i is not None], dtype=int)
-        if len(found):
-            boundaries[name] = np.unique(found)
+        inner_facets = np.array([i for i in inside if i is not None], dtype=int)
+        if len(inner_facets):
+            boundaries[name] = np.unique(inner_facets)
     position = np.full(mesh.t.shape[1], -1)
     position[elements] = np.arange(len(elements))
     subdomains = {name: np.sort(at[at >= 0]) for name, of in volumes.items() if ((at := position[of]) >= 0).any()}
     sets = {name: np.sort(at[at >= 0]) for name, of in node_sets.items() if ((at := number[of]) >= 0).any()}
-    result = replace(own, doflocs=locations).with_boundaries(boundaries).with_subdomains(subdomains)
+    result = replace(extracted, doflocs=locations).with_boundaries(boundaries).with_subdomains(subdomains)
     return result, sets
 
 
-def overlap(one: Any, other: Any) -> tuple[float, np.ndarray] | None:
+def overlap(first: Any, second: Any) -> tuple[float, np.ndarray] | None:
     """Share of the elements of one mesh whose middles lie in the other one, and the mean of their places (3,) [m].
 
     one, other : skfem MeshHex2 or MeshTet2; None where less than SHARE of them do
     """
-    middles = _middles(one)
-    picked = middles[np.unique(np.linspace(0, len(middles) - 1, MOST).astype(int))]
-    corners = other.doflocs[:, np.unique(other.t)]
-    near = picked[((picked > corners.min(axis=1)) & (picked < corners.max(axis=1))).all(axis=1)]
-    if len(near) < SHARE * len(picked):
+    middles = _middles(first)
+    picked = middles[np.unique(np.linspace(0, len(middles) - 1, MAX_SAMPLES).astype(int))]
+    corners = second.doflocs[:, np.unique(second.t)]
+    candidates = picked[((picked > corners.min(axis=1)) & (picked < corners.max(axis=1))).all(axis=1)]
+    if len(candidates) < SHARE * len(picked):
         return None
-    triangles = _triangles(other)
+    triangles = _triangles(second)
     step = max(BLOCK // len(triangles), 1)
-    parts = [_winding(near[i : i + step], triangles) for i in range(0, len(near), step)]
-    inside = near[np.abs(np.concatenate(parts)) > 0.5]
+    parts = [_winding(candidates[i : i + step], triangles) for i in range(0, len(candidates), step)]
+    inside = candidates[np.abs(np.concatenate(parts)) > 0.5]
     return (len(inside) / len(picked), inside.mean(axis=0)) if len(inside) >= SHARE * len(picked) else None
 
 
@@ -103,12 +103,12 @@ def _triangles(mesh: Any) -> np.ndarray:
     points = mesh.doflocs.T[mesh.facets[:, facets].T]
     n = points.shape[1]
     thirds = [(0, i, i + 1) for i in range(1, n - 1)]
-    found = np.concatenate([points[:, list(third)] for third in thirds])
-    behind = np.tile(mesh.doflocs[:, mesh.t].mean(axis=1).T[mesh.f2t[0, facets]], (len(thirds), 1))
-    normal = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
-    inward = np.einsum("nx,nx->n", normal, found.mean(axis=1) - behind) < 0
-    found[inward] = found[inward, ::-1]
-    return np.asarray(found)
+    corners = np.concatenate([points[:, list(third)] for third in thirds])
+    body_centre = np.tile(mesh.doflocs[:, mesh.t].mean(axis=1).T[mesh.f2t[0, facets]], (len(thirds), 1))
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("nx,nx->n", normal, corners.mean(axis=1) - body_centre) < 0
+    corners[inward] = corners[inward, ::-1]
+    return np.asarray(corners)
 
 
 def _winding(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -119,5 +119,5 @@ def _winding(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     a, b, c = np.moveaxis(triangles[None] - points[:, None, None], 2, 0)
     la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
     triple = np.einsum("knx,knx->kn", a, np.cross(b, c))
-    below = la * lb * lc + sum(np.einsum("knx,knx->kn", u, v) * l for u, v, l in ((a, b, lc), (b, c, la), (c, a, lb)))
-    return np.asarray(np.arctan2(triple, below).sum(axis=1) / (2 * np.pi))
+    lower = la * lb * lc + sum(np.einsum("knx,knx->kn", u, v) * l for u, v, l in ((a, b, lc), (b, c, la), (c, a, lb)))
+    return np.asarray(np.arctan2(triple, lower).sum(axis=1) / (2 * np.pi))

@@ -52,7 +52,7 @@ def polygon(corners: np.ndarray) -> Curve:
 def ring(
     inner: Curve,
     outer: Curve,
-    around: int,
+    angles: int,
     across: int,
     z: np.ndarray,
     volume: str,
@@ -69,7 +69,7 @@ def ring(
         plane = (1 - v)[:, None] * inner(u) + v[:, None] * outer(u) + np.asarray(centre)
         return np.column_stack([plane, height])
 
-    return Block(np.linspace(0, 1, around + 1), np.linspace(0, 1, across + 1), z, volume, sides or {}, mapped)
+    return Block(np.linspace(0, 1, angles + 1), np.linspace(0, 1, across + 1), z, volume, sides or {}, mapped)
 
 
 def core(half: float, across: int, z: np.ndarray, volume: str, sides: Mapping[str, str] | None = None) -> Block:

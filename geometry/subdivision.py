@@ -61,7 +61,7 @@ def _once(mesh: Any, node_sets: Mapping[str, np.ndarray]) -> tuple[Any, Groups]:
         cells[2:, mirrored] = cells[:1:-1, mirrored]
     linear: Any = (MeshHex if hexahedra else MeshTet)(np.asarray(mesh.doflocs), cells, sort_t=False)
     fine: Any = (MeshHex2 if hexahedra else MeshTet2).from_mesh(linear)
-    points = _placed(mesh, nodes, fine, cells, parent)
+    points = _node_positions(mesh, nodes, fine, cells, parent)
     boundaries = {name: _pieces(mesh, fine, np.asarray(ids)) for name, ids in (mesh.boundaries or {}).items()}
     subdomains = {
         name: np.flatnonzero(np.isin(parent, np.asarray(ids))) for name, ids in (mesh.subdomains or {}).items()
@@ -79,26 +79,28 @@ def _incidence(groups: np.ndarray, n_node: int) -> csr_matrix:
 def _containing(cells: np.ndarray, nodes: np.ndarray, n_node: int) -> np.ndarray:
     """(n_cell,) the element that all corners of a piece belong to."""
     shared = (_incidence(cells, n_node) @ _incidence(nodes, n_node).T).tocoo()
-    whole = shared.data == len(cells)
+    is_contained = shared.data == len(cells)
     parent = np.full(cells.shape[1], -1)
-    parent[shared.row[whole]] = shared.col[whole]
+    parent[shared.row[is_contained]] = shared.col[is_contained]
     assert (parent >= 0).all()
     return parent
 
 
-def _placed(mesh: Any, nodes: np.ndarray, fine: Any, cells: np.ndarray, parent: np.ndarray) -> np.ndarray:
+def _node_positions(mesh: Any, nodes: np.ndarray, fine: Any, cells: np.ndarray, parent: np.ndarray) -> np.ndarray:
     """(3, n_node) nodes of the pieces, where the shape functions of their parents bring them."""
     element = mesh.elem()
     linear: Any = ElementHex1() if isinstance(mesh, MeshHex2) else ElementTetP1()
     local = (nodes[:, parent][None] == cells[:, None]).argmax(axis=1)  # (corner, piece) local node of the parent
     kinds, kind = np.unique(local, axis=1, return_inverse=True)
     weights = np.stack([_values(linear, element.doflocs.T, a) for a in range(len(cells))])  # (corner, node)
-    points, own = np.empty_like(fine.doflocs), np.asarray(fine.dofs.element_dofs)
+    points, fine_dofs = np.empty_like(fine.doflocs), np.asarray(fine.dofs.element_dofs)
     for i, corners in enumerate(kinds.T):
         at = element.doflocs[corners].T @ weights  # (3, node) in the parent
         N = np.stack([_values(element, at, a) for a in range(len(nodes))])
-        these = np.flatnonzero(kind.ravel() == i)
-        points[:, own[:, these]] = np.einsum("xap,an->xnp", mesh.doflocs[:, nodes[:, parent[these]]], N)
+        cells_of_kind = np.flatnonzero(kind.ravel() == i)
+        points[:, fine_dofs[:, cells_of_kind]] = np.einsum(
+            "xap,an->xnp", mesh.doflocs[:, nodes[:, parent[cells_of_kind]]], N
+        )
     return points
 
 
@@ -124,19 +126,21 @@ def _pieces(mesh: Any, fine: Any, facets: np.ndarray) -> np.ndarray:
 def _filled(mesh: Any, nodes: np.ndarray, fine: Any, parent: np.ndarray, members: np.ndarray) -> np.ndarray:
     """A node set of the mesh on the refined one."""
     n = mesh.doflocs.shape[1]
-    held, more = np.zeros(n, dtype=bool), np.zeros(fine.doflocs.shape[1], dtype=bool)
-    held[members] = True
-    more[members] = True
-    more[fine.dofs.element_dofs[:, held[nodes].all(axis=0)[parent]]] = True
-    every = np.arange(mesh.facets.shape[1])
-    facets = every[held[_all_nodes(mesh, every)].all(axis=0)]
+    is_member, is_refined_member = np.zeros(n, dtype=bool), np.zeros(fine.doflocs.shape[1], dtype=bool)
+    is_member[members] = True
+    is_refined_member[members] = True
+    is_refined_member[fine.dofs.element_dofs[:, is_member[nodes].all(axis=0)[parent]]] = True
+    all_facets = np.arange(mesh.facets.shape[1])
+    facets = all_facets[is_member[_all_nodes(mesh, all_facets)].all(axis=0)]
     if len(facets):
-        more[fine.dofs.get_facet_dofs(_pieces(mesh, fine, facets)).flatten()] = True
+        is_refined_member[fine.dofs.get_facet_dofs(_pieces(mesh, fine, facets)).flatten()] = True
     middle = mesh.dofs.edge_dofs[0]
-    edges = np.flatnonzero(held[mesh.edges].all(axis=0) & held[middle])
+    edges = np.flatnonzero(is_member[mesh.edges].all(axis=0) & is_member[middle])
     halves = np.hstack([np.vstack([end[edges], middle[edges]]) for end in mesh.edges])
-    wanted = np.sort(halves, axis=0)
+    halved_edges = np.sort(halves, axis=0)
     key = np.sort(fine.edges, axis=0)
-    found = np.flatnonzero(np.isin(key[0].astype(np.int64) * n + key[1], wanted[0].astype(np.int64) * n + wanted[1]))
-    more[fine.dofs.edge_dofs[0][found]] = True
-    return np.flatnonzero(more)
+    inner = np.flatnonzero(
+        np.isin(key[0].astype(np.int64) * n + key[1], halved_edges[0].astype(np.int64) * n + halved_edges[1])
+    )
+    is_refined_member[fine.dofs.edge_dofs[0][inner]] = True
+    return np.flatnonzero(is_refined_member)

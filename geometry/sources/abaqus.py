@@ -157,23 +157,23 @@ def load(path: Path) -> DeckAssembly:
 def _instance(card: Card, parts: dict[str, Scope], assembly: DeckAssembly) -> Scope:
     part, name = card.option("PART"), card.option("NAME")
     if part.upper() not in parts:
-        known = ", ".join(parts) or "there is none"
-        raise Refusal(f"{card.where} names the part '{part}', which the deck has not ({known}): correct the name")
+        part_names = ", ".join(parts) or "there is none"
+        raise Refusal(f"{card.where} names the part '{part}', which the deck has not ({part_names}): correct the name")
     if any(name.upper() == other.upper() for other in assembly.instances):
         raise Refusal(f"{card.where} has the name '{name}' of another instance: give each its own")
     source = parts[part.upper()]
-    own: dict[str, Any] = {
+    content: dict[str, Any] = {
         key: {k: list(items) for k, items in getattr(source, key).items()} for key in ("nsets", "elsets")
     }
-    own |= {one.name: copy(getattr(source, one.name)) for one in fields(source) if one.name not in own}
-    scope = Scope(**{**own, "system": None})
+    content |= {item.name: copy(getattr(source, item.name)) for item in fields(source) if item.name not in content}
+    scope = Scope(**{**content, "system": None})
     turn, shift = np.eye(3), np.zeros(3)
     if card.data:
         shift = np.array(card.floats(card.data[0], 3))
     if len(card.data) > 1:
         *axis, angle = card.floats(card.data[1], 7)
-        start, along = np.array(axis[:3]), np.array(axis[3:]) - np.array(axis[:3])
-        turn = rotation(along, math.radians(angle))
+        start, direction = np.array(axis[:3]), np.array(axis[3:]) - np.array(axis[:3])
+        turn = rotation(direction, math.radians(angle))
         shift = start + turn @ (shift - start)
     assembly.instances[name] = scope
     assembly.moves[name] = (turn, shift)
@@ -195,11 +195,11 @@ def _system(card: Card, scope: Scope) -> None:
     if not card.data:
         scope.system = None
         return
-    origin, along = (np.array(card.floats(card.data[0][k : k + 3], 3)) for k in (0, 3))
+    origin, on_x = (np.array(card.floats(card.data[0][k : k + 3], 3)) for k in (0, 3))
     axes = np.eye(3)
     if len(card.data[0]) > 3:
-        across = np.array(card.floats(card.data[1], 3)) if len(card.data) > 1 else origin + [0.0, 0.0, 1.0]
-        x, second, third = orthogonal(along - origin, across - origin)
+        on_plane = np.array(card.floats(card.data[1], 3)) if len(card.data) > 1 else origin + [0.0, 0.0, 1.0]
+        x, second, third = orthogonal(on_x - origin, on_plane - origin)
         axes = np.stack([x, second, third] if len(card.data) > 1 else [x, -third, second])
     scope.system = System("rectangular", origin, axes)
 
@@ -209,7 +209,7 @@ def _nodes(card: Card, scope: Scope) -> None:
     kinds = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
     if letter not in kinds:
         raise Refusal(f"{card.where} has the system '{letter}': it is one of R, C, S")
-    labels = [card.whole(line[0]) for line in card.data]
+    labels = [card.integer(line[0]) for line in card.data]
     if not labels:
         raise Refusal(f"{card.where} has no nodes: write them in the deck, or take an *INCLUDE")
     places = np.array([card.floats(line[1:], 3) for line in card.data])
@@ -228,7 +228,7 @@ def _elements(card: Card, scope: Scope) -> None:
     labels = []
     numbers: list[int] = []
     for line in card.data:
-        numbers += [card.whole(text) for text in line if text]
+        numbers += [card.integer(text) for text in line if text]
         if count is None or len(numbers) > count:
             if count is not None or numbers[0] not in scope.elements:
                 scope.elements[numbers[0]] = (kind, tuple(numbers[1:]))
@@ -242,8 +242,8 @@ def _elements(card: Card, scope: Scope) -> None:
 
 def solid_node_count(kind: str) -> int | None:
     """Nodes of a solid element by its type; None for elements that are none."""
-    found = _SOLID.match(kind)
-    return int(found[1]) if found and int(found[1]) in SOLIDS else None
+    number = _SOLID.match(kind)
+    return int(number[1]) if number and int(number[1]) in SOLIDS else None
 
 
 def _set(card: Card, scope: Scope) -> None:
@@ -254,7 +254,7 @@ def _set(card: Card, scope: Scope) -> None:
         target.append(prefix + card.option("ELSET"))
     for line in card.data:
         if "GENERATE" in card.options:
-            first, last, *step = [card.whole(text) for text in line if text]
+            first, last, *step = [card.integer(text) for text in line if text]
             target += [f"{prefix}{label}" for label in range(first, last + 1, step[0] if step else 1)]
         else:
             target += [prefix + text for text in line if text]

@@ -68,7 +68,7 @@ class _Cards(MaterialCards):
         if card.name in TABLE.reads:
             getattr(self, "_" + card.name.lower().replace(" ", "_"))(card)
         else:
-            self.met.other(card.name)
+            self.skipped.skip(card.name)
 
     # constraints
 
@@ -92,21 +92,23 @@ class _Cards(MaterialCards):
             return
         lines = iter(card.data)
         for line in lines:
-            count, fields = card.whole(line[0]), [text for text in line[1:] if text]
+            count, fields = card.integer(line[0]), [text for text in line[1:] if text]
             while len(fields) < 3 * count:
-                more = next(lines, None)
-                if more is None:
+                next_line = next(lines, None)
+                if next_line is None:
                     raise Refusal(f"{card.where} ends before its {count} terms: the deck is cut off")
-                fields += [text for text in more if text]
+                fields += [text for text in next_line if text]
             terms = [
-                (fields[i], card.whole(fields[i + 1]) - 1, card.number(fields[i + 2])) for i in range(0, 3 * count, 3)
+                (fields[i], card.integer(fields[i + 1]) - 1, card.number(fields[i + 2])) for i in range(0, 3 * count, 3)
             ]
             members = [self._rows(place, card) for place, _, _ in terms]
             for i in range(max(map(len, members))):
-                picked = [rows[min(i, len(rows) - 1)] for rows in members]
+                node_rows = [rows[min(i, len(rows) - 1)] for rows in members]
                 self.equations.append(
                     deck.DeckEquation(
-                        tuple((self._node(r), axis, value) for r, (_, axis, value) in zip(picked, terms, strict=True))
+                        tuple(
+                            (self._node(r), axis, value) for r, (_, axis, value) in zip(node_rows, terms, strict=True)
+                        )
                     )
                 )
 
@@ -148,7 +150,7 @@ class _Cards(MaterialCards):
         """The node of the element, such as DCOUP3D, to which CalculiX gives a distributing coupling."""
         for where, label in self.assembly.elements(card.option("ELSET")):
             kind, nodes = self.assembly.scope(where).elements[label]
-            self.met.refused.pop(kind, None)
+            self.skipped.refused.pop(kind, None)
             return f"{where}.{nodes[0]}" if where else str(nodes[0])
         return ""
 
@@ -174,7 +176,7 @@ class _Cards(MaterialCards):
         for line in card.data:
             if len(line) < 3:
                 raise Refusal(f"{card.where} needs node, direction and value: complete the line")
-            axis = card.whole(line[1]) - 1
+            axis = card.integer(line[1]) - 1
             if 0 <= axis <= 5:
                 self.forces.append(deck.Force(self._place(line[0], card), axis, card.number(line[2])))
             else:
@@ -243,7 +245,7 @@ class _Cards(MaterialCards):
 
     def _initial_conditions(self, card: Card) -> None:
         if card.option("TYPE").upper() == "TEMPERATURE":
-            self.met.ignored["*INITIAL CONDITIONS, TEMPERATURE"] += 1
+            self.skipped.ignored["*INITIAL CONDITIONS, TEMPERATURE"] += 1
             for line in (line for line in card.data if len(line) > 1):
                 with suppress(ValueError):  # of nodes that the deck has not: no table is taken at a temperature then
                     self.warm[self._rows(line[0], card)] = card.number(line[1])
@@ -257,7 +259,7 @@ class _Cards(MaterialCards):
     def finished(self) -> RawMesh:
         """The mesh with everything that the cards give."""
         solid = self.solid
-        made = deck.Deck(
+        content = deck.Deck(
             tuple(self._with_groups()),
             tuple(self.ties),
             tuple(self.contacts),
@@ -278,16 +280,16 @@ class _Cards(MaterialCards):
                 points.setdefault(name, self.raw.points[rows[0]])
         nodes = {name: rows for name, rows in named.items() if name not in points}
         unused = list(self.unused)
-        unused += self.met.unused()
+        unused += self.skipped.unused()
         notes = [f"the loads and supports of {self.steps} steps are taken together"] if self.steps > 1 else []
         return replace(
             self.raw,
             nodes=nodes,
             faces={**self.raw.faces, **self.faces},
             points_of_reference=points,
-            deck=made,
+            deck=content,
             unused=[*self.raw.unused, *unused],
-            refused={**self.raw.refused, **self.met.refused},
+            refused={**self.raw.refused, **self.skipped.refused},
             notes=[*self.raw.notes, *notes],
         )
 
@@ -297,20 +299,20 @@ class _Cards(MaterialCards):
                 if not card.data or {"NONLINEAR", "ORIENTATION"} & set(card.options):
                     self._refused(card, ", ".join({"NONLINEAR", "ORIENTATION"} & set(card.options)) or "no stiffness")
                     continue
-                axes = [card.whole(text) - 1 for line in card.data[:-1] for text in line if text]
+                axes = [card.integer(text) - 1 for line in card.data[:-1] for text in line if text]
                 for where, label in self.assembly.elements(card.option("ELSET"), instance):
                     kind, nodes = self.assembly.scope(where).elements[label]
                     rows = [self.row[where, node] for node in nodes]
                     if kind == "SPRINGA":
-                        along = np.subtract(*self.raw.points[rows[::-1]])
-                        factors = along / np.linalg.norm(along)
+                        direction = np.subtract(*self.raw.points[rows[::-1]])
+                        factors = direction / np.linalg.norm(direction)
                         terms = [
                             (r, k, s * f) for r, s in zip(rows, (-1, 1), strict=True) for k, f in enumerate(factors)
                         ]
                     else:
                         terms = [(r, axis, s) for r, axis, s in zip(rows, axes, (1.0, -1.0), strict=False)]
-                    kept = tuple((self._node(r), axis, float(factor)) for r, axis, factor in terms if factor)
-                    yield deck.DeckSpring(kept, card.number(card.data[-1][0]))
+                    terms_of_nodes = tuple((self._node(r), axis, float(factor)) for r, axis, factor in terms if factor)
+                    yield deck.DeckSpring(terms_of_nodes, card.number(card.data[-1][0]))
 
     def _masses(self) -> Iterator[deck.PointMass]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
@@ -322,7 +324,7 @@ class _Cards(MaterialCards):
 
 def _axes(card: Card, fields: list[str]) -> range:
     """Axes 0..5 from a first and a last one, counted from 1 in the deck."""
-    given = [card.whole(text) for text in fields if text]
-    if not given:
+    numbers = [card.integer(text) for text in fields if text]
+    if not numbers:
         return range(0)
-    return range(given[0] - 1, min(given[-1] if len(given) > 1 else given[0], 6))
+    return range(numbers[0] - 1, min(numbers[-1] if len(numbers) > 1 else numbers[0], 6))

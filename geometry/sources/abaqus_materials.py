@@ -94,13 +94,13 @@ class MaterialCards(DeckPlaces):
                         f"*SOLID SECTION of '{elset}' names the material '{material}', which the deck has not: "
                         "correct the name or add the material"
                     )
-                wanted = f"{instance}.{elset}" if instance else elset
-                name = next((name for name in self.raw.volumes if name.upper() == wanted.upper()), None)
+                group_name = f"{instance}.{elset}" if instance else elset
+                name = next((name for name in self.raw.volumes if name.upper() == group_name.upper()), None)
                 if name:
                     groups.setdefault(material.upper(), {})[name] = self._directions(card, scope, instance)
-        for key, one in self.materials.items():
+        for key, item in self.materials.items():
             mine = groups.get(key, {})
-            yield replace(one, groups=tuple(mine), directions={name: axes for name, axes in mine.items() if axes})
+            yield replace(item, groups=tuple(mine), directions={name: axes for name, axes in mine.items() if axes})
 
     def _directions(self, section: Card, scope: abaqus.Scope, instance: str) -> Directions | None:
         """Axes of the material of a section, None for x, y, z."""
@@ -115,37 +115,37 @@ class MaterialCards(DeckPlaces):
             self._refused(card, card.option("DEFINITION").upper())
             return None
         turn, shift = self.assembly.moves.get(instance, (np.eye(3), np.zeros(3)))
-        own = np.eye(3)
+        local = np.eye(3)
         if len(card.data) > 1 and card.data[1][0]:
             axis, angle = card.floats(card.data[1], 2)
             if axis not in (1.0, 2.0, 3.0):
                 raise Refusal(f"{card.where} turns about axis {axis:g}: give 1, 2 or 3")
-            own = axis_rotation(int(axis) - 1, angle)
+            local = axis_rotation(int(axis) - 1, angle)
         table = scope.distributions.get(card.data[0][0].upper())
         if table is not None:
-            return self._listed(table, instance, turn, own)
+            return self._listed(table, instance, turn, local)
         points = np.array(card.floats(card.data[0], 9)).reshape(3, 3)
         kind = card.option("SYSTEM").upper() or "RECTANGULAR"
         if kind in ("RECTANGULAR", "Z RECTANGULAR"):
             rows = orthogonal(points[0] - points[2], points[1] - points[2])
             if kind[0] == "Z":  # the first is z, the second x
                 rows = np.roll(rows, -1, axis=0)
-            system = System("rectangular", np.zeros(3), rows, own)
+            system = System("rectangular", np.zeros(3), rows, local)
         elif kind in ("CYLINDRICAL", "SPHERICAL"):
             pole = points[1] - points[0]
-            aside = np.eye(3)[np.abs(pole).argmin()]
-            system = replace(System.of_points(kind.lower(), points[0], points[1], points[0] + aside), turn=own)
+            other_axis = np.eye(3)[np.abs(pole).argmin()]
+            system = replace(System.of_points(kind.lower(), points[0], points[1], points[0] + other_axis), turn=local)
         else:
             self._refused(card, kind)
             return None
-        return system.moved(turn, shift)
+        return system.transformed(turn, shift)
 
-    def _listed(self, card: Card, instance: str, turn: np.ndarray, own: np.ndarray) -> ElementAxes:
+    def _listed(self, card: Card, instance: str, turn: np.ndarray, local: np.ndarray) -> ElementAxes:
         """Axes element by element; those that no line names have those of the first line."""
         centres = np.vstack([self.raw.points[block.nodes].mean(axis=1) for block in self.raw.cells])
         mine = [number for (where, _), number in self.number.items() if where == instance]  # labels are those of a part
         axes: list[np.ndarray] = []
-        which = np.zeros(len(centres), dtype=int)
+        axes_of = np.zeros(len(centres), dtype=int)
         for line in card.data:
             points = np.array(card.floats(line[1:], 6)).reshape(2, 3)
             if line[0]:
@@ -153,9 +153,9 @@ class MaterialCards(DeckPlaces):
                     named = self.assembly.elements(line[0], instance)
                 except KeyError:
                     raise Refusal(f"{card.where} names the elements '{line[0]}', which the deck has not") from None
-                which[[self.number[key] for key in named if key in self.number]] = len(axes)
-            axes.append(own @ orthogonal(*points) @ turn.T)
-        return ElementAxes(centres[mine], np.array(axes)[which[mine]])
+                axes_of[[self.number[key] for key in named if key in self.number]] = len(axes)
+            axes.append(local @ orthogonal(*points) @ turn.T)
+        return ElementAxes(centres[mine], np.array(axes)[axes_of[mine]])
 
 
 def engineering_constants(D: list[float]) -> tuple[float, ...]:

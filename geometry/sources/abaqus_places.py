@@ -31,7 +31,7 @@ class DeckPlaces:
     nodes: dict[str, np.ndarray] = field(default_factory=dict)
     faces: dict[str, list[np.ndarray]] = field(default_factory=dict)
     references: dict[int, str] = field(default_factory=dict)
-    met: SkippedCards = field(default_factory=lambda: SkippedCards(TABLE, "*"))
+    skipped: SkippedCards = field(default_factory=lambda: SkippedCards(TABLE, "*"))
     solid: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool))
 
     def __post_init__(self) -> None:
@@ -43,9 +43,9 @@ class DeckPlaces:
             if len(rows) == 1 and not self.solid[rows[0]]:
                 self.references.setdefault(int(rows[0]), name)
 
-    def _refused(self, card: Card, what: str = "") -> None:
+    def _refused(self, card: Card, form: str = "") -> None:
         """Refuse a card, or one form of it."""
-        self.met.refuse(f"*{card.name}{what and ', '}{what}")
+        self.skipped.refuse(f"*{card.name}{form and ', '}{form}")
 
     def _rows(self, text: str, card: Card) -> list[int]:
         try:
@@ -70,8 +70,8 @@ class DeckPlaces:
 
     def _place(self, text: str, card: Card, face: bool = False) -> str:
         """Name of the group that a card means: a face, a node set, or a group of one node that is made for it."""
-        known = [*self.raw.faces, *self.raw.nodes] if face else [*self.raw.nodes, *self.raw.faces]
-        for name in known:
+        names = [*self.raw.faces, *self.raw.nodes] if face else [*self.raw.nodes, *self.raw.faces]
+        for name in names:
             if name.upper() == text.upper():
                 rows = self.raw.nodes.get(name)
                 return self.references.get(int(rows[0]), name) if rows is not None and len(rows) == 1 else name
@@ -101,17 +101,17 @@ class DeckPlaces:
 
     def _faces_of(self, text: str, face: int, card: Card) -> list[np.ndarray]:
         try:
-            named = self.assembly.elements(text)
+            element_keys = self.assembly.elements(text)
         except KeyError:
-            named = []
-        wanted = np.array([self.number[key] for key in named if key in self.number], dtype=int)
-        found, start = [], 0
+            element_keys = []
+        solids = np.array([self.number[key] for key in element_keys if key in self.number], dtype=int)
+        face_corners, start = [], 0
         for block in self.raw.cells:
-            inside = wanted[(wanted >= start) & (wanted < start + len(block.nodes))] - start
+            inside = solids[(solids >= start) & (solids < start + len(block.nodes))] - start
             start += len(block.nodes)
             faces = abaqus.FACES[VOLUMES[block.kind][0].corners]
             if len(inside) and face <= len(faces):
-                found.append(block.nodes[inside][:, list(faces[face - 1])])
-        if not found:
+                face_corners.append(block.nodes[inside][:, list(faces[face - 1])])
+        if not face_corners:
             self._refused(card, f"on '{text}', which is no solid element")
-        return found
+        return face_corners

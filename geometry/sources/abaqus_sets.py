@@ -100,9 +100,9 @@ class _Sets:
     def collect(self, scopes: dict[str, Scope]) -> None:
         """Resolve the sets of all scopes; those of an instance bear its name before a dot."""
         for instance in self.assembly.instances:
-            held = [self.number[key] for key in self.number if key[0] == instance]
-            if held:
-                self.volumes[instance] = np.array(held)
+            solids = [self.number[key] for key in self.number if key[0] == instance]
+            if solids:
+                self.volumes[instance] = np.array(solids)
         for instance, scope in scopes.items():
             before = f"{instance}." if instance else ""
             for key in scope.elsets:
@@ -112,11 +112,11 @@ class _Sets:
             for key, (kind, items) in scope.surfaces.items():
                 self._surface(before + scope.names[key], kind, items, instance)
 
-    def _try(self, resolve: Callable[[str, str], list[Node]], key: str, instance: str, what: str) -> list[Node]:
+    def _try(self, resolve: Callable[[str, str], list[Node]], key: str, instance: str, label: str) -> list[Node]:
         try:
             return list(resolve(key, instance))
         except KeyError as missing:
-            self.unused.append(f"{what} '{key}', which names '{missing.args[0]}' that the deck has not")
+            self.unused.append(f"{label} '{key}', which names '{missing.args[0]}' that the deck has not")
             return []
 
     def _elset(self, name: str, members: Iterable[Node]) -> None:
@@ -150,7 +150,7 @@ class _Sets:
             self.faces[name] = corners
 
     def _faces(self, numbers: np.ndarray, face: str, name: str) -> list[np.ndarray]:
-        found, start = [], 0
+        corners_of_faces, start = [], 0
         for block in self.blocks:
             inside = numbers[(numbers >= start) & (numbers < start + len(block.nodes))] - start
             start += len(block.nodes)
@@ -158,23 +158,23 @@ class _Sets:
                 continue
             faces = FACES[VOLUMES[block.kind][0].corners]
             if face in ("", "SPOS"):
-                found += [block.nodes[inside][:, list(corners)] for corners in faces]
+                corners_of_faces += [block.nodes[inside][:, list(corners)] for corners in faces]
             elif face[1:].isdigit() and 1 <= int(face[1:]) <= len(faces):
-                found.append(block.nodes[inside][:, list(faces[int(face[1:]) - 1])])
+                corners_of_faces.append(block.nodes[inside][:, list(faces[int(face[1:]) - 1])])
             else:
                 self.unused.append(f"face {face} of {len(inside)} elements of surface '{name}', which they have not")
-        return free_faces(found, self.blocks) if face in ("", "SPOS") else found
+        return free_faces(corners_of_faces, self.blocks) if face in ("", "SPOS") else corners_of_faces
 
 
 def free_faces(parts: list[np.ndarray], blocks: Sequence[Cells]) -> list[np.ndarray]:
     """Those of some faces, corners (k, 3 or 4), that belong to one element of the mesh only."""
-    seen: Counter[tuple[int, ...]] = Counter()
+    counts: Counter[tuple[int, ...]] = Counter()
     for block in blocks:
         for corners in FACES[VOLUMES[block.kind][0].corners]:
-            seen.update(map(tuple, np.sort(block.nodes[:, list(corners)], axis=1).tolist()))
-    kept = []
+            counts.update(map(tuple, np.sort(block.nodes[:, list(corners)], axis=1).tolist()))
+    outer_parts = []
     for part in parts:
-        outer = np.array([seen[tuple(key)] == 1 for key in np.sort(part, axis=1).tolist()], dtype=bool)
+        outer = np.array([counts[tuple(key)] == 1 for key in np.sort(part, axis=1).tolist()], dtype=bool)
         if outer.any():
-            kept.append(part[outer])
-    return kept
+            outer_parts.append(part[outer])
+    return outer_parts

@@ -30,13 +30,15 @@ def with_added_nodes(source: Source) -> Source:
         for added, ends in body.added:
             for node, of in zip(added.tolist(), ends.tolist(), strict=True):
                 between[frozenset((name, end) for end in of)] = (name, node)
-    new = set(between.values())
-    names = {place: f"{place[0]} added {place[1]}" for place in new} | {place: group for group, place in at.items()}
+    added_at = set(between.values())
+    names = {place: f"{place[0]} added {place[1]}" for place in added_at} | {
+        place: group for group, place in at.items()
+    }
     equations, used = [], set()
     for form, table in _tables(source, at).items():
         for places in _means(form, table, source, between):
             equations.append(DeckEquation(tuple((names[p], *term) for p, term in zip(places, form, strict=True))))
-            used |= new.intersection(places)
+            used |= added_at.intersection(places)
     bodies = {
         name: replace(body, node_sets=body.node_sets | {names[p]: np.array([p[1]]) for p in used if p[0] == name})
         for name, body in source.bodies.items()
@@ -48,24 +50,24 @@ def with_added_nodes(source: Source) -> Source:
 
 def _places(source: Source) -> dict[str, Place]:
     """Where the groups of its equations are."""
-    found: dict[str, Place] = {}
-    for group in {group for one in source.deck.equations for group, *_ in one.terms}:
+    place_of: dict[str, Place] = {}
+    for group in {group for equation in source.deck.equations for group, *_ in equation.terms}:
         on = [(name, int(b.node_sets[group][0])) for name, b in source.bodies.items() if group in b.node_sets]
-        found[group] = on[0] if on else (group, -1)
-    return found
+        place_of[group] = on[0] if on else (group, -1)
+    return place_of
 
 
 def _tables(source: Source, at: Mapping[str, Place]) -> dict[Form, dict[Place, list[Place]]]:
     """Form of equations -> the first place of each -> all places; of two that are equal that with fewer equations."""
-    found: dict[Form, list[list[Place]]] = {}
-    for one in source.deck.equations:
-        if one.terms and one.terms[0][2]:
-            form = tuple((axis, factor / one.terms[0][2]) for _, axis, factor in one.terms)
-            found.setdefault(form, []).append([at[group] for group, *_ in one.terms])
-    for form in filter(_equal, found):
-        count = Counter(place for row in found[form] for place in row)
-        found[form] = [sorted(row, key=lambda place: (count[place], place)) for row in found[form]]
-    return {form: {row[0]: row[1:] for row in rows} for form, rows in found.items()}
+    rows_of_form: dict[Form, list[list[Place]]] = {}
+    for equation in source.deck.equations:
+        if equation.terms and equation.terms[0][2]:
+            form = tuple((axis, factor / equation.terms[0][2]) for _, axis, factor in equation.terms)
+            rows_of_form.setdefault(form, []).append([at[group] for group, *_ in equation.terms])
+    for form in filter(_equal, rows_of_form):
+        count = Counter(place for row in rows_of_form[form] for place in row)
+        rows_of_form[form] = [sorted(row, key=lambda place: (count[place], place)) for row in rows_of_form[form]]
+    return {form: {row[0]: row[1:] for row in rows} for form, rows in rows_of_form.items()}
 
 
 def _equal(form: Form) -> bool:
@@ -76,18 +78,18 @@ def _means(
     form: Form, table: Mapping[Place, list[Place]], source: Source, between: Mapping[frozenset[Place], Place]
 ) -> Iterator[list[Place]]:
     """Places of the terms of each further equation of one form."""
-    known = {*table, *(row[0] for row in table.values() if _equal(form))}  # what others follow equals itself
+    places = {*table, *(row[0] for row in table.values() if _equal(form))}  # what others follow equals itself
     for name, body in source.bodies.items():
         inside = np.zeros(body.mesh.doflocs.shape[1], dtype=bool)
-        inside[[node for where, node in known if where == name]] = True
+        inside[[node for where, node in places if where == name]] = True
         outer = np.flatnonzero(body.mesh.f2t[1] < 0)
         facets = outer[inside[body.mesh.facets[:, outer]].all(axis=0)]
-        near = body.mesh.dofs.get_facet_dofs(facets).flatten() if len(facets) else []
+        boundary_nodes = body.mesh.dofs.get_facet_dofs(facets).flatten() if len(facets) else []
         for added, ends in body.added:
-            chosen = inside[ends].all(axis=1) & np.isin(added, near)
+            chosen = inside[ends].all(axis=1) & np.isin(added, boundary_nodes)
             for node, of in zip(added[chosen].tolist(), ends[chosen].tolist(), strict=True):
                 rows = [table.get((name, end), [(name, end)]) for end in of]
                 columns = [set(column) for column in zip(*rows, strict=True)]
-                others = [min(c) if len(c) == 1 else between.get(frozenset(c)) for c in columns]
-                if None not in others and (name, node) not in others:
-                    yield [(name, node), *(place for place in others if place)]
+                following_places = [min(c) if len(c) == 1 else between.get(frozenset(c)) for c in columns]
+                if None not in following_places and (name, node) not in following_places:
+                    yield [(name, node), *(place for place in following_places if place)]

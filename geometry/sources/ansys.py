@@ -27,7 +27,7 @@ _PAIRS = ("XY", "XZ", "YZ")
 def read(path: Path) -> RawMesh:
     """Read an archive. Raises Refusal: one sentence that names the block and the cure."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    return _Archive(path, lines, LabelledMesh(SkippedCards(TABLE))).taken()
+    return _Archive(path, lines, LabelledMesh(SkippedCards(TABLE))).read_all()
 
 
 @dataclass
@@ -44,10 +44,10 @@ class _Archive(ArchiveMesh):
     systems: dict[int, System] = field(default_factory=dict)
     equations: dict[str, Terms] = field(default_factory=dict)
     equation: str = ""
-    alike: dict[str, int] = field(default_factory=dict)
+    first_coupled: dict[str, int] = field(default_factory=dict)
     loads: Terms = field(default_factory=list)
 
-    def taken(self) -> RawMesh:
+    def read_all(self) -> RawMesh:
         """The mesh with everything that the commands give."""
         while self.i < len(self.lines):
             words = [word.strip() for word in self.lines[self.i].split(",")]
@@ -63,15 +63,15 @@ class _Archive(ArchiveMesh):
                         else f"'{self.path}' has a broken {name} at line {self.i}: {trouble}: write it again"
                     ) from None
             elif (name[:1].isalpha() and "=" not in name) or name.startswith(("/INPUT", "*")):
-                self.mesh.met.other(name)
+                self.mesh.skipped.skip(name)
         for material, system in self.of_solids.values():
             if system and system not in self.systems:
                 raise Refusal(f"'{self.path}' has elements in system {system}, which it has not: add its LOCAL")
             self.constants.setdefault(material, {})
         if self.node_axes:
             places = np.array([self.mesh.points[label] for label in self.node_axes])
-            own = ElementAxes(places, np.array(list(self.node_axes.values())))
-            self.mesh.frames = dict.fromkeys(self.node_axes, own)
+            element_axes = ElementAxes(places, np.array(list(self.node_axes.values())))
+            self.mesh.frames = dict.fromkeys(self.node_axes, element_axes)
         for node, axis, value in self.loads:
             self.mesh.force(node, axis, value)
         return self.mesh.raw(self.path, tuple(self._material(number) for number in self.constants))
@@ -82,8 +82,8 @@ class _Archive(ArchiveMesh):
         mine = [name for name, (material, _) in self.of_solids.items() if material == number]
         at = {name: self.of_solids[name][1] for name in mine}
         if len({of.get(name, of.get("ALPX")) for name in ("ALPX", "ALPY", "ALPZ")}) > 1:
-            self.mesh.met.refuse("MP, an expansion that depends on direction")
-        one = deck.DeckMaterial(
+            self.mesh.skipped.refuse("MP, an expansion that depends on direction")
+        item = deck.DeckMaterial(
             f"material {number}", density=of.get("DENS"), expansion=of.get("ALPX"), groups=tuple(mine),
             directions={name: self.systems[system] for name, system in at.items() if system},
         )  # fmt: skip
@@ -94,12 +94,12 @@ class _Archive(ArchiveMesh):
             if poisson[k] is None and minor is not None and first and second:
                 poisson[k] = minor * first / second  # NU is the strain along the first when pulled along the second
         if not {"EY", "EZ", *(f"G{pair}" for pair in _PAIRS)} & set(of):
-            return replace(one, young=young[0], poisson=poisson[0])
+            return replace(item, young=young[0], poisson=poisson[0])
         shear = [of.get(f"G{pair}") for pair in _PAIRS]
         if None in (*young, *poisson, *shear):
-            self.mesh.met.refuse(f"MP, material {number} with some constants of an orthotropic one")
-            return one
-        return replace(one, engineering=(*young, *poisson, *shear))  # type: ignore[arg-type]
+            self.mesh.skipped.refuse(f"MP, material {number} with some constants of an orthotropic one")
+            return item
+        return replace(item, engineering=(*young, *poisson, *shear))  # type: ignore[arg-type]
 
     # mesh
 
@@ -109,22 +109,22 @@ class _Archive(ArchiveMesh):
         """A constant of a material, or a table of it over the temperature, which has to be constant."""
         if words[0].upper() == "MP":
             label, number, values = words[1], words[2], words[3:]
-            alike = not any(float(value or 0) for value in values[1:])
+            is_constant = not any(float(value or 0) for value in values[1:])
         else:
             label, number, values = words[3], words[4], [value for value in words[6:] if value]
-            alike = len(set(map(float, values))) <= 1
+            is_constant = len(set(map(float, values))) <= 1
         label = label.upper()
-        if not alike:
-            self.mesh.met.refuse(f"MP, {label} that depends on the temperature")
+        if not is_constant:
+            self.mesh.skipped.refuse(f"MP, {label} that depends on the temperature")
         elif label in CONSTANTS:
             self.constants.setdefault(int(number), {})[label] = float(values[0])
         else:
-            self.mesh.met.other(f"MP {label}")
+            self.mesh.skipped.skip(f"MP {label}")
 
     def csys(self, words: list[str]) -> None:
         """The system that places count in from here on."""
         if words[1] not in ("", "0"):
-            self.mesh.met.refuse(f"CSYS, {words[1]}")
+            self.mesh.skipped.refuse(f"CSYS, {words[1]}")
 
     def local(self, words: list[str]) -> None:
         """A local system: LOCAL, its number, kind, origin and angles; archives write these on lines of their own."""
@@ -136,16 +136,16 @@ class _Archive(ArchiveMesh):
             elif part == "ANG":
                 self.systems[number] = replace(self.systems[number], axes=euler_axes(_floats(words[2:5])))
             elif any(value not in (0.0, 1.0) for value in _floats(words[2:4])):
-                self.mesh.met.refuse("LOCAL, an elliptic system")
+                self.mesh.skipped.refuse("LOCAL, an elliptic system")
         else:
             self._system(int(words[1]), words[2], words[3:6], words[6:9])
 
     def _system(self, number: int, kind: str, origin: list[str], angles: list[str]) -> None:
-        which = int(kind or 0)
-        if which >= len(_SYSTEMS):
-            self.mesh.met.refuse("LOCAL, a toroidal system")
-            which = 0
-        self.systems[number] = System(_SYSTEMS[which], np.array(_floats(origin)), euler_axes(_floats(angles)))
+        kind_number = int(kind or 0)
+        if kind_number >= len(_SYSTEMS):
+            self.mesh.skipped.refuse("LOCAL, a toroidal system")
+            kind_number = 0
+        self.systems[number] = System(_SYSTEMS[kind_number], np.array(_floats(origin)), euler_axes(_floats(angles)))
 
     # supports, loads, equations
 
@@ -155,7 +155,7 @@ class _Archive(ArchiveMesh):
         axes = tuple(range(6)) if label == "ALL" else (_AXES[label],) if label in _AXES else ()
         members = self._members(words[1])
         if not axes or not members:
-            self.mesh.met.refuse(f"D, {label if members else words[1]}")
+            self.mesh.skipped.refuse(f"D, {label if members else words[1]}")
         for node in members:
             self.mesh.hold(node, axes, float(words[3] or 0))
 
@@ -164,7 +164,7 @@ class _Archive(ArchiveMesh):
         label = words[2].upper()
         members = self._members(words[1])
         if label not in _FORCES or not members:
-            self.mesh.met.refuse(f"F, {label if members else words[1]}")
+            self.mesh.skipped.refuse(f"F, {label if members else words[1]}")
         self.loads += [(node, _FORCES[label], float(words[3] or 0)) for node in members if label in _FORCES]
 
     def _members(self, text: str) -> list[int]:
@@ -186,10 +186,10 @@ class _Archive(ArchiveMesh):
             self.equations[number] = []
             self.mesh.equations.append(self.equations[number])
         if float(constant or 0):
-            self.mesh.met.refuse("CE, a constant term")
+            self.mesh.skipped.refuse("CE, a constant term")
         for node, label, factor in zip(terms[::3], terms[1::3], terms[2::3], strict=False):
             if node and label.upper() not in _AXES:
-                self.mesh.met.refuse(f"CE, {label}")
+                self.mesh.skipped.refuse(f"CE, {label}")
             elif node:
                 self.equations[number].append((int(node), _AXES[label.upper()], float(factor or 0)))
 
@@ -198,10 +198,10 @@ class _Archive(ArchiveMesh):
         labels = _AXES if words[2].upper() == "ALL" else {words[2].upper(): 0}
         nodes = [word for word in words[3:] if word]
         if not set(labels) <= set(_AXES) or not all(word.isdigit() for word in (words[1], *nodes)):
-            self.mesh.met.refuse(f"CP, {words[1]}, {words[2]}")
+            self.mesh.skipped.refuse(f"CP, {words[1]}, {words[2]}")
             return
         for node in map(int, nodes):
-            first = self.alike.setdefault(words[1], node)  # a set may go on in a further command
+            first = self.first_coupled.setdefault(words[1], node)  # a set may go on in a further command
             self.mesh.equations += [
                 [(node, _AXES[label], 1.0), (first, _AXES[label], -1.0)] for label in labels if node != first
             ]

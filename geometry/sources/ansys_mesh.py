@@ -64,7 +64,7 @@ class ArchiveMesh:
     def eblock(self, words: list[str]) -> None:
         """Elements."""
         if words[2].upper() != "SOLID":
-            self.mesh.met.refuse(f"EBLOCK, {words[2]}")
+            self.mesh.skipped.refuse(f"EBLOCK, {words[2]}")
             return
         width, _, _ = self._widths()
         while self.i < len(self.lines) and self.lines[self.i].strip() != "-1":
@@ -79,7 +79,7 @@ class ArchiveMesh:
                 self._no_solid(head[1], kind)
                 continue
             if kind in LAYERED and self.options.get(head[1], {}).get(3) == "1":
-                self.mesh.met.refuse(f"layered elements of type {kind}")
+                self.mesh.skipped.refuse(f"layered elements of type {kind}")
             shape, members = _solid(nodes[:count])
             name = f"material {head[0]}" + (f" in system {head[4]}" if head[4] else "")
             self.of_solids[name] = head[0], head[4]
@@ -93,9 +93,9 @@ class ArchiveMesh:
         options = self.options.get(number, {})
         glued = any(options.get(key) in values for key, values in BONDED.items())
         if kind in HARMLESS_TYPES or (kind in CONTACT_TYPES and not glued):
-            self.mesh.met.ignored[f"elements of type {kind}"] += 1
+            self.mesh.skipped.ignored[f"elements of type {kind}"] += 1
         else:
-            self.mesh.met.refuse(f"elements of type {kind}{', bonded' if glued else ''}")
+            self.mesh.skipped.refuse(f"elements of type {kind}{', bonded' if glued else ''}")
 
     def cmblock(self, words: list[str]) -> None:
         """A component; a negative number ends a range."""
@@ -113,11 +113,11 @@ class ArchiveMesh:
     def _widths(self) -> tuple[int, int, int]:
         """Width of an integer, integers on a line, width of a number, from a line such as (3i9,6e21.13e3)."""
         line = self.lines[self.i].strip() if self.i < len(self.lines) else ""
-        found = re.match(r"\((\d+)[iI](\d+)(?:,\s*\d+[eE](\d+))?", line)
-        if found is None:
+        layout = re.match(r"\((\d+)[iI](\d+)(?:,\s*\d+[eE](\d+))?", line)
+        if layout is None:
             raise Refusal(f"'{self.path}' has a block with the format '{line}': expected one as (3i9,6e21.13e3)")
         self.i += 1
-        return int(found[2]), int(found[1]), int(found[3] or 0)
+        return int(layout[2]), int(layout[1]), int(layout[3] or 0)
 
     def _numbers(self, width: int) -> list[int]:
         """Whole numbers of the next line."""

@@ -34,9 +34,9 @@ class Sizes:
     everywhere: float | None = None
     bodies: Mapping[str, float] = field(default_factory=dict)
     faces: Mapping[int, float] = field(default_factory=dict)
-    only: str | None = None
-    along: int = 10
-    around: int = 8
+    solid: str | None = None
+    elements_per_edge: int = 10
+    elements_per_turn: int = 8
     finest: int = 4
 
 
@@ -59,7 +59,7 @@ def default_size(path: Path) -> float:
 
 def _default_size(model: Any, sizes: Sizes) -> float:
     box = np.array(model.getBoundingBox(-1, -1)).reshape(2, 3)
-    return float(np.ptp(box, axis=0).max()) / sizes.along
+    return float(np.ptp(box, axis=0).max()) / sizes.elements_per_edge
 
 
 def _solids(gmsh: Any, path: Path) -> dict[str, int]:
@@ -85,15 +85,15 @@ def _solids(gmsh: Any, path: Path) -> dict[str, int]:
 def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> RawMesh:
     model = gmsh.model
     faces = {tag for _, tag in model.getEntities(2)}
-    for what, wanted, known in (("solid", sizes.bodies, shapes), ("face", sizes.faces, faces)):
-        for key in wanted:
-            if key not in known:
-                listed = ", ".join(map(str, sorted(known)[:12]))
-                raise Refusal(f"CAD file '{path}' has no {what} {key} to give a size to: it has {listed}")
-    if sizes.only is not None:
-        if sizes.only not in shapes:
-            raise Refusal(f"CAD file '{path}' has no solid '{sizes.only}': it has {', '.join(shapes)}")
-        shapes = {sizes.only: shapes[sizes.only]}
+    for kind, size_table, existing in (("solid", sizes.bodies, shapes), ("face", sizes.faces, faces)):
+        for key in size_table:
+            if key not in existing:
+                listed = ", ".join(map(str, sorted(existing)[:12]))
+                raise Refusal(f"CAD file '{path}' has no {kind} {key} to give a size to: it has {listed}")
+    if sizes.solid is not None:
+        if sizes.solid not in shapes:
+            raise Refusal(f"CAD file '{path}' has no solid '{sizes.solid}': it has {', '.join(shapes)}")
+        shapes = {sizes.solid: shapes[sizes.solid]}
         model.setVisibility(model.getEntities(), 0)
         model.setVisibility([(3, *shapes.values())], 1, recursive=True)
         gmsh.option.setNumber("Mesh.MeshOnlyVisible", 1)
@@ -112,15 +112,15 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         fields.append(number)
 
     for name, size in sizes.bodies.items():
-        around = [tag for _, tag in model.getBoundary([(3, shapes[name])], oriented=False)]
-        constant(size, VolumesList=[shapes[name]], SurfacesList=around)
+        surfaces = [tag for _, tag in model.getBoundary([(3, shapes[name])], oriented=False)]
+        constant(size, VolumesList=[shapes[name]], SurfacesList=surfaces)
     for face, size in sizes.faces.items():
         constant(size, SurfacesList=[face])
-    asked = [everywhere, *sizes.bodies.values(), *sizes.faces.values()]
-    gmsh.option.setNumber("Mesh.MeshSizeMax", max(asked))
-    gmsh.option.setNumber("Mesh.MeshSizeMin", min(asked) / sizes.finest)
+    all_sizes = [everywhere, *sizes.bodies.values(), *sizes.faces.values()]
+    gmsh.option.setNumber("Mesh.MeshSizeMax", max(all_sizes))
+    gmsh.option.setNumber("Mesh.MeshSizeMin", min(all_sizes) / sizes.finest)
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)  # those of a CAD file are 0, which asks for the least one
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", sizes.around)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", sizes.elements_per_turn)
     if fields:
         least = model.mesh.field.add("Min")
         model.mesh.field.setNumbers(least, "FieldsList", fields)

@@ -42,7 +42,7 @@ class CardTable:
     @cached_property
     def spares(self) -> Mapping[str, str]:
         """Harmless card -> why."""
-        return {name: why for why, text in self.harmless.items() for name in words(text)}
+        return {name: reason for reason, text in self.harmless.items() for name in words(text)}
 
 
 @dataclass
@@ -54,7 +54,7 @@ class SkippedCards:
     ignored: Counter[str] = field(default_factory=Counter)
     refused: dict[str, str] = field(default_factory=dict)
 
-    def other(self, name: str) -> None:
+    def skip(self, name: str) -> None:
         """A card that is not read."""
         if name in self.table.spares:
             self.ignored[self.mark + name] += 1

@@ -169,29 +169,31 @@ def in_si(deck: Deck, metre: float, newton: float) -> Deck:
         deck,
         materials=tuple(
             replace(
-                one,
-                young=scaled(one.young, newton / area),
-                density=scaled(one.density, mass / metre**3),
-                engineering=moduli(one.engineering),
-                stiffness=one.stiffness and tuple(tuple(newton / area * v for v in row) for row in one.stiffness),
-                directions={group: own.scaled(metre) for group, own in one.directions.items()},
+                item,
+                young=scaled(item.young, newton / area),
+                density=scaled(item.density, mass / metre**3),
+                engineering=moduli(item.engineering),
+                stiffness=item.stiffness and tuple(tuple(newton / area * v for v in row) for row in item.stiffness),
+                directions={group: axes.scaled(metre) for group, axes in item.directions.items()},
             )
-            for one in deck.materials
+            for item in deck.materials
         ),
-        ties=tuple(replace(one, tolerance=scaled(one.tolerance, metre)) for one in deck.ties),
-        equations=tuple(replace(one, terms=lengths(one.terms)) for one in deck.equations),
+        ties=tuple(replace(item, tolerance=scaled(item.tolerance, metre)) for item in deck.ties),
+        equations=tuple(replace(item, terms=lengths(item.terms)) for item in deck.equations),
         springs=tuple(
-            replace(one, terms=lengths(one.terms), stiffness=one.stiffness * newton / metre) for one in deck.springs
+            replace(item, terms=lengths(item.terms), stiffness=item.stiffness * newton / metre) for item in deck.springs
         ),
-        forces=tuple(replace(one, value=one.value * newton * (1.0 if one.axis < 3 else metre)) for one in deck.forces),
-        pressures=tuple(replace(one, value=one.value * newton / area) for one in deck.pressures),
+        forces=tuple(
+            replace(item, value=item.value * newton * (1.0 if item.axis < 3 else metre)) for item in deck.forces
+        ),
+        pressures=tuple(replace(item, value=item.value * newton / area) for item in deck.pressures),
         supports=tuple(
             replace(
-                one,
-                value=one.value * (metre if one.axis < 3 else 1.0),
-                system=one.system and one.system.scaled(metre),
+                item,
+                value=item.value * (metre if item.axis < 3 else 1.0),
+                system=item.system and item.system.scaled(metre),
             )
-            for one in deck.supports
+            for item in deck.supports
         ),
-        masses=tuple(one.times(mass, area) for one in deck.masses),
+        masses=tuple(item.times(mass, area) for item in deck.masses),
     )

@@ -60,7 +60,7 @@ class System:
         z, x, y = orthogonal(np.asarray(pole) - at, np.asarray(plane) - at)
         return cls(kind, at, np.stack([x, y, z]))
 
-    def moved(self, turn: np.ndarray, shift: np.ndarray) -> System:
+    def transformed(self, turn: np.ndarray, shift: np.ndarray) -> System:
         """The system carried along by x -> turn @ x + shift."""
         return replace(self, origin=turn @ self.origin + shift, axes=self.axes @ turn.T)
 
@@ -74,16 +74,16 @@ class System:
         The angles of "spherical" are the longitude and the latitude, those of "nastran spherical" the angle from the
         pole and the longitude.
         """
-        own = np.array(coordinates, dtype=float)
+        local = np.array(coordinates, dtype=float)
         if self.kind != "rectangular":
-            r, a, b = own[:, 0], np.radians(own[:, 1]), np.radians(own[:, 2])
+            r, a, b = local[:, 0], np.radians(local[:, 1]), np.radians(local[:, 2])
             if self.kind == "cylindrical":
-                own = np.stack([r * np.cos(a), r * np.sin(a), own[:, 2]], axis=1)
+                local = np.stack([r * np.cos(a), r * np.sin(a), local[:, 2]], axis=1)
             else:
                 longitude, height = (a, b) if self.kind == "spherical" else (b, np.pi / 2 - a)
                 flat = r * np.cos(height)
-                own = np.stack([flat * np.cos(longitude), flat * np.sin(longitude), r * np.sin(height)], axis=1)
-        return np.asarray(self.origin + own @ self.axes)
+                local = np.stack([flat * np.cos(longitude), flat * np.sin(longitude), r * np.sin(height)], axis=1)
+        return np.asarray(self.origin + local @ self.axes)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(n, 3, 3) directions at points (n, 3), rows. Raises Refusal at a point on the axis or pole."""
@@ -117,11 +117,11 @@ class ElementAxes:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(n, 3, 3) directions at points (n, 3), rows."""
-        apart, which = scipy.spatial.cKDTree(self.centres).query(points, k=range(1, min(4, len(self.centres)) + 1))
-        equally_near = apart <= 1.000001 * apart[:, :1]
-        mean = np.einsum("nk,nkij->nij", equally_near, self.rows[which])
+        distance, nearest = scipy.spatial.cKDTree(self.centres).query(points, k=range(1, min(4, len(self.centres)) + 1))
+        equally_near = distance <= 1.000001 * distance[:, :1]
+        mean = np.einsum("nk,nkij->nij", equally_near, self.rows[nearest])
         return np.where(
-            (equally_near.sum(axis=1) > 1)[:, None, None], orthogonal(mean[:, 0], mean[:, 1]), self.rows[which[:, 0]]
+            (equally_near.sum(axis=1) > 1)[:, None, None], orthogonal(mean[:, 0], mean[:, 1]), self.rows[nearest[:, 0]]
         )
 
     def scaled(self, metre: float) -> ElementAxes:

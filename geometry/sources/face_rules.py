@@ -45,21 +45,21 @@ def outline(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def select_facets(mesh: Any, rule: FacetRule) -> np.ndarray:
     """Facets that satisfy a rule; raises Refusal where none does, or where the rule is empty."""
-    found = []
+    selections = []
     if rule.box is not None:
-        found.append(within_box(mesh, *rule.box))
+        selections.append(within_box(mesh, *rule.box))
     if rule.normal is not None:
-        found.append(by_normal(mesh, rule.normal, float(np.degrees(rule.within))))
+        selections.append(by_normal(mesh, rule.normal, float(np.degrees(rule.within))))
     if len(rule.numbers):
-        found.append(by_number(mesh, rule.numbers))
+        selections.append(by_number(mesh, rule.numbers))
     if rule.nearest is not None:
-        found.append(nearest(mesh, rule.nearest, *found))
-    if not found:
+        selections.append(nearest(mesh, rule.nearest, *selections))
+    if not selections:
         raise Refusal("a face needs a rule: give box, nearest, normal or cad")
-    common = found[0]
-    for other in found[1:]:
+    common = selections[0]
+    for other in selections[1:]:
         common = np.intersect1d(common, other)
-    return _some(common, mesh, "satisfies all its rules together")
+    return _require_facets(common, mesh, "satisfies all its rules together")
 
 
 def add_faces(
@@ -87,26 +87,28 @@ def within_box(mesh: Any, low: Sequence[float], high: Sequence[float]) -> np.nda
     corners = mesh.p[:, mesh.facets[:, facets]]
     slack = 1e-6 * float(np.ptp(mesh.p, axis=1).max())
     inside = (corners >= np.reshape(low, (3, 1, 1)) - slack) & (corners <= np.reshape(high, (3, 1, 1)) + slack)
-    return _some(facets[inside.all(axis=(0, 1))], mesh, f"lies within the box {_place(low)} to {_place(high)} m")
+    return _require_facets(
+        facets[inside.all(axis=(0, 1))], mesh, f"lies within the box {_place(low)} to {_place(high)} m"
+    )
 
 
 def by_normal(mesh: Any, direction: Sequence[float], degrees: float) -> np.ndarray:
     """Boundary facets whose outward normal points along a direction to within an angle; raises Refusal likewise."""
     facets, _, normal = outline(mesh)
-    along = np.asarray(direction, dtype=float)
-    if along.shape != (3,) or not along.any():
+    axis = np.asarray(direction, dtype=float)
+    if axis.shape != (3,) or not axis.any():
         raise Refusal(f"a normal must be three numbers that are not all zero, got {list(direction)}")
-    here = normal @ (along / np.linalg.norm(along)) >= np.cos(np.radians(degrees))
-    return _some(facets[here], mesh, f"faces {_place(along.tolist())} to within {degrees:g} degrees")
+    is_parallel = normal @ (axis / np.linalg.norm(axis)) >= np.cos(np.radians(degrees))
+    return _require_facets(facets[is_parallel], mesh, f"faces {_place(axis.tolist())} to within {degrees:g} degrees")
 
 
 def by_number(mesh: Any, numbers: Sequence[int]) -> np.ndarray:
     """Facets of faces of a CAD file by their numbers; raises Refusal for one that the body has not."""
     boundaries = mesh.boundaries or {}
-    known = [name for name in boundaries if name.startswith("face ")]
+    face_groups = [name for name in boundaries if name.startswith("face ")]
     for number in numbers:
-        if f"face {number}" not in known:
-            listed = ", ".join(name.partition(" ")[2] for name in known)
+        if f"face {number}" not in face_groups:
+            listed = ", ".join(name.partition(" ")[2] for name in face_groups)
             raise Refusal(f"the body has no face {number} of a CAD file: it has {listed or 'none, being a mesh'}")
     return np.unique(np.concatenate([boundaries[f"face {number}"] for number in numbers]))
 
@@ -119,22 +121,22 @@ def nearest(mesh: Any, point: Sequence[float], *among: np.ndarray) -> np.ndarray
     facets, _, normal = outline(mesh)
     edges = mesh.f2e[:, facets]
     owner: dict[int, list[int]] = {}
-    for i, around in enumerate(edges.T.tolist()):
-        for edge in around:
+    for i, edges_of_facet in enumerate(edges.T.tolist()):
+        for edge in edges_of_facet:
             owner.setdefault(edge, []).append(i)
     distance = _distance(mesh.p[:, mesh.facets[:, facets]], np.asarray(point, dtype=float))
     for allowed in among:
         distance[~np.isin(facets, allowed)] = np.inf
     start = int(distance.argmin())
-    found, queue = {start}, [start]
+    smooth_face, queue = {start}, [start]
     while queue:
         i = queue.pop()
         for edge in edges[:, i].tolist():
             for j in owner[edge]:
-                if j not in found and normal[i] @ normal[j] >= SMOOTH:
-                    found.add(j)
+                if j not in smooth_face and normal[i] @ normal[j] >= SMOOTH:
+                    smooth_face.add(j)
                     queue.append(j)
-    return np.asarray(np.sort(facets[sorted(found)]))
+    return np.asarray(np.sort(facets[sorted(smooth_face)]))
 
 
 def _distance(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -146,11 +148,11 @@ def _distance(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
         normal = np.cross(b - a, c - a, axis=0)
         size = (normal**2).sum(axis=0)
         inside = np.ones(len(best), dtype=bool)
-        for one, other in ((a, b), (b, c), (c, a)):
-            inside &= (np.cross(one, other, axis=0) * normal).sum(axis=0) >= 0
-            along = other - one
-            part = np.clip(-(one * along).sum(axis=0) / (along**2).sum(axis=0), 0, 1)
-            best = np.minimum(best, np.linalg.norm(one + part * along, axis=0))
+        for start, end in ((a, b), (b, c), (c, a)):
+            inside &= (np.cross(start, end, axis=0) * normal).sum(axis=0) >= 0
+            edge = end - start
+            part = np.clip(-(start * edge).sum(axis=0) / (edge**2).sum(axis=0), 0, 1)
+            best = np.minimum(best, np.linalg.norm(start + part * edge, axis=0))
         height = np.abs((a * normal).sum(axis=0)) / np.sqrt(size)
         best = np.where(inside, np.minimum(best, height), best)
     return best
@@ -160,9 +162,9 @@ def _place(point: Sequence[float]) -> str:
     return f"({', '.join(f'{float(c):.4g}' for c in point)})"
 
 
-def _some(facets: np.ndarray, mesh: Any, what: str) -> np.ndarray:
+def _require_facets(facets: np.ndarray, mesh: Any, condition: str) -> np.ndarray:
     if not len(facets):
         low, high = mesh.p.min(axis=1), mesh.p.max(axis=1)
         extent = " to ".join(_place(corner) for corner in (low, high))
-        raise Refusal(f"no face of the boundary {what}: the body reaches from {extent} m")
+        raise Refusal(f"no face of the boundary {condition}: the body reaches from {extent} m")
     return facets

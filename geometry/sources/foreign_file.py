@@ -74,8 +74,8 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
         for group, rows in raw.nodes.items()
     }
     unused = (*raw.unused, *missing_groups(raw, built))
-    said = conversion_notes(raw, built), order_notes(raw)
-    return Source(built, raw.deck, raw.points_of_reference, *said, unused, counts, raw.refused)
+    remarks = conversion_notes(raw, built), order_notes(raw)
+    return Source(built, raw.deck, raw.points_of_reference, *remarks, unused, counts, raw.refused)
 
 
 def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> RawMesh:
@@ -115,8 +115,8 @@ def in_metres(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
     if metre == 1.0:
         return raw
     points = {name: metre * point for name, point in raw.points_of_reference.items()}
-    made = in_si(raw.deck, metre, newton)
-    return replace(raw, points=metre * raw.points, points_of_reference=points, deck=made)
+    scaled_deck = in_si(raw.deck, metre, newton)
+    return replace(raw, points=metre * raw.points, points_of_reference=points, deck=scaled_deck)
 
 
 def missing_groups(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:

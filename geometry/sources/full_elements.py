@@ -48,8 +48,8 @@ def full(cells: Cells, points: np.ndarray) -> Full:
     rows = np.full((n, len(roles)), -1)
     rows[:, : cells.nodes.shape[1]] = cells.nodes  # meshio's order is this one: corners, edges, faces, middle
     positions = np.empty((n, len(roles), 3))
-    given = cells.nodes.shape[1]
-    positions[:, :given] = points[cells.nodes]
+    n_given = cells.nodes.shape[1]
+    positions[:, :n_given] = points[cells.nodes]
     corner = positions[:, :n_corner]
     if not has_edges:
         ends = np.array(solid.edges)
@@ -59,8 +59,8 @@ def full(cells: Cells, points: np.ndarray) -> Full:
         _check_between(solid, positions, cells)
     if not has_quads:
         for i, quad in enumerate(solid.quads):
-            around = [edge_of[frozenset(pair)] for pair in zip(quad, quad[1:] + quad[:1], strict=True)]
-            middle = positions[:, around].sum(axis=1) / 2 - corner[:, list(quad)].sum(axis=1) / 4
+            edges_of_quad = [edge_of[frozenset(pair)] for pair in zip(quad, quad[1:] + quad[:1], strict=True)]
+            middle = positions[:, edges_of_quad].sum(axis=1) / 2 - corner[:, list(quad)].sum(axis=1) / 4
             positions[:, n_corner + n_edge + i] = middle
     if solid is HEXA and not has_middle:
         edges = positions[:, n_corner : n_corner + n_edge]
@@ -91,7 +91,7 @@ class Pieces:
     local: np.ndarray
 
 
-def whole(elements: Full) -> Pieces:
+def uncut(elements: Full) -> Pieces:
     """Hexahedra or tetrahedra as they are."""
     n, k = elements.rows.shape
     return Pieces(np.arange(n), np.broadcast_to(np.arange(k), (n, k)))
@@ -101,7 +101,7 @@ def tetrahedra(elements: Full) -> Pieces:
     """Each element cut into tetrahedra: from its corner of the lowest number to the faces that do not hold it."""
     solid = elements.solid
     if solid is TETRA:
-        return whole(elements)
+        return uncut(elements)
     corner_rows = elements.rows[:, : solid.corners]
     lowest = corner_rows.argmin(axis=1)
     mirrored = _volume(elements.points[:, : solid.corners], solid).sum() < 0  # as VTK's prisms are
@@ -131,9 +131,9 @@ def tetrahedra(elements: Full) -> Pieces:
 def cut_face(corners: np.ndarray) -> np.ndarray:
     """The two triangles (2 k, 3) of quadrilaterals (k, 4), cut as `tetrahedra` cuts them."""
     through_first = (corners.argmin(axis=1) % 2 == 0)[:, None]
-    one = np.where(through_first, corners[:, [0, 1, 2]], corners[:, [1, 2, 3]])
-    other = np.where(through_first, corners[:, [0, 2, 3]], corners[:, [1, 3, 0]])
-    return np.vstack([one, other])
+    first = np.where(through_first, corners[:, [0, 1, 2]], corners[:, [1, 2, 3]])
+    second = np.where(through_first, corners[:, [0, 2, 3]], corners[:, [1, 3, 0]])
+    return np.vstack([first, second])
 
 
 def _ten_nodes(solid: Solid, corners: tuple[int, ...], place: dict[frozenset[int], int], mirrored: bool) -> np.ndarray:

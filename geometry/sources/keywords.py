@@ -38,7 +38,7 @@ class Card:
         except ValueError:
             raise Refusal(f"{self.where} expects a number, got '{text}': correct the line") from None
 
-    def whole(self, text: str) -> int:
+    def integer(self, text: str) -> int:
         """A whole number."""
         try:
             return int(text)
@@ -87,9 +87,9 @@ def cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[Card]:
 
 
 def _card(text: str, path: Path, line: int) -> Card:
-    name, *rest = text[1:].split(",")
+    name, *options_text = text[1:].split(",")
     options = {}
-    for item in rest:
+    for item in options_text:
         key, _, value = item.partition("=")
         if key.strip():
             options["".join(key.upper().split())] = value.strip().strip('"')

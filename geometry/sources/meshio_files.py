@@ -24,8 +24,8 @@ def read(path: Path) -> RawMesh:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             file = meshio.read(path)
     except (Exception, SystemExit) as problem:  # the readers raise what they meet, and where none fits meshio exits
-        why = "" if isinstance(problem, SystemExit) else " ".join(str(problem).split())
-        reason = f" ({why})" if why else ""
+        message = "" if isinstance(problem, SystemExit) else " ".join(str(problem).split())
+        reason = f" ({message})" if message else ""
         raise Refusal(f"mesh file '{path}' cannot be read{reason}: write it as a Gmsh file, MSH 4.1") from None
     names: dict[int, list[str]] = getattr(file, "cell_tags", None) or {}
     cells: list[Cells] = []
@@ -60,8 +60,8 @@ def read(path: Path) -> RawMesh:
     point_names: dict[int, list[str]] = getattr(file, "point_tags", None) or {}
     tags = file.point_data.get("point_tags")
     if tags is not None and point_names:
-        for value, given in point_names.items():
-            for name in given:
+        for value, tag_names in point_names.items():
+            for name in tag_names:
                 of_nodes[name] = np.union1d(of_nodes.get(name, np.empty(0, dtype=int)), np.flatnonzero(tags == value))
     for key, values in file.point_data.items():
         values = np.asarray(values)

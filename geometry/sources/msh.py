@@ -62,7 +62,7 @@ def from_gmsh(gmsh: Any) -> RawMesh:
         return np.searchsorted(labels, nodes.astype(int))
 
     def elements(entity: tuple[int, int]) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        found = []
+        blocks_of_entity = []
         for kind, numbers, nodes in zip(*model.mesh.getElements(*entity), strict=True):
             if kind not in _KINDS:
                 raise Refusal(
@@ -71,16 +71,16 @@ def from_gmsh(gmsh: Any) -> RawMesh:
                 )
             name, order = _KINDS[kind]
             nodes = rows(nodes).reshape(len(numbers), -1)
-            found.append((name, nodes if order is None else nodes[:, order], numbers.astype(int)))
-        return found
+            blocks_of_entity.append((name, nodes if order is None else nodes[:, order], numbers.astype(int)))
+        return blocks_of_entity
 
     groups = model.getPhysicalGroups()
     filled = [tag for _, tag in model.getEntities(3) if len(model.mesh.getElements(3, tag)[0])]
     grouped = {int(tag) for d, g in groups if d == 3 for tag in model.getEntitiesForPhysicalGroup(3, g)}
-    kept = [tag for tag in filled if tag in grouped or not grouped]
-    unused = [f"{len(filled) - len(kept)} volumes that belong to no group"] if len(kept) < len(filled) else []
+    used = [tag for tag in filled if tag in grouped or not grouped]
+    unused = [f"{len(filled) - len(used)} volumes that belong to no group"] if len(used) < len(filled) else []
     cells, numbers_of, start = [], {}, 0
-    for tag in kept:
+    for tag in used:
         blocks = elements((3, tag))
         cells += [Cells(*block) for block in blocks]
         count = sum(len(nodes) for _, nodes, _ in blocks)
@@ -117,6 +117,6 @@ def _check(path: Path) -> None:
             raise Refusal(_cannot(path, f"it ends inside ${section.decode()}, so it is not complete"))
 
 
-def _cannot(path: Path, why: str) -> str:
-    reason = " ".join(why.split())
+def _cannot(path: Path, cause: str) -> str:
+    reason = " ".join(cause.split())
     return f"mesh file '{path}' cannot be read{f' ({reason})' if reason else ''}: write it as a Gmsh file, MSH 4.1"

@@ -56,7 +56,7 @@ def read(path: Path) -> RawMesh:
         if name in READ:
             READ[name](reader, name, fields)
         elif name not in TABLE.reads:
-            reader.mesh.met.other(name)
+            reader.mesh.skipped.skip(name)
     return reader.finished(control)
 
 
@@ -89,37 +89,42 @@ class _Bulk(ReferenceCards):
         low, high, order = SOLIDS[card]
         if len(nodes) < CORNERS[card]:
             raise Refusal(f"{card} {fields[0]} of '{self.path}' has {len(nodes)} nodes: the file is cut off or broken")
-        whole = len(nodes) >= len(order)
-        kept = [nodes[i] for i in order] if whole else nodes[: CORNERS[card]]
-        self.mesh.solid(high if whole else low, to_int(fields[0], card), kept, f"PSOLID {to_int(fields[1], card)}")
+        quadratic = len(nodes) >= len(order)
+        ordered = [nodes[i] for i in order] if quadratic else nodes[: CORNERS[card]]
+        self.mesh.solid(
+            high if quadratic else low,
+            to_int(fields[0], card),
+            ordered,
+            f"PSOLID {to_int(fields[1], card)}",
+        )
 
     def psolid(self, card: str, fields: list[str]) -> None:
         """Material of solids, and its system."""
         self.properties[to_int(fields[0], card)] = (to_int(fields[1], card), to_int(fields[2] or "0", card))
         if fields[6] not in ("", "SMECH"):
-            self.mesh.met.refuse(f"PSOLID, {fields[6]}")
+            self.mesh.skipped.refuse(f"PSOLID, {fields[6]}")
 
     def material(self, card: str, fields: list[str]) -> None:
         """An isotropic, orthotropic or anisotropic material."""
         number = to_int(fields[0], card)
-        one = deck.DeckMaterial(f"{card} {number}")
-        given = [to_float(x, card) if x else None for x in (*fields[1:], *[""] * 28)]
-        filled = [value or 0.0 for value in given]
+        item = deck.DeckMaterial(f"{card} {number}")
+        constants = [to_float(x, card) if x else None for x in (*fields[1:], *[""] * 28)]
+        filled = [value or 0.0 for value in constants]
         if card == "MAT1":
-            young, shear, poisson = given[:3]
+            young, shear, poisson = constants[:3]
             if poisson is None and young and shear:
                 poisson = young / (2 * shear) - 1
             elif young is None and poisson is not None and shear:
                 young = 2 * shear * (1 + poisson)
-            one, after = replace(one, young=young, poisson=poisson), given[3:5]
+            item, after = replace(item, young=young, poisson=poisson), constants[3:5]
         elif card == "MAT11":
-            one, after = replace(one, engineering=tuple(filled[:9])), given[9:13]
+            item, after = replace(item, engineering=tuple(filled[:9])), constants[9:13]
         else:  # MAT9
-            one, after = replace(one, stiffness=deck.stiffness(filled[:21], STRESSES)), given[21:28]
+            item, after = replace(item, stiffness=deck.stiffness(filled[:21], STRESSES)), constants[21:28]
         density, *expansions = after
         if set(expansions[3:]) - {0.0, None} or len(set(expansions[:3])) > 1:
-            self.mesh.met.refuse(f"{card}, an expansion that depends on direction")
-        self.materials[number] = replace(one, density=density, expansion=expansions[0])
+            self.mesh.skipped.refuse(f"{card}, an expansion that depends on direction")
+        self.materials[number] = replace(item, density=density, expansion=expansions[0])
 
     def set1(self, card: str, fields: list[str]) -> None:
         """A set of grid points or elements."""
@@ -130,7 +135,7 @@ class _Bulk(ReferenceCards):
         if fields[0].upper() == "WTMASS":
             self.weight = to_float(fields[1], card)
         else:
-            self.mesh.met.other(f"{card} {fields[0].upper()}")
+            self.mesh.skipped.skip(f"{card} {fields[0].upper()}")
 
     # supports and loads
 
@@ -195,14 +200,14 @@ class _Bulk(ReferenceCards):
             elif word:
                 members.append(to_int(word, card))
         if len(weights) > 1 or axes != "123" or not set("123") <= set(fields[3]):
-            self.mesh.met.refuse("RBE3, unequal weights or some directions")
+            self.mesh.skipped.refuse("RBE3, unequal weights or some directions")
         self.mesh.couple(card, "distributing", to_int(fields[2], card), members)
 
     def conm2(self, card: str, fields: list[str]) -> None:
         """A mass."""
         inertia = [to_float(text, card) for text in fields[8:14]]
         if any(to_float(text, card) for text in fields[4:7]) or any(inertia[k] for k in (1, 3, 4)):
-            self.mesh.met.refuse("CONM2, an offset or products of inertia")
+            self.mesh.skipped.refuse("CONM2, an offset or products of inertia")
         about = inertia[0], inertia[2], inertia[5]
         self.mesh.masses.append(deck.PointMass(self.mesh.at(to_int(fields[1], card)), to_float(fields[3], card), about))
 
@@ -216,20 +221,20 @@ class _Bulk(ReferenceCards):
             elif labels.issuperset(members):
                 mesh.volumes[f"SET {number}"] = members
             else:
-                mesh.met.ignored[f"SET {number}, whose members are neither grid points nor solids"] += 1
+                mesh.skipped.ignored[f"SET {number}, whose members are neither grid points nor solids"] += 1
         groups: dict[int, dict[str, System | None]] = {}
         for number, (material, system) in self.properties.items():
             if (name := f"PSOLID {number}") in mesh.volumes:
                 if system < 0 and material in self.materials and self.materials[material].young is None:
-                    mesh.met.refuse(f"{name}, the material's axes along those of the elements")
+                    mesh.skipped.refuse(f"{name}, the material's axes along those of the elements")
                 groups.setdefault(material, {})[name] = self.system(str(max(system, 0)))
         materials = []
-        for number, one in self.materials.items():
+        for number, item in self.materials.items():
             mine = groups.get(number, {})
             axes = {name: system for name, system in mine.items() if system is not None}
-            density = None if one.density is None else self.weight * one.density
-            materials.append(replace(one, density=density, groups=tuple(mine), directions=axes))
-        mesh.masses = [one.times(self.weight) for one in mesh.masses]
+            density = None if item.density is None else self.weight * item.density
+            materials.append(replace(item, density=density, groups=tuple(mine), directions=axes))
+        mesh.masses = [item.times(self.weight) for item in mesh.masses]
         raw = mesh.raw(self.path, tuple(materials))
         count = len(re.findall(r"(?im)^\s*SUBCASE", control))
         notes = [f"the loads and supports of {count} subcases are taken together"] if count > 1 else []

@@ -60,8 +60,8 @@ class ReferenceCards:
         if label not in self.grids:
             raise Refusal(f"'{self.path}' names the grid point {label}, which it has not: the file is cut off")
         fields = self.grids[label]
-        own, of = np.array([[to_float(text, "GRID") for text in fields[2:5]]]), self.system(fields[1])
-        return np.asarray(own if of is None else of.places(own))[0]
+        local, of = np.array([[to_float(text, "GRID") for text in fields[2:5]]]), self.system(fields[1])
+        return np.asarray(local if of is None else of.places(local))[0]
 
     def selected(self, kind: str, text: str) -> bool:
         """Whether a set of supports, equations or loads is in force."""
@@ -74,7 +74,7 @@ class ReferenceCards:
         """A grid point, systems, stiffnesses of springs."""
         if card == "GRID":
             self.grids[to_int(fields[0], card)] = fields
-            fields[1:8] = [own or preset for own, preset in zip(fields[1:8], self.common[1:8], strict=True)]
+            fields[1:8] = [text or preset for text, preset in zip(fields[1:8], self.common[1:8], strict=True)]
         elif card.startswith("CORD2"):
             self.systems[to_int(fields[0], card)] = card, [*fields[1:], *[""] * 9]
         else:
@@ -90,9 +90,9 @@ class ReferenceCards:
         number = to_int(fields[0], card)
         if card == "LOAD":
             if self.chosen is None or number in self.chosen[card]:
-                whole, parts = to_float(fields[1], card), [text for text in fields[2:] if text]
+                total_scale, parts = to_float(fields[1], card), [text for text in fields[2:] if text]
                 for scale, of in zip(parts[::2], parts[1::2], strict=False):
-                    self.scales[to_int(of, card)] = whole * to_float(scale, card)
+                    self.scales[to_int(of, card)] = total_scale * to_float(scale, card)
                     if self.chosen is not None:
                         self.chosen[card].add(to_int(of, card))
         elif self.chosen is not None and number in self.chosen[card[:3]]:

@@ -30,13 +30,13 @@ def cards_of(lines: Iterable[str]) -> Iterator[tuple[str, list[str]]]:
     """Name and fields of each card of the bulk data, continuation lines joined."""
     name, fields = "", []
     for line in lines:
-        head, more = _fields(line)
+        head, line_fields = _fields(line)
         if head in ("", "+", "*") or head[0] in "+*":
-            fields += more
+            fields += line_fields
             continue
         if name:
             yield name, fields + [""] * 8
-        name, fields = head.rstrip("*").upper(), more
+        name, fields = head.rstrip("*").upper(), line_fields
     if name:
         yield name, fields + [""] * 8
 
@@ -44,11 +44,11 @@ def cards_of(lines: Iterable[str]) -> Iterator[tuple[str, list[str]]]:
 def _fields(line: str) -> tuple[str, list[str]]:
     """Name and fields of a line: eight, or the four of a name with a star, in free and in fixed format."""
     if "," in line:
-        head, *more = [item.strip() for item in line.split(",")]
-        if "*" in head and any(item and item[0] not in "+*" for item in more[4:]):
+        head, *items = [item.strip() for item in line.split(",")]
+        if "*" in head and any(item and item[0] not in "+*" for item in items[4:]):
             raise Refusal(f"the line '{line[:40]}' has more than the four fields of a star: take the star out")
         count = 4 if "*" in head else 8
-        return head, (more + [""] * count)[:count]
+        return head, (items + [""] * count)[:count]
     line = line.expandtabs(8)
     head = line[:8].strip()
     width, count = (16, 4) if "*" in head else (8, 8)
@@ -57,10 +57,10 @@ def _fields(line: str) -> tuple[str, list[str]]:
 
 def selected_sets(control: str) -> dict[str, set[int]]:
     """Sets of supports, equations and loads that the case control selects."""
-    found: dict[str, set[int]] = {"SPC": set(), "MPC": set(), "LOAD": set()}
+    numbers_of: dict[str, set[int]] = {"SPC": set(), "MPC": set(), "LOAD": set()}
     for kind, number in re.findall(r"(?im)^\s*(SPC|MPC|LOAD)\s*=\s*(\d+)", control):
-        found[kind.upper()].add(int(number))
-    return found
+        numbers_of[kind.upper()].add(int(number))
+    return numbers_of
 
 
 def case_sets(control: str) -> Iterator[tuple[int, list[int]]]:
@@ -72,17 +72,17 @@ def case_sets(control: str) -> Iterator[tuple[int, list[int]]]:
 
 
 def expand_list(words: list[str]) -> list[int]:
-    found: list[int] = []
+    numbers: list[int] = []
     words = [word for word in words if word]
     i = 0
     while i < len(words):
         if words[i].upper() == "THRU":
-            found += range(found[-1] + 1, to_int(words[i + 1], "a list with THRU") + 1)
+            numbers += range(numbers[-1] + 1, to_int(words[i + 1], "a list with THRU") + 1)
             i += 1
         else:
-            found.append(to_int(words[i], "a list"))
+            numbers.append(to_int(words[i], "a list"))
         i += 1
-    return found
+    return numbers
 
 
 def to_axes(text: str, card: str) -> tuple[int, ...]:

@@ -74,13 +74,13 @@ class LabelledMesh:
     held : (axis, value) -> nodes that are held there; equations, springs : terms, and a stiffness
     """
 
-    met: SkippedCards
+    skipped: SkippedCards
     points: dict[int, list[float]] = field(default_factory=dict)
     solids: dict[str, list[tuple[int, list[int]]]] = field(default_factory=dict)
     volumes: dict[str, list[int]] = field(default_factory=dict)
     node_sets: dict[str, list[int]] = field(default_factory=dict)
     frames: dict[int, Directions] = field(default_factory=dict)
-    held: dict[tuple[int, float], dict[int, None]] = field(default_factory=dict)
+    prescribed: dict[tuple[int, float], dict[int, None]] = field(default_factory=dict)
     equations: list[Terms] = field(default_factory=list)
     springs: list[tuple[Terms, float]] = field(default_factory=list)
     forces: list[deck.Force] = field(default_factory=list)
@@ -100,12 +100,13 @@ class LabelledMesh:
     def hold(self, label: int, axes: Iterable[int], value: float = 0.0) -> None:
         """A support of a node."""
         for axis in axes:
-            self.held.setdefault((axis, value), {})[label] = None
+            self.prescribed.setdefault((axis, value), {})[label] = None
 
     def force(self, label: int, axis: int, value: float) -> None:
         """A force, or a moment, along a displacement of a node."""
         self.forces += [
-            deck.Force(place, own, value * factor) for place, own, factor in self._terms([(label, axis, 1.0)])
+            deck.Force(place, along_axis, value * factor)
+            for place, along_axis, factor in self._terms([(label, axis, 1.0)])
         ]
 
     def couple(self, card: str, kind: str, point: int, members: list[int], axes: Sequence[int] = range(6)) -> None:
@@ -116,34 +117,34 @@ class LabelledMesh:
 
     def _terms(self, terms: Terms) -> tuple[tuple[str, int, float], ...]:
         """Terms by groups, along x, y, z."""
-        found = []
+        group_terms = []
         for label, axis, factor in terms:
             if label not in self.points:
                 raise Refusal(f"node {label} is named, which the file has not: it is cut off")
             row = np.eye(3)[axis % 3]
             if label in self.frames:
                 row = self.frames[label].at(np.array([self.points[label]]))[0][axis % 3]
-            kept = np.flatnonzero(np.abs(row) > 1e-12).tolist()
-            found += [(self.at(label), axis - axis % 3 + k, factor * float(row[k])) for k in kept]
-        return tuple(found)
+            used_axes = np.flatnonzero(np.abs(row) > 1e-12).tolist()
+            group_terms += [(self.at(label), axis - axis % 3 + k, factor * float(row[k])) for k in used_axes]
+        return tuple(group_terms)
 
     def _supports(self, solid: set[int]) -> Iterator[deck.Support]:
         """Supports of groups: nodes that are held alike are one, and what lies between them is held too."""
         places: dict[tuple[int, ...], str] = {}
-        for (axis, value), labels in self.held.items():
-            alike: dict[int, tuple[Directions | None, list[int]]] = {}
+        for (axis, value), labels in self.prescribed.items():
+            nodes_by_frame: dict[int, tuple[Directions | None, list[int]]] = {}
             first = axis - axis % 3
             for label in labels:
                 frame = self.frames.get(label)
-                if not value and all(label in self.held.get((first + k, 0.0), ()) for k in range(3)):
+                if not value and all(label in self.prescribed.get((first + k, 0.0), ()) for k in range(3)):
                     frame = None  # held along all of them
                 if label in solid:
-                    alike.setdefault(id(frame), (frame, []))[1].append(label)
+                    nodes_by_frame.setdefault(id(frame), (frame, []))[1].append(label)
                 elif label in self.points:
                     yield deck.Support(self.at(label), axis, value, frame)
                 else:
-                    self.met.ignored["supports of nodes that the file has not"] += 1
-            for frame, members in alike.values():
+                    self.skipped.ignored["supports of nodes that the file has not"] += 1
+            for frame, members in nodes_by_frame.values():
                 place = places.setdefault(tuple(sorted(members)), f"support {len(places) + 1}")
                 self.node_sets[place] = members
                 yield deck.Support(place, axis, value, frame)
@@ -156,10 +157,10 @@ class LabelledMesh:
         if not self.solids:
             return NOTHING
         labels_of_solids = {node for elements in self.solids.values() for _, nodes in elements for node in nodes}
-        for one in self.couplings:
-            if not labels_of_solids.issuperset(self.node_sets[one.face]):
-                self.met.refuse(f"{one.name.split()[0]} of nodes that belong to no solid")
-        made = deck.Deck(
+        for coupling in self.couplings:
+            if not labels_of_solids.issuperset(self.node_sets[coupling.face]):
+                self.skipped.refuse(f"{coupling.name.split()[0]} of nodes that belong to no solid")
+        content = deck.Deck(
             materials=materials,
             couplings=tuple(self.couplings),
             equations=tuple(deck.DeckEquation(self._terms(terms)) for terms in self.equations),
@@ -185,9 +186,9 @@ class LabelledMesh:
             solid[block.nodes] = True
         where = np.array(list(self.points.values()), dtype=float)
         rows = {name: np.unique([row[at] for at in labels if at in row]) for name, labels in self.node_sets.items()}
-        alone = {name for name, found in rows.items() if len(found) == 1 and not solid[found[0]]}
+        lone_points = {name for name, in_group in rows.items() if len(in_group) == 1 and not solid[in_group[0]]}
         volumes = {name: [number[at] for at in labels if at in number] for name, labels in self.volumes.items()}
-        unused = self.met.unused()
+        unused = self.skipped.unused()
         for name, labels in self.node_sets.items():
             if missing := sum(label not in row for label in labels):
                 unused.append(f"{missing} nodes of group '{name}', which the file has not")
@@ -197,12 +198,12 @@ class LabelledMesh:
             cells,
             {name: np.unique(members) for name, members in volumes.items() if members},
             {},
-            {name: found for name, found in rows.items() if len(found) and name not in alone},
-            skins=frozenset(name for name, found in rows.items() if len(found) > 2),
-            points_of_reference={name: where[rows[name][0]] for name in alone},
-            deck=made,
+            {name: in_group for name, in_group in rows.items() if len(in_group) and name not in lone_points},
+            skins=frozenset(name for name, in_group in rows.items() if len(in_group) > 2),
+            points_of_reference={name: where[rows[name][0]] for name in lone_points},
+            deck=content,
             unused=unused,
-            refused=self.met.refused,
+            refused=self.skipped.refused,
         )
 
 

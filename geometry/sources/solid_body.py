@@ -19,7 +19,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
-from tribodyn.geometry.sources.full_elements import Full, Pieces, cut_face, full, supports, tetrahedra, whole
+from tribodyn.geometry.sources.full_elements import Full, Pieces, cut_face, full, supports, tetrahedra, uncut
 from tribodyn.geometry.sources.raw_mesh import HEXA, TETRA, VOLUMES, Cells, RawMesh
 from tribodyn.refusal import Refusal
 
@@ -57,9 +57,9 @@ def bodies(raw: RawMesh) -> dict[str, np.ndarray]:
     inside: dict[int, list[str]] = {}
     named = raw.bodies or sorted(raw.volumes, key=lambda name: len(raw.volumes[name]))
     for name in named:
-        held = np.bincount(piece[raw.volumes[name]], minlength=n_piece)
-        for i in np.flatnonzero(held).tolist():
-            if held[i] == size[i]:
+        counts = np.bincount(piece[raw.volumes[name]], minlength=n_piece)
+        for i in np.flatnonzero(counts).tolist():
+            if counts[i] == size[i]:
                 chosen.setdefault(i, name)
             else:
                 inside.setdefault(i, []).append(name)
@@ -70,10 +70,10 @@ def bodies(raw: RawMesh) -> dict[str, np.ndarray]:
         chosen[i] = "body" if n_piece == 1 else f"body{count}"
     for i, names in inside.items():
         chosen.setdefault(i, "+".join(sorted(names)))
-    found: dict[str, list[int]] = {}
+    parts_of: dict[str, list[int]] = {}
     for i in range(n_piece):
-        found.setdefault(chosen[i], []).append(i)
-    return {name: np.flatnonzero(np.isin(piece, parts)) for name, parts in found.items()}
+        parts_of.setdefault(chosen[i], []).append(i)
+    return {name: np.flatnonzero(np.isin(piece, parts)) for name, parts in parts_of.items()}
 
 
 def _pieces(raw: RawMesh) -> np.ndarray:
@@ -83,9 +83,9 @@ def _pieces(raw: RawMesh) -> np.ndarray:
     columns = np.concatenate([cells.nodes.ravel() for cells in raw.cells])
     n = len(raw.points)
     _, label = connected_components(coo_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n)))
-    _, seen, number = np.unique(label[first], return_index=True, return_inverse=True)
-    rank = np.empty(len(seen), dtype=int)
-    rank[seen.argsort()] = np.arange(len(seen))
+    _, labels, number = np.unique(label[first], return_index=True, return_inverse=True)
+    rank = np.empty(len(labels), dtype=int)
+    rank[labels.argsort()] = np.arange(len(labels))
     return np.asarray(rank[number])
 
 
@@ -99,15 +99,17 @@ def build(raw: RawMesh, elements: np.ndarray | None = None) -> SolidBody:
     kinds = {id(VOLUMES[block.kind][0]) for block in cells}
     cut = kinds not in ({id(HEXA)}, {id(TETRA)})
     hexahedra = kinds == {id(HEXA)}
-    pieces = [tetrahedra(one) if cut else whole(one) for one in fulls]
-    rows = np.vstack([np.take_along_axis(one.rows[p.parent], p.local, 1) for one, p in zip(fulls, pieces, strict=True)])
-    points = np.vstack([one.points[p.parent[:, None], p.local] for one, p in zip(fulls, pieces, strict=True)])
+    pieces = [tetrahedra(filled) if cut else uncut(filled) for filled in fulls]
+    rows = np.vstack(
+        [np.take_along_axis(filled.rows[p.parent], p.local, 1) for filled, p in zip(fulls, pieces, strict=True)]
+    )
+    points = np.vstack([filled.points[p.parent[:, None], p.local] for filled, p in zip(fulls, pieces, strict=True)])
     mesh, node_of = _mesh(rows, points, hexahedra, len(raw.points))
     part_of = np.concatenate([number[b][p.parent] for b, p in enumerate(pieces)])  # element number of each piece
 
-    found = {name: _facets(mesh, node_of, parts) for name, parts in raw.faces.items()}
-    unmatched = tuple(name for name, ids in found.items() if ids is None)
-    boundaries = {name: ids for name, ids in found.items() if ids is not None and len(ids)}
+    facets_of = {name: _facets(mesh, node_of, parts) for name, parts in raw.faces.items()}
+    unmatched = tuple(name for name, ids in facets_of.items() if ids is None)
+    boundaries = {name: ids for name, ids in facets_of.items() if ids is not None and len(ids)}
     volumes = {name: np.flatnonzero(np.isin(part_of, members)) for name, members in raw.volumes.items()}
     subdomains = {name: members for name, members in volumes.items() if len(members)}
     node_sets = {name: np.unique(mesh.dofs.element_dofs[:, members]) for name, members in subdomains.items()}
@@ -128,11 +130,11 @@ def build(raw: RawMesh, elements: np.ndarray | None = None) -> SolidBody:
 def _chosen(raw: RawMesh, elements: np.ndarray | None) -> tuple[list[Cells], list[np.ndarray]]:
     """Blocks cut down to some elements, and the numbers of these."""
     blocks, numbers, start = [], [], 0
-    wanted = None if elements is None else np.asarray(elements)
+    chosen_numbers = None if elements is None else np.asarray(elements)
     for block in raw.cells:
         number = np.arange(start, start + len(block.nodes))
         start += len(block.nodes)
-        keep = np.arange(len(number)) if wanted is None else np.flatnonzero(np.isin(number, wanted))
+        keep = np.arange(len(number)) if chosen_numbers is None else np.flatnonzero(np.isin(number, chosen_numbers))
         if len(keep):
             blocks.append(Cells(block.kind, block.nodes[keep], block.labels[keep]))
             numbers.append(number[keep])
@@ -172,20 +174,20 @@ def _facets(mesh: Any, node_of: np.ndarray, parts: Iterable[np.ndarray]) -> np.n
         if n_corner == 3 and part.shape[1] == 4:
             part = cut_face(part)
         nodes = node_of[part]
-        here = (nodes >= 0).any(axis=1)
-        if (nodes[here] < 0).any() or (here.any() and part.shape[1] != n_corner):
+        is_inside = (nodes >= 0).any(axis=1)
+        if (nodes[is_inside] < 0).any() or (is_inside.any() and part.shape[1] != n_corner):
             return None
-        corners.append(nodes[here])
-    found = np.vstack([nodes for nodes in corners if nodes.shape[1] == n_corner])
+        corners.append(nodes[is_inside])
+    facet_corners = np.vstack([nodes for nodes in corners if nodes.shape[1] == n_corner])
 
     def key(nodes: np.ndarray) -> np.ndarray:
         low = np.sort(nodes, axis=1)[:, :3].astype(np.int64)
         return np.asarray((low[:, 0] * mesh.nvertices + low[:, 1]) * mesh.nvertices + low[:, 2])
 
-    keys, wanted = key(mesh.facets.T), key(found)
+    keys, target_keys = key(mesh.facets.T), key(facet_corners)
     order = keys.argsort()
-    at = order[np.searchsorted(keys, wanted, sorter=order).clip(max=len(keys) - 1)]
-    return np.unique(at) if (keys[at] == wanted).all() else None
+    at = order[np.searchsorted(keys, target_keys, sorter=order).clip(max=len(keys) - 1)]
+    return np.unique(at) if (keys[at] == target_keys).all() else None
 
 
 def _added(mesh: Any, fulls: Sequence[Full], pieces: Sequence[Pieces]) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
@@ -195,16 +197,16 @@ def _added(mesh: Any, fulls: Sequence[Full], pieces: Sequence[Pieces]) -> tuple[
     """
     order = permutation(REFERENCE_POINTS["tetra10" if mesh.t.shape[0] == 4 else "hexahedron27"], mesh.elem().doflocs)
     start, tables = 0, []
-    for one, piece in zip(fulls, pieces, strict=True):
+    for elements, piece in zip(fulls, pieces, strict=True):
         dofs = mesh.dofs.element_dofs[:, start : start + len(piece.parent)].T
         start += len(piece.parent)
-        nodes = np.empty(one.rows.shape, dtype=int)
+        nodes = np.empty(elements.rows.shape, dtype=int)
         nodes[piece.parent[:, None], piece.local[:, order]] = dofs
-        for place, support in enumerate(supports(one.solid)):
-            new = one.rows[:, place] < 0
-            if new.any():
-                found, first = np.unique(nodes[new, place], return_index=True)
-                tables.append((found, nodes[new][first][:, _between(one, support)]))
+        for place, support in enumerate(supports(elements.solid)):
+            is_added = elements.rows[:, place] < 0
+            if is_added.any():
+                added_nodes, first = np.unique(nodes[is_added, place], return_index=True)
+                tables.append((added_nodes, nodes[is_added][first][:, _between(elements, support)]))
     return tuple(tables)
 
 
@@ -212,13 +214,13 @@ def _implied(members: np.ndarray, added: Sequence[tuple[np.ndarray, np.ndarray]]
     """The added nodes that belong to a set: those that interpolate nodes of it alone."""
     inside = np.zeros(n_node, dtype=bool)
     inside[members] = True
-    return np.concatenate([np.empty(0, dtype=int), *(new[inside[ends].all(axis=1)] for new, ends in added)])
+    return np.concatenate([np.empty(0, dtype=int), *(new_nodes[inside[ends].all(axis=1)] for new_nodes, ends in added)])
 
 
-def _between(one: Full, support: tuple[int, ...]) -> list[int]:
+def _between(elements: Full, support: tuple[int, ...]) -> list[int]:
     """Places in a full element of the nodes of the file that an added node interpolates."""
-    roles = supports(one.solid)
-    in_file = np.all(one.rows >= 0, axis=0).tolist()
+    roles = supports(elements.solid)
+    in_file = np.all(elements.rows >= 0, axis=0).tolist()
     return [i for i, role in enumerate(roles) if in_file[i] and set(role) <= set(support) and role != support]
 
 

@@ -60,7 +60,7 @@ def test_sizes_by_body_and_by_face_refine_there(blocks):
 def test_one_solid_alone_with_edges_of_the_size_that_is_asked_for(blocks):
     name = next(iter(foreign_file.read(blocks, "mm", Sizes(20.0)).bodies))
     for size in (5.0, 8.0):
-        (body,) = foreign_file.read(blocks, "mm", Sizes(size, only=name)).bodies.values()
+        (body,) = foreign_file.read(blocks, "mm", Sizes(size, solid=name)).bodies.values()
         a, b = (body.mesh.p[:, end] for end in body.mesh.edges)
         length = 1e3 * np.linalg.norm(a - b, axis=0)
         assert np.median(length) == pytest.approx(size, rel=0.2)

@@ -118,7 +118,7 @@ def _sizes(table: structure_tables.BodyTable) -> cad.Sizes | None:
             raise Refusal(f"size and face_sizes are for CAD files, '{table.mesh}' is meshed already: leave them out")
         return None
     faces = {int(name.removeprefix("face ")): size / table.unit for name, size in table.face_sizes.items()}
-    return cad.Sizes(table.size and table.size / table.unit, faces=faces, only=table.volume)
+    return cad.Sizes(table.size and table.size / table.unit, faces=faces, solid=table.volume)
 
 
 def _material(table: structure_tables.BodyTable, materials: Mapping[str, SolidMaterial]) -> Materials:

@@ -28,6 +28,6 @@ class Parameters:
 
 def depth_rate(exposure: Exposure) -> np.ndarray:
     """(n_pair,) total wear depth per cycle [m]."""
-    own = exposure.numbers
-    coefficient = own["coefficient"] * (1 + (own["ratio"] - 1) * np.exp(-exposure.depth / own["depth"]))
+    values = exposure.numbers
+    coefficient = values["coefficient"] * (1 + (values["ratio"] - 1) * np.exp(-exposure.depth / values["depth"]))
     return coefficient * exposure.energy / exposure.area

@@ -38,10 +38,10 @@ class Section:
         bulge = 4 * u * (1 - u)
         slope = 4 * self.camber * (1 - 2 * u)
         offset = (v - 0.5) * self.thickness * (self.edge + (1 - self.edge) * bulge)
-        along = (u - 0.5) * self.chord - offset * slope / np.hypot(1, slope)
-        across = self.camber * self.chord * (bulge - 2 / 3) + offset / np.hypot(1, slope)
+        x = (u - 0.5) * self.chord - offset * slope / np.hypot(1, slope)
+        y = self.camber * self.chord * (bulge - 2 / 3) + offset / np.hypot(1, slope)
         c, s = np.cos(self.stagger), np.sin(self.stagger)
-        return along * c - across * s, along * s + across * c
+        return x * c - y * s, x * s + y * c
 
 
 def between(root: Section, tip: Section, height: np.ndarray) -> Section:
@@ -66,13 +66,13 @@ class Platform:
         weights = [np.stack([1 - t, t]) for t in p.T]
         straight = np.einsum("an,bn,cn,cabx->nx", *weights, self.corners[:, i : i + 2, j : j + 2])
         a, b = p[:, 0], p[:, 1]
-        one, zero = np.ones_like(a), np.zeros_like(a)
+        ones, zeros = np.ones_like(a), np.zeros_like(a)
         curved = {
-            (1, 1): (a, b, one),
-            (1, 2): (a, one, 1 - b),
-            (1, 0): (a, zero, b),
-            (0, 1): (zero, b, a),
-            (2, 1): (one, b, 1 - a),
+            (1, 1): (a, b, ones),
+            (1, 2): (a, ones, 1 - b),
+            (1, 0): (a, zeros, b),
+            (0, 1): (zeros, b, a),
+            (2, 1): (ones, b, 1 - a),
         }
         if (i, j) in curved:
             u, v, fading = curved[i, j]
@@ -105,14 +105,14 @@ class Platform:
         ]
 
 
-def platform(section: Section, heights: tuple[float, float], left: np.ndarray, right: np.ndarray) -> Platform:
+def platform(section: Section, heights: tuple[float, float], left_edge: np.ndarray, right_edge: np.ndarray) -> Platform:
     """Platform around a section from its left and right edge.
 
     heights : z of the section at bottom and top [m]
     left, right : (2, 4, 3) points of the edges at bottom and top, from front to rear [m]
     """
     corners = np.empty((2, 4, 4, 3))
-    corners[:, :, 0], corners[:, :, 3] = left, right
+    corners[:, :, 0], corners[:, :, 3] = left_edge, right_edge
     u, v = np.array([0.0, 1.0])[:, None], np.array([0.0, 1.0])[None, :]
     x, y = section.at(*np.broadcast_arrays(u, v))
     corners[:, 1:3, 1:3, 0], corners[:, 1:3, 1:3, 1] = x, y

@@ -121,8 +121,8 @@ def build(parameters: Parameters, path: str | Path) -> None:
     rows = (p.n_end, p.n_along - 1, p.n_end)
     columns = (p.n_side, p.n_through, p.n_side)
     root, shroud = _root(p), shroud_of(p)
-    every = [(i, j) for i in range(3) for j in range(3)]
-    under = {} if p.disk_radius else {at: {"w-": "clamp"} for at in every}
+    all_blocks = [(i, j) for i in range(3) for j in range(3)]
+    under = {} if p.disk_radius else {at: {"w-": "clamp"} for at in all_blocks}
     faces = {(1, 2): {"v+": "shroud_right"}, (1, 0): {"v-": "shroud_left"}}
     sector = [
         *root.blocks(rows, columns, p.n_root, "root", under),
@@ -159,10 +159,10 @@ def shroud_of(p: Parameters) -> Platform:
     edge = np.array([[-p.shroud_length / 2, -y], [-x, -y], [x, y], [p.shroud_length / 2, y]])
     relief = p.clearance * np.array([1.0, 0.0, 0.0, 1.0])
     line = np.stack([np.column_stack([edge, np.full(4, r)]) for r in radii])
-    left, right = line.copy(), line.copy()
-    left[..., 1] += relief
-    right[..., 1] -= relief
-    return platform(p.tip, radii, turned(left, p.pitch / 2), turned(right, -p.pitch / 2))
+    left_side, right_side = line.copy(), line.copy()
+    left_side[..., 1] += relief
+    right_side[..., 1] -= relief
+    return platform(p.tip, radii, turned(left_side, p.pitch / 2), turned(right_side, -p.pitch / 2))
 
 
 def _root(p: Parameters) -> Platform:
@@ -190,8 +190,8 @@ def _disk(p: Parameters, root: Platform, rows: tuple[int, ...], columns: tuple[i
     def rim_at(i: int, j: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         if j not in edges:
             return root.position(i, j - 1, np.column_stack([a, b, np.zeros_like(a)]))
-        left, right = ((1 - a[:, None]) * edge[i] + a[:, None] * edge[i + 1] for edge in edges[j])
-        return (1 - b[:, None]) * left + b[:, None] * right
+        left_side, right = ((1 - a[:, None]) * edge[i] + a[:, None] * edge[i + 1] for edge in edges[j])
+        return (1 - b[:, None]) * left_side + b[:, None] * right
 
     def mapping(i: int, j: int) -> Callable[[np.ndarray], np.ndarray]:
         def place(q: np.ndarray) -> np.ndarray:

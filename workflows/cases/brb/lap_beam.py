@@ -49,9 +49,7 @@ class Parameters:
         if not self.hole < self.pad < min(self.pitch, self.width):
             raise Refusal("geometry.pad must lie between geometry.hole and the smaller of geometry.pitch and width")
         if not self.holes * self.pitch < self.lap < self.length:
-            raise Refusal(
-                "geometry.lap must exceed geometry.holes times geometry.pitch, and geometry.length the lap"
-            )
+            raise Refusal("geometry.lap must exceed geometry.holes times geometry.pitch, and geometry.length the lap")
 
 
 def build(parameters: Parameters, path: str | Path) -> None:
@@ -63,7 +61,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     p = parameters
     half, side, row = p.height / 2, p.width / 2, p.holes * p.pitch / 2
     y = np.linspace(-side, side, p.n_side + 1)
-    below, above = np.linspace(-half, 0.0, p.n_lap + 1), np.linspace(0.0, half, p.n_lap + 1)
+    lower_half, upper_half = np.linspace(-half, 0.0, p.n_lap + 1), np.linspace(0.0, half, p.n_lap + 1)
     lap = {"w+": "lap"}
     parts = []
     for number in range(p.holes):
@@ -72,15 +70,15 @@ def build(parameters: Parameters, path: str | Path) -> None:
         a, b = p.pitch / 2, side
         field = rings.polygon(np.array([[a, b], [-a, b], [-a, -b], [a, -b]]))
         under = {"w-": f"pad_{number + 1}", **lap}
-        parts.append(rings.ring(hole, pad, 4 * p.n_side, p.n_pad, below, "beam", under, centre))
-        parts.append(rings.ring(pad, field, 4 * p.n_side, p.n_field, below, "beam", lap, centre))
+        parts.append(rings.ring(hole, pad, 4 * p.n_side, p.n_pad, lower_half, "beam", under, centre))
+        parts.append(rings.ring(pad, field, 4 * p.n_side, p.n_field, lower_half, "beam", lap, centre))
     strip = np.linspace(row, p.lap / 2, p.n_end + 1)
-    parts.append(blocks.Block(-strip[::-1], y, below, "beam", lap))
-    parts.append(blocks.Block(strip, y, below, "beam", lap))
+    parts.append(blocks.Block(-strip[::-1], y, lower_half, "beam", lap))
+    parts.append(blocks.Block(strip, y, lower_half, "beam", lap))
     end = p.lap / 2 - p.length
     x = blocks.towards_end(end, -p.lap / 2, p.n_length, p.grading)
-    parts += [blocks.Block(x, y, z, "beam", {"u-": "end"}) for z in (below, above)]
-    made = blocks.body(parts)
+    parts += [blocks.Block(x, y, z, "beam", {"u-": "end"}) for z in (lower_half, upper_half)]
+    joined = blocks.body(parts)
     at = {"tip": (end, 0.0, 0.0), "top": (end, 0.0, half)}
-    nodes = {name: np.array([np.linalg.norm(made.nodes - place, axis=1).argmin()]) for name, place in at.items()}
-    blocks.write(path, replace(made, points=nodes))
+    nodes = {name: np.array([np.linalg.norm(joined.nodes - place, axis=1).argmin()]) for name, place in at.items()}
+    blocks.write(path, replace(joined, points=nodes))

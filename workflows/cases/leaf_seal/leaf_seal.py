@@ -77,7 +77,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     half = p.angle / 2
     columns = np.linspace(-half, half, (p.n_column + 1) // 2)
     through = np.linspace(0.0, p.thickness, p.n_thickness + 1)
-    below, above = p.pin_height - p.pin_width / 2, p.pin_height + p.pin_width / 2
+    pin_bottom, pin_top = p.pin_height - p.pin_width / 2, p.pin_height + p.pin_width / 2
     low, high = -p.height / 2, p.height / 2
     patch = (p.n_row + 1) // 2
 
@@ -91,13 +91,13 @@ def build(parameters: Parameters, path: str | Path) -> None:
 
     strips = [
         strip(np.linspace(low, low + p.patch_height, patch), "lower_contact"),
-        strip(np.linspace(low + p.patch_height, below, p.n_web + 1), "front"),
-        strip(np.array([below, above]), "front"),
-        strip(np.linspace(above, high - p.patch_height, p.n_web + 1), "front"),
+        strip(np.linspace(low + p.patch_height, pin_bottom, p.n_web + 1), "front"),
+        strip(np.array([pin_bottom, pin_top]), "front"),
+        strip(np.linspace(pin_top, high - p.patch_height, p.n_web + 1), "front"),
         strip(np.linspace(high - p.patch_height, high, patch), "upper_contact"),
     ]
     at_pin = half * (1 - 2 * p.pin_column / (p.n_column - 1))
-    seat, middle = np.array([below, p.pin_height, above]), p.thickness / 2
+    seat, middle = np.array([pin_bottom, p.pin_height, pin_top]), p.thickness / 2
     ends = np.unique(np.concatenate([s.v for s in strips]))
     heights = np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
 

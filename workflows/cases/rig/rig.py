@@ -96,7 +96,7 @@ class Parameters:
 
     def __post_init__(self) -> None:
         checks.numbers(self, ("n_contact_length", "n_contact_width"))
-        for name, largest, what in (
+        for name, largest, label in (
             ("contact_length", OURS.shank, "the shank of the upper specimen"),
             ("contact_width", self.thickness, "geometry.thickness"),
             ("foot", 0.9 * self.protrusion, "nine tenths of geometry.protrusion"),
@@ -106,11 +106,11 @@ class Parameters:
             ("shaker_distance", self.solid_length - 0.01, "the free length without the slot less 10 mm"),
         ):
             if getattr(self, name) > largest:
-                raise Refusal(f"geometry.{name} is {getattr(self, name)}: keep it within {what}, {largest:.4g} m")
-        if self.free_length > checks.MOST * self.longest:
+                raise Refusal(f"geometry.{name} is {getattr(self, name)}: keep it within {label}, {largest:.4g} m")
+        if self.free_length > checks.MAX_COUNT * self.longest:
             raise Refusal(
                 f"geometry.longest is {self.longest}: the free length of {self.free_length:g} m takes more than "
-                f"{checks.MOST} such elements; give at least {self.free_length / checks.MOST:.4g} m"
+                f"{checks.MAX_COUNT} such elements; give at least {self.free_length / checks.MAX_COUNT:.4g} m"
             )
         if self.slot_length <= OURS.specimen_side:
             raise Refusal(
@@ -162,41 +162,41 @@ def _height_lines(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
 
 def _contact_lines(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
     """Vertex positions of the contact grid along x and y, both about the contact centre."""
-    along = np.linspace(-p.contact_length / 2, p.contact_length / 2, (p.n_contact_length + 1) // 2)
-    across = np.linspace(-p.contact_width / 2, p.contact_width / 2, (p.n_contact_width + 1) // 2)
-    return along, across
+    x = np.linspace(-p.contact_length / 2, p.contact_length / 2, (p.n_contact_length + 1) // 2)
+    y = np.linspace(-p.contact_width / 2, p.contact_width / 2, (p.n_contact_width + 1) // 2)
+    return x, y
 
 
 def _column(p: Parameters) -> blocks.JoinedBlocks:
     """Bulk column beside the beam, whose seat on it is the side y = thickness / 2."""
     root, up = _root_lines(p), np.unique(np.concatenate(_height_lines(p)))
-    behind = np.array([-p.column_length, root[0]])
-    whole = np.append(behind[0], root)
-    across = p.thickness / 2 + blocks.towards_start(0.0, p.column_depth, 3, 2.0)
-    below = np.linspace(-p.column_height, 0.0, 3)
+    back = np.array([-p.column_length, root[0]])
+    full_x = np.append(back[0], root)
+    depth = p.thickness / 2 + blocks.towards_start(0.0, p.column_depth, 3, 2.0)
+    lower_z = np.linspace(-p.column_height, 0.0, 3)
     above = np.array([p.height, p.height + OURS.column_above])
     return blocks.body(
         [
-            blocks.Block(whole, across, below, "column", {"w-": "column_base"}),
-            blocks.Block(root, across, up, "column", {"v-": "column_seat"}),
-            blocks.Block(behind, across, up, "column"),
-            blocks.Block(whole, across, above, "column"),
+            blocks.Block(full_x, depth, lower_z, "column", {"w-": "column_base"}),
+            blocks.Block(root, depth, up, "column", {"v-": "column_seat"}),
+            blocks.Block(back, depth, up, "column"),
+            blocks.Block(full_x, depth, above, "column"),
         ]
     )
 
 
 def _beam(p: Parameters) -> blocks.JoinedBlocks:
     """Beam on edge with its cover plate at the seat and the upper specimen under its free end."""
-    along, across = _contact_lines(p)
+    x_lines, y_lines = _contact_lines(p)
     root, (_, above) = _root_lines(p), _height_lines(p)
     up = np.unique(np.concatenate(_height_lines(p)))
-    thick = across * (p.thickness / p.contact_width)
+    thick = y_lines * (p.thickness / p.contact_width)
     cover = np.array([thick[0] - OURS.cover_depth, thick[0]])
     quarters = p.solid_length * np.array([0.25, 0.5, 0.75, 1.0])
     stops = sorted({0.0, p.shaker_distance, *quarters})
     pieces = [np.linspace(a, b, int(np.ceil((b - a) / p.longest)) + 1)[:-1] for a, b in pairwise(stops)]
     span = np.concatenate([*pieces, stops[-1:]])
-    specimen = p.contact_x + along * (OURS.shank / p.contact_length)
+    specimen = p.contact_x + x_lines * (OURS.shank / p.contact_length)
     arm = np.concatenate([span[-1:], specimen, [p.free_length]])
     taper = p.contact_z + np.array([0.0, p.foot, (p.foot + p.protrusion) / 2, p.protrusion])
 
@@ -218,7 +218,7 @@ def _beam(p: Parameters) -> blocks.JoinedBlocks:
             blocks.Block(root, cover, up, "beam"),
             blocks.Block(span, thick, up, "beam"),
             blocks.Block(arm, thick, above, "beam"),
-            blocks.Block(along, across, taper, "upper_specimen", {"w-": "upper_contact"}, widen),
+            blocks.Block(x_lines, y_lines, taper, "upper_specimen", {"w-": "upper_contact"}, widen),
         ],
         points=points,
     )
@@ -226,9 +226,9 @@ def _beam(p: Parameters) -> blocks.JoinedBlocks:
 
 def _platform(p: Parameters) -> blocks.JoinedBlocks:
     """Lower specimen on the separator, whose two limbs stand at 45 degrees on the platform."""
-    along, across = _contact_lines(p)
+    x_lines, y_lines = _contact_lines(p)
     side = OURS.specimen_side / 2
-    u, v = np.concatenate([[-side], along, [side]]), np.concatenate([[-side], across, [side]])
+    u, v = np.concatenate([[-side], x_lines, [side]]), np.concatenate([[-side], y_lines, [side]])
     top = p.contact_z
     foot, neck, sole, bottom = top - np.cumsum(
         [OURS.specimen_depth, OURS.head_depth, OURS.limb_depth, OURS.plate_depth]

@@ -110,44 +110,30 @@ class Parameters:
     n_damper: int = 3
 
     def __post_init__(self) -> None:
-        own = dict.fromkeys(("camber", "root_stagger", "tip_stagger", "shroud_angle"))  # limits of cases.blade
-        checks.numbers(self, lap=(0.0, 0.5), damper_low=(0.0, 1.0), damper_high=(0.0, 1.0), **own)
+        free = dict.fromkeys(("camber", "root_stagger", "tip_stagger", "shroud_angle"))  # limits of cases.blade
+        checks.numbers(self, lap=(0.0, 0.5), damper_low=(0.0, 1.0), damper_high=(0.0, 1.0), **free)
         _ = self.upper  # refuses what airfoil and shroud cannot be
-        if self.bulb_width <= self.neck_width:
-            raise Refusal(
-                f"geometry.bulb_width is {self.bulb_width}: give more than geometry.neck_width ({self.neck_width}), or "
-                "the root has no flanks to hang on"
-            )
-        if self.gap_top >= self.gap_bottom:
-            raise Refusal(
-                f"geometry.gap_top is {self.gap_top}: give less than geometry.gap_bottom ({self.gap_bottom}), or the "
-                "damper flies out"
-            )
-        if self.damper_low >= self.damper_high:
-            raise Refusal(
-                f"geometry.damper_low is {self.damper_low}: give less than geometry.damper_high ({self.damper_high})"
-            )
-        if self.damper_length > self.platform_length:
-            raise Refusal(
-                f"geometry.damper_length is {self.damper_length}: give at most geometry.platform_length "
-                f"({self.platform_length})"
-            )
-        if self.disk_radius >= self.bottom:
-            raise Refusal(
-                f"geometry.disk_radius is {self.disk_radius}: give a radius below {self.bottom:.4g} m, the bottom of "
-                "the slot"
-            )
-        if self.slot(self.lap)[1] >= self.post_top:
-            raise Refusal(
-                f"geometry.neck_height is {self.neck_height}: give more than "
-                f"{self.under - self.post_top - self.lap * self.flank_height:.4g}, or the posts of the disk end below "
-                "the flanks of its slot"
-            )
-        if self.slot(1 + self.lap)[0] >= 0.9 * self.bottom * np.tan(self.pitch / 2):
-            raise Refusal(
-                f"geometry.bulb_width is {self.bulb_width}: the disk has no room for it between its seams; give less, "
-                "or fewer geometry.n_blades"
-            )
+        least_neck = self.under - self.post_top - self.lap * self.flank_height
+        room = 0.9 * self.bottom * np.tan(self.pitch / 2)
+        limits = (
+            (self.bulb_width <= self.neck_width, "bulb_width",
+             f"give more than geometry.neck_width ({self.neck_width}), or the root has no flanks to hang on"),
+            (self.gap_top >= self.gap_bottom, "gap_top",
+             f"give less than geometry.gap_bottom ({self.gap_bottom}), or the damper flies out"),
+            (self.damper_low >= self.damper_high, "damper_low",
+             f"give less than geometry.damper_high ({self.damper_high})"),
+            (self.damper_length > self.platform_length, "damper_length",
+             f"give at most geometry.platform_length ({self.platform_length})"),
+            (self.disk_radius >= self.bottom, "disk_radius",
+             f"give a radius below {self.bottom:.4g} m, the bottom of the slot"),
+            (self.slot(self.lap)[1] >= self.post_top, "neck_height",
+             f"give more than {least_neck:.4g}, or the posts of the disk end below the flanks of its slot"),
+            (self.slot(1 + self.lap)[0] >= room, "bulb_width",
+             "the disk has no room for it between its seams; give less, or fewer geometry.n_blades"),
+        )  # fmt: skip
+        for is_violated, name, cure in limits:
+            if is_violated:
+                raise Refusal(f"geometry.{name} is {getattr(self, name)}: {cure}")
 
     @property
     def upper(self) -> blade.Parameters:
@@ -228,10 +214,10 @@ def _platform(p: Parameters) -> Platform:
     if not (np.diff(x) > 0).all():
         raise Refusal(f"geometry.platform_length is {p.platform_length}: make it longer than the airfoil at the hub")
     edge = [(p.gap_bottom / 2, p.under), (p.gap_top / 2, p.hub_radius)]
-    left, right = (
+    left_edge, right_edge = (
         np.stack([np.column_stack([x, np.full(4, sign * half), np.full(4, r)]) for half, r in edge]) for sign in (1, -1)
     )
-    return platform(section, (p.under, p.hub_radius), turned(left, p.pitch / 2), turned(right, -p.pitch / 2))
+    return platform(section, (p.under, p.hub_radius), turned(left_edge, p.pitch / 2), turned(right_edge, -p.pitch / 2))
 
 
 def _root(p: Parameters, base: Platform, rows: tuple[int, ...]) -> list[blocks.Block]:
@@ -242,8 +228,8 @@ def _root(p: Parameters, base: Platform, rows: tuple[int, ...]) -> list[blocks.B
 
     def straight(i: int, half: float, height: float) -> Callable[[np.ndarray], np.ndarray]:
         def at(q: np.ndarray) -> np.ndarray:
-            along = x[i] + q[:, 0] * (x[i + 1] - x[i])
-            return np.column_stack([along, half * (2 * q[:, 1] - 1), np.full(len(q), height)])
+            fractions = x[i] + q[:, 0] * (x[i + 1] - x[i])
+            return np.column_stack([fractions, half * (2 * q[:, 1] - 1), np.full(len(q), height)])
 
         return at
 
@@ -255,7 +241,7 @@ def _root(p: Parameters, base: Platform, rows: tuple[int, ...]) -> list[blocks.B
     ) -> Callable[[np.ndarray], np.ndarray]:
         return lambda q: (1 - q[:, 2:]) * low(q) + q[:, 2:] * high(q)
 
-    found = []
+    root_blocks = []
     flanks = {"v+": "flank_right", "v-": "flank_left"}
     for i, n in enumerate(rows):
         top, middle, bottom = straight(i, p.neck_width / 2, p.flank_top), straight(i, *low), straight(i, low[0], foot)
@@ -264,8 +250,8 @@ def _root(p: Parameters, base: Platform, rows: tuple[int, ...]) -> list[blocks.B
             (between(middle, top), p.n_flank, flanks),
             (between(bottom, middle), p.n_flank, {}),
         ):
-            found.append(blocks.Block(unit(n), unit(p.n_through), unit(count), "blade", names, layer))
-    return found
+            root_blocks.append(blocks.Block(unit(n), unit(p.n_through), unit(count), "blade", names, layer))
+    return root_blocks
 
 
 def _disk(p: Parameters) -> blocks.JoinedBlocks:
@@ -274,7 +260,7 @@ def _disk(p: Parameters) -> blocks.JoinedBlocks:
     upper, lower = p.slot(p.lap), p.slot(1 + p.lap)
     wall = [np.array([lower[0], p.bottom]), lower, upper, np.array([upper[0], p.post_top])]
 
-    def placed(profile: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    def in_place(profile: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         def at(q: np.ndarray) -> np.ndarray:
             yz = profile(q)
             radius = np.hypot(*yz.T)
@@ -293,12 +279,12 @@ def _disk(p: Parameters) -> blocks.JoinedBlocks:
         def profile(q: np.ndarray) -> np.ndarray:
             inner = (1 - q[:, 2:]) * low + q[:, 2:] * high
             across = q[:, 1:2] if side > 0 else 1 - q[:, 1:2]
-            found = (1 - across) * inner + across * seam(inner[:, 1])
-            return found * [side, 1]
+            disk_blocks = (1 - across) * inner + across * seam(inner[:, 1])
+            return disk_blocks * [side, 1]
 
-        return placed(profile)
+        return in_place(profile)
 
-    def below(inner: tuple[float, float], outer: tuple[float, float]) -> Callable[[np.ndarray], np.ndarray]:
+    def under_slot(inner: tuple[float, float], outer: tuple[float, float]) -> Callable[[np.ndarray], np.ndarray]:
         """A column under the slot's bottom, from the bore; between two places there."""
 
         def profile(q: np.ndarray) -> np.ndarray:
@@ -307,7 +293,7 @@ def _disk(p: Parameters) -> blocks.JoinedBlocks:
             bore = rim * (p.disk_radius / np.hypot(*rim.T))[:, None]
             return (1 - q[:, 2:]) * bore + q[:, 2:] * rim
 
-        return placed(profile)
+        return in_place(profile)
 
     axial = unit(p.n_axial)
     parts = []
@@ -319,8 +305,8 @@ def _disk(p: Parameters) -> blocks.JoinedBlocks:
             parts.append(blocks.Block(axial, unit(p.n_post), unit(p.n_slot), "disk", names, post(low, high, side)))
         ends = (corner, edge) if side > 0 else ((-edge[0], edge[1]), (-corner[0], corner[1]))
         names = {outward: f"cyclic_{name}", "w-": "clamp"}
-        parts.append(blocks.Block(axial, unit(p.n_post), unit(p.n_disk), "disk", names, below(*ends)))
-    middle = below((-corner[0], corner[1]), corner)
+        parts.append(blocks.Block(axial, unit(p.n_post), unit(p.n_disk), "disk", names, under_slot(*ends)))
+    middle = under_slot((-corner[0], corner[1]), corner)
     parts.append(blocks.Block(axial, unit(p.n_post), unit(p.n_disk), "disk", {"w-": "clamp"}, middle))
     return blocks.body(parts)
 
