@@ -92,8 +92,8 @@ def problem(seed: int, transitions: str = "located") -> Problem:
     stiffness = (modes * 10 ** rng.uniform(4.0, 6.0, n)) @ modes.T
     mass = np.diag(rng.uniform(0.5, 2.0, n))
     lam, shapes = sla.eigh(stiffness, mass)
-    moved = mass @ shapes
-    damping = (moved * (2 * 10 ** rng.uniform(-2.3, -1.5) * np.sqrt(lam))) @ moved.T
+    shifted = mass @ shapes
+    damping = (shifted * (2 * 10 ** rng.uniform(-2.3, -1.5) * np.sqrt(lam))) @ shifted.T
     press, shake = np.zeros(n), rng.normal(size=n)
     press[2 : 3 * n_pair : 3] = rng.uniform(0.5, 1.5, n_pair)
     system = SecondOrderSystem(mass, stiffness, damping, {"press": press, "shake": shake}, {"tip": np.eye(n)[-1]})
@@ -126,16 +126,16 @@ def run(seeds: Sequence[int], say: Callable[[str], None]) -> list[Curve]:
 
 def judged(seed: int, transitions: str = "located") -> Curve:
     """Follow the curve of one problem from both ends, and judge."""
-    given = problem(seed, transitions)
+    drawn = problem(seed, transitions)
     clock = process_time()
-    up = arc_length.follow(given.balance, given.low, given.high)
-    down = arc_length.follow(given.balance, given.high, given.low)
+    up = arc_length.follow(drawn.balance, drawn.low, drawn.high)
+    down = arc_length.follow(drawn.balance, drawn.high, drawn.low)
     seconds = process_time() - clock
-    status = _status(given.balance, up)
-    defect = max(checked(given.balance, up), checked(given.balance, down))
+    status = _status(drawn.balance, up)
+    defect = max(checked(drawn.balance, up), checked(drawn.balance, down))
     outcome, reason = verdict(up, down, defect)
     return Curve(
-        seed, given.load, given.harmonics, given.balance.contact.n_pair, outcome, reason, len(up.omega), len(up.folds),
+        seed, drawn.load, drawn.harmonics, drawn.balance.contact.n_pair, outcome, reason, len(up.omega), len(up.folds),
         bool(status & 2), bool(status & 4), defect, seconds,
     )  # fmt: skip
 
@@ -151,10 +151,10 @@ def verdict(up: Branch, down: Branch, defect: float) -> tuple[str, str]:
         return FOLLOWED, f"the curve turns back: {up.end}; {down.end}"
     if not _meet(up, down):
         return FOLLOWED, "two branches that do not meet in the range"
-    here, there = (np.sort(branch.omega[list(branch.folds)]) for branch in (up, down))
-    if len(here) != len(there) or not np.allclose(here, there, rtol=SAME_FOLD, atol=0.0):
-        return WRONG, f"{len(here)} folds upwards and {len(there)} downwards, or not the same"
-    return FOLLOWED, f"reached both ends, {len(here)} folds"
+    current, refined = (np.sort(branch.omega[list(branch.folds)]) for branch in (up, down))
+    if len(current) != len(refined) or not np.allclose(current, refined, rtol=SAME_FOLD, atol=0.0):
+        return WRONG, f"{len(current)} folds upwards and {len(refined)} downwards, or not the same"
+    return FOLLOWED, f"reached both ends, {len(current)} folds"
 
 
 def _whole(branch: Branch) -> bool:
@@ -172,19 +172,19 @@ def _meet(up: Branch, down: Branch) -> bool:
 
 def _status(balance: HarmonicBalance, branch: Branch) -> int:
     """What any pair does at any point, as bits: sticks 1, slips 2, separates 4."""
-    found = 0
+    result = 0
     for omega, x in zip(branch.omega, branch.contact, strict=True):
         state = balance.evaluate(omega, x.reshape(balance.contact.n_pair, 3, -1), jacobian=False)
-        found |= int(np.bitwise_or.reduce(state.cycle.status))
-    return found
+        result |= int(np.bitwise_or.reduce(state.cycle.status))
+    return result
 
 
 def checked(balance: HarmonicBalance, branch: Branch) -> float:
     """Largest independent residual over the displacement, at converged points spread over the curve."""
-    known = np.flatnonzero(branch.converged)
-    if len(known) == 0:
+    places = np.flatnonzero(branch.converged)
+    if len(places) == 0:
         return 0.0
-    chosen = known[np.unique(np.linspace(0, len(known) - 1, CHECKED).round().astype(int))]
+    chosen = places[np.unique(np.linspace(0, len(places) - 1, CHECKED).round().astype(int))]
     for steps in MARCHES:
         forces = marched(balance, branch.contact[chosen], steps)
         worst = max(defect(balance, branch.omega[i], branch.contact[i], f) for i, f in zip(chosen, forces, strict=True))

@@ -69,10 +69,10 @@ class Group:
 
     def line(self) -> str:
         """For people."""
-        said = "".join(f"\n    pattern {n}: {why}" for n, why in sorted({**self.failed, **self.other}.items()))
+        text = "".join(f"\n    pattern {n}: {reason}" for n, reason in sorted({**self.failed, **self.other}.items()))
         return (
             f"{self.damping:7} {self.state:9} {self.solved:4} of {self.count:4} solved, {self.slipping:4.0%} of pairs "
-            f"slip, {self.compared} dense within {self.dense_error:.1e}, {self.seconds:.2g} s each{said}"
+            f"slip, {self.compared} dense within {self.dense_error:.1e}, {self.seconds:.2g} s each{text}"
         )
 
 
@@ -85,11 +85,11 @@ def is_in(state: str, status: np.ndarray) -> bool:
 
 def run(count: int, dense: int, aside: Callable[[str], None], states: Sequence[str] = tuple(STATES)) -> list[Group]:
     """All groups, each told as it comes; `count` patterns of each, the first `dense` on the dense wheel too."""
-    found = []
+    rows = []
     for group in groups(count, dense, states):
         aside(group.line())
-        found.append(group)
-    return found
+        rows.append(group)
+    return rows
 
 
 def as_records(found: Sequence[Group]) -> list[dict[str, object]]:
@@ -101,8 +101,8 @@ def groups(count: int, dense: int, states: Sequence[str] = tuple(STATES)) -> Ite
     """Solve `count` patterns of each damping and state, and compare the first `dense` of each with the dense wheel."""
     for damping in DAMPING:
         for state in states:
-            asked = (*STATES[state], f"damping.modal='{damping}'")
-            blades = patterns.MistunedBlades.of(scene_file.parse(WHEEL + DIFFER, "wheel.toml", asked, Path()))
+            requested = (*STATES[state], f"damping.modal='{damping}'")
+            blades = patterns.MistunedBlades.of(scene_file.parse(WHEEL + DIFFER, "wheel.toml", requested, Path()))
             wheel, errors, seconds = wheels.build(blades.file), [np.nan], 0.0
             failed, other, slipping = dict[int, str](), dict[int, str](), [np.nan]
             for number in range(1, count + 1):
@@ -141,10 +141,10 @@ def from_dense(
     The dense wheel has the damping of sectors alike, which the wheel on its sector has by definition.
     """
     n = blades.wheel.n_sectors
-    alike, own = wheel.whole_wheel([1.0] * n), wheel.whole_wheel([float(1 + one) for one in pattern.stiffness])
-    system = replace(own.model.system, damping=alike.model.system.damping)
-    model, load = replace(own.model, system=system), own.excitation
-    dense = HarmonicBalance.of(model, own.contact.joints, own.basis, load, blades.wheel.wave.omega_max)
+    equal, base = wheel.whole_wheel([1.0] * n), wheel.whole_wheel([float(1 + item) for item in pattern.stiffness])
+    system = replace(base.model.system, damping=equal.model.system.damping)
+    model, load = replace(base.model, system=system), base.excitation
+    dense = HarmonicBalance.of(model, base.contact.joints, base.basis, load, blades.wheel.wave.omega_max)
     heights = []
     for balance in (blades.balance(pattern), dense):
         solution = newton.solve(balance, omega, x, EXACT)

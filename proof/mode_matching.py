@@ -24,7 +24,7 @@ def mac(first: np.ndarray, second: np.ndarray, weight: np.ndarray | None = None)
     if a.shape[0] != b.shape[0]:
         raise ValueError(f"shapes at {a.shape[0]} and {b.shape[0]} points cannot be compared: take common points")
     wa, wb = (a, b) if weight is None else (weight @ a, weight @ b)
-    sizes = [np.einsum("ij,ij->j", one.conj(), other).real for one, other in ((a, wa), (b, wb))]
+    sizes = [np.einsum("ij,ij->j", item.conj(), other).real for item, other in ((a, wa), (b, wb))]
     if min(size.min() for size in sizes) <= 0:
         raise ValueError("a shape without motion at the common points belongs to no mode: leave it out")
     return np.asarray(np.abs(a.conj().T @ wb) ** 2 / np.outer(*sizes))

@@ -48,22 +48,22 @@ def solved(file: SceneFile, seconds: float, elements: float = FINER.elements) ->
     """
     fine = finer(file, elements)
     values: Values = dict.fromkeys(names_with_error())
-    what = "its reference"
+    kind = "its reference"
     try:
         with processor_seconds(seconds), threads.limited(1):
             model = modelling.build(fine, Progress())
             values |= operating_states.unworn_state(fine, model).values
         if fine.scene.wears:
-            what = "measured, the reference of its wear"
+            kind = "measured, the reference of its wear"
             with processor_seconds(seconds), threads.limited(1):
                 worn = wear_values.worn_by(fine, model)
             if worn.history.ended.failed:
                 raise SolverFailure(str(worn.history.end))
             values |= {quantity.name: quantity.value(worn) for quantity in with_error(WearQuantity)}
     except TimeUp:
-        return values, f"{what} is too expensive"
+        return values, f"{kind} is too expensive"
     except (Refusal, SolverFailure) as refusal:
-        return values, f"{what} is refused: {refusal}"
+        return values, f"{kind} is refused: {refusal}"
     return values, MEASURED
 
 

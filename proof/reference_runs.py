@@ -133,7 +133,7 @@ def _linear(model: modelling.Model) -> Numbers:
 
 def _response(balance: HarmonicBalance, *omegas: float) -> Numbers:
     """Response, forces, energy and preload at frequencies [rad/s]."""
-    found: Numbers = {}
+    result: Numbers = {}
     for number, omega in enumerate(omegas):
         solution = arc_length.solve_along_load(balance, omega)
         state = solution.state
@@ -148,8 +148,8 @@ def _response(balance: HarmonicBalance, *omegas: float) -> Numbers:
         }
         if "n" in balance.contact.components:
             of["preload"] = np.array([balance.preload(state)])
-        found |= {f"{name} at point {number + 1}": np.asarray(value) for name, value in of.items()}
-    return found
+        result |= {f"{name} at point {number + 1}": np.asarray(value) for name, value in of.items()}
+    return result
 
 
 def _worn(history: WearHistory) -> Numbers:
@@ -204,11 +204,11 @@ def stated() -> Numbers:
     result = pipeline.run(scene_file.read("beam", BEAM), None, Progress(), judge=with_verdict)
     said = result.verdict
     assert said is not None
-    found = {f"stated error of {name}": one.error for name, one in said.statements.items()}
-    parts = {f"change of {one.quantity} by {one.refinement}": one.relative for one in said.changes}
+    outcome = {f"stated error of {name}": item.error for name, item in said.statements.items()}
+    parts = {f"change of {item.quantity} by {item.refinement}": item.relative for item in said.changes}
     values = np.array([_response_size(lattice(2, 2), top) for top in (1, 3, 7)])
     limit = {"limit over harmonics": np.array([limit_of([1, 2, 4], list(values)).value])}
-    return limit | {name: np.array([error]) for name, error in (found | parts).items() if error is not None}
+    return limit | {name: np.array([error]) for name, error in (outcome | parts).items() if error is not None}
 
 
 def _response_size(body: Body, top: int) -> float:
@@ -220,19 +220,19 @@ def _response_size(body: Body, top: int) -> float:
 def pairs() -> Numbers:
     """Pairs that stick, slip and lift, with located and with sampled transitions, over gaps and on moving ground."""
     body = lattice(2, 2)
-    found: Numbers = {}
+    result: Numbers = {}
     for transitions in ("located", "sampled"):
         for gap in (0.0, -2e-6):
             setting = replace(body.ordinary, harmonics=(0, 1, 2, 3), transitions=transitions, gap=gap)
             of = _response(body.balance(setting), setting.omega)
-            found |= {f"{name}, {transitions}, gap {gap:g} m": value for name, value in of.items()}
+            result |= {f"{name}, {transitions}, gap {gap:g} m": value for name, value in of.items()}
     plain = body.balance(replace(body.ordinary, harmonics=(0, 1)))
     base = np.zeros((plain.compliance.n_contact, 3))
     base[::3, 1] = 2e-6
     excitation = replace(plain.excitation, base=base)
     model = body.model.with_damping(lambda system, _: modal_damping(system, 0.01))
-    moved = HarmonicBalance.of(model, plain.contact.joints[0], plain.basis, excitation, body.ordinary.omega)
-    return found | {f"{name}, moving ground": v for name, v in _response(moved, body.ordinary.omega).items()}
+    shifted = HarmonicBalance.of(model, plain.contact.joints[0], plain.basis, excitation, body.ordinary.omega)
+    return result | {f"{name}, moving ground": v for name, v in _response(shifted, body.ordinary.omega).items()}
 
 
 def peak() -> Numbers:
@@ -260,7 +260,7 @@ def _normal() -> Any:
 def wear() -> Numbers:
     """Wear by both rules, and by both laws."""
     body = rigid(2)
-    found: Numbers = {}
+    result: Numbers = {}
     balance = body.balance(body.ordinary)
     delta = float(references.free_deflection(balance).max())
     for law, coefficient in (("energy", 2e-15), ("archard", 1e-15)):
@@ -273,26 +273,26 @@ def wear() -> Numbers:
             "error-controlled": evolve(error_controlled.Rule(problem, tolerance), 6),
         }
         for rule, history in histories.items():
-            found |= {f"{name}, {law}, {rule}": value for name, value in _worn(history).items()}
-    return found
+            result |= {f"{name}, {law}, {rule}": value for name, value in _worn(history).items()}
+    return result
 
 
 def in_time() -> Numbers:
     """Direct time integration, what it says of its steps, and Floquet exponents."""
-    found: Numbers = {}
+    result: Numbers = {}
     for body in (rigid(1), lattice(2, 1)):
         balance = body.balance(replace(body.ordinary, damping=0.05))
         state = arc_length.solve_along_load(balance, body.ordinary.omega).state
-        said = verify(balance, state, Options(steps=64, max_periods=200))
-        found |= {
-            f"motion in time, {body.name}": said.motion.outputs,
-            f"energy in time, {body.name}": said.motion.energy,
-            f"error of the time steps, {body.name}": np.array([said.step_error]),
+        verification = verify(balance, state, Options(steps=64, max_periods=200))
+        result |= {
+            f"motion in time, {body.name}": verification.motion.outputs,
+            f"energy in time, {body.name}": verification.motion.energy,
+            f"error of the time steps, {body.name}": np.array([verification.step_error]),
         }
     stuck = rigid(1).balance(replace(rigid(1).ordinary, force=5.0, damping=0.05))
     still = newton.solve_from_rest(stuck, 1100.0).state
     exponents = stability_in_time(stuck, still).exponents
-    return found | {"Floquet exponents": np.array([exponents.real.max(), np.abs(exponents.imag).max()])}
+    return result | {"Floquet exponents": np.array([exponents.real.max(), np.abs(exponents.imag).max()])}
 
 
 RUNS: Mapping[str, Callable[[], Numbers]] = {
@@ -303,10 +303,10 @@ RUNS: Mapping[str, Callable[[], Numbers]] = {
 def numbers(names: tuple[str, ...]) -> Iterator[tuple[str, Numbers | None]]:
     """Each run with its numbers, None where it fails, as it may do with a fault in the sources."""
     for name in names:
-        found = None
+        result = None
         with suppress(Exception):
-            found = RUNS[name]()
-        yield name, found
+            result = RUNS[name]()
+        yield name, result
 
 
 def change(before: Numbers, after: Numbers) -> tuple[float, str]:

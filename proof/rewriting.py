@@ -53,8 +53,8 @@ def rewritten(source: str, place: str, rule: Rule) -> ast.Module:
         times = f"{len(matches)} times instead of {rule.count}"
         raise ValueError(f"{place or 'the module'} matches {ast.unparse(rule.pattern)} {times}")
     node, bindings = matches[rule.number - 1]
-    new = ast.copy_location(_Filled(bindings).visit(copy.deepcopy(rule.replacement)), node)
-    _replace(module, node, ast.fix_missing_locations(new))
+    updated = ast.copy_location(_Filled(bindings).visit(copy.deepcopy(rule.replacement)), node)
+    _replace(module, node, ast.fix_missing_locations(updated))
     return module
 
 
@@ -102,10 +102,10 @@ class _Filled(ast.NodeTransformer):
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         """Called by ast."""
-        new = copy.deepcopy(self._bindings.get(node.id, node))
-        if hasattr(new, "ctx"):
-            new.ctx = node.ctx
-        return new
+        updated = copy.deepcopy(self._bindings.get(node.id, node))
+        if hasattr(updated, "ctx"):
+            updated.ctx = node.ctx
+        return updated
 
 
 def _parsed(text: str) -> ast.AST:

@@ -49,9 +49,9 @@ def processor_seconds(limit: float) -> Iterator[None]:
 
     def lost(what: UnraisableHookArgs) -> None:
         if what.exc_value is not end:
-            told(what)
+            hook(what)
 
-    told, sys.unraisablehook = sys.unraisablehook, lost
+    hook, sys.unraisablehook = sys.unraisablehook, lost
     before = signal.signal(signal.SIGPROF, up)
     signal.setitimer(signal.ITIMER_PROF, limit, AGAIN)
     try:
@@ -63,7 +63,7 @@ def processor_seconds(limit: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
-        sys.unraisablehook = told
+        sys.unraisablehook = hook
 
 
 def _compiles(frame: FrameType | None) -> bool:

@@ -32,49 +32,49 @@ def leaf(tmp_path_factory):
 
 
 def part(leaf, springs=()):
-    held = {"springs": springs, "held_motions": NO_TURN}
-    return fem_part.build(leaf.mesh, leaf.node_sets, STEEL, IN_PLANE, CONTACTS, {}, {}, **held)
+    fixed = {"springs": springs, "held_motions": NO_TURN}
+    return fem_part.build(leaf.mesh, leaf.node_sets, STEEL, IN_PLANE, CONTACTS, {}, {}, **fixed)
 
 
 def test_held_rotation_leaves_two_rigid_modes_and_every_elastic_one(leaf):
-    made = part(leaf)
-    whole, _ = linear_modes(made, n=12)
-    assert (whole[:3] < 1e-3 * whole[3]).all()  # lift, pitch and turn about the radial axis
-    reduced = craig_bampton(made.system, made.interface, n_modes=20)
-    envelope, shapes = linear_modes(hold(reduced, made.held_rows), n=10)
+    built = part(leaf)
+    full, _ = linear_modes(built, n=12)
+    assert (full[:3] < 1e-3 * full[3]).all()  # lift, pitch and turn about the radial axis
+    reduced = craig_bampton(built.system, built.interface, n_modes=20)
+    envelope, shapes = linear_modes(hold(reduced, built.held_rows), n=10)
     assert (envelope[:2] < 1e-3 * envelope[2]).all()
-    np.testing.assert_allclose(envelope[2:8], whole[3:9], rtol=2e-3)
-    np.testing.assert_allclose(made.held_rows @ hold(reduced, made.held_rows).origin.basis @ shapes, 0.0, atol=1e-9)
+    np.testing.assert_allclose(envelope[2:8], full[3:9], rtol=2e-3)
+    np.testing.assert_allclose(built.held_rows @ hold(reduced, built.held_rows).origin.basis @ shapes, 0.0, atol=1e-9)
     free, _ = linear_modes(reduced, n=11)
     np.testing.assert_allclose(envelope[2:], free[3:], rtol=1e-9)  # exactly those without the turn
 
 
 def test_held_rows_are_the_rotation_about_the_centre_of_mass(leaf):
-    made = part(leaf)
-    unit = np.zeros((len(made.points), 3))
-    x, z = made.points[:, 0], made.points[:, 2] - PARAMETERS.thickness / 2
+    built = part(leaf)
+    unit = np.zeros((len(built.points), 3))
+    x, z = built.points[:, 0], built.points[:, 2] - PARAMETERS.thickness / 2
     unit[:, 0], unit[:, 2] = z, -x
-    turn = unit.ravel()[made.free]
-    np.testing.assert_allclose(made.held_rows[0], made.system.mass @ turn, atol=1e-9 * np.abs(made.held_rows).max())
-    inertia = turn @ made.system.mass @ turn
-    assert made.held_rows[0] @ turn == pytest.approx(inertia)
-    lift = np.tile([0.0, 0, 1], len(x))[made.free]
-    assert made.held_rows[0] @ lift == pytest.approx(0.0, abs=1e-9 * np.sqrt(inertia))
+    turn = unit.ravel()[built.free]
+    np.testing.assert_allclose(built.held_rows[0], built.system.mass @ turn, atol=1e-9 * np.abs(built.held_rows).max())
+    inertia = turn @ built.system.mass @ turn
+    assert built.held_rows[0] @ turn == pytest.approx(inertia)
+    lift = np.tile([0.0, 0, 1], len(x))[built.free]
+    assert built.held_rows[0] @ lift == pytest.approx(0.0, abs=1e-9 * np.sqrt(inertia))
 
 
 def test_springs_hold_a_rigid_leaf_as_a_mass_on_springs(leaf):
     k = 100.0  # soft enough that the leaf stays rigid
     springs = [Spring(f"{side}_pin", (0, 0, 1), k) for side in ("left", "right")]
-    made = part(leaf, springs)
-    frequency, _ = linear_modes(hold(craig_bampton(made.system, made.interface, n_modes=5), made.held_rows))
-    lift, pitch = np.zeros((2, len(made.points), 3))
+    built = part(leaf, springs)
+    frequency, _ = linear_modes(hold(craig_bampton(built.system, built.interface, n_modes=5), built.held_rows))
+    lift, pitch = np.zeros((2, len(built.points), 3))
     pins = np.concatenate([leaf.node_sets[name] for name in ("left_pin", "right_pin")])
-    y = made.points[:, 1] - made.points[pins, 1].mean()
+    y = built.points[:, 1] - built.points[pins, 1].mean()
     lift[:, 2] = 1.0
-    pitch[:, 2], pitch[:, 1] = y, PARAMETERS.thickness / 2 - made.points[:, 2]
-    rigid = np.stack([lift.ravel()[made.free], pitch.ravel()[made.free]], axis=1)
+    pitch[:, 2], pitch[:, 1] = y, PARAMETERS.thickness / 2 - built.points[:, 2]
+    rigid = np.stack([lift.ravel()[built.free], pitch.ravel()[built.free]], axis=1)
     K = np.diag([2 * k, 2 * k * np.mean(y[pins] ** 2)])  # turning about the pins meets the width of their seats alone
-    exact = np.linalg.eigvals(np.linalg.solve(rigid.T @ made.system.mass @ rigid, K)).real
+    exact = np.linalg.eigvals(np.linalg.solve(rigid.T @ built.system.mass @ rigid, K)).real
     np.testing.assert_allclose(frequency[:2], np.sqrt(np.sort(exact)) / (2 * np.pi), rtol=1e-3)
     assert frequency[0] < 0.1 * frequency[1]
 

@@ -37,8 +37,8 @@ def test_an_unknown_solver_is_refused() -> None:
 @pytest.mark.parametrize("pardiso", [True, False])
 def test_eigenvalues_are_counted_by_one_factorisation(pardiso: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(factor, "pardiso_available", lambda: pardiso)
-    one, other = (random_array((150, 150), density=0.05, rng=seed) for seed in (1, 2))
-    K, M = one + one.T, other @ other.T + 2 * eye_array(150)
+    item, other = (random_array((150, 150), density=0.05, rng=seed) for seed in (1, 2))
+    K, M = item + item.T, other @ other.T + 2 * eye_array(150)
     values = eigvalsh(K.toarray(), M.toarray())
     for place in (1, 40, 75, 149):
         assert eigenvalues_below(K, M, 0.5 * (values[place - 1] + values[place])) == place
@@ -48,18 +48,18 @@ def test_eigenvalues_are_counted_by_one_factorisation(pardiso: bool, monkeypatch
 def test_few_rows_are_those_of_the_whole_solution(solver: str, most: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where a force on them vanishes, between solutions in all rows, and where they are too many to pay."""
     monkeypatch.setattr(Pardiso, "MOST_SELECTED", most)
-    some = random_array((400, 400), density=0.02, rng=1)
-    K = some @ some.T + 4 * eye_array(400)
-    few = np.array([3, 50, 51, 52, 399])
-    made = factorise(K, solver=solver, selected_rows=few)
-    assert getattr(made, "_few", False) == (solver == "pardiso" and most > 0)
-    force, every = np.zeros((400, 7)), np.random.default_rng(2).normal(size=(400, 2))
-    force[few[:4], :2] = np.random.default_rng(3).normal(size=(4, 2))
+    subset = random_array((400, 400), density=0.02, rng=1)
+    K = subset @ subset.T + 4 * eye_array(400)
+    small = np.array([3, 50, 51, 52, 399])
+    built = factorise(K, solver=solver, selected_rows=small)
+    assert getattr(built, "_few", False) == (solver == "pardiso" and most > 0)
+    force, complete = np.zeros((400, 7)), np.random.default_rng(2).normal(size=(400, 2))
+    force[small[:4], :2] = np.random.default_rng(3).normal(size=(4, 2))
     for _ in range(2):
         assert np.allclose(
-            solve_selected(made, force)[few], np.linalg.solve(K.toarray(), force)[few], rtol=1e-10, atol=1e-14
+            solve_selected(built, force)[small], np.linalg.solve(K.toarray(), force)[small], rtol=1e-10, atol=1e-14
         )
-        assert np.allclose(made.solve(every), np.linalg.solve(K.toarray(), every), rtol=1e-10, atol=1e-13)
+        assert np.allclose(built.solve(complete), np.linalg.solve(K.toarray(), complete), rtol=1e-10, atol=1e-13)
 
 
 @pytest.mark.parametrize("before", ["", WORN], ids=["fresh", "after_other_work"])

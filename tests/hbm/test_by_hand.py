@@ -37,8 +37,8 @@ def test_a_contact_half_of_the_time_closed_pushes_with_a_half_sine(name: str, wa
     parameters = ContactParameters.of(components, [[k] * len(components)], gap=gap, **numbers)
     x = np.zeros((1, len(components), 3))
     x[0, -1] = [gap, amplitude, 0.0]
-    found = aft.cycle(law, x, parameters, HarmonicBasis((0, 1), 4096, way)).force[0, -1]
-    assert found == pytest.approx([k * amplitude / np.pi, k * amplitude / 2, 0.0], abs=2e-6)
+    result = aft.cycle(law, x, parameters, HarmonicBasis((0, 1), 4096, way)).force[0, -1]
+    assert result == pytest.approx([k * amplitude / np.pi, k * amplitude / 2, 0.0], abs=2e-6)
 
 
 def test_a_contact_that_is_just_open_does_not_pull() -> None:
@@ -54,12 +54,12 @@ def test_a_slider_is_dragged_and_lets_go_where_it_turns() -> None:
     k, normal, mu = 2.0, 5.0, 0.4
     p, memory = np.array([k, 1.0, 0.0, 0.0, mu]), np.zeros(1)
     force, slopes = np.zeros(2), [np.zeros((2, 2)), np.zeros((2, 1)), np.zeros((1, 2)), np.zeros((1, 1))]
-    found = []
+    rows = []
     for x in (2.0, 1.7, -1.0):
         jenkins.step(np.array([x, normal]), memory, p, force, *slopes)
-        found.append(force.copy())
+        rows.append(force.copy())
     limit = mu * normal
-    np.testing.assert_allclose(found, [[limit, normal], [limit - 0.3 * k, normal], [-limit, normal]], rtol=1e-12)
+    np.testing.assert_allclose(rows, [[limit, normal], [limit - 0.3 * k, normal], [-limit, normal]], rtol=1e-12)
 
 
 def test_friction_that_turns_back_by_a_little_and_goes_on() -> None:
@@ -75,13 +75,13 @@ def test_friction_that_turns_back_by_a_little_and_goes_on() -> None:
     dip = u.max() - (1.0 - c)
     assert 0.001 < dip / (limit / k) < 0.01
     force, slider = np.zeros_like(u), u[0]
-    for j, one in enumerate(u):
-        force[j] = np.clip(k * (one - slider), -limit, limit)
-        slider = one - force[j] / k
+    for j, item in enumerate(u):
+        force[j] = np.clip(k * (item - slider), -limit, limit)
+        slider = item - force[j] / k
     functions = basis.functions(t[8192:])
     expected = functions.T @ force[8192:] * np.where(basis.order > 0, 2, 1) / 8192
-    found = aft.cycle(law, x, parameters, basis).force[0, 0]
-    np.testing.assert_allclose(found, expected, atol=1e-5 * limit)
+    result = aft.cycle(law, x, parameters, basis).force[0, 0]
+    np.testing.assert_allclose(result, expected, atol=1e-5 * limit)
 
 
 def test_a_mass_between_its_spring_and_a_moving_ground() -> None:
@@ -96,10 +96,10 @@ def test_a_mass_between_its_spring_and_a_moving_ground() -> None:
     )
     wave = ground[1] - 1j * ground[2]
     u = k_c * wave / (k + k_c - mass * omega**2 + 2j * ratio * np.sqrt(k * mass) * omega)
-    seen = u - wave
-    found = balance.x_lin(omega).reshape(2, 3)
-    expected = [k_c * ground[0] / (k + k_c) - ground[0], seen.real, -seen.imag]
-    np.testing.assert_allclose(found[0], expected, rtol=1e-7)
+    observed = u - wave
+    values = balance.x_lin(omega).reshape(2, 3)
+    expected = [k_c * ground[0] / (k + k_c) - ground[0], observed.real, -observed.imag]
+    np.testing.assert_allclose(values[0], expected, rtol=1e-7)
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.02])
@@ -108,13 +108,13 @@ def test_the_compliance_is_the_inverse_of_the_dynamic_stiffness(damping: float) 
     balance = body.balance(replace(body.ordinary, damping=damping, harmonics=(0, 1, 2)))
     omega, system, b = 0.9 * body.ordinary.omega, balance.model.system, np.asarray(balance.model.interface.B)
     g = np.random.default_rng(0).normal(size=(len(b), balance.basis.n_coeff))
-    found = balance.basis.to_complex(balance.compliance.at(omega).apply(g))
+    result = balance.basis.to_complex(balance.compliance.at(omega).apply(g))
     stuck = system.stiffness + b.T @ (balance.contact.stiffness.ravel()[:, None] * b)
     for place, h in enumerate(balance.basis.harmonics):
         s = 1j * h * omega
         dynamic = stuck + s * s * system.mass + s * (0.0 if system.damping is None else system.damping)
         expected = b @ np.linalg.solve(dynamic, b.T @ balance.basis.to_complex(g)[:, place])
-        np.testing.assert_allclose(found[:, place], expected, atol=1e-7 * np.abs(expected).max())
+        np.testing.assert_allclose(result[:, place], expected, atol=1e-7 * np.abs(expected).max())
 
 
 def test_the_modes_left_out_follow_as_their_own_series_says() -> None:
@@ -124,13 +124,13 @@ def test_the_modes_left_out_follow_as_their_own_series_says() -> None:
     phi = np.linalg.qr(np.random.default_rng(0).normal(size=(n, n)))[0]
     c = 2 * zeta * np.sqrt(lam)
     system = SecondOrderSystem(np.eye(n), (phi * lam) @ phi.T, (phi * c) @ phi.T, {}, {})
-    found = Expansion(system, np.zeros((0, n)), np.zeros(0), np.eye(n), 2.0)
-    assert found.n_mode < n
-    assert found.order >= 3
-    assert found.error < 1e-9
-    omitted, rest, more = phi[:, found.n_mode :], lam[found.n_mode :], c[found.n_mode :]
-    for power, factor in ((1, -more / rest**2), (2, more**2 / rest**3 - 1 / rest**2)):
-        ours = found.higher[power - 1] * found.unit / found.s_unit**power
+    expansion = Expansion(system, np.zeros((0, n)), np.zeros(0), np.eye(n), 2.0)
+    assert expansion.n_mode < n
+    assert expansion.order >= 3
+    assert expansion.error < 1e-9
+    omitted, remainder, extra = phi[:, expansion.n_mode :], lam[expansion.n_mode :], c[expansion.n_mode :]
+    for power, factor in ((1, -extra / remainder**2), (2, extra**2 / remainder**3 - 1 / remainder**2)):
+        ours = expansion.higher[power - 1] * expansion.unit / expansion.s_unit**power
         expected = (omitted * factor) @ omitted.T
         np.testing.assert_allclose(ours, expected, atol=1e-4 * np.abs(expected).max())
 
@@ -186,8 +186,8 @@ def test_the_error_of_time_steps_counts_the_energy() -> None:
     body = rigid(1)
     balance = body.balance(replace(body.ordinary, tangential=2e4, preload=3.0))
     state = newton.solve_from_rest(balance, body.ordinary.omega).state
-    found = verify.verify(balance, state, Options(steps=64))
-    half, whole = (
+    verification = verify.verify(balance, state, Options(steps=64))
+    half, full = (
         time_integration.integrate(balance, state.omega, state, Options(steps=steps)).energy.sum() for steps in (32, 64)
     )
-    assert found.step_error >= abs(half - whole) / whole / 3 * (1 - 1e-6) > 0
+    assert verification.step_error >= abs(half - full) / full / 3 * (1 - 1e-6) > 0

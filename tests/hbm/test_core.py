@@ -57,21 +57,21 @@ def test_response_to_the_loads_and_outputs_equal_direct_solves(model: ReducedMod
     system, b = model.at_harmonic(1)
     g, k = rng.normal(size=size), compliance.k[:, None]
     pushed = basis.to_complex(g)
-    held = 0.0 if base is None else basis.to_complex(k * base)
+    fixed = 0.0 if base is None else basis.to_complex(k * base)
     x, y, y_of_g = np.zeros((len(b), len(basis.harmonics)), complex), *np.zeros((2, 1, len(basis.harmonics)), complex)
     for column, h in enumerate(basis.harmonics):
         s = 1j * h * 1200.0
         d = system.stiffness + b.T @ (k * b) + s * system.damping + s * s * system.mass
-        force = b.T @ (np.zeros(len(b)) if base is None else held[:, column])
+        force = b.T @ (np.zeros(len(b)) if base is None else fixed[:, column])
         force = force + sum(v * system.loads[name] for (of, name), v in loads.items() if of == h)
         q = np.linalg.solve(d, force)
         x[:, column], y[:, column] = b @ q, system.outputs["tip"] @ q
         y_of_g[:, column] = system.outputs["tip"] @ np.linalg.solve(d, b.T @ pushed[:, column])
     point = compliance.at(1200.0)
-    found = (point.x_lin + (0.0 if base is None else base), point.outputs_lin, point.outputs(g))
-    for ours, direct in zip(found, (x, y, y_of_g), strict=True):
-        wanted = basis.to_real(direct)
-        assert np.abs(ours - wanted).max() < 1e-8 * np.abs(wanted).max()
+    result = (point.x_lin + (0.0 if base is None else base), point.outputs_lin, point.outputs(g))
+    for ours, direct in zip(result, (x, y, y_of_g), strict=True):
+        expected = basis.to_real(direct)
+        assert np.abs(ours - expected).max() < 1e-8 * np.abs(expected).max()
 
 
 def test_jacobian_and_frequency_slope_equal_finite_differences(model: ReducedModel) -> None:
@@ -103,8 +103,8 @@ def test_nothing_slips_below_the_friction_limit(model: ReducedModel) -> None:
     balance = balance_of(model, shake=1e-3)
     solution = newton.solve(balance, 300.0, balance.stuck(300.0))
     assert solution.steps == 0  # the stuck response is the solution: no balance to iterate
-    moved = np.abs(solution.state.x).max() * np.abs(solution.state.cycle.force).max()
-    assert np.abs(balance.energy(solution.state)).max() < 1e-15 * moved
+    shifted = np.abs(solution.state.x).max() * np.abs(solution.state.cycle.force).max()
+    assert np.abs(balance.energy(solution.state)).max() < 1e-15 * shifted
 
 
 @pytest.mark.parametrize(("located", "in_frequency", "in_amplitude"), [(True, 1e-6, 1e-7), (False, 1e-4, 1e-5)])

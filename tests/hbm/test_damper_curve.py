@@ -22,9 +22,9 @@ DAMPER, DAMPING, FORCE = 0.5, 0.004, 1.0  # stiffness and viscous damping of one
 
 def peak(limit: float, harmonics: tuple[int, ...] = (1,)) -> float:
     """Peak amplitude of the mode beside a damper that slips at a limit [N]."""
-    one = np.ones((1, 1))
-    system = SecondOrderSystem(one, one, DAMPING * one, {"wave": one[0]}, {"tip": one[0]})
-    model = ReducedModel(system, interface(one, ("t1",)))
+    item = np.ones((1, 1))
+    system = SecondOrderSystem(item, item, DAMPING * item, {"wave": item[0]}, {"tip": item[0]})
+    model = ReducedModel(system, interface(item, ("t1",)))
     numbers = ContactParameters.of(("t1",), [[DAMPER]], friction=1.0, normal_load=limit)
     basis = HarmonicBasis(harmonics, 64, "located")
     load = Excitation.of({}, {1: {"wave": FORCE}})
@@ -39,10 +39,10 @@ def chain_peak(limit: float, waves: int, blades: int = 6) -> tuple[float, float]
 
     Every blade is a mode as above; the force is a wave of so many nodal diameters, shrouds slip at a limit [N]
     """
-    one, angle = np.eye(blades), 2 * np.pi * waves / blades * np.arange(blades)
-    seen = {f"tip {k}": one[k] for k in range(blades)}
-    system = SecondOrderSystem(one, one, DAMPING * one, {"cos": np.cos(angle), "sin": np.sin(angle)}, seen)
-    model = ReducedModel(system, interface(np.roll(one, 1, axis=1) - one, ("t1",)))
+    item, angle = np.eye(blades), 2 * np.pi * waves / blades * np.arange(blades)
+    observed = {f"tip {k}": item[k] for k in range(blades)}
+    system = SecondOrderSystem(item, item, DAMPING * item, {"cos": np.cos(angle), "sin": np.sin(angle)}, observed)
+    model = ReducedModel(system, interface(np.roll(item, 1, axis=1) - item, ("t1",)))
     numbers = ContactParameters.of(("t1",), [[DAMPER]] * blades, friction=1.0, normal_load=limit)
     basis = HarmonicBasis((1,), 64, "located")
     load = Excitation.of({}, {1: {"cos": FORCE, "sin": -1j * FORCE}})
@@ -98,6 +98,6 @@ def test_optimum_of_a_shroud_without_other_damping(monkeypatch: pytest.MonkeyPat
     """The optimum pi F / (2 s) has the amplitude pi F / (s^2 k), and is lower than either side."""
     monkeypatch.setattr("tests.hbm.test_damper_curve.DAMPING", 1e-9)
     s = 2 * np.sin(np.pi * 2 / 6)
-    below, best, above = (chain_peak(share * np.pi * FORCE / (2 * s), 2)[0] for share in (0.9, 1.0, 1.1))
+    lower, best, above = (chain_peak(share * np.pi * FORCE / (2 * s), 2)[0] for share in (0.9, 1.0, 1.1))
     assert best == pytest.approx(np.pi * FORCE / (s**2 * DAMPER), rel=1e-6)
-    assert best < min(below, above)
+    assert best < min(lower, above)

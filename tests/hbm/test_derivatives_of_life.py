@@ -56,16 +56,16 @@ def problem_of(site, name="", factor=1.0, **changes) -> WearProblem:
     else:
         balance = balance.with_contact(balance.contact.with_parameters(changed))
     coefficient = 1e-9 * (factor if name == "coefficient" else 1.0)
-    given = {"mission": (Duty(site),), "lost_below": SHARE, "wear": JointWear.of("energy", coefficient=coefficient)}
-    return wear_problem(balance=balance, **(given | changes))
+    inputs = {"mission": (Duty(site),), "lost_below": SHARE, "wear": JointWear.of("energy", coefficient=coefficient)}
+    return wear_problem(balance=balance, **(inputs | changes))
 
 
 def found_of(problem, worn, site, names, share=SHARE, numbers=None):
-    own = BalanceInputs.of(problem.balance)
+    built = BalanceInputs.of(problem.balance)
 
     def posed(name, factor):
         there = problem_of(site, name, factor).balance
-        return replace(own, excitation=there.excitation) if name in LOADS else replace(own, contact=there.contact)
+        return replace(built, excitation=there.excitation) if name in LOADS else replace(built, contact=there.contact)
 
     changes = [ParameterChange(name, STEP, *(posed(name, 1 + side) for side in (STEP, -STEP))) for name in names]
     return tangent.of_life(problem, worn, changes, numbers or {"coefficient": ("coefficient", ["contact"])}, share)
@@ -86,13 +86,13 @@ def test_derivatives_of_a_life_are_those_of_its_steps_taken_again(rule, site, na
         worn = evolve(thesis.Rule(problem, 1e-5))
     else:
         worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
-    found = found_of(problem, worn, site, [name for name in names if name != "gap"])
+    result = found_of(problem, worn, site, [name for name in names if name != "gap"])
     for name in names:
-        slope = found.by_gap.sum(axis=1) * 1e-4 if name == "gap" else found.slopes[:, found.parameters.index(name)]
-        elasticity = slope / found.values
-        wanted = elasticity_anew(worn, SHARE, partial(problem_of, site, name), elasticity[0])
-        np.testing.assert_allclose(elasticity, wanted, rtol=1e-5, atol=1e-6)
-    np.testing.assert_allclose(1e-9 * found.slopes[:, -1] / found.values, [-1.0, 0.0, 0.0], atol=1e-12)
+        slope = result.by_gap.sum(axis=1) * 1e-4 if name == "gap" else result.slopes[:, result.parameters.index(name)]
+        elasticity = slope / result.values
+        expected = elasticity_anew(worn, SHARE, partial(problem_of, site, name), elasticity[0])
+        np.testing.assert_allclose(elasticity, expected, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(1e-9 * result.slopes[:, -1] / result.values, [-1.0, 0.0, 0.0], atol=1e-12)
 
 
 OWN_LAW = """
@@ -130,28 +130,28 @@ BESIDE = (Duty(AtPeakRatio(PEAK, 0.97)),)
 def test_other_laws_and_missions_have_the_derivatives_of_their_steps_taken_again(tmp_path, law, mission, names):
     """Where pairs lift, archard's sum over samples is rough: that is marked, and differences meet it to 1 % only."""
     (tmp_path / "own.py").write_text(OWN_LAW)
-    more = {"depth": 2e-5, "cycles": 1e3} if law == "own" else {}
-    wear = JointWear.of(str(tmp_path / "own.py") if law == "own" else law, coefficient=1e-9, **more)
+    extra = {"depth": 2e-5, "cycles": 1e3} if law == "own" else {}
+    wear = JointWear.of(str(tmp_path / "own.py") if law == "own" else law, coefficient=1e-9, **extra)
 
     def posed(name="", factor=1.0):
-        own = name in wear.numbers
-        wears = replace(wear, numbers={**wear.numbers, name: factor * wear.numbers[name]}) if own else wear
-        return problem_of(AT, "" if own else name, factor, wear=wears, mission=mission)
+        base = name in wear.numbers
+        wears = replace(wear, numbers={**wear.numbers, name: factor * wear.numbers[name]}) if base else wear
+        return problem_of(AT, "" if base else name, factor, wear=wears, mission=mission)
 
     problem = posed()
     if mission is TWO and law == "energy":
         worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
     else:
         worn = evolve(thesis.Rule(problem, 1e-5))
-    own = {name: (name, ["contact"]) for name in wear.numbers}
-    found = found_of(problem, worn, AT, [name for name in names if name not in (*own, "gap")], numbers=own)
-    assert (found.corner.any(), law) in ((False, "energy"), (False, "own"), (True, "archard"), (True, "impact"))
+    base = {name: (name, ["contact"]) for name in wear.numbers}
+    result = found_of(problem, worn, AT, [name for name in names if name not in (*base, "gap")], numbers=base)
+    assert (result.corner.any(), law) in ((False, "energy"), (False, "own"), (True, "archard"), (True, "impact"))
     for name in names:
         scale = wear.numbers.get(name, 1.0)
-        slope = found.by_gap.sum(axis=1) * 1e-4 if name == "gap" else found.slopes[:, found.parameters.index(name)]
-        wanted = elasticity_anew(worn, SHARE, partial(posed, name), (scale * slope / found.values)[0])
+        slope = result.by_gap.sum(axis=1) * 1e-4 if name == "gap" else result.slopes[:, result.parameters.index(name)]
+        expected = elasticity_anew(worn, SHARE, partial(posed, name), (scale * slope / result.values)[0])
         close = 1e-2 if law == "archard" else 1e-5
-        np.testing.assert_allclose(scale * slope / found.values, wanted, rtol=close, atol=close / 10)
+        np.testing.assert_allclose(scale * slope / result.values, expected, rtol=close, atol=close / 10)
 
 
 def test_a_wear_law_that_jumps_as_a_pair_lifts_is_told():
@@ -170,8 +170,8 @@ def test_all_loads_times_c_wear_c_times_as_deep_in_a_life_over_c(at_rest):
     problem = problem_of(AT, **ends)
     worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
     assert (worn.preload_at_rest is not None) == at_rest
-    found = found_of(problem, worn, AT, LOADS)
-    total = found.slopes[:, :2].sum(axis=1) / found.values
+    result = found_of(problem, worn, AT, LOADS)
+    total = result.slopes[:, :2].sum(axis=1) / result.values
     np.testing.assert_allclose(total, [-1.0, 1.0, 1.0], atol=1e-5)
 
 
@@ -184,15 +184,15 @@ def test_a_pair_that_just_touches_marks_the_derivatives():
 
     def pressed(gap):
         problem = opened(gap)
-        rest = PreloadAtRest(problem).quiet(assess(problem, np.zeros(4), 0.0, None))
-        return assess(rest, np.zeros(4), 0.0, None).points[0].state.x[2, 2, 0] - gap
+        remainder = PreloadAtRest(problem).quiet(assess(problem, np.zeros(4), 0.0, None))
+        return assess(remainder, np.zeros(4), 0.0, None).points[0].state.x[2, 2, 0] - gap
 
     touching = brentq(pressed, 0.0, 1e-2, xtol=1e-16)
     for gap, marked in ((touching, True), (0.5 * touching, False)):
         problem = opened(gap)
         worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
-        found = found_of(problem, worn, AT, ("press",))
-        assert found.corner.tolist() == 2 * [marked]
+        result = found_of(problem, worn, AT, ("press",))
+        assert result.corner.tolist() == 2 * [marked]
 
 
 def test_where_a_life_has_no_derivative_is_a_sentence():
@@ -207,12 +207,12 @@ def test_where_a_life_has_no_derivative_is_a_sentence():
     marched[1], stepped[1] = 3, 0.0
     moving = np.zeros((len(marched), 1))
     in_time = {"periods": marched, "moving": moving, "spread": 0.0 * marched, "mean_error": 0.0 * marched}
-    for told, run in (
+    for messages, run in (
         ("the response jumps from 66.8", replace(worn, duty_omega=jumped)),
         ("the motion is followed in time", replace(worn, settled=marched == 0, **in_time)),
         ("stepped over the end of a branch", replace(worn, memory={**worn.memory, "next_cycles": stepped})),
     ):
-        with pytest.raises(NoDerivative, match=f"cycles.* {told}"):
+        with pytest.raises(NoDerivative, match=f"cycles.* {messages}"):
             found_of(problem, run, AT, ())
     parted = np.where(np.arange(len(worn.preload)) == 0, worn.preload, 0.0)
     with pytest.raises(NoDerivative, match="first step"):

@@ -29,6 +29,6 @@ def test_a_direction_in_pieces_is_the_product(n: int, n_coeff: int) -> None:
     w0, b, static = w0.astype(np.float32), b.astype(np.float32), np.linspace(1.0, 2.0, 9)
     none = np.zeros((0, 9, 9))
     core = np.zeros(n_coeff // 2), True, none, none, np.zeros((0, 9), np.int32), static
-    found = all_harmonics.nearly_displaced(force, w0, b, np.ascontiguousarray(b.T), *core)
+    displaced = all_harmonics.nearly_displaced(force, w0, b, np.ascontiguousarray(b.T), *core)
     expected = w0.T @ force + b @ ((b.T @ force) / static[:, None])
-    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
+    assert np.abs(displaced - expected).max() < 1e-4 * np.abs(expected).max()

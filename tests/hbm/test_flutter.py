@@ -55,12 +55,12 @@ def wheel_with_flow(reduced: ReducedSector, wheel: ReducedModel, springs: np.nda
     wheel : of `cyclic.wheel_model`, damped or not; springs : (n_pair, n_component) of one sector
     """
     sector, n = reduced.sector, reduced.sector.n_sectors
-    own = seam_parts(sector)[0].T  # a sector's own coordinates from all of them
+    transform = seam_parts(sector)[0].T  # a sector's own coordinates from all of them
     total = [np.zeros((wheel.system.n_dof, wheel.system.n_dof), complex) for _ in range(4)]
     for index in range(n):
         system, B = wave_system(sector, index)
         _, omega, shape = family(system, np.asarray(B), springs, flow.mode)
-        refined = own @ (seam_map(sector, index) @ shape)
+        refined = transform @ (seam_map(sector, index) @ shape)
         turns = np.exp(-2j * np.pi * (index * np.arange(n) % n) / n) / np.sqrt(n)
         force = np.asarray(wheel.system.mass) @ np.kron(turns, refined)
         for matrix, part in zip(total, parts_of(flow, index, n, omega), strict=True):

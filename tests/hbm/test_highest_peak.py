@@ -48,9 +48,9 @@ def test_the_higher_of_two_outputs_comes_first_and_a_low_one_not_at_all() -> Non
 def test_the_peak_is_the_one_that_its_slope_finds() -> None:
     balance, site = balance_of(pressed_body(), (0, 1)), AtPeak("tip", 300.0, 700.0)
     branch = adaptive.follow(balance, site.start, site.stop, adaptive.Options(tolerance=0.03, newton=site.newton))
-    found, which = highest_peak.highest(balance, branch, [site.output], replace(site, output="none"))
+    result, selection = highest_peak.highest(balance, branch, [site.output], replace(site, output="none"))
     exact = site.solve(balance)
-    assert found is not None
-    assert which == 0
-    assert found.amplitude == pytest.approx(exact.amplitude, rel=1e-4)
-    assert found.state.omega == pytest.approx(exact.state.omega, rel=1e-3)
+    assert result is not None
+    assert selection == 0
+    assert result.amplitude == pytest.approx(exact.amplitude, rel=1e-4)
+    assert result.state.omega == pytest.approx(exact.state.omega, rel=1e-3)

@@ -42,48 +42,48 @@ def static_preload(problem: WearProblem, depth: np.ndarray) -> float:
         limit = (np.asarray(parameters.numbers["friction"]) * normal)[:, None]
         return np.column_stack([np.clip(k[:, :2] * u[:, :2], -limit, limit), normal])
 
-    found = root(lambda x: x - free + C @ forces(x).ravel(), np.zeros(3 * N_PAIR), tol=1e-12)
-    assert found.success
-    return float(forces(found.x)[:, 2].sum())
+    result = root(lambda x: x - free + C @ forces(x).ravel(), np.zeros(3 * N_PAIR), tol=1e-12)
+    assert result.success
+    return float(forces(result.x)[:, 2].sum())
 
 
 @pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
 def test_a_run_ends_where_the_preload_at_rest_is_lost(problem: WearProblem, rule: str) -> None:
-    found = worn(problem, rule)
-    rest = found.preload_at_rest
+    result = worn(problem, rule)
+    rest = result.preload_at_rest
     assert rest is not None
-    assert str(found.end) == f"{WearEnd.LOST_AT_REST.say()} 0.4 of its first value"
+    assert str(result.end) == f"{WearEnd.LOST_AT_REST.say()} 0.4 of its first value"
     assert rest[-1] <= 0.4 * rest[0] < rest[-2]
-    assert found.cycles_in_step[-1] == 0.0
-    life = cycles_to_preload(found, 0.4)
+    assert result.cycles_in_step[-1] == 0.0
+    life = cycles_to_preload(result, 0.4)
     assert life is not None
-    assert found.cycles[-2] < life <= found.cycles[-1]
+    assert result.cycles[-2] < life <= result.cycles[-1]
     for row in (0, len(rest) // 3):
-        assert rest[row] == pytest.approx(static_preload(problem, found.depth[row]), rel=1e-6)
+        assert rest[row] == pytest.approx(static_preload(problem, result.depth[row]), rel=1e-6)
     assert (np.diff(rest) < 0).all()
-    assert np.abs(rest[0] / found.preload[0] - 1) > 1e-3  # another number than the mean force while it vibrates
+    assert np.abs(rest[0] / result.preload[0] - 1) > 1e-3  # another number than the mean force while it vibrates
 
 
 def test_steps_before_the_end_are_those_of_a_run_that_does_not_look(problem: WearProblem) -> None:
-    looked, plain = worn(problem, "thesis"), worn(wear_problem(lost_below=0.0), "thesis", 12)
+    searched, plain = worn(problem, "thesis"), worn(wear_problem(lost_below=0.0), "thesis", 12)
     assert plain.preload_at_rest is None
-    n = min(len(looked.cycles), 12) - 1
-    assert np.array_equal(looked.depth[:n], plain.depth[:n])
-    assert np.array_equal(looked.cycles[:n], plain.cycles[:n])
+    n = min(len(searched.cycles), 12) - 1
+    assert np.array_equal(searched.depth[:n], plain.depth[:n])
+    assert np.array_equal(searched.cycles[:n], plain.cycles[:n])
 
 
 @pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
 def test_a_resumed_run_ends_at_the_same_row(problem: WearProblem, rule: str) -> None:
-    whole = worn(problem, rule)
-    again = worn(problem, rule, resume=worn(problem, rule, 3))
-    assert np.array_equal(whole.depth, again.depth)
-    assert whole.end == again.end
-    np.testing.assert_allclose(again.preload_at_rest, whole.preload_at_rest, rtol=1e-7)
+    full = worn(problem, rule)
+    repeated = worn(problem, rule, resume=worn(problem, rule, 3))
+    assert np.array_equal(full.depth, repeated.depth)
+    assert full.end == repeated.end
+    np.testing.assert_allclose(repeated.preload_at_rest, full.preload_at_rest, rtol=1e-7)
 
 
 def test_a_contact_without_static_normal_force_has_no_preload_at_rest(problem: WearProblem) -> None:
-    one = problem.balance
+    item = problem.balance
     shaken = Excitation.of({}, {1: {"shake": 60.0}})
-    unpressed = HarmonicBalance.of(one.model, one.contact.joints, HarmonicBasis((1,), 64), shaken, 1500.0)
+    unpressed = HarmonicBalance.of(item.model, item.contact.joints, HarmonicBasis((1,), 64), shaken, 1500.0)
     with pytest.raises(ValueError, match="component n and harmonic 0"):
         wear_problem(balance=unpressed, lost_below_at_rest=0.5)

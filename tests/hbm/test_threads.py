@@ -45,11 +45,11 @@ ENTRIES = {
 
 @pytest.mark.parametrize("entry", ENTRIES)
 def test_an_entry_called_from_python_takes_one_thread_and_gives_the_others_back(entry, monkeypatch):
-    seen = []
+    observed = []
     evaluate = HarmonicBalance.evaluate
 
     def watched(self, omega: float, x: np.ndarray, jacobian: bool = True):
-        seen.append(counts())
+        observed.append(counts())
         return evaluate(self, omega, x, jacobian)
 
     monkeypatch.setattr(HarmonicBalance, "evaluate", watched)
@@ -57,8 +57,8 @@ def test_an_entry_called_from_python_takes_one_thread_and_gives_the_others_back(
         before = counts()
         ENTRIES[entry](balance())
         assert counts() == before
-    assert seen
-    assert all(count == {1} for count in seen)
+    assert observed
+    assert all(count == {1} for count in observed)
 
 
 def test_who_asks_for_two_threads_has_two_outside_of_the_solver_and_the_limit_ends_with_its_context(monkeypatch):

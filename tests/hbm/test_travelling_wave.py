@@ -44,36 +44,38 @@ def solved(balance, frequency):
 )
 def test_one_sector_is_the_whole_wheel(sectors, disk_radius, engine_order, frequency, seen):
     """Item 2 of the issue: to 1e-6, in every sector, displacement, force and output."""
-    one, wheel = small.wave_and_wheel(sectors[disk_radius], engine_order)
-    mine, theirs = solved(one, frequency), solved(wheel, frequency)
+    item, wheel = small.wave_and_wheel(sectors[disk_radius], engine_order)
+    mine, theirs = solved(item, frequency), solved(wheel, frequency)
     if seen is not None:
         assert set(mine.cycle.status) >= seen
-    output, outputs = one.outputs(mine), wheel.outputs(theirs)
+    output, outputs = item.outputs(mine), wheel.outputs(theirs)
     names = list(wheel.compliance.output_names)
     for n in range(small.N):
         pairs = slice(n * len(mine.x), (n + 1) * len(mine.x))
-        for here, there in ((mine.x, theirs.x), (mine.cycle.force, theirs.cycle.force)):
-            expected = waves.at_sector(one.basis, here, engine_order, small.N, n)
-            assert np.abs(there[pairs] - expected).max() < 1e-6 * np.abs(here).max()
-        for i, name in enumerate(one.compliance.output_names):
-            expected = waves.at_sector(one.basis, output[i], engine_order, small.N, n)
+        for current, refined in ((mine.x, theirs.x), (mine.cycle.force, theirs.cycle.force)):
+            expected = waves.at_sector(item.basis, current, engine_order, small.N, n)
+            assert np.abs(refined[pairs] - expected).max() < 1e-6 * np.abs(current).max()
+        for i, name in enumerate(item.compliance.output_names):
+            expected = waves.at_sector(item.basis, output[i], engine_order, small.N, n)
             assert np.abs(outputs[names.index(f"{name}@{n}")] - expected).max() < 1e-6 * np.abs(output).max()
     assert wheel.energy(theirs).reshape(small.N, -1) == pytest.approx(
-        np.tile(one.energy(mine), (small.N, 1)), abs=1e-6 * one.energy(mine).max()
+        np.tile(item.energy(mine), (small.N, 1)), abs=1e-6 * item.energy(mine).max()
     )
-    assert wheel.preload(theirs) == pytest.approx(small.N * one.preload(mine), rel=1e-6)
+    assert wheel.preload(theirs) == pytest.approx(small.N * item.preload(mine), rel=1e-6)
 
 
 def test_more_harmonics_do_not_make_the_preconditioner_large(sectors):
     """Each harmonic sees a system of its own: their shares of one flexibility are averaged, not added."""
-    few, _ = small.wave_and_wheel(sectors[0.0], 3)
+    coarse, _ = small.wave_and_wheel(sectors[0.0], 3)
     basis = HarmonicBasis(tuple(range(16)), 128)
-    many = HarmonicBalance.of(few.model, few.contact.joints, basis, few.excitation, few.omega_max, few.memory)
-    x = few.basis.transfer(solved(few, 250.0).x, basis)
-    found = newton.solve(many, 2 * np.pi * 250.0, x, EXACT)
-    assert found.converged
-    assert found.products <= 12 * found.steps
-    rank = [balance.compliance.preconditioned.shape[1] for balance in (few, many)]
+    large = HarmonicBalance.of(
+        coarse.model, coarse.contact.joints, basis, coarse.excitation, coarse.omega_max, coarse.memory
+    )
+    x = coarse.basis.transfer(solved(coarse, 250.0).x, basis)
+    solution = newton.solve(large, 2 * np.pi * 250.0, x, EXACT)
+    assert solution.converged
+    assert solution.products <= 12 * solution.steps
+    rank = [balance.compliance.preconditioned.shape[1] for balance in (coarse, large)]
     assert 0 < rank[1] <= rank[0] + 2
 
 
@@ -88,42 +90,42 @@ def test_engine_orders_that_sectors_cannot_tell_apart_are_one(sectors):
 def test_excitation_pays_for_friction(sectors):
     """Without damping the work of the shaker per cycle is what the contact dissipates, blade by blade."""
     for disk_radius, order in ((0.0, 3), (0.02, 1)):
-        one, _ = small.wave_and_wheel(sectors[disk_radius], order, damping=None)
-        state = solved(one, 300.0)
-        driven = one.outputs(state)[one.compliance.output_names.index("driven")]
-        force = one.basis.to_real(np.array([0, one.excitation.loads[1, "shaker"], 0, 0]))
-        friction = one.energy(state).sum()
+        item, _ = small.wave_and_wheel(sectors[disk_radius], order, damping=None)
+        state = solved(item, 300.0)
+        driven = item.outputs(state)[item.compliance.output_names.index("driven")]
+        force = item.basis.to_real(np.array([0, item.excitation.loads[1, "shaker"], 0, 0]))
+        friction = item.energy(state).sum()
         assert friction > 1e-3
-        assert one.basis.work_per_cycle(force, driven) == pytest.approx(friction, rel=1e-5)
+        assert item.basis.work_per_cycle(force, driven) == pytest.approx(friction, rel=1e-5)
 
 
 def test_left_face_gets_what_the_right_one_of_the_neighbour_gives(sectors):
     """Item 5: reactions on both faces, from the recovered motion of the sector alone, balance between neighbours."""
     reduced, order = sectors[0.0], 3
-    one, _ = small.wave_and_wheel(reduced, order)
-    state = solved(one, 310.0)
+    item, _ = small.wave_and_wheel(reduced, order)
+    state = solved(item, 310.0)
     flat, force = state.flat, state.cycle.force.reshape(state.flat.shape)
-    sector, basis = reduced.sector, one.basis
-    right, left = np.asarray(sector.interface.B), np.asarray(sector.left_map)
+    sector, basis = reduced.sector, item.basis
+    right, remaining = np.asarray(sector.interface.B), np.asarray(sector.left_map)
     reaction = {"right": [], "left": []}
-    for h, z in zip(basis.harmonics, coordinates(one, flat, force, state.omega), strict=True):
+    for h, z in zip(basis.harmonics, coordinates(item, flat, force, state.omega), strict=True):
         T, _ = relative_map(sector, h * order)
         q, s = T @ z, 1j * h * state.omega
         C = T @ np.linalg.pinv(T)  # of a rigid disk T is square: q and z tell the same
         assert np.abs(C - np.eye(len(q))).max() < 1e-9
         inverse = np.linalg.inv(T)
-        damping = inverse.conj().T @ one.model.at_harmonic(h)[0].damping @ inverse
+        damping = inverse.conj().T @ item.model.at_harmonic(h)[0].damping @ inverse
         system = sector.system
         residual = (system.stiffness + s * damping + s * s * system.mass) @ q
-        for (harmonic, name), value in one.excitation.loads.items():
+        for (harmonic, name), value in item.excitation.loads.items():
             if harmonic == h:
                 residual = residual - value * system.loads[name]
         reaction["right"].append(-right @ residual)  # what this sector gives to its right neighbour
-        reaction["left"].append(left @ residual)
-    given = {face: basis.to_real(np.stack(f, axis=-1)) for face, f in reaction.items()}
-    assert given["right"] == pytest.approx(force, abs=1e-7 * np.abs(force).max())
+        reaction["left"].append(remaining @ residual)
+    inputs = {face: basis.to_real(np.stack(f, axis=-1)) for face, f in reaction.items()}
+    assert inputs["right"] == pytest.approx(force, abs=1e-7 * np.abs(force).max())
     on_left = waves.at_sector(basis, force, order, small.N, 1)
-    assert given["left"] == pytest.approx(on_left, abs=1e-7 * np.abs(force).max())
+    assert inputs["left"] == pytest.approx(on_left, abs=1e-7 * np.abs(force).max())
     # preload and dissipation do not know from which side they are seen
     x_left = waves.at_sector(basis, flat, order, small.N, 1)
     work = basis.work_per_cycle(force, flat)
@@ -133,17 +135,17 @@ def test_left_face_gets_what_the_right_one_of_the_neighbour_gives(sectors):
 
 def test_shear_and_pressure_over_the_wheel_balance(sectors):
     """Item 5: in space, the forces on all sectors and their moments about the axis add up to nothing."""
-    one, _ = small.wave_and_wheel(sectors[0.0], 2)
-    state = solved(one, 280.0)
+    item, _ = small.wave_and_wheel(sectors[0.0], 2)
+    state = solved(item, 280.0)
     interface = sectors[0.0].sector.interface
     turn = sectors[0.0].sector.turn
-    local = np.stack([waves.at_sector(one.basis, state.cycle.force, 2, small.N, n) for n in range(small.N)])
+    local = np.stack([waves.at_sector(item.basis, state.cycle.force, 2, small.N, n) for n in range(small.N)])
     total, moment, scale = 0.0, 0.0, np.abs(local).sum()
     for n in range(small.N):
         R = np.linalg.matrix_power(turn, n)
         on_right = -np.einsum("pck,pcx->pxk", local[n], interface.frames @ R.T)
         ahead = np.linalg.matrix_power(turn, n + 1)
-        from_left = waves.at_sector(one.basis, state.cycle.force, 2, small.N, n + 1)
+        from_left = waves.at_sector(item.basis, state.cycle.force, 2, small.N, n + 1)
         on_left = np.einsum("pck,pcx->pxk", from_left, interface.frames @ ahead.T)
         for pushed, where in ((on_right, interface.points @ R.T), (on_left, interface.points @ ahead.T)):
             total = total + pushed.sum(axis=0)
@@ -154,20 +156,20 @@ def test_shear_and_pressure_over_the_wheel_balance(sectors):
 
 def test_full_field_of_a_sector_holds_its_outputs(sectors):
     reduced = sectors[0.02]
-    one, _ = small.wave_and_wheel(reduced, 3)
-    state = solved(one, 250.0)
-    field = full_displacement(one, state.flat, state.cycle.force.reshape(state.flat.shape), state.omega)
-    assert field.shape == (len(reduced.origin.basis), one.basis.n_coeff)
+    item, _ = small.wave_and_wheel(reduced, 3)
+    state = solved(item, 250.0)
+    field = full_displacement(item, state.flat, state.cycle.force.reshape(state.flat.shape), state.omega)
+    assert field.shape == (len(reduced.origin.basis), item.basis.n_coeff)
     masters = reduced.origin.masters
-    output = one.outputs(state)
-    for i, name in enumerate(one.compliance.output_names):
+    output = item.outputs(state)
+    for i, name in enumerate(item.compliance.output_names):
         row = reduced.sector.system.outputs[name][: len(masters)]
         assert row @ field[masters] == pytest.approx(output[i], rel=1e-6, abs=1e-9 * np.abs(output).max())
     # both sides of the seam are one: left in its frame is the right one of the next sector
     sector = reduced.sector
-    right, left = (field[masters[dofs]] for dofs in (sector.seam_right, sector.seam_left))
-    following = waves.at_sector(one.basis, right, 3, small.N, 1)
-    assert np.einsum("xy,kyc->kxc", sector.turn, following) == pytest.approx(left, abs=1e-9 * np.abs(field).max())
+    right, remaining = (field[masters[dofs]] for dofs in (sector.seam_right, sector.seam_left))
+    following = waves.at_sector(item.basis, right, 3, small.N, 1)
+    assert np.einsum("xy,kyc->kxc", sector.turn, following) == pytest.approx(remaining, abs=1e-9 * np.abs(field).max())
 
 
 def test_responses_to_several_engine_orders(sectors):
@@ -186,8 +188,8 @@ def test_responses_to_several_engine_orders(sectors):
     expected = nodal_diameters(reduced.sector, orders, 1, k)[:, 0]
     for order, frequency in zip(orders, expected, strict=True):
         balance = problem(travelling_wave(reduced, order))
-        found = natural.follow(balance, 2 * np.pi * 1000, 2 * np.pi * 1100, natural.Options(n_points=51))
-        peak = found.omega[np.argmax(found.amplitude("tip"))] / (2 * np.pi)
+        branch = natural.follow(balance, 2 * np.pi * 1000, 2 * np.pi * 1100, natural.Options(n_points=51))
+        peak = branch.omega[np.argmax(branch.amplitude("tip"))] / (2 * np.pi)
         assert peak == pytest.approx(frequency, abs=1.0)
 
 
@@ -206,10 +208,10 @@ def test_mistuned_wheel_is_made_of_the_same_parts(sectors):
         outputs, names = balance.outputs(state), balance.compliance.output_names
         return np.array([np.hypot(*outputs[i, 1:3]) for i, name in enumerate(names) if name.startswith("tip")])
 
-    blades, alike = tip(wheel, state), tip(tuned, reference)
+    blades, equal = tip(wheel, state), tip(tuned, reference)
     assert len(blades) == small.N
-    assert np.ptp(blades) > 0.05 * alike[0]
-    assert blades.mean() == pytest.approx(alike[0], rel=0.25)
+    assert np.ptp(blades) > 0.05 * equal[0]
+    assert blades.mean() == pytest.approx(equal[0], rel=0.25)
     # small deviations, small differences
     _, nearly = small.wave_and_wheel(sectors[0.0], basis_order, harmonics=(0, 1), stiffness=1 + 1e-6 * deviation)
-    assert tip(nearly, solved(nearly, 300.0)) == pytest.approx(np.full(small.N, alike[0]), rel=1e-4)
+    assert tip(nearly, solved(nearly, 300.0)) == pytest.approx(np.full(small.N, equal[0]), rel=1e-4)

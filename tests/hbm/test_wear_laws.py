@@ -26,8 +26,8 @@ def problem() -> WearProblem:
 def test_archard_and_energy_law_agree_up_to_the_uncoupled_directions(problem: WearProblem) -> None:
     point = problem.mission[0].site.solve(problem.balance)
     area = problem.area
-    own = {"coefficient": np.ones(N_PAIR)}
-    exposure = wear_law.Exposure(problem.balance, point.state, area, own, np.zeros(N_PAIR), 0.0)
+    base = {"coefficient": np.ones(N_PAIR)}
+    exposure = wear_law.Exposure(problem.balance, point.state, area, base, np.zeros(N_PAIR), 0.0)
     energy = wear_law.load("energy").depth_rate(exposure)
     archard = wear_law.load("archard").depth_rate(exposure)
     slips = energy > 0.05 * energy.max()
@@ -46,9 +46,9 @@ def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str)
 
 def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
     law = str(scene_file.CASES / "beam" / "running_in.py")
-    own = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
-    fine = evolve(thesis.Rule(own, 1.5e-6))
-    worn = evolve(error_controlled.Rule(own, Tolerance(0.02, 2e-4)))
+    base = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
+    fine = evolve(thesis.Rule(base, 1.5e-6))
+    worn = evolve(error_controlled.Rule(base, Tolerance(0.02, 2e-4)))
     assert life(worn) == pytest.approx(life(fine), rel=0.015)
     plain_problem = wear_problem(wear=JointWear.of("energy", coefficient=4e-10))
     plain = evolve(error_controlled.Rule(plain_problem, Tolerance(0.02, 2e-4)))

@@ -46,9 +46,9 @@ def block() -> HarmonicBalance:
     )  # fmt: skip
     basis = HarmonicBasis((0, 1), 256)
     excitation = Excitation.of({"press": LOAD}, {1: {"shake": 6000.0}})
-    made = HarmonicBalance.of(model, Joint("contact", "rough", parameters), basis, excitation, 1500.0)
-    at_rest = rest.displacement(made)
-    return replace(made.with_memory(rest.memory(made, at_rest)), at_rest=at_rest)
+    built = HarmonicBalance.of(model, Joint("contact", "rough", parameters), basis, excitation, 1500.0)
+    at_rest = rest.displacement(built)
+    return replace(built.with_memory(rest.memory(built, at_rest)), at_rest=at_rest)
 
 
 def test_a_sliding_block_wears_as_its_differential_equation_says() -> None:
@@ -58,7 +58,7 @@ def test_a_sliding_block_wears_as_its_differential_equation_says() -> None:
     swing X less MU d' / RATIO, four times in a cycle.
     """
     balance = block()
-    own = asperity((YOUNG, POISSON, RADIUS, YIELD, TANGENT))
+    base = asperity((YOUNG, POISSON, RADIUS, YIELD, TANGENT))
     preloaded = np.maximum(balance.at_rest[:, 1] - GAP, 0.0)
     duty, law = Duty(AtFrequency("tip", 1000.0)), JointWear.of("archard", coefficient=WEAR)
     problem = WearProblem(balance, (duty,), law, np.full(len(GAP), AREA))
@@ -69,7 +69,7 @@ def test_a_sliding_block_wears_as_its_differential_equation_says() -> None:
     def forces(z: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Depths of the Hertzian contacts [m] and what their faces carry [N]."""
         depth = np.maximum(z - GAP - w, 0.0)
-        offset, root = own.flattened(np.maximum(preloaded, depth))
+        offset, root = base.flattened(np.maximum(preloaded, depth))
         d = np.maximum(depth - offset, 0.0)
         return d, COUNT * 4 / 3 * E_STAR * root * d**1.5
 

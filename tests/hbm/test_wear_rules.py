@@ -103,14 +103,14 @@ def test_a_resumed_run_ends_in_the_same_bits(problem: WearProblem, kind: str) ->
         tolerance = Tolerance(0.05, 1e-5)
         return evolve(error_controlled.Rule(problem, tolerance), max_steps, None, resume)
 
-    whole = run()
+    full = run()
     parts = run(run(None, 3))
-    assert np.array_equal(whole.depth, parts.depth)
-    assert np.array_equal(whole.cycles, parts.cycles)
-    assert np.array_equal(whole.solves, parts.solves)
-    killed = run(replace(whole, end=WearEnd.UNFINISHED.say()))  # after its last row, before its end was kept
-    assert killed.end == whole.end
-    assert np.array_equal(whole.depth, killed.depth)
+    assert np.array_equal(full.depth, parts.depth)
+    assert np.array_equal(full.cycles, parts.cycles)
+    assert np.array_equal(full.solves, parts.solves)
+    killed = run(replace(full, end=WearEnd.UNFINISHED.say()))  # after its last row, before its end was kept
+    assert killed.end == full.end
+    assert np.array_equal(full.depth, killed.depth)
 
 
 def test_missions_average_their_duties(problem: WearProblem) -> None:
@@ -123,10 +123,10 @@ def test_missions_average_their_duties(problem: WearProblem) -> None:
         for load, start in ((1.0, (np.zeros(N_PAIR), 0.0, None)), (0.5, (np.zeros(N_PAIR), 0.0, None)))
     )
     assert state.rate == pytest.approx(0.25 * full.rate + 0.75 * half.rate, rel=1e-6)
-    beside = AtPeakRatio(AtPeak("tip", 250.0, 1200.0), 0.97).solve(problem.balance)
+    neighbour = AtPeakRatio(AtPeak("tip", 250.0, 1200.0), 0.97).solve(problem.balance)
     peak = AtPeak("tip", 250.0, 1200.0).solve(problem.balance)
-    assert beside.state.omega == pytest.approx(0.97 * peak.state.omega, rel=1e-4)
-    assert beside.amplitude < peak.amplitude
+    assert neighbour.state.omega == pytest.approx(0.97 * peak.state.omega, rel=1e-4)
+    assert neighbour.amplitude < peak.amplitude
 
 
 def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProblem) -> None:
@@ -141,20 +141,20 @@ def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProb
 
 def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: WearProblem, fine: WearHistory) -> None:
     gap, basis = problem.balance.contact.gap, HarmonicBasis((0, 1), 1024)
-    _, found = events(fine, ("t1", "t2", "n"), gap, basis)
+    _, result = events(fine, ("t1", "t2", "n"), gap, basis)
     # by the status that the contact law itself reported, to one row
     for i in range(N_PAIR):
         lost = np.flatnonzero(fine.status[:, i] == SEPARATES)
         touching = np.flatnonzero(fine.status[:, i] != SEPARATES)
-        if np.isfinite(found[i]) and found[i] > 0:
-            k = np.searchsorted(fine.cycles, found[i])
+        if np.isfinite(result[i]) and result[i] > 0:
+            k = np.searchsorted(fine.cycles, result[i])
             assert lost[0] == pytest.approx(k, abs=1)
-        elif not np.isfinite(found[i]):
+        elif not np.isfinite(result[i]):
             assert touching[-1] == len(fine.cycles) - 1
     coarse = evolve(error_controlled.Rule(problem, Tolerance(0.01, 2e-4)))
     _, rough = events(coarse, ("t1", "t2", "n"), gap, basis)
-    assert first(found) is not None
-    assert first(rough) == pytest.approx(first(found), rel=0.05)
+    assert first(result) is not None
+    assert first(rough) == pytest.approx(first(result), rel=0.05)
 
 
 def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> None:
@@ -205,35 +205,35 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
 def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None:
     """With six harmonics no solution is found while the deepest pair is between 1e-5 and 6e-5 m, with four it is."""
     tolerance = Tolerance(0.2, 2e-4)
-    whole = wear_problem(balance=balance_of(pressed_body(), tuple(range(6))))
-    gap = whole.balance.contact.gap
+    full = wear_problem(balance=balance_of(pressed_body(), tuple(range(6))))
+    gap = full.balance.contact.gap
 
     def gone(balance: HarmonicBalance) -> bool:
         return len(balance.basis.harmonics) == 6 and 1e-5 < (balance.contact.gap - gap).max() < 6e-5
 
     class Missing(AtFrequency):
         def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
-            found = super().solve_near(balance, omega, x)
-            return replace(found, solution=replace(found.solution, outcome="gone")) if gone(balance) else found
+            result = super().solve_near(balance, omega, x)
+            return replace(result, solution=replace(result.solution, outcome="gone")) if gone(balance) else result
 
         def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
             return FrequencyCorrection(state.omega if gone(balance) else 0.0, 0)
 
-    lacking = replace(whole, mission=(Duty(Missing("tip", 420.0)),))
+    lacking = replace(full, mission=(Duty(Missing("tip", 420.0)),))
     worn = evolve(error_controlled.Rule(lacking, tolerance))
     moves = np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2))
     deepest = worn.depth.max(axis=1)
-    few = np.flatnonzero(~moves)
-    assert np.all(few == np.arange(few[0], few[-1] + 1))
-    assert deepest[few[0]] <= 1e-5 < deepest[few[0] + 1]
-    assert deepest[few[-1]] < 6e-5 <= deepest[few[-1] + 1]
+    small = np.flatnonzero(~moves)
+    assert np.all(small == np.arange(small[0], small[-1] + 1))
+    assert deepest[small[0]] <= 1e-5 < deepest[small[0] + 1]
+    assert deepest[small[-1]] < 6e-5 <= deepest[small[-1] + 1]
     assert np.all(worn.memory["next_cycles"][:-1] > 0)  # implicit steps throughout
     assert "with harmonics up to 3" in str(worn.end)
-    assert life(worn) == pytest.approx(life(evolve(error_controlled.Rule(whole, tolerance))), rel=0.02)
-    begun = evolve(error_controlled.Rule(lacking, tolerance), int(few[0]) + 2)
-    again = evolve(error_controlled.Rule(lacking, tolerance), int(few[0]) + 3, resume=begun)
-    assert np.array_equal(again.depth, worn.depth[: len(again.depth)])
-    assert len(again.depth) > len(begun.depth)
+    assert life(worn) == pytest.approx(life(evolve(error_controlled.Rule(full, tolerance))), rel=0.02)
+    started = evolve(error_controlled.Rule(lacking, tolerance), int(small[0]) + 2)
+    repeated = evolve(error_controlled.Rule(lacking, tolerance), int(small[0]) + 3, resume=started)
+    assert np.array_equal(repeated.depth, worn.depth[: len(repeated.depth)])
+    assert len(repeated.depth) > len(started.depth)
 
 
 def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(problem: WearProblem) -> None:
@@ -281,51 +281,51 @@ def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(proble
 
 def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() -> None:
     """Fewer harmonics carry a step in vain; a peak that they lack would be lost if it were looked for with them."""
-    whole = wear_problem(balance=balance_of(pressed_body(), tuple(range(8))))
-    seen = []
+    full = wear_problem(balance=balance_of(pressed_body(), tuple(range(8))))
+    observed = []
 
     class Never(AtFrequency):
         def solve(self, balance: HarmonicBalance) -> OperatingPoint:
-            seen.append(len(balance.basis.harmonics))
+            observed.append(len(balance.basis.harmonics))
             return super().solve(balance)
 
         def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
             return FrequencyCorrection(state.omega, 0)
 
     tolerance = Tolerance(0.1, 2e-4)
-    never = replace(whole, mission=(Duty(Never("tip", 420.0)),))
+    never = replace(full, mission=(Duty(Never("tip", 420.0)),))
     worn = evolve(error_controlled.Rule(never, tolerance), max_steps=2)
-    assert seen == [8, 8, 8]  # at the start and behind both steps
+    assert observed == [8, 8, 8]  # at the start and behind both steps
     assert np.all(worn.step_error == 1.0)
     assert np.all(np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2)))  # the step wears with all of them
 
     class Ends(Never):
         def solve(self, balance: HarmonicBalance) -> OperatingPoint:
-            if len(balance.basis.harmonics) == 8 and balance.contact.gap.max() > whole.balance.contact.gap.max():
+            if len(balance.basis.harmonics) == 8 and balance.contact.gap.max() > full.balance.contact.gap.max():
                 raise NoPeak("the scan with all of them ends early")
             return super().solve(balance)
 
-    seen.clear()
-    ends = replace(whole, mission=(Duty(Ends("tip", 420.0)),))
+    observed.clear()
+    ends = replace(full, mission=(Duty(Ends("tip", 420.0)),))
     evolve(error_controlled.Rule(ends, tolerance), max_steps=1)
-    assert seen == [8, 4]
+    assert observed == [8, 4]
 
 
 @pytest.mark.parametrize("steepness", [0.5, 1.0, 10.0, 30.0])
 def test_the_frequency_of_a_peak_is_found_where_its_distance_is_taken_for_far_too_large(steepness: float) -> None:
     """The frequencies that are tried stay beside the peak: further off there may be no solution."""
     search, peak = sdirk_stages.FrequencySearch(sdirk_stages.RULES.unknown_slope), 1.002
-    tried = [1.0]
-    while abs(tried[-1] - peak) > 1e-5 and len(tried) <= sdirk_stages.RULES.max_corrections:
-        tried.append(search.next(tried[-1], steepness * (peak - tried[-1])))
-    assert abs(tried[-1] - peak) <= 1e-5
-    assert max(tried) < peak + 0.002
+    attempts = [1.0]
+    while abs(attempts[-1] - peak) > 1e-5 and len(attempts) <= sdirk_stages.RULES.max_corrections:
+        attempts.append(search.next(attempts[-1], steepness * (peak - attempts[-1])))
+    assert abs(attempts[-1] - peak) <= 1e-5
+    assert max(attempts) < peak + 0.002
 
 
 def test_the_forces_of_a_faint_contact_are_solved_too(problem: WearProblem) -> None:
     """A start whose residual is just below Newton's tolerance, but far above the stretch of the springs."""
-    apart = newton.solve_from_rest(problem.balance.with_gap(np.full(N_PAIR, 1e-3)), 420.0).state.x[:, 2]
-    faint = problem.balance.with_gap(apart[:, 0] + np.hypot(apart[:, 1], apart[:, 2]) - 1e-11)
+    distance = newton.solve_from_rest(problem.balance.with_gap(np.full(N_PAIR, 1e-3)), 420.0).state.x[:, 2]
+    faint = problem.balance.with_gap(distance[:, 0] + np.hypot(distance[:, 1], distance[:, 2]) - 1e-11)
     exact = newton.solve_from_rest(faint, 420.0, newton.NewtonOptions(1e-13))
     k = faint.compliance.k
     stretch = np.linalg.norm(exact.state.cycle.force.reshape(len(k), -1) / k[:, None])
@@ -334,9 +334,9 @@ def test_the_forces_of_a_faint_contact_are_solved_too(problem: WearProblem) -> N
     push = np.random.default_rng(0).normal(size=exact.state.x.shape)
     start = exact.state.x + 5e-9 * size * push / np.linalg.norm(push)
     assert newton.relative_residual(faint.evaluate(420.0, start), faint.x_lin(420.0)) < 1e-8
-    found = newton.solve(faint, 420.0, start)
-    assert found.converged
-    missed = np.linalg.norm(found.state.cycle.force - exact.state.cycle.force)
+    solution = newton.solve(faint, 420.0, start)
+    assert solution.converged
+    missed = np.linalg.norm(solution.state.cycle.force - exact.state.cycle.force)
     assert missed < 1e-3 * np.linalg.norm(exact.state.cycle.force)
 
 
@@ -365,11 +365,11 @@ def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearPro
     none = site.dominant_peak(problem.balance, highest)
     assert none.point is None
     assert lower.amplitude / (1.01 * site.dominance * highest.amplitude) < none.nearness < 0.5
-    beside = AtPeakRatio(site, 1.01)
-    here = beside.solve_near(problem.balance, 1.01 * lower.state.omega, lower.state.x)
-    moved = beside.dominant_peak(problem.balance, here).point
-    assert moved is not None
-    assert moved.state.omega == pytest.approx(1.01 * highest.state.omega, rel=1e-4)
+    neighbour = AtPeakRatio(site, 1.01)
+    current = neighbour.solve_near(problem.balance, 1.01 * lower.state.omega, lower.state.x)
+    shifted = neighbour.dominant_peak(problem.balance, current).point
+    assert shifted is not None
+    assert shifted.state.omega == pytest.approx(1.01 * highest.state.omega, rel=1e-4)
 
 
 def test_no_higher_peak_is_looked_for_above_what_any_linear_response_reaches(problem: WearProblem) -> None:
@@ -384,9 +384,9 @@ def test_no_higher_peak_is_looked_for_above_what_any_linear_response_reaches(pro
 def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypatch: pytest.MonkeyPatch) -> None:
     site = AtPeak("tip", 250.0, 1200.0)
     peak = site.solve(problem.balance).state
-    below = site.solve_near(problem.balance, 0.99 * peak.omega, peak.x)
-    assert below.solution.converged
-    assert below.state.omega == pytest.approx(peak.omega, rel=1e-4)
+    lower = site.solve_near(problem.balance, 0.99 * peak.omega, peak.x)
+    assert lower.solution.converged
+    assert lower.state.omega == pytest.approx(peak.omega, rel=1e-4)
     solve = newton.solve
 
     def ends(balance: HarmonicBalance, omega: float, *rest: object) -> newton.Solution:
@@ -408,8 +408,8 @@ def test_no_lower_peak_is_taken_for_one_that_is_not_refined(
 
     def ends(balance: HarmonicBalance, omega: float, x: np.ndarray, *rest: object) -> newton.Solution:
         found = solve(balance, omega, x, *rest)
-        near = abs(omega / highest.state.omega - 1) < 0.004
-        return replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1")) if near else found
+        nearby = abs(omega / highest.state.omega - 1) < 0.004
+        return replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1")) if nearby else found
 
     branch = site._scan(problem.balance)
     monkeypatch.setattr(AtPeak, "_scan", lambda *given: branch)
@@ -429,8 +429,8 @@ class TwoPlaces(AtFrequency):
         depth = float(balance.contact.gap.max())
         if depth < LEAP_DEPTH or point.state.omega != self.omega:
             return DominantPeak(nearness=depth / LEAP_DEPTH)
-        found = AtFrequency("tip", SECOND).solve(balance)
-        return DominantPeak(found, found.solves, depth / LEAP_DEPTH)
+        solution = AtFrequency("tip", SECOND).solve(balance)
+        return DominantPeak(solution, solution.solves, depth / LEAP_DEPTH)
 
     def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
         return FrequencyCorrection(0.0, 0)
@@ -461,14 +461,16 @@ def test_a_step_is_held_to_the_cycles_that_its_error_takes_behind_it() -> None:
         second = (max(1 - length * first, 0.0) - 2 * first) / (1 + steady_motion.GAMMA * length)
         worn, deviation = length * (1.5 * first + 0.5 * second), 0.5 * length * (first + second)
         off = abs(worn - (1 - np.exp(-length))) / np.exp(-length)  # cycles by which the rate is reached early or late
-        told = local_error(tolerance, area[:1], np.array([deviation]), np.array([1 - worn]), length, length) * length
-        assert told >= min(off, length)
+        messages = (
+            local_error(tolerance, area[:1], np.array([deviation]), np.array([1 - worn]), length, length) * length
+        )
+        assert messages >= min(off, length)
 
 
 def test_the_steps_of_a_run_add_up_in_its_estimate(problem: WearProblem, fine: WearHistory) -> None:
     run = evolve(error_controlled.Rule(problem, Tolerance(0.1, 2e-4)))
     estimate = measured_error(run, Tolerance(0.1, 2e-4)).cycles
     assert 0.0 < abs(life(run) / life(fine) - 1) < estimate < 0.2
-    begun = replace(run, step_error=np.where(run.cycles == 0, 10.0, run.step_error))
+    started = replace(run, step_error=np.where(run.cycles == 0, 10.0, run.step_error))
     # a first step that is far off is so by its own few cycles
-    assert measured_error(begun, Tolerance(0.1, 2e-4)).cycles < 0.2
+    assert measured_error(started, Tolerance(0.1, 2e-4)).cycles < 0.2

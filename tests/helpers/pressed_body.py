@@ -55,14 +55,14 @@ def balance_of(model: ReducedModel, harmonics: tuple[int, ...] = (0, 1, 2, 3), s
 
 def wear_problem(**changes: object) -> WearProblem:
     """Its wear at a fixed frequency with harmonics 0 and 1, until 1 % of the preload is left."""
-    given: dict = {
+    inputs: dict = {
         "balance": balance_of(pressed_body(), (0, 1)),
         "mission": (Duty(AtFrequency("tip", 420.0)),),
         "wear": JointWear.of("energy", coefficient=1e-9),
         "area": np.full(N_PAIR, 1e-4),
         "lost_below": 0.01,
     }
-    return WearProblem(**(given | changes))
+    return WearProblem(**(inputs | changes))
 
 
 @contextmanager
@@ -74,6 +74,6 @@ def growth_by_few_modes() -> Iterator[None]:
 
 def life(worn: WearHistory) -> float:
     """Cycles to 2 % of the first preload."""
-    found = cycles_to_preload(worn, 0.02)
-    assert found is not None
-    return found
+    result = cycles_to_preload(worn, 0.02)
+    assert result is not None
+    return result

@@ -39,8 +39,8 @@ def again(problem, worn, end, longer):
         else:
             state = assess(problem, state.depth + stride * state.rate, state.cycles + stride, state)
         assert not state.failure
-    left = np.log(problem.preload_of(state) / first)
-    return np.array([state.cycles, state.depth.max(), problem.area @ state.depth]), left
+    remaining = np.log(problem.preload_of(state) / first)
+    return np.array([state.cycles, state.depth.max(), problem.area @ state.depth]), remaining
 
 
 def elasticity_anew(worn, share, problem_of, guess):
@@ -49,12 +49,12 @@ def elasticity_anew(worn, share, problem_of, guess):
     problem_of : factor on the number -> problem; guess : the elasticity of the life, near it
     """
     end, h = int(np.flatnonzero(worn.preload < share * worn.preload[0])[0]), 3e-5
-    same = problem_of(1.0)
-    values, left = again(same, worn, end, 1.0)
-    slope = (again(same, worn, end, 1 + h)[1] - left) / h
+    equal = problem_of(1.0)
+    values, remaining = again(equal, worn, end, 1.0)
+    slope = (again(equal, worn, end, 1 + h)[1] - remaining) / h
     sides = []
     for factor in (1 + h, 1 - h):
         longer, problem = 1 + guess * (factor - 1), problem_of(factor)
-        longer -= (again(problem, worn, end, longer)[1] - left) / slope
+        longer -= (again(problem, worn, end, longer)[1] - remaining) / slope
         sides.append(again(problem, worn, end, longer)[0])
     return (sides[0] - sides[1]) / (2 * h) / values

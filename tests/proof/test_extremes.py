@@ -61,7 +61,9 @@ def test_a_contact_force_or_an_energy_off_by_a_thousandth_is_seen(transitions: s
     state = solve_and_judge(balance, body.ordinary.omega)[1].state
 
     def told(found: State) -> set[str]:
-        return {one.name for one in march_checks(balance, found) if one.off > one.allowed}
+        return {
+            march_check.name for march_check in march_checks(balance, found) if march_check.off > march_check.allowed
+        }
 
     assert not told(state)
     for part, name in ((np.s_[:, :-1], "friction"), (np.s_[:, -1:], "normal")):
@@ -77,7 +79,9 @@ def test_a_friction_work_off_by_a_thousandth_is_seen(transitions: str, monkeypat
     state = solve_and_judge(balance, body.ordinary.omega)[1].state
     energy = HarmonicBalance.energy
     monkeypatch.setattr(HarmonicBalance, "energy", lambda self, state: 1.001 * energy(self, state))
-    assert [one.name for one in march_checks(balance, state) if one.off > one.allowed] == ["work"]
+    assert [
+        march_check.name for march_check in march_checks(balance, state) if march_check.off > march_check.allowed
+    ] == ["work"]
 
 
 def test_the_march_finds_the_loop_of_a_jenkins_element() -> None:

@@ -59,17 +59,17 @@ def check(balance: HarmonicBalance, state: State) -> None:
     offsets = [parameters.gap, balance.memory, np.zeros(1) if base is None else base]
     tiny = 1e-14 * max(float(np.abs(offset).max(initial=0.0)) for offset in offsets)  # their rounding
     force = contact_forces(balance, state.x)
-    left = newton.relative_residual(state, balance.x_lin(state.omega)) + 5e-14  # with what rounding adds to it
-    rounding = SINGLE + left * condition(balance, state.omega)  # infinite where nothing holds it
+    remaining = newton.relative_residual(state, balance.x_lin(state.omega)) + 5e-14  # with what rounding adds to it
+    rounding = SINGLE + remaining * condition(balance, state.omega)  # infinite where nothing holds it
     if np.isfinite(force).all() and rounding < 1.0:
         size = max(float(np.linalg.norm(v)) for v in (state.x, balance.x_lin(state.omega), offsets[-1]))
         back = displacement_under(balance, state.omega, state.x, force)
         assert np.linalg.norm(back - state.flat) <= (3 * TOLERANCE + rounding) * size + tiny * np.sqrt(back.size)
-    along = parameters.tangential
+    path = parameters.tangential
     basis = balance.basis
     travelled = np.maximum(basis.order, 1) * state.x  # harmonic h goes to and fro h times in a cycle
-    forces, travels = (np.linalg.norm(values[:, along], axis=2) for values in (state.cycle.force, travelled))
-    scale = np.pi * ((forces + tiny * parameters.stiffness[:, along]) * (travels + tiny)).sum(axis=1)
+    forces, travels = (np.linalg.norm(values[:, path], axis=2) for values in (state.cycle.force, travelled))
+    scale = np.pi * ((forces + tiny * parameters.stiffness[:, path]) * (travels + tiny)).sum(axis=1)
     factor, order = SAMPLING.get(balance.contact.joints[0].law, UNCOUPLED)
     coarse = 0.0 if basis.transitions == "located" else factor * (basis.harmonics[-1] / basis.n_samples) ** order
     assert (balance.energy(state) >= -(1e-10 + coarse) * scale).all()
@@ -105,13 +105,13 @@ LOOSE = Drawn(  # held by its contact alone, ten thousand times below its freque
 def test_what_counts_as_converged_is_in_balance(d: Drawn) -> None:
     try:
         balance = problem_of(d)
-        found = newton.solve_from_rest(balance, omega_of(balance))
+        result = newton.solve_from_rest(balance, omega_of(balance))
     except DECLARED:
         return
-    assert found.outcome
-    assert np.isfinite(found.state.x).all()
-    if found.converged:
-        check(balance, found.state)
+    assert result.outcome
+    assert np.isfinite(result.state.x).all()
+    if result.converged:
+        check(balance, result.state)
 
 
 @cases(20)

@@ -95,11 +95,11 @@ def test_few_modes_are_enough(part, model):
 
 def test_a_cutoff_with_too_many_modes_is_refused_before_they_are_computed(part, model, monkeypatch):
     omitted = model.origin.first_omitted_frequency
-    found = craig_bampton(part.system, part.interface, cutoff=2 * omitted).origin.n_modes
-    monkeypatch.setattr(craig_bampton_module, "LIMITS", ReductionLimits(most_modes=found))
-    assert craig_bampton(part.system, part.interface, cutoff=2 * omitted).origin.n_modes == found
-    monkeypatch.setattr(craig_bampton_module, "LIMITS", ReductionLimits(most_modes=found - 1))
-    with pytest.raises(ValueError, match=rf"is above {found - 1} modes: {found} of its \d+ modes lie below it"):
+    refusal = craig_bampton(part.system, part.interface, cutoff=2 * omitted).origin.n_modes
+    monkeypatch.setattr(craig_bampton_module, "LIMITS", ReductionLimits(most_modes=refusal))
+    assert craig_bampton(part.system, part.interface, cutoff=2 * omitted).origin.n_modes == refusal
+    monkeypatch.setattr(craig_bampton_module, "LIMITS", ReductionLimits(most_modes=refusal - 1))
+    with pytest.raises(ValueError, match=rf"is above {refusal - 1} modes: {refusal} of its \d+ modes lie below it"):
         craig_bampton(part.system, part.interface, cutoff=2 * omitted)
 
 

@@ -77,14 +77,14 @@ def test_relative_coordinates_are_the_contact_itself(reduced):
         system, B = wave_system(reduced.sector, index)
         z = np.random.default_rng(index).normal(size=T.shape[1])
         q = T @ z
-        kept = np.setdiff1d(np.arange(len(q)), reduced.sector.seam_left)
-        assert S @ q[kept] == pytest.approx(q, abs=1e-12)
-        assert B @ q[kept] == pytest.approx(z[:n_contact], abs=1e-12)
+        saved = np.setdiff1d(np.arange(len(q)), reduced.sector.seam_left)
+        assert S @ q[saved] == pytest.approx(q, abs=1e-12)
+        assert B @ q[saved] == pytest.approx(z[:n_contact], abs=1e-12)
         assert T.shape[1] == system.n_dof
         assert n_masters == n_contact + 4  # two of the couple, the driven node, the tip
         small_system = reduced.sector.system.projected(T)
-        same = [modes(s.stiffness, s.mass, system.n_dof)[0] for s in (system, small_system)]
-        assert same[1] == pytest.approx(same[0], rel=1e-7)
+        equal = [modes(s.stiffness, s.mass, system.n_dof)[0] for s in (system, small_system)]
+        assert equal[1] == pytest.approx(equal[0], rel=1e-7)
 
 
 def test_contact_of_fewer_components_leaves_the_others_free(tmp_path):

@@ -49,9 +49,9 @@ def beam(tmp_path_factory: pytest.TempPathFactory) -> tuple[scene_file.SceneFile
 
 
 def _balance(file: scene_file.SceneFile, model: ReducedModel, harder: float = 1.0) -> HarmonicBalance:
-    made = joints.make_joints(file.scene, model)
+    built = joints.make_joints(file.scene, model)
     changed: list[Joint] = [
-        replace(j, parameters=replace(j.parameters, stiffness=harder * j.parameters.stiffness)) for j in made
+        replace(j, parameters=replace(j.parameters, stiffness=harder * j.parameters.stiffness)) for j in built
     ]
     basis = HarmonicBasis((0, 1, 2, 3), 100)
     return HarmonicBalance.of(model, changed, basis, joints.excite(file.scene, None), 2 * np.pi * 1000.0)
@@ -81,19 +81,19 @@ def test_contact_forces_are_those_of_the_full_model(beam, harder: float, modes: 
     assert ours.converged
     assert theirs.converged
     assert len(np.unique(theirs.state.cycle.status)) > 1  # some stick and some do not
-    wanted = theirs.state.cycle.force
+    target = theirs.state.cycle.force
     limit = FORCES if harder == 1.0 else 10 * reduced_balance.compliance.error
-    assert np.abs(ours.state.cycle.force - wanted).max() < limit * np.abs(wanted).max()
+    assert np.abs(ours.state.cycle.force - target).max() < limit * np.abs(target).max()
     found, expected = reduced_balance.outputs(ours.state), full_balance.outputs(theirs.state)
     assert np.abs(found - expected).max() < limit * np.abs(expected).max()
     slope = [b.frequency_slope(s.state) for b, s in ((reduced_balance, ours), (full_balance, theirs))]
     for mine, other in zip(*slope, strict=True):
         assert np.abs(mine - other).max() < 100 * limit * np.abs(other).max()
     # the field of the whole part, with what its coordinates leave out
-    moved = full_displacement(
+    shifted = full_displacement(
         reduced_balance, ours.state.flat, ours.state.cycle.force.reshape(ours.state.flat.shape), OMEGA
     )
-    relative = part.interface.B @ moved
+    relative = part.interface.B @ shifted
     assert np.abs(relative - ours.state.flat).max() < 1e-7 * np.abs(ours.state.flat).max()
 
 
@@ -105,16 +105,16 @@ def test_statics_are_exact_and_what_is_left_out_is_told(beam) -> None:
     assert rest is not None
     K_s = part.system.stiffness.toarray() + B.T @ (springs.ravel()[:, None] * B)
     exact = B @ np.linalg.solve(K_s, B.T)
-    found = rest.apply(np.eye(len(B))) + rest.at_contact @ (rest.at_contact.T / rest.squares[:, None])
-    assert np.abs(found - exact).max() < 1e-10 * np.abs(exact).max()
+    result = rest.apply(np.eye(len(B))) + rest.at_contact @ (rest.at_contact.T / rest.squares[:, None])
+    assert np.abs(result - exact).max() < 1e-10 * np.abs(exact).max()
     root = np.sqrt(springs.ravel())
-    left = exact - rest.at_contact @ (rest.at_contact.T / rest.squares[:, None])
-    assert rest.left_out == pytest.approx(np.linalg.eigvalsh(root[:, None] * left * root)[-1], rel=1e-3)
+    remaining = exact - rest.at_contact @ (rest.at_contact.T / rest.squares[:, None])
+    assert rest.left_out == pytest.approx(np.linalg.eigvalsh(root[:, None] * remaining * root)[-1], rel=1e-3)
     # loads and outputs have no rest at all
     force = np.stack([*part.system.loads.values(), *part.system.outputs.values()], axis=1)
     modal = np.stack([*model.system.loads.values(), *model.system.outputs.values()], axis=1)
-    moved = np.linalg.solve(K_s, force)
-    assert np.abs(rest.shapes @ (modal / rest.squares[:, None]) - moved).max() < 1e-8 * np.abs(moved).max()
+    shifted = np.linalg.solve(K_s, force)
+    assert np.abs(rest.shapes @ (modal / rest.squares[:, None]) - shifted).max() < 1e-8 * np.abs(shifted).max()
 
 
 def test_the_error_is_that_of_the_mass_left_out(beam) -> None:
@@ -138,31 +138,31 @@ def test_what_a_solve_does_not_ask_for_is_below_its_tolerance(beam, monkeypatch:
     """A solve ends on a bound of the residual flexibility; its state has the residual wanted with all of it, too."""
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
-    rest, asked = balance.model.residual, []
+    rest, requested = balance.model.residual, []
     assert rest is not None
     assert rest.left_out <= NEARLY_ALL
     force = np.random.default_rng(0).normal(size=(75, 4)) * np.sqrt(springs.ravel())[:, None]
-    moved, x = rest.apply(force), np.random.default_rng(1).normal(size=(75, 4))
+    shifted, x = rest.apply(force), np.random.default_rng(1).normal(size=(75, 4))
     root = np.sqrt(springs.ravel())[:, None]
-    share = np.linalg.norm(root * moved) / np.linalg.norm(root * x)
+    share = np.linalg.norm(root * shifted) / np.linalg.norm(root * x)
     assert 0.1 * rest.at_most(rest.lacking(force), x) < share < rest.at_most(rest.lacking(force), x)
     one_row = np.eye(75)[:, :1]
     loose = replace(rest, stiffness=springs.ravel() * (1 - one_row[:, 0]))
     assert loose.at_most(loose.lacking(one_row), x[:, :1]) == np.inf
     plain = type(rest).apply
-    monkeypatch.setattr(type(rest), "apply", lambda self, f: (asked.append(1), plain(self, f))[1])
+    monkeypatch.setattr(type(rest), "apply", lambda self, f: (requested.append(1), plain(self, f))[1])
     start = newton.solve_from_rest(balance, OMEGA, NewtonOptions(tolerance=1e-8)).state.x
-    bounded, along = 0, parameter.of(balance).make(OMEGA)
+    bounded, path = 0, parameter.of(balance).make(OMEGA)
     for omega in OMEGA * np.linspace(1.0, 1.005, 6):
-        before = len(asked)
-        found = newton.solve(along, omega, start, NewtonOptions(tolerance=1e-8))
-        spent = len(asked) - before
-        exact = newton.relative_residual(balance.evaluate(omega, found.state.x), balance.x_lin(omega))
-        assert found.converged
-        assert exact <= found.history[-1] <= 1e-8
-        bounded += exact < found.history[-1]
-        assert spent < len(found.history)
-        start = found.state.x
+        before = len(requested)
+        solution = newton.solve(path, omega, start, NewtonOptions(tolerance=1e-8))
+        spent = len(requested) - before
+        exact = newton.relative_residual(balance.evaluate(omega, solution.state.x), balance.x_lin(omega))
+        assert solution.converged
+        assert exact <= solution.history[-1] <= 1e-8
+        bounded += exact < solution.history[-1]
+        assert spent < len(solution.history)
+        start = solution.state.x
     assert bounded >= 3
 
 
@@ -178,39 +178,39 @@ def test_what_was_asked_for_is_known_of_all_that_adds_up_to_it(beam, monkeypatch
     monkeypatch.setattr(type(rest), "apply", lambda self, f: (solved.append(f.shape[1]), plain(self, f))[1])
     root = np.sqrt(springs.ravel())[:, None]
     first, other = (root * rng.normal(size=(75, n)) for n in (5, 3))
-    asked: list[np.ndarray] = []
-    lacking, still = rest.lacking(first, asked), rest.recalled(first, asked)
+    requested: list[np.ndarray] = []
+    lacking, still = rest.lacking(first, requested), rest.recalled(first, requested)
     assert np.array_equal(lacking, first / root)
     assert not still.any()
-    rest.ask(first, asked, 0.0)
-    moved, exact = rest.recalled(first, asked), plain(rest, first)
-    assert np.abs(moved - exact).max() < 1e-12 * np.abs(exact).max()
+    rest.ask(first, requested, 0.0)
+    shifted, exact = rest.recalled(first, requested), plain(rest, first)
+    assert np.abs(shifted - exact).max() < 1e-12 * np.abs(exact).max()
     for force in (first @ rng.normal(size=(5, 2)), other):
-        lacking, moved = rest.lacking(force, asked), rest.recalled(force, asked)
-        near = force - root * lacking
-        exact = plain(rest, near)
-        assert np.abs(moved - exact).max() < 1e-12 * np.abs(exact).max()
+        lacking, shifted = rest.lacking(force, requested), rest.recalled(force, requested)
+        nearby = force - root * lacking
+        exact = plain(rest, nearby)
+        assert np.abs(shifted - exact).max() < 1e-12 * np.abs(exact).max()
         assert np.abs((first / root).T @ lacking).max() < 1e-10 * np.abs(force / root).max()
     assert np.abs(lacking).max() > 0.1 * np.abs(force / root).max()
     # of forces nearly known only the direction that matters is solved for, and the bound tells what is left
     small = first + root * (1e-4 * rng.normal(size=(75, 1)) @ rng.normal(size=(1, 5)) + 1e-8 * rng.normal(size=(75, 5)))
     solved.clear()
-    rest.ask(small, asked, 1e-6)
-    lacking, moved = rest.lacking(small, asked), rest.recalled(small, asked)
+    rest.ask(small, requested, 1e-6)
+    lacking, shifted = rest.lacking(small, requested), rest.recalled(small, requested)
     assert solved == [1]
     assert 1e-8 < np.linalg.norm(lacking) < 1e-6
-    off = root * (moved - plain(rest, small))
+    off = root * (shifted - plain(rest, small))
     assert np.linalg.norm(off) < left_out * np.linalg.norm(lacking)
-    rest.ask(small, asked, 1e-6)
+    rest.ask(small, requested, 1e-6)
     assert solved == [1]
     for size in np.logspace(-2, -8, 12):  # however near the forces are, columns stay orthonormal and the first go
         latest = first + size * root * rng.normal(size=(75, 5))
-        rest.ask(latest, asked, 0.0)
-        basis, moved = asked[0]
+        rest.ask(latest, requested, 0.0)
+        basis, shifted = requested[0]
         assert np.abs(basis.T @ basis - np.eye(basis.shape[1])).max() < 1e-12
-        assert np.abs(rest.lacking(latest, asked)).max() < 1e-12 * np.abs(latest / root).max()
+        assert np.abs(rest.lacking(latest, requested)).max() < 1e-12 * np.abs(latest / root).max()
         exact = plain(rest, root * basis)
-        assert np.abs(moved - exact).max() < 1e-11 * np.abs(exact).max()
+        assert np.abs(shifted - exact).max() < 1e-11 * np.abs(exact).max()
     assert basis.shape == (75, 5 * LIMITS.recalled)
 
 
@@ -218,18 +218,18 @@ def test_directions_know_what_is_recalled(beam) -> None:
     """The Jacobian of a balance with what is known of the residual flexibility, against differences."""
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
-    rest, asked = balance.model.residual, list[np.ndarray]()
+    rest, requested = balance.model.residual, list[np.ndarray]()
     assert rest is not None
     state = newton.solve_from_rest(balance, OMEGA).state
-    rest.ask(state.g, asked, 0.0)
-    near = replace(balance, rest=lambda g: rest.recalled(g, asked))
-    along = np.random.default_rng(0).normal(size=state.x.shape) * np.abs(state.x).max()
-    high, low = (near.evaluate(OMEGA, state.x + h * along) for h in (1e-6, -1e-6))
-    wanted = (high.residual - low.residual) / 2e-6
-    found, _, _ = near.linearise(state).solve(wanted, 1e-6)
-    without, _, _ = balance.linearise(state).solve(wanted, 1e-6)
-    exact = along.reshape(found.shape)
-    off, before = (np.linalg.norm(d - exact) / np.linalg.norm(exact) for d in (found, without))
+    rest.ask(state.g, requested, 0.0)
+    nearby = replace(balance, rest=lambda g: rest.recalled(g, requested))
+    path = np.random.default_rng(0).normal(size=state.x.shape) * np.abs(state.x).max()
+    high, low = (nearby.evaluate(OMEGA, state.x + h * path) for h in (1e-6, -1e-6))
+    expected = (high.residual - low.residual) / 2e-6
+    result, _, _ = nearby.linearise(state).solve(expected, 1e-6)
+    without, _, _ = balance.linearise(state).solve(expected, 1e-6)
+    exact = path.reshape(result.shape)
+    off, before = (np.linalg.norm(d - exact) / np.linalg.norm(exact) for d in (result, without))
     assert off < 1e-4 < before
 
 
@@ -237,14 +237,14 @@ def test_a_curve_recalls_what_its_points_asked_for_and_a_solution_by_itself_noth
     """What was solved before changes no bit of it: a run that goes on after a stop has not solved that."""
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
-    alone = newton.solve_from_rest(balance, OMEGA)
+    single = newton.solve_from_rest(balance, OMEGA)
     curve = parameter.of(balance).make(OMEGA)
-    found = newton.solve(curve, OMEGA, alone.state.x)
-    again = newton.solve(curve, OMEGA, found.state.x)
-    assert (again.steps, again.products) == (0, 0)
-    assert np.array_equal(newton.solve_from_rest(balance, OMEGA).state.x, alone.state.x)
-    whole = [natural.follow(balance, 0.9 * OMEGA, OMEGA, natural.Options(n_points=3)).contact for _ in range(2)]
-    assert np.array_equal(*whole)
+    solution = newton.solve(curve, OMEGA, single.state.x)
+    repeated = newton.solve(curve, OMEGA, solution.state.x)
+    assert (repeated.steps, repeated.products) == (0, 0)
+    assert np.array_equal(newton.solve_from_rest(balance, OMEGA).state.x, single.state.x)
+    full = [natural.follow(balance, 0.9 * OMEGA, OMEGA, natural.Options(n_points=3)).contact for _ in range(2)]
+    assert np.array_equal(*full)
 
 
 def test_matrices_of_velocity_are_projected(beam) -> None:
@@ -269,9 +269,9 @@ def test_a_copy_in_another_process_makes_its_own_factor(beam) -> None:
     _, part, springs = beam
     rest = residual_flexibility(part.system, part.interface, springs, 4, clusters=2).residual
     force = np.random.default_rng(0).normal(size=(75, 2))
-    again = pickle.loads(pickle.dumps(rest))
+    record = pickle.loads(pickle.dumps(rest))
     assert rest is not None
-    assert np.allclose(again.apply(force), rest.apply(force), rtol=1e-10, atol=0)
+    assert np.allclose(record.apply(force), rest.apply(force), rtol=1e-10, atol=0)
 
 
 def test_a_scene_with_thousands_of_pairs_does_without_masters(beam) -> None:
@@ -281,10 +281,10 @@ def test_a_scene_with_thousands_of_pairs_does_without_masters(beam) -> None:
     assert part_reduction.without_masters(scene, part_reduction.MOST_MASTERS + 1, False)
     assert not part_reduction.without_masters(scene, part_reduction.MOST_MASTERS + 1, True)
     assert not part_reduction.without_masters(file.mesh_scene, 10**5, False)  # it says craig_bampton
-    asked = scene_file.read("beam_thesis", ['reduction.method="residual_flexibility"']).mesh_scene
-    assert part_reduction.without_masters(asked, 75, False)
+    requested = scene_file.read("beam_thesis", ['reduction.method="residual_flexibility"']).mesh_scene
+    assert part_reduction.without_masters(requested, 75, False)
     with pytest.raises(ValueError, match='cannot do no_turning: take "craig_bampton"'):
-        part_reduction.without_masters(asked, 75, True)
+        part_reduction.without_masters(requested, 75, True)
 
 
 def test_what_needs_every_contact_dof_says_so(beam) -> None:

@@ -118,8 +118,8 @@ def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
 
 
 def test_damping_is_that_of_the_files_or_of_the_scene(folder: Path) -> None:
-    given = modelling.build(read(str(folder / "own.toml"), ["model.names.damping=C"]), Progress())
-    assert given.reduced.system.damping == pytest.approx(random_structure(2, n_extra=12).system.damping)
+    inputs = modelling.build(read(str(folder / "own.toml"), ["model.names.damping=C"]), Progress())
+    assert inputs.reduced.system.damping == pytest.approx(random_structure(2, n_extra=12).system.damping)
     with pytest.raises(ValueError, match=r"hold a damping matrix: leave \[damping\] out"):
         modelling.build(read(str(folder / "own.toml"), ["damping.modal=1 %"]), Progress())
 

@@ -58,11 +58,11 @@ def test_sectors_alike_are_amplified_by_nothing(scene: Path) -> None:
 SLOW = ("modal='2 %', state='stuck'", "mass=20.0, stiffness='1e-5 s'")
 
 
-@pytest.mark.parametrize("damping", ["modal='2 %'", *(pytest.param(one, marks=pytest.mark.slow) for one in SLOW)])
+@pytest.mark.parametrize("damping", ["modal='2 %'", *(pytest.param(end, marks=pytest.mark.slow) for end in SLOW)])
 def test_derivatives_by_the_factors_are_those_of_other_wheels(scene: Path, damping: str) -> None:
     """Of a wheel that slips at its peak, along a direction in which every sector has a part of its own."""
-    near = ("contact.friction=0.3", "harmonics.transitions=located", "response.frequency=['822 Hz', '834 Hz']")
-    overrides = (*near, f"damping={{{damping}}}")
+    nearby = ("contact.friction=0.3", "harmonics.transitions=located", "response.frequency=['822 Hz', '834 Hz']")
+    overrides = (*nearby, f"damping={{{damping}}}")
     factors, way = unequal_sectors.deviations(6, 0.02, 1), np.array([0.4, -1.0, 0.7, 0.9, -0.3, -0.6])
     wheel, solved = (
         wheels.build(scene_file.read(str(scene), overrides)),
@@ -72,8 +72,8 @@ def test_derivatives_by_the_factors_are_those_of_other_wheels(scene: Path, dampi
     assert found.names[3] == "energy"
     assert found.values[3] > 0
     step = 3e-5
-    ends = (wheel.whole_wheel([float(one) for one in factors + side * way]) for side in (step, -step))
-    up, down = (cycle_derivatives.at_peak(one, found.state, output, ()).values[:2] for one in ends)
+    ends = (wheel.whole_wheel([float(end) for end in factors + side * way]) for side in (step, -step))
+    up, down = (cycle_derivatives.at_peak(end, found.state, output, ()).values[:2] for end in ends)
     off, size = found.slopes[:2] @ way - (up - down) / (2 * step), np.linalg.norm(found.slopes[:2], axis=1)
     assert (abs(off) < 1e-5 * size).all(), off / size
 
@@ -93,16 +93,16 @@ def test_a_wheel_shows_the_derivatives_of_its_peak(scene: Path, tmp_path: Path) 
 
 
 def test_damping_by_two_modes_of_a_wheel_has_no_derivatives(scene: Path) -> None:
-    two = ("response.frequency=['640 Hz', '680 Hz']", "damping={ratios=['2 %', '2 %'], modes=[0, 6]}")
-    found = unequal_sectors.mistuned(scene, overrides=two)
+    pair = ("response.frequency=['640 Hz', '680 Hz']", "damping={ratios=['2 %', '2 %'], modes=[0, 6]}")
+    found = unequal_sectors.mistuned(scene, overrides=pair)
     assert found.lines()[-1].endswith("give damping.modal, or mass and stiffness")
 
 
 def test_the_command_takes_any_wheel(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cli.app(["wheel", "mistuned", str(scene), "--spread", "3 %", "--seed", "2", "--out", str(tmp_path), "--json"],
             result_action="return_value")  # fmt: skip
-    said = json.loads(capsys.readouterr().out)
-    np.testing.assert_allclose(said["stiffness"], unequal_sectors.deviations(6, 0.03, 2))
+    record = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(record["stiffness"], unequal_sectors.deviations(6, 0.03, 2))
     assert (tmp_path / "mistuned.csv").read_text(encoding="utf-8").startswith("frequency_Hz,sector_0_m")
 
 

@@ -96,8 +96,8 @@ def test_head_verdict_and_arc_length_have_one_peak(name: str) -> None:
     assert result.response is not None
     assert operating_states.turns_back(result.response)
     head = numbers(result)
-    said = operating_states.first_state(file, modelling.build(file, Progress()).balance, result).values
-    assert (said["peak_frequency"], said["amplitude"]) == pytest.approx(
+    statement = operating_states.first_state(file, modelling.build(file, Progress()).balance, result).values
+    assert (statement["peak_frequency"], statement["amplitude"]) == pytest.approx(
         (head["peak_frequency"]["first"], head["amplitude"]["first"]), rel=1e-9
     )
     down = pipeline.run(file.changed("response.method=arc_length", "response.sweep=down"), None, Progress())

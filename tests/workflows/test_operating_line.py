@@ -55,43 +55,43 @@ def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz, law)
     span = (
         f'response.frequency=["{low} Hz", "{high} Hz"]', f'contact.law="{law}"', f"harmonics.samples={samples}"
     )  # fmt: skip
-    one = line(sectors, order, *span)
+    item = line(sectors, order, *span)
     for f in (0.5 * (low + high), high - 1.0):
-        own = (*LINE[1:], f"wheel.engine_order={order}", f'wheel.speed="{f / abs(order)} Hz"', *span)
-        whole = wheel_model.build(scene(sectors, *own)).whole_wheel()
-        mine, theirs = (arc_length.solve_along_load(b, 2 * np.pi * f, EXACT) for b in (one, whole))
+        base = (*LINE[1:], f"wheel.engine_order={order}", f'wheel.speed="{f / abs(order)} Hz"', *span)
+        full = wheel_model.build(scene(sectors, *base)).whole_wheel()
+        mine, theirs = (arc_length.solve_along_load(b, 2 * np.pi * f, EXACT) for b in (item, full))
         assert mine.converged
         assert theirs.converged
-        assert one.energy(mine.state).sum() > 1e-4
-        outputs, found, names = one.outputs(mine.state), whole.outputs(theirs.state), whole.compliance.output_names
+        assert item.energy(mine.state).sum() > 1e-4
+        outputs, result, names = item.outputs(mine.state), full.outputs(theirs.state), full.compliance.output_names
         for n in range(sectors):
-            expected = waves.at_sector(one.basis, outputs[0], order, sectors, n)
-            miss = found[names.index(f"response@{n}")] - expected
+            expected = waves.at_sector(item.basis, outputs[0], order, sectors, n)
+            miss = result[names.index(f"response@{n}")] - expected
             assert np.abs(miss).max() < 1e-4 * np.abs(expected).max()
 
 
 def test_the_peak_of_a_line_is_where_it_meets_a_mode():
     """The slope over the frequency is that of the whole problem, speed and all; the peak that it finds is the top."""
-    one = line(5, -2, 'response.frequency=["240 Hz", "280 Hz"]')
-    peak = AtPeak("response", 2 * np.pi * 240, 2 * np.pi * 280).solve(one)
+    item = line(5, -2, 'response.frequency=["240 Hz", "280 Hz"]')
+    peak = AtPeak("response", 2 * np.pi * 240, 2 * np.pi * 280).solve(item)
     omega, x = peak.state.omega, peak.state.x
-    beside = [one.evaluate(omega * (1 + s), x).residual for s in (1e-4, -1e-4)]
-    expected = (beside[0] - beside[1]) / (2e-4 * omega)
-    assert np.abs(one.frequency_slope(peak.state)[0] - expected).max() < 1e-5 * np.abs(expected).max()
+    neighbour = [item.evaluate(omega * (1 + s), x).residual for s in (1e-4, -1e-4)]
+    expected = (neighbour[0] - neighbour[1]) / (2e-4 * omega)
+    assert np.abs(item.frequency_slope(peak.state)[0] - expected).max() < 1e-5 * np.abs(expected).max()
     heights = []
     for s in (-2e-4, 0.0, 2e-4):
-        beside = newton.solve(one, omega * (1 + s), x, EXACT)
-        assert beside.converged
-        heights.append(np.linalg.norm(one.outputs(beside.state)[0, 1:]))
+        neighbour = newton.solve(item, omega * (1 + s), x, EXACT)
+        assert neighbour.converged
+        heights.append(np.linalg.norm(item.outputs(neighbour.state)[0, 1:]))
     assert heights[1] == max(heights)
-    there = wheel_model.build(scene(5, *LINE[1:], f'wheel.speed="{omega / (4 * np.pi)} Hz"'))
-    free, stuck = (float(there.diagram([-2], 1, state)[0, 0]) for state in (False, True))
+    built = wheel_model.build(scene(5, *LINE[1:], f'wheel.speed="{omega / (4 * np.pi)} Hz"'))
+    free, stuck = (float(built.diagram([-2], 1, state)[0, 0]) for state in (False, True))
     assert 2 * np.pi * free < omega < 2 * np.pi * stuck
     ends = 2 * np.pi * 240, 2 * np.pi * 280
-    along, still = (linear_references(b, "response", *ends) for b in (one, there.wave(-2, (240, 280))))
-    i = int(np.argmin(np.abs(along.omega - omega)))
-    assert along.free[i] == pytest.approx(still.free[i], rel=2e-3)  # between speeds it is interpolated
-    assert along.stuck[i] == pytest.approx(still.stuck[i], rel=2e-3)
+    path, still = (linear_references(b, "response", *ends) for b in (item, built.wave(-2, (240, 280))))
+    i = int(np.argmin(np.abs(path.omega - omega)))
+    assert path.free[i] == pytest.approx(still.free[i], rel=2e-3)  # between speeds it is interpolated
+    assert path.stuck[i] == pytest.approx(still.stuck[i], rel=2e-3)
 
 
 def test_speeds_and_frequencies_of_a_scene_belong_together():
@@ -99,10 +99,10 @@ def test_speeds_and_frequencies_of_a_scene_belong_together():
     by_frequency = scene(
         6, 'wheel.sweep="speed"', 'response.frequency=["100 Hz", "140 Hz"]', "wheel.engine_order=-2"
     ).scene
-    for one in (by_speed, by_frequency):
-        assert one.response.frequency == pytest.approx((100, 140))
-        assert one.wheel.speed == pytest.approx(60)
-        assert scene_file.from_json(one.model_dump_json()).wheel == one.wheel
+    for item in (by_speed, by_frequency):
+        assert item.response.frequency == pytest.approx((100, 140))
+        assert item.wheel.speed == pytest.approx(60)
+        assert scene_file.from_json(item.model_dump_json()).wheel == item.wheel
     for wrong in (
         ('response.speed=["3000 rpm", "4200 rpm"]',),
         ('wheel.sweep="speed"', 'wheel.speed="3000 rpm"'),
@@ -115,11 +115,11 @@ def test_speeds_and_frequencies_of_a_scene_belong_together():
 
 @pytest.mark.parametrize(("given", "said"), [((), True), (('wheel.sweep="frequency"',), False)])
 def test_a_speed_that_does_not_excite_the_range_is_told(given, said):
-    one = scene(6, 'wheel.speed="3000 rpm"', *given).mesh_scene
-    remarks = check_speed(one, None)
+    item = scene(6, 'wheel.speed="3000 rpm"', *given).mesh_scene
+    remarks = check_speed(item, None)
     assert bool(remarks) is said
     assert not said or "24000" in remarks[0]  # rpm at which engine order 1 excites 400 Hz
-    fits = one.model_copy(update={"wheel": one.wheel.model_copy(update={"speed": 402.0})})
+    fits = item.model_copy(update={"wheel": item.wheel.model_copy(update={"speed": 402.0})})
     assert not check_speed(fits, None)
 
 
@@ -131,11 +131,11 @@ def test_a_study_follows_each_engine_order_at_its_own_frequencies(tmp_path: Path
     tables = {
         "study": {"scene": "wheel.toml", "design": "list", "set": quick}, "vary": {"wheel.engine_order": [-1, -2, -3]}
     }  # fmt: skip
-    asked = study_file.parse(tables, "orders.toml", tmp_path)
-    tasks, refused = study_runs._tasks(asked, parameter_space.runs(asked))
+    requested = study_file.parse(tables, "orders.toml", tmp_path)
+    tasks, refused = study_runs._tasks(requested, parameter_space.runs(requested))
     assert not refused
-    for order, one in zip((1, 2, 3), tasks, strict=True):
-        assert one.scene().scene.response.frequency == pytest.approx((100 * order, 125 * order))
+    for order, task in zip((1, 2, 3), tasks, strict=True):
+        assert task.scene().scene.response.frequency == pytest.approx((100 * order, 125 * order))
     row = run_task.solve(tasks[1])
     assert row.status == "complete"
     assert 230 < row.numbers["peak_frequency_first"] < 240

@@ -83,6 +83,6 @@ def test_a_study_that_is_none_is_refused(
     with pytest.raises(SystemExit) as remaining:
         cli.main(["study", "converge", str(folder / "arm.toml")])
     assert remaining.value.code == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert sentence in message
+    assert message.count("\n") == 1

@@ -59,21 +59,21 @@ class Rule(WearRule):
 def scene(folder: Path, *overrides: str) -> scene_file.SceneFile:
     (folder / "my_rule.py").write_text(RULE)
     text = (scene_file.CASES / "beam" / "beam.toml").read_text()
-    own = ("wear.rule=my_rule.py", "wear.first_depth=2 um", "wear.ratio=2", "wear.at=800 Hz", "verdict.enabled=false")
-    return scene_file.parse(text, "beam.toml", (*coarse_scenes.BEAM, *own, *overrides), folder)
+    base = ("wear.rule=my_rule.py", "wear.first_depth=2 um", "wear.ratio=2", "wear.at=800 Hz", "verdict.enabled=false")
+    return scene_file.parse(text, "beam.toml", (*coarse_scenes.BEAM, *base, *overrides), folder)
 
 
 def test_a_rule_beside_a_scene_wears_resumes_and_is_refined(tmp_path: Path) -> None:
     file = scene(tmp_path, "wear.max_steps=3")
     assert planning.plan(file).wear_steps is None
-    whole = pipeline.run(file, tmp_path / "whole", Progress()).wear
-    assert whole is not None
-    np.testing.assert_allclose(whole.worn.max(axis=1), [2e-6, 4e-6, 8e-6], rtol=1e-12)
+    full = pipeline.run(file, tmp_path / "whole", Progress()).wear
+    assert full is not None
+    np.testing.assert_allclose(full.worn.max(axis=1), [2e-6, 4e-6, 8e-6], rtol=1e-12)
     pipeline.run(scene(tmp_path, "wear.max_steps=2"), tmp_path / "part", Progress())
     earlier = checkpoint.earlier(tmp_path / "part" / "result.h5", file)
     resumed = pipeline.run(file, tmp_path / "part", Progress(), earlier=earlier).wear
     assert resumed is not None
-    np.testing.assert_array_equal(resumed.depth, whole.depth)
+    np.testing.assert_array_equal(resumed.depth, full.depth)
     stored = store.load(tmp_path / "part").wear
     assert stored is not None
     np.testing.assert_allclose(stored.memory["next_depth"], [4e-6, 8e-6, 16e-6])

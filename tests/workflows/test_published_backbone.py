@@ -32,11 +32,11 @@ def test_ours_stands_at_the_published_amplitudes_that_it_has_reached(tmp_path: P
     published = published_backbone(given(tmp_path, TABLE))
     assert published is not None
     a = np.geomspace(1e-7, 5e-5, 60)
-    found = SimpleNamespace(converged=a > 0, modal_amplitude=a, frequency=200 - np.log10(a), damping=1e-3 + 0 * a)
-    said = backbones.differences_from(found, published)
-    assert said["source"] == "others"
-    assert [row["modal_amplitude"] for row in said["rows"]] == [1e-6, 1e-5]
-    last = said["rows"][-1]
+    curve = SimpleNamespace(converged=a > 0, modal_amplitude=a, frequency=200 - np.log10(a), damping=1e-3 + 0 * a)
+    message = backbones.differences_from(curve, published)
+    assert message["source"] == "others"
+    assert [row["modal_amplitude"] for row in message["rows"]] == [1e-6, 1e-5]
+    last = message["rows"][-1]
     assert (last["frequency_hz"], last["damping"], last["shift"]) == (99.0, 2e-3, pytest.approx(-0.01))
     assert last["our_frequency_hz"] == pytest.approx(205.0)
     assert last["our_shift"] == pytest.approx(205 / 206 - 1)

@@ -34,11 +34,11 @@ def test_the_scan_gives_radius_and_table(scene: Path):
     found = td.studies.asperities(scene.parent / "scan.txt", **scales).asperities
     assert read.numbers["radius"] == pytest.approx(found.radius, rel=1e-12)
     np.testing.assert_allclose(np.array(read.table), found.table(), rtol=1e-12)
-    given = scene_file.read(str(scene), [NO_TABLE, *FACES]).scene.joints["lap"]
-    assert given.numbers["radius"] == pytest.approx(1.36493e-3)  # what the file says is kept
-    assert given.table == read.table
-    own = scene_file.read(str(scene), FACES).scene.joints["lap"]
-    assert own.table == scene_file.read("brb_flat").scene.joints["lap"].table
+    inputs = scene_file.read(str(scene), [NO_TABLE, *FACES]).scene.joints["lap"]
+    assert inputs.numbers["radius"] == pytest.approx(1.36493e-3)  # what the file says is kept
+    assert inputs.table == read.table
+    base = scene_file.read(str(scene), FACES).scene.joints["lap"]
+    assert base.table == scene_file.read("brb_flat").scene.joints["lap"].table
 
 
 @pytest.mark.parametrize(

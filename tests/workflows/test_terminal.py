@@ -22,10 +22,10 @@ from tribodyn.workflows.run import progress
 def test_an_unknown_command_is_answered_with_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         cli.main(["fly"])
-    said = capsys.readouterr().err
+    message = capsys.readouterr().err
     assert stop.value.code == 2
     for name in cli.WORDS:
-        assert re.search(rf"\b{name}\b", said), name
+        assert re.search(rf"\b{name}\b", message), name
 
 
 def test_quiet_prints_nothing_and_the_log_has_every_line(

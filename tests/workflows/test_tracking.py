@@ -74,14 +74,14 @@ def test_a_fold_against_the_load_is_that_of_a_branch_traced_anew(
     arguments = ["--against", "load", "--from", "1", "--to", "1.4", "--fold", "2", "--out", str(tmp_path), "--json"]
     code, out, err = leave(["curve", "track", lifting, *arguments], capsys)
     assert code == 0, err
-    found = json.loads(out)
-    assert (found["kind"], found["against"], found["end"]) == ("fold", "load factor", "reached load factor 1.4")
+    record = json.loads(out)
+    assert (record["kind"], record["against"], record["end"]) == ("fold", "load factor", "reached load factor 1.4")
     balance = modelling.build(read(lifting), Progress()).balance
     for at in (0, -1):
-        loaded = balance.with_load(found["value"][at])
+        loaded = balance.with_load(record["value"][at])
         branch = arc_length.follow(loaded, 2 * np.pi * 0.6, 2 * np.pi * 0.1)
         folds = branch.frequency[list(branch.folds)]
-        assert np.abs(folds / found["frequency_hz"][at] - 1).min() < 1e-8
+        assert np.abs(folds / record["frequency_hz"][at] - 1).min() < 1e-8
     assert (tmp_path / "track.csv").read_text().startswith("value,frequency_hz,amplitude_m")
     assert (tmp_path / "track.png").is_file()
 
@@ -97,11 +97,11 @@ def test_peaks_are_those_of_the_problem_made_anew(
     arguments = ["--against", against, "--from", start, "--to", stop, "--points", "3", "--out", str(tmp_path)]
     code, out, err = leave(["curve", "track", "beam", *sets, *arguments, "--json"], capsys)
     assert code == 0, err
-    found = json.loads(out)
-    assert len(found["value"]) == 3
+    record = json.loads(out)
+    assert len(record["value"]) == 3
     file = read("beam", SMALL)
     balance = modelling.build(file, Progress()).balance
-    last = found["value"][-1]
+    last = record["value"][-1]
     if against == "load":
         balance = balance.with_load(last)
     elif against == "gap":
@@ -112,8 +112,8 @@ def test_peaks_are_those_of_the_problem_made_anew(
     else:
         balance = balance.with_contact(balance.contact.with_friction_scaled(last))
     peak = settings.peak_of(file.scene).first(balance)
-    assert found["frequency_hz"][-1] == pytest.approx(peak.state.omega / (2 * np.pi), rel=1e-5)
-    assert found["amplitude_m"][-1] == pytest.approx(peak.amplitude, rel=1e-5)
+    assert record["frequency_hz"][-1] == pytest.approx(peak.state.omega / (2 * np.pi), rel=1e-5)
+    assert record["amplitude_m"][-1] == pytest.approx(peak.amplitude, rel=1e-5)
 
 
 def test_a_wear_of_one_is_the_end_of_the_worn_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -124,9 +124,9 @@ def test_a_wear_of_one_is_the_end_of_the_worn_result(tmp_path: Path, capsys: pyt
     arguments = ["--against", "wear", "--worn", str(tmp_path), "--from", "0", "--to", "1", "--points", "4"]
     code, out, err = leave(["curve", "track", "beam", *sets, *arguments, "--out", str(tmp_path), "--json"], capsys)
     assert code == 0, err
-    found = json.loads(out)
+    record = json.loads(out)
     for at, row in ((0, 0), (-1, -1)):
-        assert found["frequency_hz"][at] == pytest.approx(result.wear.omega[row] / (2 * np.pi), rel=2e-5)
+        assert record["frequency_hz"][at] == pytest.approx(result.wear.omega[row] / (2 * np.pi), rel=2e-5)
 
 
 @pytest.mark.parametrize(

@@ -40,9 +40,9 @@ SMALL = [
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("verify")
-    pipeline.run(read("beam", SMALL), made, Progress())
-    return made
+    built = tmp_path_factory.mktemp("verify")
+    pipeline.run(read("beam", SMALL), built, Progress())
+    return built
 
 
 def test_the_command_compares_and_draws(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -61,33 +61,33 @@ def test_the_command_compares_and_draws(folder: Path, capsys: pytest.CaptureFixt
 def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = {}
+    result = {}
     for hertz in (900, 640):
         code, out, err = leave(["verify", str(folder), "--at", f"{hertz}Hz", "--steps", "128", "--json"], capsys)
         assert code == 0, err
-        found[hertz] = json.loads(out)
-    assert not found[900]["stable"]
-    assert abs(found[900]["outputs"]["response"]["difference"]) > 0.1
-    assert found[900]["left_alone"]["periods"] == verification.LEFT_ALONE
-    assert found[640]["left_alone"] is None
-    assert found[640]["stable"]
-    assert abs(found[640]["outputs"]["response"]["difference"]) < 0.1
+        result[hertz] = json.loads(out)
+    assert not result[900]["stable"]
+    assert abs(result[900]["outputs"]["response"]["difference"]) > 0.1
+    assert result[900]["left_alone"]["periods"] == verification.LEFT_ALONE
+    assert result[640]["left_alone"] is None
+    assert result[640]["stable"]
+    assert abs(result[640]["outputs"]["response"]["difference"]) < 0.1
 
 
 def with_harmonics(folder: Path, highest: int, hertz: float) -> verification.TimeComparison:
     override = [f"harmonics.kept={list(range(highest + 1))}"]
-    found = verify(store.load(folder / "result.h5"), hertz, overrides=override, steps=512, progress=Progress())
-    assert isinstance(found, verification.TimeComparison)
-    return found
+    result = verify(store.load(folder / "result.h5"), hertz, overrides=override, steps=512, progress=Progress())
+    assert isinstance(result, verification.TimeComparison)
+    return result
 
 
 @pytest.mark.slow
 def test_more_harmonics_come_closer(folder: Path) -> None:
     """The differences fall with the harmonics kept: this beam lifts and slides, its third harmonic is near a mode."""
-    found = [with_harmonics(folder, highest, 680.0).integration for highest in (3, 9, 15)]
-    assert all(one.motion.periodic for one in found)
-    waveform = [one.waveform["response"] for one in found]
-    energy = [abs(one.energy) for one in found]
+    rows = [with_harmonics(folder, highest, 680.0).integration for highest in (3, 9, 15)]
+    assert all(item.motion.periodic for item in rows)
+    waveform = [item.waveform["response"] for item in rows]
+    energy = [abs(item.energy) for item in rows]
     assert waveform[0] > 1.1 * waveform[1] > 4 * waveform[2]
     assert energy[0] > 2 * energy[1] > 4 * energy[2]
     assert waveform[2] < 0.06
@@ -101,12 +101,12 @@ def test_a_machine_leaves_an_unstable_motion(folder: Path) -> None:
     600 periods from this start and from rest, at 256 and 1024 steps: 5.09 and 5.19 J, spread 0.28 J.
     """
     comparison = with_harmonics(folder, 15, 700.0)
-    alone = comparison.left_alone
-    assert alone is not None
+    single = comparison.left_alone
+    assert single is not None
     assert not comparison.stable
-    assert alone.energy == pytest.approx(5.15, rel=0.05)
-    assert 0.1 < alone.energy_spread < 0.6
-    assert alone.drift > 0.1
+    assert single.energy == pytest.approx(5.15, rel=0.05)
+    assert 0.1 < single.energy_spread < 0.6
+    assert single.drift > 0.1
     assert any(line.startswith("left alone") for line in comparison.lines())
 
 
@@ -127,22 +127,22 @@ def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest
 def test_worn_states_are_compared_along_a_run(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wear = store.load(folder / "result.h5").wear
     assert wear is not None
-    given = ["verify", str(folder), "--states", "2", "--steps", "128"]
-    code, out, err = leave([*given, "--json"], capsys)
+    inputs = ["verify", str(folder), "--states", "2", "--steps", "128"]
+    code, out, err = leave([*inputs, "--json"], capsys)
     assert code == 0, err
-    found = json.loads(out)
-    rows = [state["row"] for state in found["states"]]
+    record = json.loads(out)
+    rows = [state["row"] for state in record["states"]]
     assert rows == [0, 1]  # nearest to a quarter and three quarters of the cycles
-    for row, state in zip(rows, found["states"], strict=True):
+    for row, state in zip(rows, record["states"], strict=True):
         compared = state["comparison"]
         assert state["energy_of_run_J"] == pytest.approx(wear.energy[row].sum())
         assert compared["energy"]["balance_J"] == pytest.approx(state["energy_of_run_J"], rel=1e-6)
         assert compared["frequency_hz"] == pytest.approx(wear.frequency[row])
-    assert Path(found["files"][0]).is_file()
-    code, out, _ = leave(given, capsys)
+    assert Path(record["files"][0]).is_file()
+    code, out, _ = leave(inputs, capsys)
     assert code == 0
     assert out.strip().splitlines()[-4].split()[:2] == ["row", "cycles"]  # head, two states, picture
-    assert f"{found['states'][1]['comparison']['energy']['difference']:.2%}" in out
+    assert f"{record['states'][1]['comparison']['energy']['difference']:.2%}" in out
 
 
 @pytest.mark.parametrize(

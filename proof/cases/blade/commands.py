@@ -42,8 +42,8 @@ def blade(
     if work == "study":
         written = blade_study.run(scene, overrides, folder, highest, report_progress, blade_study.Extent())
     else:
-        found = mistuned(scene, overrides=(*FEW_SECTORS, *overrides))
-        written = found.write(folder)
-        print(f"largest amplitude over that of blades alike: {found.amplification:.3f}")
+        result = mistuned(scene, overrides=(*FEW_SECTORS, *overrides))
+        written = result.write(folder)
+        print(f"largest amplitude over that of blades alike: {result.amplification:.3f}")
     for path in written:
         print(path)

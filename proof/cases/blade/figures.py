@@ -53,9 +53,9 @@ def forces_figure(curves: Mapping[float, Curve]) -> Figure:
     """
     with plot_axes(7.6, 4.8) as (figure, axes):
         kilo = 1e-3
-        one, first = next(iter(curves.items()))
+        item, first = next(iter(curves.items()))
         hertz = first.references.omega / (2 * np.pi)
-        scale = MILLI / (kilo * one)
+        scale = MILLI / (kilo * item)
         axes.plot(hertz, scale * first.references.free, "--", color=GREY, lw=1.2, zorder=3, label="free")
         axes.plot(hertz, scale * first.references.stuck, ":", color=INK, lw=1.2, zorder=3, label="stuck")
         for (force, curve), color in zip(curves.items(), shades(len(curves)), strict=True):

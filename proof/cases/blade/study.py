@@ -152,8 +152,8 @@ def trade(runs: Sequence[Worn]) -> list[TradeRow]:
     """Table 4.4: the reference of the depth is the finest published step, that of the life the finest of all."""
     depths = {run.step: 1e3 * float(run.history.depth[-1].max()) for run in runs}
     lives = {run.step: cycles_to_preload(run.history) or float("nan") for run in runs}
-    known = [step for step in depths if step in PUBLISHED]
-    reference = depths[min(known or depths)]
+    rows = [step for step in depths if step in PUBLISHED]
+    reference = depths[min(rows or depths)]
     return [
         TradeRow(
             step=run.step,
@@ -207,8 +207,8 @@ def frames(history: WearHistory, count: int) -> np.ndarray:
     """Rows of a run that are drawn: the first, the last worn, and others at equal depth between them."""
     last = int(np.count_nonzero(history.cycles_in_step)) - 1
     depth = history.depth[: last + 1].mean(axis=1)
-    wanted = np.linspace(depth[0], depth[-1], count)
-    return np.unique([int(np.abs(depth - value).argmin()) for value in wanted])
+    expected = np.linspace(depth[0], depth[-1], count)
+    return np.unique([int(np.abs(depth - value).argmin()) for value in expected])
 
 
 def run(
@@ -234,11 +234,11 @@ def run(
             say(f"reduced against full sector, {state}: frequencies at most {100 * np.abs(errors).max():.2g} % off")
         if highest is not None:
             chosen = [o for o in extent.orders if o <= blade.n_sectors // 2]
-            speeds, found = campbell(blade, highest, extent.speeds, chosen)
-            met = {o: critical_speeds(speeds, found["stuck"][:, i, 0], o) for i, o in enumerate(chosen)}
-            for order, at in met.items():
+            speeds, outcome = campbell(blade, highest, extent.speeds, chosen)
+            matched = {o: critical_speeds(speeds, outcome["stuck"][:, i, 0], o) for i, o in enumerate(chosen)}
+            for order, at in matched.items():
                 say(f"engine order {order}: critical at {', '.join(f'{60 * s:.0f}' for s in at) or 'no'} rpm, stuck")
-            drawn["campbell"] = plot_campbell(speeds, found, chosen, met)
+            drawn["campbell"] = plot_campbell(speeds, outcome, chosen, matched)
         by_order = orders(blade, extent)
         drawn["orders"] = blade_figures.orders_figure(by_order)
         by_load = forces(blade, extent)
@@ -247,8 +247,8 @@ def run(
         rows = [("engine_order", float(order), *curve.peak()) for order, curve in by_order.items()]
         rows += [("force_N", force * load, *curve.peak()) for load, curve in by_load.items()]
         _write_table(folder / "peaks.csv", ("what", "value", "peak_Hz", "peak_m"), rows)
-        for what, value, hertz, height in rows:
-            say(f"{what} {value:g}: peak {hertz:.1f} Hz, {1e3 * height:.3f} mm")
+        for kind, value, hertz, height in rows:
+            say(f"{kind} {value:g}: peak {hertz:.1f} Hz, {1e3 * height:.3f} mm")
         runs, balance = wear_runs(blade, extent, say)
         shown = next((run for run in runs if run.step == extent.shown), runs[0])
         result = result_of(file, blade.part, balance, shown.history)

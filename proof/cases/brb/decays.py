@@ -42,7 +42,7 @@ def decays(beam: Beam) -> dict[str, Any]:
         beam.model(FITTED, fitted)[1],
         beam.model(FIRST_FIT, parabola)[1],
     ]
-    found: dict[str, Any] = {"stated": STATED}
+    result: dict[str, Any] = {"stated": STATED}
     for name, (number, low, high) in MODES.items():
         at = np.geomspace(high, low, 13)[:7]  # below, a decrement is a quotient of small differences
         hertz, damping = np.empty((2, len(models), len(at)))
@@ -56,10 +56,10 @@ def decays(beam: Beam) -> dict[str, Any]:
         rate = 2 * np.pi * hertz * damping
         step = np.diff(-np.log(at)) * 2 / (rate[:, 1:] + rate[:, :-1])
         seconds = np.concatenate([np.zeros((len(models), 1)), np.cumsum(step, axis=1)], axis=1)
-        found[name] = {"modal_mass_kg": mass, "amplitude_m": at.tolist()}
+        result[name] = {"modal_mass_kg": mass, "amplitude_m": at.tolist()}
         for word, rows in (("frequency_hz", hertz), ("damping", damping), ("seconds", seconds)):
             ends = {"predicted": rows[0], "least": rows.min(0), "most": rows.max(0)}
-            found[name][word] = {key: values.tolist() for key, values in ends.items()}
+            result[name][word] = {key: values.tolist() for key, values in ends.items()}
         for j in range(0, len(at), 2):
             f = hertz[:, j]
             print(
@@ -69,7 +69,7 @@ def decays(beam: Beam) -> dict[str, Any]:
                 flush=True,
             )
         print(f"{name} modal mass {mass:.3f} kg")
-    return found
+    return result
 
 
 if __name__ == "__main__":

@@ -63,10 +63,13 @@ class Beam:
         gap = opening(self.plain.interface.points, values["ends"], values["sides"])
         file, model = self.model(values, gap, "backbone.modal_amplitude=[2.2e-5, 4.6e-4]", "backbone.points=12")
         return {
-            one.measured.control: np.log(
-                [one.computed.frequency / one.measured.frequency, one.computed.damping / one.measured.damping]
+            compare_run.measured.control: np.log(
+                [
+                    compare_run.computed.frequency / compare_run.measured.frequency,
+                    compare_run.computed.damping / compare_run.measured.damping,
+                ]
             )
-            for one in compare_runs(file, model, self.measured, Progress())
+            for compare_run in compare_runs(file, model, self.measured, Progress())
         }
 
 
@@ -80,10 +83,10 @@ def main(path: Path, names: list[str]) -> None:
     def residual(unknowns: np.ndarray) -> np.ndarray:
         if np.array_equal(unknowns, last[0]):
             return last[1]
-        found = (beam.off(values(unknowns))["force"] / WANTED).ravel()
-        last[:] = unknowns.copy(), found
-        print({n: f"{v:.4g}" for n, v in values(unknowns).items()}, f"cost {found @ found / 2:.3f}", flush=True)
-        return found
+        result = (beam.off(values(unknowns))["force"] / WANTED).ravel()
+        last[:] = unknowns.copy(), result
+        print({n: f"{v:.4g}" for n, v in values(unknowns).items()}, f"cost {result @ result / 2:.3f}", flush=True)
+        return result
 
     def slopes(unknowns: np.ndarray) -> np.ndarray:
         at, steps = residual(unknowns), np.diag([DIFFERENCE[n] for n in names])
@@ -91,11 +94,11 @@ def main(path: Path, names: list[str]) -> None:
 
     first, wide = (np.log([table[n] for n in names]) for table in (START, FACTOR))
     scale = [DIFFERENCE[n] for n in names]
-    found = least_squares(residual, first, slopes, (first - wide, first + wide), x_scale=scale, max_nfev=3)
-    spread = np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)))
+    result = least_squares(residual, first, slopes, (first - wide, first + wide), x_scale=scale, max_nfev=3)
+    spread = np.sqrt(np.diag(np.linalg.pinv(result.jac.T @ result.jac)))
     for name, error in zip(names, spread, strict=True):
-        print(f"{name} {values(found.x)[name]:.4g}, standard error {100 * error:.0f} % if the data's are 0.3 and 15 %")
-    for control, rows in beam.off(values(found.x)).items():
+        print(f"{name} {values(result.x)[name]:.4g}, standard error {100 * error:.0f} % if the data's are 0.3 and 15 %")
+    for control, rows in beam.off(values(result.x)).items():
         for hertz, damping in 100 * np.expm1(rows.T):
             print(f"constant {control}: frequency {hertz:+.2f} %, damping {damping:+.1f} %")
     print(f"{process_time():.0f} s of processor")

@@ -60,8 +60,8 @@ def curve(backbone: dict[str, Any]) -> dict[str, np.ndarray]:
     omega, phi = 2 * np.pi * hertz, tip / q * shape(DRIVEN)
     a, force = omega**2 * phi * q, 2 * zeta * omega**2 * q / phi
     logs = np.log(ACCELERATION)
-    found = {"frequency_hz": hertz, "damping": zeta, "force_N": force}
-    return {name: np.exp(np.interp(logs, np.log(a), np.log(values))) for name, values in found.items()}
+    result = {"frequency_hz": hertz, "damping": zeta, "force_N": force}
+    return {name: np.exp(np.interp(logs, np.log(a), np.log(values))) for name, values in result.items()}
 
 
 def decay(backbone: dict[str, Any], seconds: np.ndarray) -> np.ndarray:
@@ -78,15 +78,15 @@ def predict(path: Path) -> None:
     """Solve the backbones and write the prediction."""
     import tribodyn as td
 
-    found = {
+    result = {
         name: td.studies.backbone(SCENE, overrides=[*BEFORE_THE_FIT, *over]).record() for name, over in VARIANTS.items()
     }
-    few = [*BEFORE_THE_FIT, "backbone.points=4", "backbone.modal_amplitude=[2e-8,2e-6]"]
+    small = [*BEFORE_THE_FIT, "backbone.points=4", "backbone.modal_amplitude=[2e-8,2e-6]"]
     higher = {
-        name: td.studies.backbone(SCENE, overrides=[*few, f"backbone.mode={mode}"]).record()["frequency_hz"][0]
+        name: td.studies.backbone(SCENE, overrides=[*small, f"backbone.mode={mode}"]).record()["frequency_hz"][0]
         for name, mode in HIGHER.items()
     }
-    curves = {name: curve(one) for name, one in found.items()}
+    curves = {name: curve(item) for name, item in result.items()}
     seconds = np.array([0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0])
     record: dict[str, Any] = {
         "assumed": ASSUMED,
@@ -96,13 +96,13 @@ def predict(path: Path) -> None:
         "higher_modes_hz": higher,
     }
     for name in ("frequency_hz", "damping", "force_N"):
-        all_of = np.array([one[name] for one in curves.values()])
+        all_of = np.array([item[name] for item in curves.values()])
         record[name] = {
             "predicted": all_of[0].tolist(),
             "least": all_of.min(0).tolist(),
             "most": all_of.max(0).tolist(),
         }
-    falls = np.array([decay(one, seconds) for one in found.values()])
+    falls = np.array([decay(item, seconds) for item in result.values()])
     record["decay_m"] = {"predicted": falls[0].tolist(), "least": falls.min(0).tolist(), "most": falls.max(0).tolist()}
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
@@ -147,11 +147,11 @@ def _fitted(control: str, run: str, points: np.ndarray) -> Resonance:
         amount = np.linalg.lstsq(basis, measured, rcond=None)[0]
         return basis @ amount - measured, amount
 
-    found = least_squares(lambda p: fit(p)[0].view(float), [0.0, np.log(3e-3)], x_scale=[1e-3, 1.0])
-    left, amount = fit(found.x)
+    result = least_squares(lambda p: fit(p)[0].view(float), [0.0, np.log(3e-3)], x_scale=[1e-3, 1.0])
+    remaining, amount = fit(result.x)
     return Resonance(
-        control, run, float(hertz[top] * (1 + found.x[0])), float(np.exp(found.x[1])), float(1 / np.abs(amount[0])),
-        float(a[top]), float(force[top]), float(np.sqrt(np.mean(np.abs(left) ** 2)) / np.abs(measured).max()),
+        control, run, float(hertz[top] * (1 + result.x[0])), float(np.exp(result.x[1])), float(1 / np.abs(amount[0])),
+        float(a[top]), float(force[top]), float(np.sqrt(np.mean(np.abs(remaining) ** 2)) / np.abs(measured).max()),
     )  # fmt: skip
 
 
@@ -159,34 +159,42 @@ def compare(path: Path, measured: Path, picture: Path) -> None:
     """Print the measurement beside the prediction, and draw both."""
     from matplotlib import pyplot as plt
 
-    said = json.loads(path.read_text(encoding="utf-8"))
-    at = np.log(said["acceleration_m_s2"])
+    record = json.loads(path.read_text(encoding="utf-8"))
+    at = np.log(record["acceleration_m_s2"])
     print("control run   m/s2     Hz   predicted  damping %  predicted (range)   force N  predicted   mass kg  misfit")
-    for one in resonances(measured):
-        inside = np.log(one.acceleration) <= at[-1]
-        hertz, zeta, least, most, force = (
-            float(np.exp(np.interp(np.log(one.acceleration), at, np.log(said[name][kind])))) if inside else np.nan
+    for row in resonances(measured):
+        inside = np.log(row.acceleration) <= at[-1]
+        hertz, zeta, least, largest, force = (
+            float(np.exp(np.interp(np.log(row.acceleration), at, np.log(record[name][kind])))) if inside else np.nan
             for name, kind in (
                 ("frequency_hz", "predicted"), ("damping", "predicted"), ("damping", "least"), ("damping", "most"),
                 ("force_N", "predicted"),
             )
         )  # fmt: skip
         print(
-            f"{one.control:8} {one.run} {one.acceleration:7.1f} {one.frequency_hz:7.2f} {hertz:8.2f} "
-            f"{100 * one.damping:9.3f} {100 * zeta:9.3f} ({100 * least:.2f} to {100 * most:.2f}) "
-            f"{one.force:8.3f} {force:8.3f} {one.mass:9.2f} {one.misfit:8.3f}"
+            f"{row.control:8} {row.run} {row.acceleration:7.1f} {row.frequency_hz:7.2f} {hertz:8.2f} "
+            f"{100 * row.damping:9.3f} {100 * zeta:9.3f} ({100 * least:.2f} to {100 * largest:.2f}) "
+            f"{row.force:8.3f} {force:8.3f} {row.mass:9.2f} {row.misfit:8.3f}"
         )
-    figure, both = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-    for axes, name, label in zip(both, ("frequency_hz", "damping"), ("frequency / Hz", "damping ratio"), strict=True):
-        axes.fill_between(said["acceleration_m_s2"], said[name]["least"], said[name]["most"], alpha=0.2)
-        axes.plot(said["acceleration_m_s2"], said[name]["predicted"], label="predicted, with its range")
+    figure, two_results = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    for axes, name, label in zip(
+        two_results, ("frequency_hz", "damping"), ("frequency / Hz", "damping ratio"), strict=True
+    ):
+        axes.fill_between(record["acceleration_m_s2"], record[name]["least"], record[name]["most"], alpha=0.2)
+        axes.plot(record["acceleration_m_s2"], record[name]["predicted"], label="predicted, with its range")
         for control, mark in (("force", "o"), ("response", "s")):
-            runs = [one for one in resonances(measured) if one.control == control]
-            values = [getattr(one, name) for one in runs]
-            axes.plot([one.acceleration for one in runs], values, mark, ms=4, label=f"measured, constant {control}")
+            runs = [row for row in resonances(measured) if row.control == control]
+            values = [getattr(row, name) for row in runs]
+            axes.plot(
+                [row.acceleration for row in runs],
+                values,
+                mark,
+                ms=4,
+                label=f"measured, constant {control}",
+            )
         axes.set(xscale="log", xlabel="acceleration of the driven point / (m/s²)", ylabel=label)
-    both[1].set_yscale("log")
-    both[0].legend(fontsize=8)
+    two_results[1].set_yscale("log")
+    two_results[0].legend(fontsize=8)
     figure.savefig(picture, dpi=150)
 
 

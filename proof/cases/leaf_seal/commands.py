@@ -44,14 +44,14 @@ def leaf(
         print(line, file=sys.stderr if as_json else sys.stdout, flush=True)
 
     if work == "study":
-        whole = study.whole(folder, resume, tell)
-        said, record = whole.text(), whole.record()
+        full = study.whole(folder, resume, tell)
+        message, record = full.text(), full.record()
     elif work == "accuracy":
-        found = accuracy.compute(folder)
-        said, record = found.text(), found.record()
+        computed = accuracy.compute(folder)
+        message, record = computed.text(), computed.record()
     else:
-        one = (
+        item = (
             fit.of_scene(read_scene("leaf_seal_thesis").mesh_scene) if work == "check" else fit.search(report_progress)
         )
-        said, record = fit.as_text(one), one.record()
-    print(json.dumps(record, indent=2) if as_json else said)
+        message, record = fit.as_text(item), item.record()
+    print(json.dumps(record, indent=2) if as_json else message)

@@ -55,9 +55,9 @@ def response_figure(response: LeafResponse, low: float, high: float) -> Figure:
                 lower = 2 if values[points[1]] < values[points[3]] else 4  # neighbours on two branches
                 for number, point in enumerate(points, start=1):
                     axes.plot(branch.frequency[point], values[point], "o", color=INK, ms=4)
-                    beside = (-3, -13) if number == lower else (5, 4)
+                    neighbour = (-3, -13) if number == lower else (5, 4)
                     axes.annotate(
-                        str(number), (branch.frequency[point], values[point]), beside, textcoords="offset points"
+                        str(number), (branch.frequency[point], values[point]), neighbour, textcoords="offset points"
                     )
             moving.set(yscale="log", ylabel="µm")
             moving.set_ylim(0.5 * height.min(), 3 * height.max())
@@ -126,7 +126,7 @@ def history_figure(response: LeafResponse, points: Sequence[int], names: Sequenc
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.7 * len(points) + 2.2, 5.6), layout="constrained")
         grid = figure.subplots(2, len(points), sharex=True, squeeze=False)
-        for (above, below), point, name in zip(grid.T, points, names, strict=True):
+        for (above, lower), point, name in zip(grid.T, points, names, strict=True):
             outputs = MICRO * branch.response[point] @ functions.T
             for output, color in zip(TITLES, (BLUE, ORANGE, GREEN), strict=True):
                 above.plot(
@@ -134,9 +134,9 @@ def history_figure(response: LeafResponse, points: Sequence[int], names: Sequenc
                 )
             _, force = balance.history(response.state(point))
             for (label, pair), color in zip(pairs.items(), (BLUE, GREEN, RED), strict=True):
-                below.plot(shares, np.append(force[pair, 0], force[pair, 0, 0]), color=color, label=label)
+                lower.plot(shares, np.append(force[pair, 0], force[pair, 0, 0]), color=color, label=label)
             above.set_title(name, fontsize=10, fontweight="normal")
-            below.set_xlabel("time / period")
+            lower.set_xlabel("time / period")
         grid[0, 0].set_ylabel("displacement z / µm")
         grid[1, 0].set_ylabel("contact force / N")
         for axes in grid[:, -1]:
@@ -147,7 +147,7 @@ def history_figure(response: LeafResponse, points: Sequence[int], names: Sequenc
 def chosen_pairs(response: LeafResponse) -> dict[str, int]:
     """Pairs whose force is shown: the middle of the upper patch, the middle and an end of the lower one."""
     points, pairs = response.part.interface.points, response.part.pairs
-    found = {}
+    result = {}
     for label, face, end in (
         ("upper, middle", "upper_contact", False),
         ("lower, middle", "lower_contact", False),
@@ -155,8 +155,8 @@ def chosen_pairs(response: LeafResponse) -> dict[str, int]:
     ):
         x, y = points[pairs[face], 0], points[pairs[face], 1]
         score = -x if end else np.abs(x) + 1e-3 * np.abs(y - y.mean())
-        found[label] = pairs[face].start + int(np.argmin(score))
-    return found
+        result[label] = pairs[face].start + int(np.argmin(score))
+    return result
 
 
 def summary_figure(records: Sequence[Record]) -> Figure:
@@ -169,9 +169,9 @@ def summary_figure(records: Sequence[Record]) -> Figure:
         panels = figure.subplots(2, 4).ravel()
         for axes, (group, members) in zip(panels, groups.items(), strict=False):
             colors = mpl.colormaps["viridis"](np.linspace(0, 0.9, len(members)))
-            for color, one in zip(colors, members, strict=True):
-                label = one.case.label if one.complete else f"{one.case.label}: incomplete"
-                draw_curve(axes, one.frequency, one.stable, MICRO * one.amplitude, color, lw=1.3, label=label)
+            for color, member in zip(colors, members, strict=True):
+                label = member.case.label if member.complete else f"{member.case.label}: incomplete"
+                draw_curve(axes, member.frequency, member.stable, MICRO * member.amplitude, color, lw=1.3, label=label)
             axes.set(yscale="log", title=group, xlabel="frequency / Hz")
             axes.legend(fontsize=7)
         amplitudes = MICRO * np.concatenate([record.amplitude for record in records if len(record.amplitude)])
@@ -190,7 +190,7 @@ def draw_seconds(axes: Any, groups: Mapping[str, Sequence[Record]]) -> None:
     total = 0.0
     for place, (group, members) in enumerate(groups.items()):
         axes.text(0.03, place, group, fontsize=8, transform=axes.get_yaxis_transform(), va="center")
-        seconds = [one.numbers["seconds"] for one in members if "seconds" in one.numbers]
+        seconds = [member.numbers["seconds"] for member in members if "seconds" in member.numbers]
         axes.plot(seconds, [place] * len(seconds), "o", color=BLUE, ms=5, alpha=0.7)
         total += sum(seconds)
     axes.set(title=f"seconds, in all {total:.0f}", xlabel="processor time of model and curve / s")

@@ -102,8 +102,8 @@ class Fit:
         """Ratios, errors and dimensions for machines."""
         columns = {}
         for name, ours, errors in zip(PUBLISHED, self.columns / self.unit, self.errors, strict=True):
-            told = [error if ratio else None for ratio, error in zip(PUBLISHED[name], errors.tolist(), strict=True)]
-            columns[name] = {"published": PUBLISHED[name], "ours": ours.tolist(), "error": told}
+            rows = [error if ratio else None for ratio, error in zip(PUBLISHED[name], errors.tolist(), strict=True)]
+            columns[name] = {"published": PUBLISHED[name], "ours": ours.tolist(), "error": rows}
         return {
             "columns": columns, "rms": self.rms, "unit_hz": self.unit, "pin_N_per_m": self.spring,
             "contact_N_per_m": self.contact, "geometry": dict(self.parameters),
@@ -140,9 +140,9 @@ def relative_errors(ratios: np.ndarray) -> np.ndarray:
 def reduced_leaf(parameters: Dimensions) -> JointSprings:
     """The leaf of the scene with other dimensions, by the same chain as a run of the scene."""
     units = {"angle": "rad", **dict.fromkeys(LENGTHS, "m")}
-    said = [f"geometry.{name}={value!r} {units[name]}" for name, value in parameters.items() if name in units]
-    said.append(f"geometry.pin_column={int(parameters['pin_column'])}")
-    return joint_springs(read_scene("leaf_seal_thesis", said))
+    rows = [f"geometry.{name}={value!r} {units[name]}" for name, value in parameters.items() if name in units]
+    rows.append(f"geometry.pin_column={int(parameters['pin_column'])}")
+    return joint_springs(read_scene("leaf_seal_thesis", rows))
 
 
 def dimensions(scene: MeshScene) -> Dimensions:
@@ -155,25 +155,25 @@ def of_scene(scene: MeshScene) -> Fit:
     parameters = dimensions(scene)
     spring = next(iter(scene.springs.values())).stiffness
     contact = scene.contact.normal_stiffness or 0.0
-    found = columns(reduced_leaf(parameters), spring, contact)
-    unit = least_squares(lambda u: _counted(found / u[0]), [found[0, 2]], x_scale=found[0, 2]).x[0]
-    return Fit(parameters, spring, contact, float(unit), found)
+    result = columns(reduced_leaf(parameters), spring, contact)
+    unit = least_squares(lambda u: _counted(result / u[0]), [result[0, 2]], x_scale=result[0, 2]).x[0]
+    return Fit(parameters, spring, contact, float(unit), result)
 
 
 def stiffnesses(leaf: JointSprings, mass: float) -> tuple[float, float, float, np.ndarray]:
     """Unit frequency [Hz], spring and contact stiffness [N/m] that suit a leaf best, and the (28,) errors left."""
-    alone = columns(leaf, 0.0, 0.0)[0]
-    unit = np.exp(np.mean(np.log(alone[2:] / _RATIOS[0, 2:])))
+    single = columns(leaf, 0.0, 0.0)[0]
+    unit = np.exp(np.mean(np.log(single[2:] / _RATIOS[0, 2:])))
     turn = (2 * np.pi * unit) ** 2 * mass
 
     def errors(logarithms: np.ndarray) -> np.ndarray:
-        one, spring, contact = np.exp(logarithms)
-        return _counted(columns(leaf, spring, contact) / one)
+        item, spring, contact = np.exp(logarithms)
+        return _counted(columns(leaf, spring, contact) / item)
 
     start = np.log([unit, _RATIOS[1, 1] ** 2 * turn / 2, _RATIOS[2, 0] * _RATIOS[2, 1] * turn])
-    found = least_squares(errors, start, x_scale=0.1, max_nfev=12)
-    one, spring, contact = np.exp(found.x)
-    return float(one), float(spring), float(contact), found.fun
+    result = least_squares(errors, start, x_scale=0.1, max_nfev=12)
+    item, spring, contact = np.exp(result.x)
+    return float(item), float(spring), float(contact), result.fun
 
 
 def _counted(ratios: np.ndarray) -> np.ndarray:
@@ -190,7 +190,7 @@ def doubt(one: Fit, other: Fit) -> float:
 
 def chosen(own: Fit, others: Sequence[Fit]) -> Fit:
     """The scene's own leaf, or the best of the others where it fits better by more than two standard errors."""
-    best = min(others, key=lambda one: one.rms)
+    best = min(others, key=lambda item: item.rms)
     return best if own.rms - best.rms > 2 * doubt(own, best) else own
 
 
@@ -201,8 +201,8 @@ def fit(scene: MeshScene, pin_column: int, start: Sequence[float] | None = None,
     Every shape gets its own best unit and stiffnesses, so that only the shape is searched for.
     """
     first = dimensions(scene)
-    lower, usual, upper, scale = (np.array(column) for column in zip(*SHAPE.values(), strict=True))
-    begin = usual if start is None else np.clip(start, lower, upper)
+    lower, typical, upper, scale = (np.array(column) for column in zip(*SHAPE.values(), strict=True))
+    begin = typical if start is None else np.clip(start, lower, upper)
 
     def parameters(shape: np.ndarray) -> Dimensions:
         angle, height, patch, pin, seat = (float(value) for value in shape)
@@ -216,11 +216,11 @@ def fit(scene: MeshScene, pin_column: int, start: Sequence[float] | None = None,
         volume = p["angle"] * p["radius"] * p["height"] * p["thickness"]
         return p, leaf, stiffnesses(leaf, scene.material.density * volume)
 
-    found = least_squares(
+    result = least_squares(
         lambda shape: solved(shape)[2][3], begin, bounds=(lower, upper), x_scale=scale, diff_step=DIFFERENCE,
         max_nfev=max_steps, ftol=1e-4,
     )  # fmt: skip
-    p, leaf, (unit, spring, contact, _) = solved(found.x)
+    p, leaf, (unit, spring, contact, _) = solved(result.x)
     return Fit(p, spring, contact, unit, columns(leaf, spring, contact))
 
 
@@ -238,19 +238,19 @@ def search(tell: Callable[[str], None]) -> Fit:
     scene = read_scene("leaf_seal_thesis").mesh_scene
     with threadpool_limits(1):
         first = dimensions(scene)
-        own = fit(scene, int(first["pin_column"]), shape_of(first))
-        tell(f"from the scene's own leaf: {own.line()}")
-        others = []
+        base = fit(scene, int(first["pin_column"]), shape_of(first))
+        tell(f"from the scene's own leaf: {base.line()}")
+        remaining = []
         for column in PIN_COLUMNS:
-            others.append(fit(scene, column))
-            tell(f"afresh, pins in column {column}: {others[-1].line()}")
-        found, best = chosen(own, others), min(others, key=lambda one: one.rms)
-        verdict = "is kept" if found is own else "gives way"
+            remaining.append(fit(scene, column))
+            tell(f"afresh, pins in column {column}: {remaining[-1].line()}")
+        result, best = chosen(base, remaining), min(remaining, key=lambda item: item.rms)
+        verdict = "is kept" if result is base else "gives way"
         tell(
-            f"the best of these is {100 * (own.rms - best.rms):.2f} points better than the scene's own, which "
-            f"{verdict}: the standard error of that is {100 * doubt(own, best):.2f} points (jackknife)"
+            f"the best of these is {100 * (base.rms - best.rms):.2f} points better than the scene's own, which "
+            f"{verdict}: the standard error of that is {100 * doubt(base, best):.2f} points (jackknife)"
         )
-    return found
+    return result
 
 
 def as_text(found: Fit) -> str:

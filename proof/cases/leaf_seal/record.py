@@ -108,7 +108,7 @@ def save(record: Record, scene: Scene, folder: Path) -> None:
     """Write a record; a kill at any moment leaves the old file or the new one."""
     path = file_of(record.case, folder)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with write_whole(path) as new, new.open("wb") as file:
+    with write_whole(path) as updated, updated.open("wb") as file:
         np.savez(
             file,
             scene=scene.model_dump_json(),
@@ -122,10 +122,10 @@ def save(record: Record, scene: Scene, folder: Path) -> None:
 def load(case: Case, scene: Scene, folder: Path) -> Record | None:
     """The record of a configuration as it is kept; None where there is none of the same scene."""
     try:
-        with np.load(file_of(case, folder)) as kept:
-            if str(kept["scene"]) != scene.model_dump_json():
+        with np.load(file_of(case, folder)) as loaded:
+            if str(loaded["scene"]) != scene.model_dump_json():
                 return None
-            numbers = json.loads(str(kept["numbers"]))
-            return Record(case, numbers, kept["frequency"], kept["amplitude"], kept["stable"])
+            numbers = json.loads(str(loaded["numbers"]))
+            return Record(case, numbers, loaded["frequency"], loaded["amplitude"], loaded["stable"])
     except (OSError, KeyError, ValueError, zipfile.BadZipFile):
         return None

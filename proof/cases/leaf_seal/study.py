@@ -64,9 +64,9 @@ def study(
     records: list[Record] = []
     for case in chosen:
         scene = read_scene("leaf_seal_thesis", case.overrides).scene
-        kept = leaf_record.load(case, scene, folder / KEPT) if resume else None
-        record = kept if kept is not None and kept.complete else solve(case)
-        if record is not kept:
+        saved = leaf_record.load(case, scene, folder / KEPT) if resume else None
+        record = saved if saved is not None and saved.complete else solve(case)
+        if record is not saved:
             leaf_record.save(record, scene, folder / KEPT)
         drawn = case.group in MAPS or not records
         records.append(record if drawn else replace(record, response=None))  # a model is some megabytes

@@ -98,7 +98,7 @@ def compute(file: SceneFile, tell: Callable[[str], None]) -> Study:
         tell("prescribed height")
         heights = tuple(_height(rig, share * rig.height) for share in (0.0, 1 / 3, 2 / 3, 1.0, 4 / 3))
         tell("energy per cycle against shaker force")
-        cycles = {kept: _energies(rig.with_harmonics(kept)) for kept in READINGS}
+        cycles = {saved: _energies(rig.with_harmonics(saved)) for saved in READINGS}
         stiffness = heights[-1].preload / heights[-1].height
         tight = rig.with_height(STUCK_PRELOAD / stiffness).cycle()
         runs = tuple(wear_down(rig, shift, tell) for shift in MATING_HEIGHTS)
@@ -131,9 +131,9 @@ def _energies(rig: Rig) -> dict[float, Cycle]:
 
 def apart(rig: Rig, references: References) -> float:
     """Largest relative difference of the response of faces held apart to that of the linear open rig."""
-    loose, some = rig.with_mating_height(-APART), slice(None, None, len(references.omega) // 8)
-    found = np.array([loose.cycle(float(omega / (2 * np.pi))).amplitude for omega in references.omega[some]])
-    return float(np.max(np.abs(found / references.free[some] - 1)))
+    loose, subset = rig.with_mating_height(-APART), slice(None, None, len(references.omega) // 8)
+    values = np.array([loose.cycle(float(omega / (2 * np.pi))).amplitude for omega in references.omega[subset]])
+    return float(np.max(np.abs(values / references.free[subset] - 1)))
 
 
 def _stage(rig: Rig, run: RigWear, share: float, tell: Callable[[str], None]) -> Stage:

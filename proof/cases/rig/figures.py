@@ -46,19 +46,19 @@ def draw(study: Study, folder: Path) -> list[Path]:
 
 def energy_against_force(study: Study) -> Figure:
     """Table 5.3: energy per cycle and sliding range against shaker force."""
-    figure, (left, right) = _axes(9.0, 3.8, 2)
+    figure, (remaining, right) = _axes(9.0, 3.8, 2)
     force = list(published.TABLE_5_3)
-    for kept, style in zip(READINGS, ("o-", "s:"), strict=True):
-        cycles = study.cycles[kept]
-        name = f"ours, harmonics 0 to {kept[-1]}"
-        left.plot(force, [MICRO * cycles[f].energy for f in force], style, color=BLUE, ms=4, label=name)
+    for saved, style in zip(READINGS, ("o-", "s:"), strict=True):
+        cycles = study.cycles[saved]
+        name = f"ours, harmonics 0 to {saved[-1]}"
+        remaining.plot(force, [MICRO * cycles[f].energy for f in force], style, color=BLUE, ms=4, label=name)
         right.plot(force, [2 * MICRO * cycles[f].slip for f in force], style, color=BLUE, ms=4, label=name)
-    for axes, column in ((left, 0), (right, 1)):
+    for axes, column in ((remaining, 0), (right, 1)):
         axes.plot(force, [MICRO * row[column] for row in published.TABLE_5_3.values()], label="experiment", **MARKS)
         axes.set(yscale="log", xlabel="shaker force / N")
-    left.set(ylabel="energy per cycle / µJ", title="Table 5.3: 290 Hz, 31 N")
+    remaining.set(ylabel="energy per cycle / µJ", title="Table 5.3: 290 Hz, 31 N")
     right.set(ylabel="sliding range / µm")
-    left.legend(fontsize=9)
+    remaining.legend(fontsize=9)
     return figure
 
 
@@ -85,13 +85,13 @@ def contact_area_maps(study: Study) -> Figure:
 def total_wear(study: Study) -> Figure:
     """Figure 5.27: total wear when the preload is lost."""
     run = study.runs[0]
-    along, across = 1e3 * run.points.T
+    path, across = 1e3 * run.points.T
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     axes = figure.add_subplot(projection="3d")
     corners = study.patch.faces
     triangles = np.concatenate([corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)])
     height = -MICRO * run.history.depth[-1]
-    shown = axes.plot_trisurf(across, along, height, triangles=triangles, cmap=WEAR_MAP + "_r", lw=0.2)
+    shown = axes.plot_trisurf(across, path, height, triangles=triangles, cmap=WEAR_MAP + "_r", lw=0.2)
     figure.colorbar(shown, ax=axes, label="total wear / µm", shrink=0.7)
     axes.set(xlabel="sliding direction / mm", ylabel="along the beam / mm", yticks=[-1, 0, 1])
     axes.set_title("Figure 5.27: total wear", loc="left")
@@ -132,18 +132,18 @@ def loops(study: Study) -> Figure:
 
 def preload(study: Study) -> Figure:
     """Figure 5.29: preload against friction work and against cycles, at rest and under vibration."""
-    figure, both = _axes(10.0, 4.2, 2)
+    figure, two_results = _axes(10.0, 4.2, 2)
     ends = (published.WORK * 1e-3, published.LIFE_MEASURED * MILLION)
-    for axes, end, of in zip(both, ends, (_kilojoules, _millions), strict=True):
+    for axes, end, of in zip(two_results, ends, (_kilojoules, _millions), strict=True):
         for run, colour in zip(study.runs, COLOURS, strict=True):
             axes.plot(of(run), run.rest, color=colour, label=_name(run))
             axes.plot(of(run), run.history.preload, ":", color=colour, lw=1.2)
         axes.plot([], [], ":", color=GREY, label="mean force while shaking")
         axes.plot([0, end], [published.PRELOAD, 0], label="experiment, start and loss", **MARKS)
         axes.set_ylim(bottom=0)
-    both[0].set(xlabel="friction work / kJ", ylabel="preload / N", title="Figure 5.29: preload")
-    both[1].set(xlabel="million cycles")
-    both[1].legend(fontsize=8)
+    two_results[0].set(xlabel="friction work / kJ", ylabel="preload / N", title="Figure 5.29: preload")
+    two_results[1].set(xlabel="million cycles")
+    two_results[1].legend(fontsize=8)
     return figure
 
 

@@ -30,8 +30,8 @@ class Modes:
 
     def assigned(self, published: Sequence[tuple[str, float]]) -> np.ndarray:
         """The frequency [Hz] of ours that stands for each published mode: of its kind, and nearest on the whole."""
-        wanted = [(KINDS.index(kind), value) for kind, value in published]
-        return self.frequency[match_kinds(self.frequency, self.share, wanted)]
+        expected = [(KINDS.index(kind), value) for kind, value in published]
+        return self.frequency[match_kinds(self.frequency, self.share, expected)]
 
 
 @dataclass(frozen=True)

@@ -98,13 +98,13 @@ def _row(change: str, file: SceneFile, tell: Callable[[str], None]) -> Life:
 
 def _pressed(rig: Rig) -> Rig:
     """The rig with its platform at the height of the published preload; raises NoSolution where there is none."""
-    found = fit_height(rig)
-    if abs(found.after[0] / PRELOAD - 1) > CLOSE:
+    result = fit_height(rig)
+    if abs(result.after[0] / PRELOAD - 1) > CLOSE:
         raise NoSolution(
             f"no height of the platform that is looked at makes {PRELOAD:.3g} N of preload, the nearest makes "
-            f"{found.after[0]:.3g} N"
+            f"{result.after[0]:.3g} N"
         )
-    return rig.with_height(found.named()["platform"])
+    return rig.with_height(result.named()["platform"])
 
 
 def as_text(rows: Sequence[Life]) -> str:
@@ -121,8 +121,8 @@ def as_text(rows: Sequence[Life]) -> str:
             _number(row.sliding, 1e6).rjust(12),
             _number(row.height, 1e6).rjust(13),
         )
-        why = "" if row.outcome == LOST else f": {row.outcome}"
-        lines.append(" ".join(numbers) + f"  {row.change or 'the scene'}{why}")
+        reason = "" if row.outcome == LOST else f": {row.outcome}"
+        lines.append(" ".join(numbers) + f"  {row.change or 'the scene'}{reason}")
     return "\n".join(lines)
 
 

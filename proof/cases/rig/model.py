@@ -112,8 +112,8 @@ class Rig:
 
     def model(self) -> Model:
         """The nonlinear problem."""
-        found = build(self.file, Progress())
-        return replace(found, balance=found.balance.with_gap(found.balance.contact.gap + self.opening))
+        built = build(self.file, Progress())
+        return replace(built, balance=built.balance.with_gap(built.balance.contact.gap + self.opening))
 
     def at_rest(self) -> Cycle:
         """The static state: the rig without its shaker force."""
@@ -165,6 +165,6 @@ def check(file: SceneFile) -> None:
 
 def _reaction(file: SceneFile, model: Model, state: State) -> float:
     """Static force at the prescribed nodes of a scene in a solved state of its model [N]."""
-    given, found = next(iter(file.mesh_scene.prescribed.values())), model.balance.model.reaction
+    inputs, found = next(iter(file.mesh_scene.prescribed.values())), model.balance.model.reaction
     assert found is not None
-    return float(found.force(given.displacement, state.cycle.force[:, :, 0]).sum())
+    return float(found.force(inputs.displacement, state.cycle.force[:, :, 0]).sum())

@@ -76,8 +76,8 @@ def table(study: Study) -> Table:
 
 def _check(run: RigWear, stage: Stage) -> Check:
     time = stage.in_time
-    cycles, rest = float(run.history.cycles[stage.row]), float(run.rest[stage.row])
-    return Check(cycles, rest, stage.cycle.energy, time.energy, time.amplitude, time.outcome)
+    cycles, remainder = float(run.history.cycles[stage.row]), float(run.rest[stage.row])
+    return Check(cycles, remainder, stage.cycle.energy, time.energy, time.amplitude, time.outcome)
 
 
 def _frequencies(study: Study) -> list[Number]:
@@ -92,7 +92,7 @@ def _frequencies(study: Study) -> list[Number]:
 
 
 def _energies(study: Study) -> list[Number]:
-    all_, fewer = (study.cycles[kept] for kept in READINGS)
+    all_, fewer = (study.cycles[saved] for saved in READINGS)
     numbers = []
     for force, (energy, range_) in published.TABLE_5_3.items():
         cycle, other = all_[force], fewer[force]
@@ -110,8 +110,8 @@ def _lives(study: Study) -> list[Number]:
     numbers = [
         Number("preload", "at the start", "N", published.PRELOAD, float(first.rest[0]), "platform height fitted to it")
     ]
-    others = f", harmonics 0 to {READINGS[1][-1]}"
-    for run, reading in (*((run, "") for run in study.runs), (study.other, others)):
+    remaining = f", harmonics 0 to {READINGS[1][-1]}"
+    for run, reading in (*((run, "") for run in study.runs), (study.other, remaining)):
         name = f"mating height {1e6 * run.shift:+.0f} um{reading}"
         end = "to loss of preload" if run.lost else f"so far ({run.end})"
         start = f"{run.rest[0]:.1f} N at the start"
@@ -161,8 +161,8 @@ def _sliding_share(status: np.ndarray) -> float:
 
 def _first_contact(study: Study) -> list[Trend]:
     run = study.runs[0]
-    force, along = run.history.normal_force[0], run.points[:, 0]
-    inner, outer = (force[np.isclose(along, end)].sum() / force.sum() for end in (along.min(), along.max()))
+    force, path = run.history.normal_force[0], run.points[:, 0]
+    inner, outer = (force[np.isclose(path, end)].sum() / force.sum() for end in (path.min(), path.max()))
     touching = float((run.history.status[0] != SEPARATES) @ run.area / run.area.sum())
     return [
         Trend("first contact", "at the two ridges along the long edges", f"{inner + outer:.0%} of the normal force",
@@ -201,8 +201,8 @@ def _evolution(study: Study) -> list[Trend]:
 def _fall(run: RigWear, start: float, stop: float) -> float:
     """Fall of the preload at rest [N] per million cycles, up to the end of the run."""
     stop = min(stop, float(run.history.cycles[-1]))
-    here, there = run.at_cycles(np.array([start, stop]), run.rest)
-    return float((here - there) / max((stop - start) / MILLION, 1e-9))
+    current, refined = run.at_cycles(np.array([start, stop]), run.rest)
+    return float((current - refined) / max((stop - start) / MILLION, 1e-9))
 
 
 def upper_peak(stage: Stage) -> tuple[float, float] | None:
@@ -219,22 +219,23 @@ def upper_peak(stage: Stage) -> tuple[float, float] | None:
 
 def _responses(stages: Sequence[Stage], study: Study) -> list[Trend]:
     peaks = [upper_peak(stage) for stage in stages]
-    said = ", ".join("none" if peak is None else f"{peak[0]:.0f}" for peak in peaks)
-    found = [peak[0] for peak in peaks if peak is not None]
+    text = ", ".join("none" if peak is None else f"{peak[0]:.0f}" for peak in peaks)
+    rows = [peak[0] for peak in peaks if peak is not None]
     last = stages[-1]
     good = solved(last.response)
     hertz, height = last.response.frequency[good], last.response.amplitude("response")[good]
     order = np.argsort(hertz)
     free = np.interp(hertz, study.references.omega / (2 * np.pi), study.references.free)
-    near = float(np.median(np.abs(height / free - 1)))
+    nearby = float(np.median(np.abs(height / free - 1)))
     top = float(hertz[order][np.argmax(height[order])])
     open_ = float(study.references.omega[np.argmax(study.references.free)] / (2 * np.pi))
     return [
-        Trend("response", "the peak near 400 Hz softens with wear", f"{said} Hz at the five stages",
-              len(found) > 1 and bool((np.diff(found) < 0).all())),
+        Trend("response", "the peak near 400 Hz softens with wear", f"{text} Hz at the five stages",
+              len(rows) > 1 and bool((np.diff(rows) < 0).all())),
         Trend("response", "ends on the open one",
-              f"largest at {top:.0f} Hz (open: {open_:.0f}), half of the points within {near:.0%} of the open response",
-              near < 0.1),
+              f"largest at {top:.0f} Hz (open: {open_:.0f}), half of the points within "
+              f"{nearby:.0%} of the open response",
+              nearby < 0.1),
     ]  # fmt: skip
 
 

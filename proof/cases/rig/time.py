@@ -31,9 +31,9 @@ def in_time(rig: Rig, cycle: Cycle) -> InTime:
     """Integrate from a solved cycle to the periodic motion nearby."""
     options = TimeOptions(STEPS, tolerance=DRIFT, max_periods=PERIODS)
     try:
-        found = verify_in_time(rig.model().balance, cycle.state, options)
+        result = verify_in_time(rig.model().balance, cycle.state, options)
     except IntegrationFailed as failure:
         return InTime(None, None, None, str(failure))
-    amplitude = found.amplitude[OUTPUT]
-    energy = float(found.motion.energy.sum())
-    return InTime(energy, found.motion.preload, amplitude, str(found.outcome), found.motion.periodic)
+    amplitude = result.amplitude[OUTPUT]
+    energy = float(result.motion.energy.sum())
+    return InTime(energy, result.motion.preload, amplitude, str(result.outcome), result.motion.periodic)

@@ -103,7 +103,7 @@ def loop(balance: HarmonicBalance, history: WearHistory, row: int) -> tuple[np.n
 
     balance : the unworn problem
     """
-    here = worn(balance, history.depth[row])
-    x, f = here.history(state_at(here, float(history.omega[row]), history.displacement[row]))
+    current = worn(balance, history.depth[row])
+    x, f = current.history(state_at(current, float(history.omega[row]), history.displacement[row]))
     share = balance.model.interface.area / balance.model.interface.area.sum()
     return np.asarray(share @ x[:, 0]), np.asarray(f[:, 0].sum(axis=0))

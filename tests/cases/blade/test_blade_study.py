@@ -36,8 +36,8 @@ def rows_of(path):
 
 
 def test_study_writes_its_tables_and_pictures(tmp_path):
-    said = []
-    paths = blade_study.run("blade_thesis", COARSE, tmp_path, 150.0, said.append, SHORT)
+    rows = []
+    paths = blade_study.run("blade_thesis", COARSE, tmp_path, 150.0, rows.append, SHORT)
     pictures = [path for path in paths if path.suffix == ".png"]
     assert {path.stem for path in pictures} == {
         "diagram", "campbell", "orders", "forces", "maps", "backbone", "cycles", "peaks",
@@ -46,13 +46,13 @@ def test_study_writes_its_tables_and_pictures(tmp_path):
         assert_not_blank(path)
     peaks = rows_of(tmp_path / "peaks.csv")
     assert [row["what"] for row in peaks] == ["engine_order"] * 2 + ["force_N"] * 2
-    little, much = (float(row["peak_Hz"]) for row in peaks[2:])
-    assert little > much  # rising excitation leaves the stuck peak towards the free one
+    little, large = (float(row["peak_Hz"]) for row in peaks[2:])
+    assert little > large  # rising excitation leaves the stuck peak towards the free one
     table = rows_of(tmp_path / "trade.csv")
     assert [float(row["step"]) for row in table] == [0.6, 0.4]
     assert {row["end"] for row in table} == {"contact lost at every pair"}
     assert (tmp_path / "trade.md").read_text(encoding="utf-8").count("\n") == 4
-    assert any("engine order 20: critical at" in line for line in said)
+    assert any("engine order 20: critical at" in line for line in rows)
 
 
 def test_diagram_of_blades_alone_and_stuck(blade):
@@ -72,7 +72,7 @@ def test_critical_speeds_are_where_the_order_meets_its_frequency():
 
 def test_speed_stiffens_and_loads(blade):
     spinning = blade.at_speed(100.0)
-    still, fast = (one.diagram([1], 1, False)[0, 0] for one in (blade, spinning))
+    still, fast = (item.diagram([1], 1, False)[0, 0] for item in (blade, spinning))
     assert fast > 1.02 * still
     assert spinning.wave().excitation.loads[0, "centrifugal"] == pytest.approx((2 * np.pi * 100) ** 2)
 
@@ -86,35 +86,35 @@ def test_highest_maximum_is_not_an_end_of_the_range(blade):
 
 def test_references_carry_the_load_of_their_curve(blade):
     """Hardly shaken the response is the stuck one, and both references grow with the load."""
-    little, more = (blade_study.respond(blade.wave().with_load(load), (150.0, 160.0), 0.01) for load in (1e-3, 1e-2))
+    little, extra = (blade_study.respond(blade.wave().with_load(load), (150.0, 160.0), 0.01) for load in (1e-3, 1e-2))
     stuck = np.interp(2 * np.pi * little.branch.frequency, little.references.omega, little.references.stuck)
     assert little.amplitude() == pytest.approx(stuck, rel=1e-4)
     for state in ("free", "stuck"):
-        assert getattr(more.references, state) == pytest.approx(10 * getattr(little.references, state), rel=1e-9)
+        assert getattr(extra.references, state) == pytest.approx(10 * getattr(little.references, state), rel=1e-9)
 
 
 def test_blades_alike_are_a_travelling_wave():
     """The wheel that the mistuned example solves, with no deviation, is the sector: same parts, same answer."""
     blade = build(scene_file.read("blade_thesis", FEWER))
-    one, wheel = blade.wave(), blade.whole_wheel()
+    item, wheel = blade.wave(), blade.whole_wheel()
     exact = newton.NewtonOptions(tolerance=1e-11)
-    mine, theirs = (newton.solve_from_rest(balance, 2 * np.pi * 1000, exact) for balance in (one, wheel))
+    mine, theirs = (newton.solve_from_rest(balance, 2 * np.pi * 1000, exact) for balance in (item, wheel))
     assert mine.outcome == theirs.outcome == CONVERGED
-    pairs = one.contact.n_pair
+    pairs = item.contact.n_pair
     for n in range(8):
-        expected = waves.at_sector(one.basis, mine.state.x, 2, 8, n)
-        found = theirs.state.x[n * pairs : (n + 1) * pairs]
-        assert np.abs(found - expected).max() < 1e-6 * np.abs(mine.state.x).max()
+        expected = waves.at_sector(item.basis, mine.state.x, 2, 8, n)
+        result = theirs.state.x[n * pairs : (n + 1) * pairs]
+        assert np.abs(result - expected).max() < 1e-6 * np.abs(mine.state.x).max()
 
 
 def test_mistuned_wheel(tmp_path, capsys):
     words = [word for text in FEWER[-3:] for word in ("--set", text)]
     cli.app(["blade", "mistuned", "--out", str(tmp_path), *words], result_action="return_value")
-    said, *paths = capsys.readouterr().out.splitlines()
+    message, *paths = capsys.readouterr().out.splitlines()
     names = ["mistuned.csv", "mistuned.png", "derivatives.csv", "derivatives.png"]
     assert sorted(path.rsplit("/", 1)[-1] for path in paths) == sorted(names)
     assert_not_blank(tmp_path / "mistuned.png")
-    amplification = float(said.split(": ")[1])
+    amplification = float(message.split(": ")[1])
     assert 1.1 < amplification < 0.5 * (1 + np.sqrt(8)) * 1.2  # Whitehead's bound for a linear wheel, and some slack
 
 

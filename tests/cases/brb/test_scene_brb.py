@@ -84,14 +84,14 @@ def test_pressed_together_the_lap_carries_the_bolts_and_six_motions_are_left(fac
 @pytest.mark.parametrize("faces", ["flat", "wavy"])
 def test_rough_faces_soften_and_damp_along_the_backbone(faces):
     balance = built(faces).balance
-    found = backbone(balance, 2e-8, 6.3e-5, 6, "response", BackboneOptions(14), modal=True)
-    assert str(found.end) == "reached the amplitude asked for"
-    assert 160 < found.frequency[0] < 210
-    assert found.frequency[-1] < 0.97 * found.frequency[0]
-    assert found.damping[0] == pytest.approx(0.087e-2, rel=0.05)  # what was measured at small amplitude
-    assert found.damping.max() > 10 * found.damping[0]
-    assert (np.diff(found.frequency) < 1e-6).all()
-    np.testing.assert_allclose(found.modal_amplitude[[0, -1]], [2e-8, 6.3e-5], rtol=1e-9)
+    result = backbone(balance, 2e-8, 6.3e-5, 6, "response", BackboneOptions(14), modal=True)
+    assert str(result.end) == "reached the amplitude asked for"
+    assert 160 < result.frequency[0] < 210
+    assert result.frequency[-1] < 0.97 * result.frequency[0]
+    assert result.damping[0] == pytest.approx(0.087e-2, rel=0.05)  # what was measured at small amplitude
+    assert result.damping.max() > 10 * result.damping[0]
+    assert (np.diff(result.frequency) < 1e-6).all()
+    np.testing.assert_allclose(result.modal_amplitude[[0, -1]], [2e-8, 6.3e-5], rtol=1e-9)
 
 
 def test_the_command_gives_rows_by_modal_amplitude(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch):
@@ -109,10 +109,10 @@ def test_the_command_gives_rows_by_modal_amplitude(capsys: pytest.CaptureFixture
     ]  # beside what is published
     code, out, err = leave(words, capsys)
     assert code == 0, err
-    said = json.loads(out)
-    rows = said["rows"]
-    assert said["published"]["source"] == "Porter and Brake 2023"
-    first, last = said["published"]["rows"][0], said["published"]["rows"][-1]
+    record = json.loads(out)
+    rows = record["rows"]
+    assert record["published"]["source"] == "Porter and Brake 2023"
+    first, last = record["published"]["rows"][0], record["published"]["rows"][-1]
     assert first["frequency_hz"] == 168.5023
     assert last["shift"] == pytest.approx(158.6675 / 168.5023 - 1)
     ours = [row["frequency_hz"] for row in rows]
@@ -128,21 +128,21 @@ def test_the_beam_rings_down_from_one_amplitude_to_the_other(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch
 ):
     """From --to down to --from, along the backbone of faces that have yielded: frequency 0.1 %, damping 3 %."""
-    model, follow, found = built("flat"), time_ring_down.ring_down, []
+    model, follow, rows = built("flat"), time_ring_down.ring_down, []
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)
-    monkeypatch.setattr(time_ring_down, "ring_down", lambda *asked: found.append(follow(*asked)) or found[-1])
+    monkeypatch.setattr(time_ring_down, "ring_down", lambda *asked: rows.append(follow(*asked)) or rows[-1])
     words = ["--from", "11um", "--to", "16um", "--points", "8", "--steps", "96", "--out", str(tmp_path), "--json"]
     code, out, err = leave(["curve", "ring-down", "brb_flat", *words], capsys)
     assert code == 0, err
-    said = json.loads(out)
-    assert said["largest_frequency_difference"] < 1e-3
-    assert said["largest_decrement_difference"] < 0.03
-    assert said["largest_decrement_difference"] < said["largest_damping_difference"]
-    assert said["end"].startswith("fell to the ")
+    record = json.loads(out)
+    assert record["largest_frequency_difference"] < 1e-3
+    assert record["largest_decrement_difference"] < 0.03
+    assert record["largest_decrement_difference"] < record["largest_damping_difference"]
+    assert record["end"].startswith("fell to the ")
     swing = np.loadtxt(tmp_path / "ring_down.csv", delimiter=",", skiprows=1)[:, 1]
     assert np.ptp(swing[:96]) / 2 == pytest.approx(16e-6, rel=0.03)
     assert 10.5e-6 < np.ptp(swing[-96:]) / 2 < 11.1e-6
-    assert found[0].last < 11.1e-6
+    assert rows[0].last < 11.1e-6
     code, out, err = leave(["curve", "ring-down", "brb_flat", "--from", "60um", "--to", "40um"], capsys)
     assert code == 2
     assert "--from below --to" in err
@@ -151,23 +151,23 @@ def test_the_beam_rings_down_from_one_amplitude_to_the_other(
 def test_references_of_a_beam_that_hangs_free_are_those_of_its_dynamic_stiffness():
     """At some frequencies, free (the halves loose) and stuck, by a direct solve of the whole matrices."""
     balance = built("plain").balance
-    found = linear_references(balance, "response", 2 * np.pi * 100, 2 * np.pi * 200)
+    result = linear_references(balance, "response", 2 * np.pi * 100, 2 * np.pi * 200)
     system, interface = balance.model.system, balance.model.interface
     B, k = np.asarray(interface.B), balance.contact.stiffness.ravel()
     force = sum(value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == 1)
     for at in (0, 137, 400):
-        w = found.omega[at]
+        w = result.omega[at]
         stuck = system.stiffness + B.T @ (k[:, None] * B)
-        for stiffness, height in ((system.stiffness, found.free), (stuck, found.stuck)):
+        for stiffness, height in ((system.stiffness, result.free), (stuck, result.stuck)):
             dynamic = stiffness - w**2 * system.mass + 1j * w * system.velocity_matrix
-            wanted = abs(system.outputs["response"] @ np.linalg.solve(dynamic, force))
-            assert height[at] == pytest.approx(wanted, rel=1e-4)
+            expected = abs(system.outputs["response"] @ np.linalg.solve(dynamic, force))
+            assert height[at] == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize("faces", ["plain", pytest.param("flat", marks=pytest.mark.slow)])
 def test_the_report_is_clicked_zoomed_and_turned(faces, chromium, tmp_path: Path, monkeypatch):
     model, name = built(faces), SCENES[faces][0]
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)
-    given = "response.frequency=['174 Hz', '178 Hz']"
-    result = td.run(name, overrides=(*COARSE, "response.points=2", given, "verdict.enabled=false"))
+    inputs = "response.frequency=['174 Hz', '178 Hz']"
+    result = td.run(name, overrides=(*COARSE, "response.points=2", inputs, "verdict.enabled=false"))
     clicked_zoomed_and_turned(chromium, name, result, tmp_path, monkeypatch)
