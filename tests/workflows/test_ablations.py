@@ -25,12 +25,14 @@ def test_a_neutral_value_acts_and_is_taken_back():
 def test_every_rule_that_is_listed_is_a_field_with_another_default():
     for place, rules in ablations.RULES.items():
         name, _, kind = place.rpartition(".")
-        known = {one.name: one.default for one in fields(getattr(import_module(f"tribodyn.hbm.{name}"), kind))}
+        fields_of_rules = {
+            one.name: one.default for one in fields(getattr(import_module(f"tribodyn.hbm.{name}"), kind))
+        }
         for rule, neutral in rules.items():
-            assert known[rule] != neutral, rule
+            assert fields_of_rules[rule] != neutral, rule
 
 
 def test_a_rule_that_finds_hidden_folds_changes_a_branch_problem():
     with ablations.without("continuation.curve_segment.CurveRules", "fold_turn", 0.0):
-        there = ablations.outcomes([18], [])
-    assert there != ablations.outcomes([18], [])
+        changed = ablations.outcomes([18], [])
+    assert changed != ablations.outcomes([18], [])

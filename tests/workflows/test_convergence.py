@@ -29,20 +29,20 @@ SMALL = (
 
 
 @pytest.fixture(scope="module")
-def found() -> Convergence:
+def converged() -> Convergence:
     names = ("modes", "newton", "interface_rank")
     return convergence.converge("beam", settings=names, overrides=(*SMALL, "wear="))
 
 
-def test_each_setting_is_held_against_where_it_tends_to(found: Convergence) -> None:
-    for ladder in found.table.ladders:
+def test_each_setting_is_held_against_where_it_tends_to(converged: Convergence) -> None:
+    for ladder in converged.table.ladders:
         assert all(row.solved.outcome == "converged" and row.solved.memory > 1e7 for row in ladder.rows)
         bounds = [ladder.bound(row, "amplitude") for row in ladder.rows]
         assert bounds[-1] == min(bounds) < 5e-3
-    exact = found.table.ladders[-1].rows[-1]
+    exact = converged.table.ladders[-1].rows[-1]
     assert np.isnan(exact.setting.size)
-    assert found.table.ladders[-1].bound(exact, "energy") == 0
-    rows = found.record()
+    assert converged.table.ladders[-1].bound(exact, "energy") == 0
+    rows = converged.record()
     assert [row["setting"] for row in rows if row["of_the_scene"]] == ["modes=4", "tolerance=1e-08", "interface_modes="]
     assert json.loads(json.dumps(rows)) == rows
 

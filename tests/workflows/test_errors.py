@@ -60,14 +60,16 @@ def rows(result: td.Result, refinement: Refinement) -> dict[str, MeasuredChange]
 
 
 def test_every_quantity_has_a_statement(small: td.Result) -> None:
-    said = small.summary()["verdict"]
-    assert tuple(said) == names_with_error()
-    for name, one in said.items():
-        assert one["stated"] == (one["status"] == Status.REPORTED), name
-        assert not one["stated"] or 0 < one["error"] <= DEFAULT.largest  # no value is stated without an error
-    assert [said[name]["stated"] for name in OF_STATE].count(True) >= 2
-    assert said["life"]["value"] is None
-    assert json.loads(json.dumps(said)) == said
+    statements = small.summary()["verdict"]
+    assert tuple(statements) == names_with_error()
+    for name, statement in statements.items():
+        assert statement["stated"] == (statement["status"] == Status.REPORTED), name
+        assert (
+            not statement["stated"] or 0 < statement["error"] <= DEFAULT.largest
+        )  # no value is stated without an error
+    assert [statements[name]["stated"] for name in OF_STATE].count(True) >= 2
+    assert statements["life"]["value"] is None
+    assert json.loads(json.dumps(statements)) == statements
 
 
 def test_single_refinements_lead_step_by_step_to_the_combined_one(small: td.Result) -> None:
@@ -99,30 +101,30 @@ def test_the_scatter_of_a_motion_in_time_and_of_its_steps_is_the_least_change_th
     def row(refinement: Refinement, relative: float) -> MeasuredChange:
         return MeasuredChange(refinement, "life", None, None, relative, "")
 
-    own = [row(Refinement.COMBINED, 0.002), row(Refinement.WEAR_STEPS, 0.01)]
-    assert judgement.total_error(own, 0.7)[0] == 0.01 > DEFAULT.total(0.002, 0.7)
-    assert judgement.total_error([own[0], row(Refinement.WEAR_STEPS, 0.005)], 0.7)[0] == DEFAULT.total(0.002, 0.7)
-    assert judgement.total_error([*own, row(Refinement.MOTION, 0.005)], 0.7)[0] == DEFAULT.total(0.01, 0.7)
-    assert judgement.total_error([*own, row(Refinement.MOTION, 0.03)], 0.7)[0] == DEFAULT.total(0.03, 0.7)
-    assert judgement.total_error([*own, row(Refinement.OTHER_MOTION, 0.06)], 0.7)[0] == pytest.approx(0.01 + 0.06)
+    changes = [row(Refinement.COMBINED, 0.002), row(Refinement.WEAR_STEPS, 0.01)]
+    assert judgement.total_error(changes, 0.7)[0] == 0.01 > DEFAULT.total(0.002, 0.7)
+    assert judgement.total_error([changes[0], row(Refinement.WEAR_STEPS, 0.005)], 0.7)[0] == DEFAULT.total(0.002, 0.7)
+    assert judgement.total_error([*changes, row(Refinement.MOTION, 0.005)], 0.7)[0] == DEFAULT.total(0.01, 0.7)
+    assert judgement.total_error([*changes, row(Refinement.MOTION, 0.03)], 0.7)[0] == DEFAULT.total(0.03, 0.7)
+    assert judgement.total_error([*changes, row(Refinement.OTHER_MOTION, 0.06)], 0.7)[0] == pytest.approx(0.01 + 0.06)
 
 
 def test_the_error_holds_against_a_finer_reference(small: td.Result) -> None:
     file = scene_file.read("beam", (*SMALL, "wear="))
     truth, outcome = reference.solved(file, 120.0)
     assert outcome == reference.MEASURED
-    for name, one in verdict_of(small).statements.items():
+    for name, statement in verdict_of(small).statements.items():
         right = truth[name]
-        if one.stated and right is not None:
-            assert one.value is not None
-            change = relative_change(one.value, right)
-            assert change < (one.error or 0.0) < 12 * max(change, DEFAULT.floor)
+        if statement.stated and right is not None:
+            assert statement.value is not None
+            change = relative_change(statement.value, right)
+            assert change < (statement.error or 0.0) < 12 * max(change, DEFAULT.floor)
 
 
 def test_the_same_scene_has_the_same_errors_in_every_digit(small: td.Result) -> None:
     """Nothing that is decided depends on a clock."""
-    first, again = verdict_of(small), verdict_of(td.run("beam", overrides=(*SMALL, "wear.max_steps=2")))
-    assert replace(again, seconds=first.seconds) == first
+    first, second = verdict_of(small), verdict_of(td.run("beam", overrides=(*SMALL, "wear.max_steps=2")))
+    assert replace(second, seconds=first.seconds) == first
 
 
 def test_an_error_that_nobody_measured_is_not_known() -> None:
@@ -136,8 +138,8 @@ def test_a_life_is_dominated_by_what_changed_it_most() -> None:
         return MeasuredChange(refinement, quantity, None, None, change, "")
 
     for quantity, expected in (("life", Refinement.COMBINED), ("energy", Refinement.WEAR_STEPS)):
-        both = [row(Refinement.COMBINED, quantity, 0.12), row(Refinement.WEAR_STEPS, quantity, 0.02)]
-        assert judgement.dominating(both) == expected
+        changes = [row(Refinement.COMBINED, quantity, 0.12), row(Refinement.WEAR_STEPS, quantity, 0.02)]
+        assert judgement.dominating(changes) == expected
 
 
 def test_what_is_above_a_limit_of_work_is_not_measured() -> None:
@@ -145,9 +147,9 @@ def test_what_is_above_a_limit_of_work_is_not_measured() -> None:
     limits = replace(DEFAULT, max_unknowns=10)
     file = scene_file.read("beam", (*TINY, "wear="))
     result = td.run(file, overrides=["verdict.enabled=false"])
-    found = judgement.judge(file, td.build(file), result, td_progress(), limits)
-    assert {found.statements[name].status for name in OF_STATE} == {Status.NOT_KNOWN}
-    assert {row.refinement for row in found.changes if row.relative} >= {Refinement.MODES, Refinement.HARMONICS}
+    verdict = judgement.judge(file, td.build(file), result, td_progress(), limits)
+    assert {verdict.statements[name].status for name in OF_STATE} == {Status.NOT_KNOWN}
+    assert {row.refinement for row in verdict.changes if row.relative} >= {Refinement.MODES, Refinement.HARMONICS}
 
 
 def td_progress() -> change_table.Progress:
@@ -161,8 +163,8 @@ def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
     assert result.summary()["life"] == combined["life"].value
     file = scene_file.read("beam", overrides)
     finer = refine.wear(refine.harmonics(refine.modes(refine.mesh(file, 2.0)[0], 2) or file, 5), 2.0)
-    there = td.run(finer, overrides=["verdict.enabled=false"])
-    assert there.summary()["life"] == pytest.approx(combined["life"].refined, rel=1e-6)
+    finer_run = td.run(finer, overrides=["verdict.enabled=false"])
+    assert finer_run.summary()["life"] == pytest.approx(combined["life"].refined, rel=1e-6)
     assert result.wear is not None
     stated(result, result.wear.unstable_share or 0.0)
 
@@ -181,29 +183,29 @@ def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
     assert verdict.worn_ratio == pytest.approx(refine.mesh(file, 1 / 1.5)[1])
     judged = replace(result, verdict=verdict)
     coarser = refine.harmonics(refine.modes(refine.mesh(file, 1 / 1.5)[0], 2) or file, 3)
-    there = td.run(coarser, overrides=["verdict.enabled=false"])
-    assert rows(judged, Refinement.COMBINED)["life"].refined == pytest.approx(there.summary()["life"], rel=1e-6)
+    coarser_run = td.run(coarser, overrides=["verdict.enabled=false"])
+    assert rows(judged, Refinement.COMBINED)["life"].refined == pytest.approx(coarser_run.summary()["life"], rel=1e-6)
     assert result.wear.growth is not None
     stated(judged, result.wear.unstable_share or 0.0)
-    left = replace(result.wear, growth=np.where(np.arange(len(result.wear.growth)) < 2, 1e-3, -1e-3))
-    assert left.unstable_share == pytest.approx(left.cycles_in_step[:2].sum() / left.cycles_in_step.sum())
+    unstable = replace(result.wear, growth=np.where(np.arange(len(result.wear.growth)) < 2, 1e-3, -1e-3))
+    assert unstable.unstable_share == pytest.approx(unstable.cycles_in_step[:2].sum() / unstable.cycles_in_step.sum())
 
 
 def test_a_refined_run_begins_at_the_peak_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     file = scene_file.read("beam", (*TINY, "wear.rule=thesis", "wear.step=1 um", "wear.max_steps=1"))
     model = td.build(file)
-    first, wanted = operating_states.unworn_state(file, model), wear_run.worn_out(file, model)
+    first, reference = operating_states.unworn_state(file, model), wear_run.worn_out(file, model)
     monkeypatch.delattr(AtPeak, "solve")
-    begun = wear_run.worn_out(file, model, start=(first.point.state.omega, first.point.state.x))
-    assert begun.amplitude == pytest.approx(wanted.amplitude, rel=1e-5)
+    from_peak = wear_run.worn_out(file, model, start=(first.point.state.omega, first.point.state.x))
+    assert from_peak.amplitude == pytest.approx(reference.amplitude, rel=1e-5)
 
 
 def stated(result: td.Result, unstable: float) -> None:
     """The life's error follows from its row by the rule, and is no less than the wear steps say of themselves."""
-    found = verdict_of(result)
-    own = DEFAULT.total(rows(result, Refinement.COMBINED)["life"].relative or 0.0, found.worn_ratio)
+    verdict = verdict_of(result)
+    combined = DEFAULT.total(rows(result, Refinement.COMBINED)["life"].relative or 0.0, verdict.worn_ratio)
     least = rows(result, Refinement.WEAR_STEPS)["life"].relative or 0.0
-    assert found.statements["life"].error == pytest.approx(max(own, least) + unstable)
+    assert verdict.statements["life"].error == pytest.approx(max(combined, least) + unstable)
 
 
 @pytest.mark.parametrize(
@@ -219,8 +221,8 @@ def stated(result: td.Result, unstable: float) -> None:
 def test_what_time_integration_finds_decides_what_is_reported(
     changes: dict[str, object], status: Status | None
 ) -> None:
-    one = MotionDifference(0.0, np.ones(2), np.ones(2), {"energy": 0.001}, 0.0, 0.0)
-    assert replace(one, **changes).judge("energy", 0.01)[0] == status  # type: ignore[arg-type]
+    comparison = MotionDifference(0.0, np.ones(2), np.ones(2), {"energy": 0.001}, 0.0, 0.0)
+    assert replace(comparison, **changes).judge("energy", 0.01)[0] == status  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("steepness", [0.0, 3.0])
@@ -228,67 +230,77 @@ def test_a_life_is_off_by_the_mean_of_its_states(steepness: float) -> None:
     """Three states stand for all, beside the cycles that the wear takes by its work in time, 3 to 7 % less."""
     done = np.linspace(0.0, 1.0, 401)
     off, rate = 0.03 + 0.04 * done[:-1], np.exp(-steepness * done[:-1])
-    taken = np.diff(done) / rate
-    cycles, left = np.cumsum(taken) - taken, np.linspace(1.0, 0.9, 400)
+    cycles_taken = np.diff(done) / rate
+    cycles, left = np.cumsum(cycles_taken) - cycles_taken, np.linspace(1.0, 0.9, 400)
     worn = np.diff(done)[:, None] * [1.0, 0.5]
-    wear = SimpleNamespace(cycles=cycles, cycles_in_step=taken, preload=left, in_time=np.zeros(400, bool), worn=worn)
+    wear = SimpleNamespace(
+        cycles=cycles, cycles_in_step=cycles_taken, preload=left, in_time=np.zeros(400, bool), worn=worn
+    )
     wear.depth = np.cumsum(worn, axis=0) - worn
     result = cast(td.Result, SimpleNamespace(wear=wear))
-    share, here = np.array([0.6, 0.4]), (0, *operating_states.later_rows(result))
-    found = [MotionDifference(cycles[i], (1 + off[i]) * share, share, {}, 0.0, 0.0) for i in here]
+    share, state_rows = np.array([0.6, 0.4]), (0, *operating_states.later_rows(result))
+    comparisons = [MotionDifference(cycles[i], (1 + off[i]) * share, share, {}, 0.0, 0.0) for i in state_rows]
     life_in_time = np.sum(np.diff(done) * (1 + off) / rate)
-    assert wear_differences(found, result) == (pytest.approx(1 - taken.sum() / life_in_time, rel=0.06), 0.0)
-    scattered = [replace(one, error=0.02) for one in found]
-    assert wear_differences(scattered, result)[0] == pytest.approx(wear_differences(found, result)[0] + 0.02)
+    assert wear_differences(comparisons, result) == (
+        pytest.approx(1 - cycles_taken.sum() / life_in_time, rel=0.06),
+        0.0,
+    )
+    scattered = [replace(comparison, error=0.02) for comparison in comparisons]
+    assert wear_differences(scattered, result)[0] == pytest.approx(wear_differences(comparisons, result)[0] + 0.02)
     elsewhere = [
-        replace(one, in_time=one.balance * [1.1, 0.85]) for one in found
+        replace(comparison, in_time=comparison.balance * [1.1, 0.85]) for comparison in comparisons
     ]  # as much work, 10 % more of it there
     assert wear_differences(elsewhere, result) == pytest.approx((0.0, 1 - 1 / 1.1))
-    at_rest = [replace(one, in_time=0.0 * share) for one in found]
+    at_rest = [replace(comparison, in_time=0.0 * share) for comparison in comparisons]
     assert wear_differences(at_rest, result)[0] == pytest.approx(1.0)  # no life ends
-    nothing = [replace(one, balance=0.0 * share) for one in at_rest]
+    nothing = [replace(comparison, balance=0.0 * share) for comparison in at_rest]
     assert wear_differences(nothing, result) == (0.0, 0.0)  # both motions rest
     wear.in_time = cycles > 0  # what was worn in time needs no balance
-    assert wear_differences(found, result)[0] < 0.001
+    assert wear_differences(comparisons, result)[0] < 0.001
 
 
 def test_small_contacts_are_integrated_in_time() -> None:
     """By default up to so many components; not where the scene says no."""
-    less = ("loads.harmonic.shake.value=2 kN", "response.frequency=['600 Hz', '2600 Hz']")
-    file = scene_file.read("beam", (*TINY[:-1], "wear=", *less))
+    smaller_load = ("loads.harmonic.shake.value=2 kN", "response.frequency=['600 Hz', '2600 Hz']")
+    file = scene_file.read("beam", (*TINY[:-1], "wear=", *smaller_load))
     result = td.run(file, overrides=["verdict.enabled=false"])
     first = operating_states.first_state(file, td.build(file).balance, result)
-    few, many = DEFAULT, replace(DEFAULT, max_time_components=1)
-    asked = [is_checked(first, *given) for given in ((None, few), (None, many), (True, many), (False, few))]
-    assert asked == [True, False, True, False]
-    one, more = (compare(state).differences for state in (first, with_more_harmonics(first, 9)))
-    assert 0.01 < one["energy"] < 1  # one harmonic beside the motion in time
-    assert more["energy"] < 0.1 * one["energy"]  # what the others change is in the combined row, and counts once
+    default_limits, small_limits = DEFAULT, replace(DEFAULT, max_time_components=1)
+    checked = [
+        is_checked(first, *case)
+        for case in ((None, default_limits), (None, small_limits), (True, small_limits), (False, default_limits))
+    ]
+    assert checked == [True, False, True, False]
+    coarse, refined = (compare(state).differences for state in (first, with_more_harmonics(first, 9)))
+    assert 0.01 < coarse["energy"] < 1  # one harmonic beside the motion in time
+    assert refined["energy"] < 0.1 * coarse["energy"]  # what the others change is in the combined row, and counts once
 
 
 def test_a_machine_that_leaves_the_balance_makes_the_error_of_a_life() -> None:
     """One harmonic alone does other work than the motion in time: that is in the errors, and no reason to refuse."""
     file = scene_file.read("beam", (*TINY[:-1], "wear.at=700 Hz", "wear.tolerance=60 %"))
     result = td.run(file)
-    aside = rows(result, Refinement.OTHER_MOTION)
-    assert set(aside) == {"life", "depth"}
-    found, life = verdict_of(result), aside["life"].relative or 0.0
+    motion_rows = rows(result, Refinement.OTHER_MOTION)
+    assert set(motion_rows) == {"life", "depth"}
+    verdict, life = verdict_of(result), motion_rows["life"].relative or 0.0
     assert life > 0
-    own = DEFAULT.total(rows(result, Refinement.COMBINED)["life"].relative or 0.0, found.worn_ratio)
+    combined = DEFAULT.total(rows(result, Refinement.COMBINED)["life"].relative or 0.0, verdict.worn_ratio)
     least = rows(result, Refinement.WEAR_STEPS)["life"].relative or 0.0
-    assert found.statements["life"].error == pytest.approx(max(own, least) + life)
+    assert verdict.statements["life"].error == pytest.approx(max(combined, least) + life)
     more_harmonics = replace(DEFAULT, harmonics=9)
     changes = changes_along_wear(file, td.build(file).balance, result, more_harmonics)
-    more = next(row.relative for row in changes if row.quantity == "life")
-    assert more != life  # beside the balance with the harmonics of the combined refinement
-    there = td.run(file, overrides=["wear.motion=time", "verdict.enabled=false"]).summary()["life"]
+    refined_change = next(row.relative for row in changes if row.quantity == "life")
+    assert refined_change != life  # beside the balance with the harmonics of the combined refinement
+    life_in_time = td.run(file, overrides=["wear.motion=time", "verdict.enabled=false"]).summary()["life"]
     balance = result.summary()["life"]
-    assert abs(balance / there - 1) < max(own, least) + life
+    assert abs(balance / life_in_time - 1) < max(combined, least) + life
 
 
 def test_an_end_of_the_range_is_no_peak() -> None:
-    said = td.run("beam", overrides=(*TINY, "wear=", "response.frequency=['500 Hz', '600 Hz']")).summary()["verdict"]
-    assert {one["status"] for one in said.values()} == {Status.ABSENT}
+    statements = td.run("beam", overrides=(*TINY, "wear=", "response.frequency=['500 Hz', '600 Hz']")).summary()[
+        "verdict"
+    ]
+    assert {statement["status"] for statement in statements.values()} == {Status.ABSENT}
 
 
 def test_the_verdict_is_kept(small: td.Result, tmp_path: Path) -> None:
@@ -309,9 +321,9 @@ def reached(tmp_path_factory: pytest.TempPathFactory) -> tuple[td.Result, ErrorB
 def test_a_bound_is_what_the_last_run_measured(reached: tuple[td.Result, ErrorBound, Path]) -> None:
     result, bound, folder = reached
     assert bound.met, bound.sentence
-    said = result.summary()["verdict"]
+    statements = result.summary()["verdict"]
     for name in ("peak_frequency", "preload"):
-        assert bound.errors[name] == said[name]["error"] <= 0.2
+        assert bound.errors[name] == statements[name]["error"] <= 0.2
     assert result.wear is None  # neither depth nor life was asked for
     assert td.load(folder).summary() == result.summary()
     assert sorted(path.name for path in (folder / "rounds").iterdir()) == [str(n) for n in range(1, bound.rounds + 1)]
@@ -320,25 +332,27 @@ def test_a_bound_is_what_the_last_run_measured(reached: tuple[td.Result, ErrorBo
 def test_a_resumed_search_repeats_no_round(reached: tuple[td.Result, ErrorBound, Path]) -> None:
     result, bound, folder = reached
     before = {path: path.stat().st_mtime_ns for path in folder.glob("rounds/*/result.h5")}
-    again = td.run_to_accuracy("beam", "20 % of peak frequency, preload", folder, overrides=TINY, resume=True)
+    resumed = td.run_to_accuracy("beam", "20 % of peak frequency, preload", folder, overrides=TINY, resume=True)
     assert {path: path.stat().st_mtime_ns for path in folder.glob("rounds/*/result.h5")} == before
-    assert (again[1], again[0].summary()) == (bound, result.summary())
+    assert (resumed[1], resumed[0].summary()) == (bound, result.summary())
 
 
-def made(changes: dict[str, dict[str, float | None]]) -> Verdict:
+def verdict_from(changes: dict[str, dict[str, float | None]]) -> Verdict:
     """A verdict from changes by refinement and quantity."""
-    table = [MeasuredChange(r, q, 1.0, 1.0, e, "made") for r, of in changes.items() for q, e in of.items()]
-    said = {}
+    table = [MeasuredChange(r, q, 1.0, 1.0, e, "changed") for r, of in changes.items() for q, e in of.items()]
+    statements = {}
     for name in names_with_error():
-        own = [row for row in table if row.quantity == name]
-        known = [row.relative for row in own if row.relative is not None]
-        error = DEFAULT.total(sum(known), 2.0) if own and len(known) == len(own) else None
+        of_quantity = [row for row in table if row.quantity == name]
+        relatives = [row.relative for row in of_quantity if row.relative is not None]
+        error = DEFAULT.total(sum(relatives), 2.0) if of_quantity and len(relatives) == len(of_quantity) else None
         status = Status.NOT_KNOWN if error is None else Status.REPORTED
-        said[name] = Statement(1.0 if own else None, error, None, status if own else Status.ABSENT, "")
-    return Verdict(said, tuple(table), 2.0, 0.0)
+        statements[name] = Statement(
+            1.0 if of_quantity else None, error, None, status if of_quantity else Status.ABSENT, ""
+        )
+    return Verdict(statements, tuple(table), 2.0, 0.0)
 
 
-def search(wanted: str, verdicts: list[Verdict]) -> tuple[ErrorBound, list[tuple[str, ...]]]:
+def search(accuracy_text: str, verdicts: list[Verdict]) -> tuple[ErrorBound, list[tuple[str, ...]]]:
     """A search whose runs have given verdicts; returns the overrides of every round, too."""
     asked: list[tuple[str, ...]] = []
 
@@ -348,12 +362,12 @@ def search(wanted: str, verdicts: list[Verdict]) -> tuple[ErrorBound, list[tuple
         return cast(td.Result, SimpleNamespace(verdict=given, harmonics=(0, 1)))
 
     file = td.read_scene("beam", ["harmonics.kept=[0, 1]"])
-    return accuracy.to_accuracy(file, wanted, run, lambda sentence: None)[1], asked
+    return accuracy.to_accuracy(file, accuracy_text, run, lambda sentence: None)[1], asked
 
 
 def test_only_what_contributes_is_refined() -> None:
-    rough = made({"harmonics": {"energy": 0.3}, "modes": {"energy": 1e-5}, "wear steps": {"life": 0.5}})
-    fine = made({"harmonics": {"energy": 0.003}, "modes": {"energy": 1e-4}})
+    rough = verdict_from({"harmonics": {"energy": 0.3}, "modes": {"energy": 1e-5}, "wear steps": {"life": 0.5}})
+    fine = verdict_from({"harmonics": {"energy": 0.003}, "modes": {"energy": 1e-4}})
     bound, rounds = search("1 % of energy", [rough, fine])
     assert bound.met
     changed = {text.partition("=")[0] for text in set(rounds[1]) - set(rounds[0])}
@@ -361,13 +375,13 @@ def test_only_what_contributes_is_refined() -> None:
 
 
 def test_scatter_of_means_in_time_is_refined_by_the_wear_steps() -> None:
-    _, rounds = search("1 % of life", [made({"statistics of the motion": {"life": 0.3}})])
+    _, rounds = search("1 % of life", [verdict_from({"statistics of the motion": {"life": 0.3}})])
     changed = {text.partition("=")[0] for text in set(rounds[1]) - set(rounds[0])}
     assert changed == {"wear.max_steps", "wear.tolerance"}
 
 
 def test_what_cannot_be_refined_is_named() -> None:
-    bound, rounds = search("1 % of energy", [made({"mesh and contact grid": {"energy": None}})])
+    bound, rounds = search("1 % of energy", [verdict_from({"mesh and contact grid": {"energy": None}})])
     assert not bound.met
     assert len(rounds) == accuracy.Rounds().most
 
@@ -379,9 +393,9 @@ def test_an_accuracy_that_means_nothing_is_refused(text: str) -> None:
 
 
 def test_an_accuracy_is_read() -> None:
-    wanted = accuracy.parsed("1 % of life and peak frequency")
-    assert wanted.error == pytest.approx(0.01)
-    assert wanted.quantities == ("life", "peak_frequency")
+    request = accuracy.parsed("1 % of life and peak frequency")
+    assert request.error == pytest.approx(0.01)
+    assert request.quantities == ("life", "peak_frequency")
 
 
 @pytest.mark.parametrize("defect", [IndexError("planted"), ValueError("planted"), AttributeError("planted")])

@@ -61,12 +61,12 @@ def series(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_pandas_reads_every_table_with_all_digits(tmp_path: Path) -> None:
-    given = result()
-    for path in formats.write(given, ["csv"], tmp_path):
+    synthetic = result()
+    for path in formats.write(synthetic, ["csv"], tmp_path):
         read = pd.read_csv(path)
-        wanted = result_tables.tables(given)[path.stem]
-        assert list(read.columns) == list(wanted)
-        for name, column in wanted.items():
+        expected = result_tables.tables(synthetic)[path.stem]
+        assert list(read.columns) == list(expected)
+        for name, column in expected.items():
             np.testing.assert_array_equal(read[name].to_numpy(), column)
     assert {"response", "wear", "wear_of_pairs", "pairs", "loops", "references", "worn_responses"} <= {
         path.stem for path in (tmp_path / "csv").iterdir()
@@ -74,45 +74,45 @@ def test_pandas_reads_every_table_with_all_digits(tmp_path: Path) -> None:
 
 
 def test_scipy_reads_the_matlab_file(tmp_path: Path) -> None:
-    given = result()
-    (path,) = formats.write(given, ["mat"], tmp_path)
+    synthetic = result()
+    (path,) = formats.write(synthetic, ["mat"], tmp_path)
     read = loadmat(path, simplify_cells=True)
-    assert given.wear is not None
-    assert given.response is not None
-    np.testing.assert_array_equal(read["wear"]["cycles"], given.wear.cycles)
-    np.testing.assert_array_equal(read["response"]["response_amplitude_m"], given.response.amplitude("response"))
+    assert synthetic.wear is not None
+    assert synthetic.response is not None
+    np.testing.assert_array_equal(read["wear"]["cycles"], synthetic.wear.cycles)
+    np.testing.assert_array_equal(read["response"]["response_amplitude_m"], synthetic.response.amplitude("response"))
     assert list(read["bifurcations"]["kind"]) == ["fold", "fold"]
     assert read["provenance"]["scene_name"] == "beam"
     assert read["facts"]["delta_max"] == 5e-3
 
 
 def test_pyuff_reads_responses_histories_and_loops(tmp_path: Path) -> None:
-    given = result()
-    (path,) = formats.write(given, ["uff"], tmp_path)
+    synthetic = result()
+    (path,) = formats.write(synthetic, ["uff"], tmp_path)
     sets = pyuff.UFF(str(path)).read_sets()
     response = next(s for s in sets if s["type"] == 58 and s["id1"].startswith("response over force, harmonic 1"))
-    assert given.response is not None
+    assert synthetic.response is not None
     assert response["func_type"] == 4
-    load = given.scene.loads.harmonic["shake"]
-    wanted = (given.response.response[:, 0, 1] - 1j * given.response.response[:, 0, 2]) / load.value
-    np.testing.assert_allclose(response["data"], wanted, rtol=1e-10, atol=1e-11 * np.abs(wanted).max())
-    np.testing.assert_allclose(response["x"], given.response.frequency, rtol=1e-5)  # single precision in the format
+    load = synthetic.scene.loads.harmonic["shake"]
+    expected = (synthetic.response.response[:, 0, 1] - 1j * synthetic.response.response[:, 0, 2]) / load.value
+    np.testing.assert_allclose(response["data"], expected, rtol=1e-10, atol=1e-11 * np.abs(expected).max())
+    np.testing.assert_allclose(response["x"], synthetic.response.frequency, rtol=1e-5)  # single precision in the format
     preload = next(s for s in sets if s.get("id1", "").startswith("preload_N"))
-    assert given.wear is not None
-    np.testing.assert_allclose(preload["data"], given.wear.preload, rtol=1e-10)
+    assert synthetic.wear is not None
+    np.testing.assert_allclose(preload["data"], synthetic.wear.preload, rtol=1e-10)
 
 
 def test_two_forces_are_no_frequency_response_function() -> None:
-    given = result()
-    loads = given.scene.loads
-    more = loads.model_copy(update={"harmonic": {**loads.harmonic, "more": loads.harmonic["shake"]}})
-    assert given.driving_force == pytest.approx(1e4)
-    assert replace(given, scene=given.scene.model_copy(update={"loads": more})).driving_force is None
+    synthetic = result()
+    loads = synthetic.scene.loads
+    harmonic_loads = loads.model_copy(update={"harmonic": {**loads.harmonic, "more": loads.harmonic["shake"]}})
+    assert synthetic.driving_force == pytest.approx(1e4)
+    assert replace(synthetic, scene=synthetic.scene.model_copy(update={"loads": harmonic_loads})).driving_force is None
 
 
 def test_paraview_reader_opens_the_series(series: Path) -> None:
-    given = result()
-    wear, patch, part = given.wear, given.patch, given.part
+    synthetic = result()
+    wear, patch, part = synthetic.wear, synthetic.patch, synthetic.part
     assert wear is not None
     assert patch is not None
     assert part is not None
@@ -129,22 +129,22 @@ def test_paraview_reader_opens_the_series(series: Path) -> None:
     grid = _read(series / "part_wear.pvd", 8)
     assert grid.n_cells == len(part.cells)
     np.testing.assert_allclose(grid.point_data["depth_on_this_face"][patch.nodes], 0.5 * wear.depth[8])
-    assert given.fields is not None
-    np.testing.assert_array_equal(grid.point_data["displacement_b1"], given.fields.displacement[2, ..., 2])
+    assert synthetic.fields is not None
+    np.testing.assert_array_equal(grid.point_data["displacement_b1"], synthetic.fields.displacement[2, ..., 2])
 
 
 def test_a_cycle_is_the_sum_of_its_harmonics(series: Path) -> None:
-    given = result()
-    assert given.fields is not None
-    terms = given.fields.displacement[1]
+    synthetic = result()
+    assert synthetic.fields is not None
+    terms = synthetic.fields.displacement[1]
     quarter = _read(series / "part_cycle_4.pvd", vtk.INSTANTS // 4)
     np.testing.assert_allclose(quarter.point_data["displacement"], terms[..., 0] + terms[..., 2], atol=1e-15)
 
 
 def test_the_contact_over_a_cycle_has_forces_and_status_of_its_instants(series: Path) -> None:
     """Read by VTK itself, as ParaView does; forces are vectors along x, y, z."""
-    given = result()
-    loops, patch = given.loops, given.patch
+    synthetic = result()
+    loops, patch = synthetic.loops, synthetic.patch
     assert loops is not None
     assert patch is not None
     listing = ElementTree.parse(series / "contact_cycle_4.pvd")
@@ -163,22 +163,22 @@ def test_the_contact_over_a_cycle_has_forces_and_status_of_its_instants(series: 
         np.einsum("pcx,px->pc", patch.frames, moved), loops.displacement[1, :, :, sample], atol=1e-15
     )
     status = vtk_to_numpy(fields.GetArray("status_now"))
-    np.testing.assert_array_equal(status, contact_states.instant_status(given, 1)[:, sample])
+    np.testing.assert_array_equal(status, contact_states.instant_status(synthetic, 1)[:, sample])
 
 
 def test_vtk_itself_reads_the_worn_part(series: Path) -> None:
-    given = result()
-    assert given.part is not None
-    assert given.wear is not None
+    synthetic = result()
+    assert synthetic.part is not None
+    assert synthetic.wear is not None
     reader = vtkXMLUnstructuredGridReader()
     reader.SetFileName(str(series / "part_wear" / "part_wear_0008.vtu"))
     reader.Update()
     grid = reader.GetOutput()
-    assert grid.GetNumberOfCells() == len(given.part.cells)
+    assert grid.GetNumberOfCells() == len(synthetic.part.cells)
     worn = vtk_to_numpy(grid.GetPointData().GetArray("worn_off"))
-    np.testing.assert_allclose(vtk_to_numpy(grid.GetPoints().GetData()) - worn, given.part.points, atol=1e-15)
-    assert np.linalg.norm(worn, axis=1).max() == pytest.approx(0.5 * given.wear.depth[8].max())
-    assert vtk_to_numpy(grid.GetFieldData().GetArray("cycles"))[0] == given.wear.cycles[8]
+    np.testing.assert_allclose(vtk_to_numpy(grid.GetPoints().GetData()) - worn, synthetic.part.points, atol=1e-15)
+    assert np.linalg.norm(worn, axis=1).max() == pytest.approx(0.5 * synthetic.wear.depth[8].max())
+    assert vtk_to_numpy(grid.GetFieldData().GetArray("cycles"))[0] == synthetic.wear.cycles[8]
 
 
 def _read(listing: Path, number: int) -> pv.DataSet:
@@ -189,27 +189,29 @@ def _read(listing: Path, number: int) -> pv.DataSet:
 
 @pytest.mark.parametrize("ending", [".xdmf", ".vtu", ".bdf"])
 def test_meshio_reads_the_worn_part(ending: str, tmp_path: Path) -> None:
-    given = result()
-    path = next(p for p in formats.write(given, ["mesh"], tmp_path, ending) if p.suffix == ending)
+    synthetic = result()
+    path = next(p for p in formats.write(synthetic, ["mesh"], tmp_path, ending) if p.suffix == ending)
     mesh = meshio.read(path)
-    assert given.part is not None
-    assert given.wear is not None
-    assert given.patch is not None
-    np.testing.assert_array_equal(mesh.cells_dict["hexahedron"], given.part.cells)
-    moved = np.abs(mesh.points - given.part.points).max(axis=1)
+    assert synthetic.part is not None
+    assert synthetic.wear is not None
+    assert synthetic.patch is not None
+    np.testing.assert_array_equal(mesh.cells_dict["hexahedron"], synthetic.part.cells)
+    displacement = np.abs(mesh.points - synthetic.part.points).max(axis=1)
     np.testing.assert_allclose(
-        moved[given.patch.nodes], 0.5 * given.wear.depth[-1], atol=1e-6 if ending == ".bdf" else 1e-14
+        displacement[synthetic.patch.nodes], 0.5 * synthetic.wear.depth[-1], atol=1e-6 if ending == ".bdf" else 1e-14
     )
     if ending != ".bdf":
-        np.testing.assert_allclose(mesh.point_data["depth_on_this_face"][given.patch.nodes], 0.5 * given.wear.depth[-1])
+        np.testing.assert_allclose(
+            mesh.point_data["depth_on_this_face"][synthetic.patch.nodes], 0.5 * synthetic.wear.depth[-1]
+        )
 
 
 def test_xarray_opens_the_result_file(tmp_path: Path) -> None:
-    given = result()
-    store.save(tmp_path / "result.h5", given)
-    assert given.wear is not None
+    synthetic = result()
+    store.save(tmp_path / "result.h5", synthetic)
+    assert synthetic.wear is not None
     with xr.open_dataset(tmp_path / "result.h5", group="wear", engine="h5netcdf") as wear:
-        np.testing.assert_array_equal(wear["depth"], given.wear.depth)
+        np.testing.assert_array_equal(wear["depth"], synthetic.wear.depth)
         assert wear["depth"].dims == ("row", "pair")
         assert wear["depth"].attrs["units"] == "m"
     tree = xr.open_datatree(tmp_path / "result.h5", engine="h5netcdf")
@@ -220,7 +222,7 @@ def test_xarray_opens_the_result_file(tmp_path: Path) -> None:
 
 def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) -> None:
     model = formats.reduced_model(small)
-    wanted = formats.arrays(model)
+    expected = formats.arrays(model)
     written = formats.write(small, ["npz", "abaqus", "op4", "matlab"], tmp_path)
     npz = foreign.read_matrices(tmp_path / "npz" / "reduced.npz")
     inp = foreign.read_matrices(
@@ -228,21 +230,23 @@ def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) ->
     )
     for read in (npz, inp):
         np.testing.assert_allclose(
-            read.stiffness.toarray(), wanted["K"], rtol=1e-12, atol=1e-12 * np.abs(wanted["K"]).max()
+            read.stiffness.toarray(), expected["K"], rtol=1e-12, atol=1e-12 * np.abs(expected["K"]).max()
         )
-        np.testing.assert_allclose(read.mass.toarray(), wanted["M"], rtol=1e-12, atol=1e-12 * np.abs(wanted["M"]).max())
-    exact = {name: (wanted[name] + wanted[name].T) / 2 for name in "MKC"}
+        np.testing.assert_allclose(
+            read.mass.toarray(), expected["M"], rtol=1e-12, atol=1e-12 * np.abs(expected["M"]).max()
+        )
+    exact = {name: (expected[name] + expected[name].T) / 2 for name in "MKC"}
     for ending, folder in (("op4", "op4"), ("mat", "matlab")):
-        again = foreign.read_matrices(tmp_path / folder / f"reduced.{ending}")
-        assert again.damping is not None
-        for name, read in zip("MKC", (again.mass, again.stiffness, again.damping), strict=True):
+        rebuilt = foreign.read_matrices(tmp_path / folder / f"reduced.{ending}")
+        assert rebuilt.damping is not None
+        for name, read in zip("MKC", (rebuilt.mass, rebuilt.stiffness, rebuilt.damping), strict=True):
             assert np.array_equal(read.toarray(), exact[name])
     op4 = read_op4(tmp_path / "op4" / "reduced.op4")
     about = json.loads((tmp_path / "op4" / "reduced.json").read_text())
-    assert np.array_equal(op4["B"].toarray(), wanted["B"])
+    assert np.array_equal(op4["B"].toarray(), expected["B"])
     for kind in ("loads", "outputs"):
         for k, name in enumerate(about[kind]):
-            assert np.array_equal(op4[kind.upper()].toarray()[:, k], wanted[f"{kind[:-1]}_{name}"])
+            assert np.array_equal(op4[kind.upper()].toarray()[:, k], expected[f"{kind[:-1]}_{name}"])
     assert npz.damping is not None
     free = np.sort(np.linalg.eigvals(np.linalg.solve(npz.mass.toarray(), npz.stiffness.toarray())).real)
     np.testing.assert_allclose(np.sqrt(free[:2]) / (2 * np.pi), small.facts.open_frequencies[:2], rtol=1e-6)
@@ -251,78 +255,78 @@ def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) ->
         lines = np.loadtxt(tmp_path / "abaqus" / f"reduced_{letter}.inp", delimiter=",")
         assert (lines[:, [1, 3]] == 1).all()
         assert (lines[:, 0] >= lines[:, 2]).all()
-        lower = np.zeros_like(wanted[letter])
+        lower = np.zeros_like(expected[letter])
         lower[lines[:, 0].astype(int) - 1, lines[:, 2].astype(int) - 1] = lines[:, 4]
-        again = lower + np.tril(lower, -1).T
-        np.testing.assert_allclose(again, wanted[letter], rtol=1e-12, atol=1e-12 * np.abs(wanted[letter]).max())
+        rebuilt = lower + np.tril(lower, -1).T
+        np.testing.assert_allclose(rebuilt, expected[letter], rtol=1e-12, atol=1e-12 * np.abs(expected[letter]).max())
     assert "STIFFNESS=K, MASS=M, VISCOUS DAMPING=C" in (tmp_path / "abaqus" / "reduced.inp").read_text()
 
 
 def two_blocks(fine: int) -> Result:
     """Two blocks one upon the other, the lower one with a mesh of its own."""
-    given = result()
-    part, below = given.part, block(fine, fine // 4, 2)
+    synthetic = result()
+    part, below = synthetic.part, block(fine, fine // 4, 2)
     assert part is not None
     lower = below.points - [0, 0, np.ptp(below.points[:, 2])]
-    both = replace(
+    blocks = replace(
         part, points=np.concatenate([lower, part.points]), cells=np.concatenate([below.cells, part.cells + len(lower)])
     )
-    assert given.patch is not None
-    patch = replace(given.patch, nodes=given.patch.nodes + len(lower))
-    return replace(given, part=both, patch=patch, facts=replace(given.facts, wear_split=0.25))
+    assert synthetic.patch is not None
+    patch = replace(synthetic.patch, nodes=synthetic.patch.nodes + len(lower))
+    return replace(synthetic, part=blocks, patch=patch, facts=replace(synthetic.facts, wear_split=0.25))
 
 
 def test_both_faces_of_a_contact_inside_the_mesh() -> None:
     """Nodes of both blocks stand at the same places."""
-    given = two_blocks(8)
-    part, patch = given.part, given.patch
+    synthetic = two_blocks(8)
+    part, patch = synthetic.part, synthetic.patch
     assert part is not None
     assert patch is not None
-    (meeting,) = faces.meetings_of(given)
+    (meeting,) = faces.meetings_of(synthetic)
     first, second = meeting.faces
     np.testing.assert_array_equal(node_of_pair(first), patch.nodes)
     np.testing.assert_allclose(part.points[node_of_pair(second)], patch.points)
     assert (second.nodes < patch.nodes.min()).all()
     assert (first.share, second.share) == (0.25, 0.75)
-    moved = faces.worn_off((meeting,), np.full(len(patch.area), 1e-3), len(part.points))
-    np.testing.assert_allclose(moved[first.nodes, 2], 0.25e-3)  # body 1 lies above, its face is worn upwards
-    np.testing.assert_allclose(moved[second.nodes, 2], -0.75e-3)
+    displacement = faces.worn_off((meeting,), np.full(len(patch.area), 1e-3), len(part.points))
+    np.testing.assert_allclose(displacement[first.nodes, 2], 0.25e-3)  # body 1 lies above, its face is worn upwards
+    np.testing.assert_allclose(displacement[second.nodes, 2], -0.75e-3)
     assert len(np.unique(faces.bodies(part))) == 2
 
 
 def test_a_face_whose_mesh_does_not_match_wears_as_the_pairs_around_its_nodes() -> None:
     """A depth that is linear over the patch is taken off every node of the other face exactly."""
-    given = two_blocks(20)
-    part, patch = given.part, given.patch
+    synthetic = two_blocks(20)
+    part, patch = synthetic.part, synthetic.patch
     assert part is not None
     assert patch is not None
-    (meeting,) = faces.meetings_of(given)
+    (meeting,) = faces.meetings_of(synthetic)
     other = meeting.faces[1]
     assert len(other.nodes) == 6 * 6  # x from 0.15 to 0.2 m in steps of 0.01 m, six nodes across
     depth = lambda at: 1e-3 + 5e-3 * (at[:, 0] - 0.15) + 0.01 * at[:, 1]  # noqa: E731
-    moved = faces.worn_off((meeting,), depth(patch.points), len(part.points))
-    np.testing.assert_allclose(moved[other.nodes, 2], -0.75 * depth(part.points[other.nodes]), rtol=1e-9)
-    assert not moved[np.setdiff1d(np.arange(len(part.points)), np.concatenate([other.nodes, patch.nodes]))].any()
+    displacement = faces.worn_off((meeting,), depth(patch.points), len(part.points))
+    np.testing.assert_allclose(displacement[other.nodes, 2], -0.75 * depth(part.points[other.nodes]), rtol=1e-9)
+    assert not displacement[np.setdiff1d(np.arange(len(part.points)), np.concatenate([other.nodes, patch.nodes]))].any()
 
 
 def test_bodies_are_drawn_apart_along_their_faces() -> None:
-    given = two_blocks(20)
-    part, patch = given.part, given.patch
+    synthetic = two_blocks(20)
+    part, patch = synthetic.part, synthetic.patch
     assert part is not None
     assert patch is not None
-    body, moved = faces.bodies(part), exploded.explosion_offsets(given)
-    between = moved[body == body[patch.nodes[0]]][0] - moved[body != body[patch.nodes[0]]][0]
+    body, offsets = faces.bodies(part), exploded.explosion_offsets(synthetic)
+    between = offsets[body == body[patch.nodes[0]]][0] - offsets[body != body[patch.nodes[0]]][0]
     np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(patch.area.sum())], atol=1e-12)
-    tied = replace(given, patch=replace(patch, faces=np.zeros((0, 4), int)))  # they touch, and no contact says so
-    moved = exploded.explosion_offsets(tied)
-    between = moved[body == body[patch.nodes[0]]][0] - moved[body != body[patch.nodes[0]]][0]
+    tied = replace(synthetic, patch=replace(patch, faces=np.zeros((0, 4), int)))  # they touch, and no contact says so
+    offsets = exploded.explosion_offsets(tied)
+    between = offsets[body == body[patch.nodes[0]]][0] - offsets[body != body[patch.nodes[0]]][0]
     np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(LENGTH * WIDTH)], atol=1e-12)
     assert not exploded.explosion_offsets(result()).any()
 
 
 def test_status_at_an_instant_is_that_of_the_force() -> None:
-    given = result()
-    loops, patch = given.loops, given.patch
+    synthetic = result()
+    loops, patch = synthetic.loops, synthetic.patch
     assert loops is not None
     assert patch is not None
     force = np.zeros((1, len(patch.area), 3, 4))  # of one state, at four instants
@@ -330,7 +334,7 @@ def test_status_at_an_instant_is_that_of_the_force() -> None:
     force[0, 1:, 2] = 10.0
     force[0, 2, 0] = 1.0
     status = contact_states.instant_status(
-        replace(given, loops=replace(loops, row=loops.row[:1], displacement=force, force=force)), 0
+        replace(synthetic, loops=replace(loops, row=loops.row[:1], displacement=force, force=force)), 0
     )
     np.testing.assert_array_equal(status[0], [1, 1, 2, 4])
     np.testing.assert_array_equal(status[1:], 1)
@@ -338,23 +342,23 @@ def test_status_at_an_instant_is_that_of_the_force() -> None:
 
 def test_every_named_contact_slips_at_its_own_friction() -> None:
     """Two contacts with 0.5 and 0.1: the same forces stick in the one and slip in the other."""
-    given = result()
-    assert given.loops is not None
-    assert given.patch is not None
-    n = len(given.patch.area)
+    synthetic = result()
+    assert synthetic.loops is not None
+    assert synthetic.patch is not None
+    n = len(synthetic.patch.area)
     table = {"group": "face", "first": "a", "second": "b"}
     first, second = (NamedContact.model_construct(**table, friction=mu) for mu in (0.5, 0.1))
     contacts = {"first": first, "second": second, "third": NamedContact.model_construct(**table)}
     force = np.zeros((1, n, 3, 2))
     force[..., 0, :], force[..., 2, :] = 1.0, 10.0
     joints = {"first": slice(0, 4), "second": slice(4, 6), "third": slice(6, n)}
-    several = replace(
-        given,
-        scene=given.scene.model_copy(update={"contact": None, "contacts": contacts}),
-        facts=replace(given.facts, joints=joints),
-        loops=replace(given.loops, row=given.loops.row[:1], displacement=force, force=force),
+    with_contacts = replace(
+        synthetic,
+        scene=synthetic.scene.model_copy(update={"contact": None, "contacts": contacts}),
+        facts=replace(synthetic.facts, joints=joints),
+        loops=replace(synthetic.loops, row=synthetic.loops.row[:1], displacement=force, force=force),
     )
-    status = contact_states.instant_status(several, 0)
+    status = contact_states.instant_status(with_contacts, 0)
     assert (status[:4] == 1).all()
     assert (status[4:6] == 2).all()
     assert (status[6:] == 1).all()

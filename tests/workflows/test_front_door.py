@@ -31,13 +31,13 @@ SMALL = {
 
 
 @pytest.fixture(scope="module")
-def told() -> list[tuple[str, float | None]]:
+def messages() -> list[tuple[str, float | None]]:
     return []
 
 
 @pytest.fixture(scope="module")
-def worn(told: list[tuple[str, float | None]]) -> td.Result:
-    return td.run("beam", overrides=SMALL, progress=lambda text, share: told.append((text, share)))
+def worn(messages: list[tuple[str, float | None]]) -> td.Result:
+    return td.run("beam", overrides=SMALL, progress=lambda text, share: messages.append((text, share)))
 
 
 def test_every_name_is_there_and_is_told_once() -> None:
@@ -85,7 +85,7 @@ def test_a_bad_scene_is_one_sentence(source: object, overrides: object, sentence
 
 
 def test_a_run_in_memory_is_that_of_the_command(
-    worn: td.Result, told: list[tuple[str, float | None]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    worn: td.Result, messages: list[tuple[str, float | None]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sets = [word for key, value in SMALL.items() for word in ("--set", f"{key}={json.dumps(value)}")]
     cli.app(["run", "beam", *sets, "--no-pictures", "--out", str(tmp_path)], result_action="return_value")
@@ -98,10 +98,10 @@ def test_a_run_in_memory_is_that_of_the_command(
     assert worn.response is not None
     assert np.array_equal(loaded.response.frequency, worn.response.frequency)
     assert loaded.summary() == td.load(tmp_path / "result.h5").summary()
-    shares = [share for text, share in told if text.startswith("frequency response") and share is not None]
+    shares = [share for text, share in messages if text.startswith("frequency response") and share is not None]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
-    assert ("wear", None) not in told
+    assert ("wear", None) not in messages
 
 
 def test_resume_and_pictures_need_a_folder() -> None:

@@ -113,16 +113,16 @@ def to_accuracy(
     for number in range(1, rounds.most + 1):
         current = file.changed(*(f"{key}={value}" for key, value in (always | added).items()))
         result = run(current, number)
-        found = result.verdict
-        assert found is not None
+        measured = result.verdict
+        assert measured is not None
         of = request.quantities or tuple(
-            name for name, statement in found.statements.items() if statement.value is not None
+            name for name, statement in measured.statements.items() if statement.value is not None
         )
         if not of:
-            raise SolverFailure(f"{file.name} has no error: {next(iter(found.statements.values())).reason}")
-        finer = {name: _finer(current, name, rounds.finer) for name in _large(found, request, of, rounds.share)}
+            raise SolverFailure(f"{file.name} has no error: {next(iter(measured.statements.values())).reason}")
+        finer = {name: _finer(current, name, rounds.finer) for name in _large(measured, request, of, rounds.share)}
         unrefined = tuple(name for name, texts in finer.items() if not texts)
-        bound = _bound(found, request, of, added, unrefined, number)
+        bound = _bound(measured, request, of, added, unrefined, number)
         say(f"round {number}: {bound.sentence}")
         if bound.met or not any(finer.values()):
             break

@@ -98,11 +98,11 @@ def _rescaled(key: str, table: Mesh, folder: Path, ratio: float) -> tuple[list[s
     """
     if not isinstance(table, DeckTable) and table.part_name is not None:
         part = parts.load(table.part_name)
-        own = part.Parameters(**table.parameters)
-        counts = parts.rescaled(part, own, ratio)
+        numbers = part.Parameters(**table.parameters)
+        counts = parts.rescaled(part, numbers, ratio)
         if not counts:
             raise Given(f"the part of [{key}] lists no counts of elements in MESH")
-        size = float(np.mean([getattr(own, name) / count for name, count in counts.items()]))
+        size = float(np.mean([getattr(numbers, name) / count for name, count in counts.items()]))
         return [f"{key}.{name}={count}" for name, count in counts.items()], size
     if not isinstance(table, BodyTable) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
         raise Given(f"the mesh of [{key}] is given")

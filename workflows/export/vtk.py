@@ -88,11 +88,11 @@ def _cycle(result: Result, state: ContactState, folder: Path) -> list[Path]:
     """The series over one period of a state; time is the share of the period."""
     written, times = [], (np.arange(INSTANTS) / INSTANTS).tolist()
     if state.field is not None and result.part is not None:
-        _, moved = over_a_cycle(result, state.field, INSTANTS)
+        _, positions = over_a_cycle(result, state.field, INSTANTS)
 
         def moving(i: int) -> Any:
             grid = part_grid(result, state)
-            grid.point_data["displacement"] = moved[i]
+            grid.point_data["displacement"] = positions[i]
             return grid
 
         written.append(
@@ -167,9 +167,9 @@ def part_grid(result: Result, state: ContactState) -> Any:
     part = result.part
     assert part is not None
     meetings = meetings_of(result)
-    moved = worn_off(meetings, state.depth, len(part.points))
-    grid = grid_of(part, part.points + moved)
-    grid.point_data["worn_off"] = moved
+    wear_displacement = worn_off(meetings, state.depth, len(part.points))
+    grid = grid_of(part, part.points + wear_displacement)
+    grid.point_data["worn_off"] = wear_displacement
     depth, contact = np.zeros(len(part.points)), np.zeros(len(part.points), np.int8)
     for meeting in meetings:
         for number, face in enumerate(meeting.faces):

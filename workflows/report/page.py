@@ -107,9 +107,9 @@ def _head(named: Sequence[tuple[str, Result]]) -> str:
     """The title block: what was run, by which program, when, how it ended, and the parts in their vibration."""
     rows, pictures = [], []
     for name, result in named:
-        given, seconds = result.provenance, result.summary()["seconds"]
-        started = given.get("started", "")[:16].replace("T", " ")
-        rows.append((name, given.get("versions", "").split(",")[0], started, f"{result.state}, {seconds:.0f} s"))
+        record, seconds = result.provenance, result.summary()["seconds"]
+        started = record.get("started", "")[:16].replace("T", " ")
+        rows.append((name, record.get("versions", "").split(",")[0], started, f"{result.state}, {seconds:.0f} s"))
         pictures += [embedded(kind, make) for kind, make in _renders(result).items() if kind == HEADING]
     title = _title(named[0][1]) if len(named) == 1 else ", ".join(name for name, _ in named)
     table = _table(rows, ("scene", "program", "started", "state"))
@@ -230,9 +230,9 @@ def _changes(result: Result) -> str:
 
 def _figures(result: Result) -> str:
     """Every figure as an embedded picture; renders only where this machine can draw them."""
-    made = [embedded(name, partial(make, result)) for name, make in plots.figures(result).items()]
-    made += [embedded(name, make) for name, make in _renders(result).items() if name != HEADING]
-    return '<div class="grid">' + "".join(made) + "</div>"
+    elements = [embedded(name, partial(make, result)) for name, make in plots.figures(result).items()]
+    elements += [embedded(name, make) for name, make in _renders(result).items() if name != HEADING]
+    return '<div class="grid">' + "".join(elements) + "</div>"
 
 
 def embedded(name: str, make: Callable[[], Figure], dpi: int = DPI) -> str:
@@ -245,14 +245,14 @@ def embedded(name: str, make: Callable[[], Figure], dpi: int = DPI) -> str:
 
 
 def _renders(result: Result) -> dict[str, Callable[[], Figure]]:
-    found = render.figures(result)
-    if not found:
+    renders = render.figures(result)
+    if not renders:
         return {}
     try:
         offscreen.check()
     except offscreen.RenderingUnavailable:
         return {}
-    return found
+    return renders
 
 
 def _viewer(number: int) -> str:
@@ -274,15 +274,15 @@ def _files(provenance: Mapping[str, str]) -> list[Path]:
 
 
 def _provenance(result: Result, path: Path | None) -> str:
-    given = result.provenance
-    changes = "".join(f" --set {json.dumps(text)}" for text in given.get("overrides", "").split("\n") if text)
-    rows = [("command", f"tribodyn run {given['scene_name']}{changes}")]
-    rows.append(("SHA-256 of the scene", hashlib.sha256(given["scene_text"].encode()).hexdigest()))
+    record = result.provenance
+    changes = "".join(f" --set {json.dumps(text)}" for text in record.get("overrides", "").split("\n") if text)
+    rows = [("command", f"tribodyn run {record['scene_name']}{changes}")]
+    rows.append(("SHA-256 of the scene", hashlib.sha256(record["scene_text"].encode()).hexdigest()))
     if path is not None:
         rows.append((f"SHA-256 of {path.name}", hashlib.sha256(path.read_bytes()).hexdigest()))
-    rows += [(f"SHA-256 of {file.name}", hashlib.sha256(file.read_bytes()).hexdigest()) for file in _files(given)]
+    rows += [(f"SHA-256 of {file.name}", hashlib.sha256(file.read_bytes()).hexdigest()) for file in _files(record)]
     rows += [
-        (key, given[key]) for key in ("versions", "python", "platform", "seed", "threads", "started") if key in given
+        (key, record[key]) for key in ("versions", "python", "platform", "seed", "threads", "started") if key in record
     ]
     rows.append(("report by", f"tribodyn {__version__}"))
     return _table(rows)

@@ -151,10 +151,12 @@ def _error_lines(statements: Mapping[str, Statement]) -> list[str]:
         unknown = statement.status == Status.NOT_KNOWN
         value = _number(quantity, statement.value, statement) if unknown else "not reported"
         lines.append(f"{quantity.label:15} {value:19} {'unknown' if unknown else ''}".rstrip())
-        why = "" if unknown else f"{statement.status.removeprefix('not reported ').strip('()')}; "
-        reasons.setdefault(f"{why}{statement.reason}".strip("; "), []).append(quantity.label)
+        status_text = "" if unknown else f"{statement.status.removeprefix('not reported ').strip('()')}; "
+        reasons.setdefault(f"{status_text}{statement.reason}".strip("; "), []).append(quantity.label)
     head = [f"{'':15} {'value':19} {'error':8} dominated by"] if lines else []
-    return head + lines + [f"{', '.join(labels)}: {why}" for why, labels in reasons.items() if why]
+    return (
+        head + lines + [f"{', '.join(labels)}: {status_text}" for status_text, labels in reasons.items() if status_text]
+    )
 
 
 def warnings(result: Result) -> Iterator[str]:

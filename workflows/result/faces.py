@@ -179,7 +179,7 @@ def _elements(part: PartMesh, nodes: np.ndarray) -> dict[int, np.ndarray]:
     node = part.cells[cell, corner]
     order = np.argsort(node, kind="stable")
     numbers, start = np.unique(node[order], return_index=True)
-    return {int(n): own for n, own in zip(numbers, np.split(cell[order], start[1:]), strict=False)}
+    return {int(n): members for n, members in zip(numbers, np.split(cell[order], start[1:]), strict=False)}
 
 
 def _wachspress(corner: np.ndarray, points: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -11,8 +11,8 @@ from tribodyn.workflows.scene import scene_file
 
 def rebuilt(result: Result, overrides: Sequence[str] = ()) -> scene_file.SceneFile:
     """The scene that a result was computed from, with further overrides."""
-    given = result.provenance
-    before = [text for text in given["overrides"].split("\n") if text]
+    record = result.provenance
+    before = [text for text in record["overrides"].split("\n") if text]
     return scene_file.parse(
-        given["scene_text"], f"{given['scene_name']}.toml", [*before, *overrides], Path(given["folder"])
+        record["scene_text"], f"{record['scene_name']}.toml", [*before, *overrides], Path(record["folder"])
     )
