@@ -201,4 +201,4 @@ def _bound(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
     stated = result.verdict
     assert stated is not None
     names = [name for name, reason in bound.reasons.items() if not reason]
-    return tuple(replace(_judged(name, stated, truth), error=bound.wanted.error) for name in names)
+    return tuple(replace(_judged(name, stated, truth), error=bound.request.error) for name in names)

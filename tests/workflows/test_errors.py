@@ -320,7 +320,7 @@ def reached(tmp_path_factory: pytest.TempPathFactory) -> tuple[td.Result, ErrorB
 
 def test_a_bound_is_what_the_last_run_measured(reached: tuple[td.Result, ErrorBound, Path]) -> None:
     result, bound, folder = reached
-    assert bound.met, bound.sentence
+    assert bound.is_satisfied, bound.sentence
     statements = result.summary()["verdict"]
     for name in ("peak_frequency", "preload"):
         assert bound.errors[name] == statements[name]["error"] <= 0.2
@@ -369,7 +369,7 @@ def test_only_what_contributes_is_refined() -> None:
     rough = verdict_from({"harmonics": {"energy": 0.3}, "modes": {"energy": 1e-5}, "wear steps": {"life": 0.5}})
     fine = verdict_from({"harmonics": {"energy": 0.003}, "modes": {"energy": 1e-4}})
     bound, rounds = search("1 % of energy", [rough, fine])
-    assert bound.met
+    assert bound.is_satisfied
     changed = {text.partition("=")[0] for text in set(rounds[1]) - set(rounds[0])}
     assert changed == {"harmonics.kept", "harmonics.samples"}
 
@@ -382,8 +382,8 @@ def test_scatter_of_means_in_time_is_refined_by_the_wear_steps() -> None:
 
 def test_what_cannot_be_refined_is_named() -> None:
     bound, rounds = search("1 % of energy", [verdict_from({"mesh and contact grid": {"energy": None}})])
-    assert not bound.met
-    assert len(rounds) == accuracy.Rounds().most
+    assert not bound.is_satisfied
+    assert len(rounds) == accuracy.Rounds().max_runs
 
 
 @pytest.mark.parametrize("text", ["", "0", "120 %", "1 % of colour", "1 % of life given harmonics", "abc"])

@@ -99,7 +99,7 @@ def test_it_is_a_column_of_studies(result: td.Result) -> None:
 def test_it_has_derivatives() -> None:
     overrides = (*SMALL, "wear=", "verdict.enabled=false")
     key = "loads.harmonic.shake.value"
-    table = td.studies.derivatives("beam", only=(key,), overrides=overrides).found
+    table = td.studies.derivatives("beam", only=(key,), overrides=overrides).derivatives
     velocity, frequency, height = (table.names.index(name) for name in (NAME, "peak_frequency", "amplitude"))
     values, slopes = table.values, table.slopes[:, 0]
     assert values[velocity] == pytest.approx(2 * np.pi * values[frequency] * values[height])

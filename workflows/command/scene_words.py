@@ -87,7 +87,7 @@ def run(
         _draw(result, folder / "pictures", report=progress.detail, complain=progress.say)
         progress.say(f"pictures  {folder / 'pictures'}")
     progress.say(f"next      tribodyn report {folder} makes one page of it, tribodyn show {folder} --verbose says all")
-    if bound is not None and not bound.met:
+    if bound is not None and not bound.is_satisfied:
         raise SolverFailure(f"{bound.sentence}; the result is kept in {path}")
 
 

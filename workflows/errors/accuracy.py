@@ -1,11 +1,10 @@
-"""From a wanted accuracy to settings that meet it: run, read the verdict, refine what contributes most, repeat."""
+"""From a requested accuracy to settings that satisfy it: run, read the verdict, refine what changes most, repeat."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from tribodyn.hbm.quantity import WearQuantity, known, load, names_with_error, with_error
 from tribodyn.refusal import Refusal, SolverFailure
@@ -25,11 +24,11 @@ Runner = Callable[[SceneFile, int], Result]
 class Rounds:
     """How a scene is refined.
 
-    most : runs; share : of the wanted error, below which the change by a refinement is left as it is
+    max_runs : after which to stop; share : of the requested error, below which a refinement is not made
     finer : elements along every edge of the next round over those of this one
     """
 
-    most: int = 8
+    max_runs: int = 8
     share: float = 0.2
     finer: float = 1.5
 
@@ -44,14 +43,14 @@ class AccuracyRequest:
 
 @dataclass(frozen=True)
 class ErrorBound:
-    """What was asked for and what the last round measured.
+    """What was requested and what the last round measured.
 
     errors : by quantity, None where not known; reasons : by quantity, why the bound is not met, empty where it is
     overrides : that the rounds have added; unrefined : refinements that contribute and could not be made
     rounds : runs made
     """
 
-    wanted: AccuracyRequest
+    request: AccuracyRequest
     errors: dict[str, float | None]
     reasons: dict[str, str]
     overrides: tuple[str, ...]
@@ -59,27 +58,24 @@ class ErrorBound:
     rounds: int
 
     @property
-    def met(self) -> bool:
-        """Whether every quantity that was asked for has an error below the wanted one."""
+    def is_satisfied(self) -> bool:
+        """Whether every requested quantity has an error below the requested one."""
         return not any(self.reasons.values())
 
     @property
     def sentence(self) -> str:
-        """Errors, the settings that gave them, and what is missed."""
+        """Errors, the settings that gave them, and what is not satisfied."""
         good = [f"{known(q).label} {self.errors[q]:.2g}" for q, reason in self.reasons.items() if not reason]
         bad = [f"{known(q).label} ({reason})" for q, reason in self.reasons.items() if reason]
         settings = f"with {', '.join(self.overrides)}" if self.overrides else "with the scene as it is"
-        text = f"error bound {self.wanted.error:g} {settings}, after {self.rounds} runs"
-        text += f"; met: {', '.join(good)}" if good else ""
-        text += f"; not met: {', '.join(bad)}" if bad else ""
+        text = f"error bound {self.request.error:g} {settings}, after {self.rounds} runs"
+        text += f"; satisfied: {', '.join(good)}" if good else ""
+        text += f"; not satisfied: {', '.join(bad)}" if bad else ""
         return text + (f"; could not be refined: {', '.join(self.unrefined)}" if self.unrefined else "")
 
 
 def parsed(text: str) -> AccuracyRequest:
-    """A wanted accuracy such as "1 %" or "1 % of life and peak frequency".
-
-    Raises  ValueError with one sentence
-    """
+    """A requested accuracy such as "1 %" or "1 % of life and peak frequency". Raises Refusal."""
     number, _, names = " ".join(text.lower().split()).rstrip(".").partition(" of ")
     try:
         error = to_si(PER_CENT.sub("%", number), "")
@@ -98,33 +94,36 @@ def parsed(text: str) -> AccuracyRequest:
 def to_accuracy(
     file: SceneFile, accuracy: str, run: Runner, say: Callable[[str], None], rounds: Rounds | None = None
 ) -> tuple[Result, ErrorBound]:
-    """Run a scene with finer and finer settings until its verdict's errors are below the wanted one.
+    """Run a scene with finer and finer settings until the errors of its verdict are below the requested one.
 
-    accuracy : as `parsed` reads it; nothing is worn where quantities are named and depth and life are not among them
+    accuracy : as `parsed` reads it; nothing is worn where quantities are named and none of them is of the wear
     run : does the run of a round, counted from 1, and keeps it; say : called with a sentence on every round
     Returns the result of the last round, and whether the bound is met
-    Raises  ValueError for an accuracy that means nothing, and what the runs raise
+    Raises  Refusal for an accuracy that means nothing, and what the runs raise
     """
     request, rounds = parsed(accuracy), rounds or Rounds()
     always = {"verdict.enabled": "true"}
     if request.quantities and not set(request.quantities) & {q.name for q in with_error(WearQuantity)}:
         always["wear"] = ""
     added: dict[str, str] = {}
-    for number in range(1, rounds.most + 1):
+    for number in range(1, rounds.max_runs + 1):
         current = file.changed(*(f"{key}={value}" for key, value in (always | added).items()))
         result = run(current, number)
         measured = result.verdict
         assert measured is not None
-        of = request.quantities or tuple(
+        quantities = request.quantities or tuple(
             name for name, statement in measured.statements.items() if statement.value is not None
         )
-        if not of:
+        if not quantities:
             raise SolverFailure(f"{file.name} has no error: {next(iter(measured.statements.values())).reason}")
-        finer = {name: _finer(current, name, rounds.finer) for name in _large(measured, request, of, rounds.share)}
+        finer = {
+            name: refine.overrides_of(current, name, rounds.finer)
+            for name in _large(measured, request, quantities, rounds.share)
+        }
         unrefined = tuple(name for name, texts in finer.items() if not texts)
-        bound = _bound(measured, request, of, added, unrefined, number)
+        bound = _bound(measured, request, quantities, added, unrefined, number)
         say(f"round {number}: {bound.sentence}")
-        if bound.met or not any(finer.values()):
+        if bound.is_satisfied or not any(finer.values()):
             break
         added |= dict(text.split("=", 1) for texts in finer.values() for text in texts)
     return result, bound
@@ -146,29 +145,9 @@ def _bound(
     return ErrorBound(request, errors, reasons, tuple(f"{k}={v}" for k, v in added.items()), unrefined, number)
 
 
-def _large(verdict: Verdict, request: AccuracyRequest, of: Sequence[str], share: float) -> list[str]:
-    """Refinements that change a quantity which is asked for much, the largest first."""
-    rows = [row for row in verdict.changes if row.quantity in of and row.refinement != Refinement.COMBINED]
+def _large(verdict: Verdict, request: AccuracyRequest, quantities: Sequence[str], share: float) -> list[str]:
+    """Refinements that change a requested quantity much, the largest first."""
+    rows = [row for row in verdict.changes if row.quantity in quantities and row.refinement != Refinement.COMBINED]
     sizes = [(float("inf") if row.relative is None else row.relative, row.refinement) for row in rows]
     large = [change for change in sizes if DEFAULT.factor(verdict.ratio) * change[0] > share * request.error]
     return list(dict.fromkeys(refinement for _, refinement in sorted(large, key=lambda change: -change[0])))
-
-
-def _finer(file: SceneFile, refinement: str, factor: float) -> tuple[str, ...]:
-    """Overrides that refine one thing of a scene; none where it cannot be refined."""
-    top = max(file.scene.harmonics.kept, default=1)
-    wear = partial(refine.wear, file, 3.0)  # its tolerance decides on the scatter of means in time too
-    refined: dict[str, Callable[[], SceneFile | None]] = {
-        Refinement.HARMONICS: lambda: refine.harmonics(file, top + 2),
-        Refinement.MESH: lambda: refine.mesh(file, factor)[0],
-        Refinement.MODES: lambda: refine.modes(file, factor),
-        Refinement.SAMPLES: lambda: file.changed(f"harmonics.samples={2 * file.scene.harmonics.samples}"),
-        Refinement.WEAR_STEPS: wear,
-        Refinement.MOTION: wear,
-        Refinement.OTHER_MOTION: lambda: None,
-    }
-    try:
-        finer = refined[refinement]()
-    except refine.NoMesh:
-        return ()
-    return () if finer is None else finer.overrides[len(file.overrides) :]

@@ -1,7 +1,12 @@
-"""A scene with a finer mesh, more modes, more harmonics, finer wear steps: what its errors are measured by."""
+"""The engine of refinement: a scene with a finer mesh, more modes, more harmonics, more samples or finer wear steps.
+
+Three views use it: the table of changes of a verdict, the rounds to a requested accuracy, and ladders of settings.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +14,15 @@ import numpy as np
 from tribodyn.geometry import parts
 from tribodyn.geometry.sources import cad
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.result.verdict import Refinement
 from tribodyn.workflows.scene.part_tables import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.structure_tables import BodyTable, DeckTable
 from tribodyn.workflows.scene.wear import Wear, WearStep
 
-HALVED = 2.0  # ratio of element sizes where every element of a given mesh is cut into eight
+WEAR_FACTOR = 3.0  # finer wear steps of another round
+HALVED = 2.0  # ratio of element sizes where every element of an imported mesh is cut into eight
 
 Mesh = Geometry | BodyTable | DeckTable
 
@@ -24,21 +31,44 @@ class NoMesh(Refusal):
     """A scene whose mesh cannot be refined."""
 
 
-class Given(Refusal):
-    """A mesh that was not made here, whose elements can only be cut."""
+class ImportedMesh(Refusal):
+    """A mesh that was imported, whose elements can only be cut."""
+
+
+def overrides_of(file: SceneFile, refinement: str, factor: float) -> tuple[str, ...]:
+    """Overrides that refine a scene in one respect; none where it cannot be refined.
+
+    refinement : a Refinement; factor : on elements along every edge and on modes
+    """
+    top = max(file.scene.harmonics.kept, default=1)
+    finer_wear = partial(wear, file, WEAR_FACTOR)  # its tolerance decides on the scatter of means in time too
+    refinements: dict[str, Callable[[], SceneFile | None]] = {
+        Refinement.HARMONICS: lambda: harmonics(file, top + 2),
+        Refinement.MESH: lambda: mesh(file, factor)[0],
+        Refinement.MODES: lambda: modes(file, factor),
+        Refinement.SAMPLES: lambda: file.changed(f"harmonics.samples={2 * file.scene.harmonics.samples}"),
+        Refinement.WEAR_STEPS: finer_wear,
+        Refinement.MOTION: finer_wear,
+        Refinement.OTHER_MOTION: lambda: None,
+    }
+    try:
+        finer = refinements[refinement]()
+    except NoMesh:
+        return ()
+    return () if finer is None else finer.overrides[len(file.overrides) :]
 
 
 def mesh(file: SceneFile, ratio: float) -> tuple[SceneFile, float]:
     """The scene with so many times the elements along every edge, and the mean ratio that comes of it.
 
-    Counts are whole numbers that the part accepts; the elements of a given mesh are cut in halves.
+    Counts are whole numbers that the part accepts; the elements of an imported mesh are cut in halves.
 
     Raises  NoMesh
     """
     tables = _meshed(file)
     try:
         rescaled = [_rescaled(key, table, file.folder, ratio) for key, table in tables.items()]
-    except Given:
+    except ImportedMesh:
         return file.changed(*(f"{key}.halved={table.halved + 1}" for key, table in tables.items())), HALVED
     return file.changed(*(text for texts, _ in rescaled for text in texts)), 1 / float(
         np.mean([size for _, size in rescaled])
@@ -94,18 +124,18 @@ def _meshed(file: SceneFile) -> dict[str, Mesh]:
 def _rescaled(key: str, table: Mesh, folder: Path, ratio: float) -> tuple[list[str], float]:
     """Overrides that give a body so many times its elements along every edge, and their mean size over its own.
 
-    Raises  Given where there are none
+    Raises  ImportedMesh where there are none
     """
     if not isinstance(table, DeckTable) and table.part_name is not None:
         part = parts.load(table.part_name)
         numbers = part.Parameters(**table.parameters)
         counts = parts.rescaled(part, numbers, ratio)
         if not counts:
-            raise Given(f"the part of [{key}] lists no counts of elements in MESH")
+            raise ImportedMesh(f"the part of [{key}] lists no counts of elements in MESH")
         size = float(np.mean([getattr(numbers, name) / count for name, count in counts.items()]))
         return [f"{key}.{name}={count}" for name, count in counts.items()], size
     if not isinstance(table, BodyTable) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
-        raise Given(f"the mesh of [{key}] is given")
+        raise ImportedMesh(f"the mesh of [{key}] is imported")
     edge = table.size or table.unit * cad.default_size(folder / str(table.mesh))
     faces = ", ".join(f'"{name}" = {face / ratio:.6g}' for name, face in table.face_sizes.items())
     return [f"{key}.size={edge / ratio:.6g}", *([f"{key}.face_sizes={{{faces}}}"] if faces else [])], 1 / ratio

@@ -154,9 +154,7 @@ def _error_lines(statements: Mapping[str, Statement]) -> list[str]:
         status_text = "" if unknown else f"{statement.status.removeprefix('not reported ').strip('()')}; "
         reasons.setdefault(f"{status_text}{statement.reason}".strip("; "), []).append(quantity.label)
     head = [f"{'':15} {'value':19} {'error':8} dominated by"] if lines else []
-    return (
-        head + lines + [f"{', '.join(labels)}: {status_text}" for status_text, labels in reasons.items() if status_text]
-    )
+    return head + lines + [f"{', '.join(labels)}: {reason}" for reason, labels in reasons.items() if reason]
 
 
 def warnings(result: Result) -> Iterator[str]:
