@@ -15,7 +15,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.wheels import patterns, wheel_model as wheels
+from tribodyn.workflows.studies.wheels import mistuned_blades, wheel_model as wheels
 
 DAMPING = ("0.05 %", "0.1 %", "0.5 %")
 DIFFER = '\n[mistuning]\nfrequency = "1 %"\nfamilies = 3\nleft_out = 1e-6\n'
@@ -102,7 +102,9 @@ def groups(count: int, dense: int, states: Sequence[str] = tuple(STATES)) -> Ite
     for damping in DAMPING:
         for state in states:
             requested = (*STATES[state], f"damping.modal='{damping}'")
-            blades = patterns.MistunedBlades.of(scene_file.parse(WHEEL + DIFFER, "wheel.toml", requested, Path()))
+            blades = mistuned_blades.MistunedBlades.of(
+                scene_file.parse(WHEEL + DIFFER, "wheel.toml", requested, Path())
+            )
             wheel, errors, seconds = wheels.build(blades.file), [np.nan], 0.0
             failed, other, slipping = dict[int, str](), dict[int, str](), [np.nan]
             for number in range(1, count + 1):
@@ -134,7 +136,11 @@ def groups(count: int, dense: int, states: Sequence[str] = tuple(STATES)) -> Ite
 
 
 def from_dense(
-    wheel: wheels.Wheel, blades: patterns.MistunedBlades, pattern: patterns.Pattern, omega: float, x: np.ndarray
+    wheel: wheels.Wheel,
+    blades: mistuned_blades.MistunedBlades,
+    pattern: mistuned_blades.Pattern,
+    omega: float,
+    x: np.ndarray,
 ) -> float:
     """Largest relative difference of blade amplitudes at omega [rad/s], from contact displacement x, inf if unsolved.
 

@@ -22,7 +22,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.parameter_variation import ParameterVariation, geometry_keys, keys
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.response_derivatives import of_summary
+from tribodyn.workflows.studies.derivatives_at_points import of_summary
 
 LOCATED = "harmonics.transitions=located"
 COARSE = {

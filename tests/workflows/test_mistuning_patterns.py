@@ -13,7 +13,7 @@ from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.wheel_tables import Mistuning
-from tribodyn.workflows.studies.wheels import mistuned_wear, patterns
+from tribodyn.workflows.studies.wheels import mistuned_blades, mistuned_wear, patterns
 
 CHANGED = {
     '["400 Hz", "404 Hz"]': '["750 Hz", "880 Hz"]',
@@ -50,13 +50,14 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_pattern_depends_on_seed_and_number_alone() -> None:
     asked = Mistuning(frequency=0.02, friction=0.1, gap=1e-6, patterns=3)
-    one, again = patterns.drawn(asked, 400, 7), patterns.drawn(asked.model_copy(update={"patterns": 9}), 400, 7)
+    more = asked.model_copy(update={"patterns": 9})
+    one, again = mistuned_blades.drawn(asked, 400, 7), mistuned_blades.drawn(more, 400, 7)
     np.testing.assert_array_equal(one.stiffness, again.stiffness)
     assert np.sqrt(1 + one.stiffness).std() == pytest.approx(0.02, rel=0.1)
     assert one.friction.std() == pytest.approx(0.1, rel=0.1)
     assert one.gap.std() == pytest.approx(1e-6, rel=0.1)
     assert abs(np.corrcoef(one.stiffness, one.friction)[0, 1]) < 0.2
-    assert not np.allclose(one.stiffness, patterns.drawn(asked, 400, 8).stiffness)
+    assert not np.allclose(one.stiffness, mistuned_blades.drawn(asked, 400, 8).stiffness)
 
 
 def test_the_command_draws_patterns_and_resumes(
@@ -76,9 +77,10 @@ def test_the_command_draws_patterns_and_resumes(
 
 def test_blades_alike_amplify_nothing(scene: Path) -> None:
     """The search for the highest peak of the whole wheel finds that of the wave."""
-    blades = patterns.MistunedBlades.of(scene_file.read(str(scene), ("mistuning.frequency=0", "mistuning.friction=0")))
+    file = scene_file.read(str(scene), ("mistuning.frequency=0", "mistuning.friction=0"))
+    blades = mistuned_blades.MistunedBlades.of(file)
     none = np.zeros(6)
-    found, _ = blades.peak(patterns.Pattern(0, none, none, none))
+    found, _ = blades.peak(mistuned_blades.Pattern(0, none, none, none))
     assert found.amplitude == pytest.approx(blades.tuned.amplitude, rel=1e-4)
     assert found.state.omega == pytest.approx(blades.tuned.state.omega, rel=1e-4)
 
@@ -109,4 +111,4 @@ def test_what_cannot_be_is_one_sentence(scene: Path, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"mistuning\.frequency"):
         scene_file.read(str(scene), ("mistuning.frequency=2",))
     with pytest.raises(SceneError, match="unknown"):
-        patterns.MistunedBlades.of(scene_file.read(str(scene), ('mistuning.body="blade"',)))
+        mistuned_blades.MistunedBlades.of(scene_file.read(str(scene), ('mistuning.body="blade"',)))

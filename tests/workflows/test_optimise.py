@@ -14,7 +14,7 @@ import tribodyn as td
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import study_file
-from tribodyn.workflows.studies.many.optimum import EvaluatedRuns, best_trades, promised, propose
+from tribodyn.workflows.studies.many.proposals import EvaluatedRuns, best_trades, promised, propose
 from tribodyn.workflows.studies.many.run_task import numbers_of
 from tribodyn.workflows.studies.many.study_table import StudyTable
 

@@ -14,7 +14,7 @@ from tests.helpers.command import leave
 from tests.helpers.fits import predict
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.fits import posterior
+from tribodyn.workflows.studies.fits import posterior, posterior_sampling
 from tribodyn.workflows.studies.fits.fit_file import Target
 from tribodyn.workflows.studies.fits.identification import FitParameter, MeasuredNumber
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
@@ -69,7 +69,7 @@ def test_a_prior_counts_and_what_is_not_told_is_said() -> None:
 
 
 def test_trials_that_fail_are_left_out_and_too_many_end_it() -> None:
-    def fails_above(limit: float) -> posterior.Trial:
+    def fails_above(limit: float) -> posterior_sampling.Trial:
         def trial(values: Mapping[str, float]) -> np.ndarray:
             if values["a"] > limit:
                 raise SolveFailed("no peak")

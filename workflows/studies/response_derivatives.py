@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,40 +13,28 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm import quantity
-from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.continuation.free_vibration import FreeVibration
-from tribodyn.hbm.continuation.nonlinear_modes import Backbone
-from tribodyn.hbm.derivatives import cycle_derivatives, fold_derivatives, mode_derivatives
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives
 from tribodyn.hbm.derivatives.parameter_change import ParameterChange
-from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.quantity import CycleQuantity, StatedQuantity, WearQuantity
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.wear import tangent
-from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
-from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.theme import CYCLE, GREY
-from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import pipeline, response_curve, settings, wear_run
+from tribodyn.workflows.run import pipeline, response_curve, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.parameter_variation import STEP, ParameterVariation, geometry_keys, keys, moves_nodes
+from tribodyn.workflows.run.parameter_variation import STEP, ParameterVariation, geometry_keys, keys
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
-from tribodyn.workflows.scene.wear import Place
 from tribodyn.workflows.studies.curves import backbones
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange
+from tribodyn.workflows.studies.derivatives_at_points import changes_of, life_share, of_branch, of_life, of_mode
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
 SHOWN = 12  # parameters in the picture
-OF_ROWS = {"peak_frequency_first": "peak_frequency", "amplitude_first": "amplitude", "preload_first": "preload"}
 # step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
 OF_MODE = 1e-4
 DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
@@ -234,17 +221,17 @@ def _of_scene(
     file: SceneFile, of: str, at: float | None, values: Mapping[str, float], without: dict[str, str] | None, report: Any
 ) -> ResponseDerivatives:
     """Of a scene that was read; at : frequency [Hz], or the amplitude of a mode [m]; wanted : key -> value; without :
-    see `_changes`."""
+    see `changes_of`."""
     varying = ParameterVariation(file, report, OF_MODE if of == "mode" else STEP)
     balance, clock = varying.model.balance, process_time()
     find: Callable[[Iterator[ParameterChange]], Derivatives]
     if of == "mode":
         range_ = AmplitudeRange.of(file, None if at is None else at / DECADES, at, None, None)
-        find = partial(_of_mode, varying, backbones.follow_mode(file, balance, range_, report), modal=at is None)
+        find = partial(of_mode, varying, backbones.follow_mode(file, balance, range_, report), modal=at is None)
     elif of == "life":
         with report.track("wear") as advance:
-            worn = wear_run.worn_out(file, varying.model, _share(file.scene))
-        find = partial(_of_life, varying, worn, values=values)
+            worn = wear_run.worn_out(file, varying.model, life_share(file.scene))
+        find = partial(of_life, varying, worn, values=values)
     else:
         with report.track("frequency response") as advance:
             branch = response_curve.follow_response(file.scene, balance, advance)
@@ -253,7 +240,7 @@ def _of_scene(
     solved = process_time()
     with report.track("derivatives") as advance:
         try:
-            derivatives_found = find(_changes(varying, values, advance, without))
+            derivatives_found = find(changes_of(varying, values, advance, without))
         except NoDerivative as reason:
             raise SolveFailed(f"{file.name} has no derivatives here: {reason}") from None
     return ResponseDerivatives(
@@ -266,113 +253,3 @@ def _of_scene(
         tuple(key for key in derivatives_found.parameters if varying.anew(key)),
         without or {},
     )
-
-
-Advance = Callable[[float, str], None]
-
-
-def _changes(
-    varying: ParameterVariation, values: Mapping[str, float], advance: Advance, without: dict[str, str] | None
-) -> Iterator[ParameterChange]:
-    """Of every key but those of wear laws; one without a derivative goes into `without`, where that is given."""
-    for i, (key, value) in enumerate(values.items()):
-        advance(i / len(values), key)
-        try:
-            if key in varying.numbers:
-                yield varying.change(key, value)
-        except (NoDerivative, Refusal) as reason:
-            if without is None:
-                raise
-            without[key] = str(reason)
-
-
-def _of_mode(
-    varying: ParameterVariation, mode: Backbone, changes: Iterator[ParameterChange], modal: bool
-) -> Derivatives:
-    """At the last point of a backbone."""
-    if mode.end.kind is not BranchEnd.REACHED:
-        raise NoDerivative(f"the backbone {mode.end}")
-    problem = FreeVibration(varying.model.balance, mode.number, mode.output)
-    x = varying.model.balance.shaped(mode.contact[-1])
-    point = problem.at(x, mode.omega[-1], mode.damping[-1], mode.modal_amplitude[-1])
-    return mode_derivatives.at_mode(problem, point, changes, settings.newton_options(varying.scene), modal)
-
-
-def _share(scene: Scene) -> float:
-    """Of the first preload, where the life that a result states ends."""
-    assert scene.wear is not None
-    return scene.wear.lost_below or LIFE_SHARE
-
-
-def _of_life(
-    varying: ParameterVariation, worn: WearHistory, changes: Iterator[ParameterChange], values: Mapping[str, float]
-) -> Derivatives:
-    scene, by_key = varying.scene, wear_run.law_numbers(varying.scene)
-    problem = wear_run.wear_problem(scene, varying.file.folder, varying.model.balance)
-    numbers = {key: by_key[key][1:3] for key in values if key in by_key}
-    return tangent.of_life(problem, worn, changes, numbers, _share(scene))
-
-
-def of_branch(
-    scene: Scene,
-    balance: HarmonicBalance,
-    branch: Branch,
-    changes: Iterator[ParameterChange],
-    at: float | None = None,
-    fold: bool = False,
-    output: str = settings.OUTPUT,
-) -> Derivatives:
-    """At a frequency [Hz], or along the highest peak of a response, or fold of it."""
-    options = settings.newton_options(scene)
-    points = np.isin(np.arange(len(branch.omega)), branch.folds) if fold else branch.converged
-    if not points.any():
-        raise NoDerivative("the response has no fold")
-    fits = branch.amplitude(output) if at is None else -np.abs(branch.frequency - at)
-    nearest = int(np.argmax(np.where(points, fits, -np.inf)))
-    if at is None and not fold and nearest in (0, len(branch.omega) - 1):
-        raise NoDerivative(branch.no_peak(output))
-    x = balance.shaped(branch.contact[nearest])
-    state = balance.evaluate(branch.omega[nearest] if at is None or fold else 2 * np.pi * at, x)
-    if fold:
-        return fold_derivatives.at_fold(balance, state, changes, options)
-    take = cycle_derivatives.at_peak if at is None else cycle_derivatives.at_frequency
-    return take(balance, state, output, changes, wear_run.coefficients(scene), options)
-
-
-def of_summary(
-    varying: ParameterVariation, result: Result, names_of_keys: Sequence[str]
-) -> dict[tuple[str, str], float]:
-    """Derivatives of numbers of a finished run, of its first state and its life, by some keys of its scene.
-
-    Returns (number, key) -> d number / d key, SI units, as far as these are exact
-    """
-    scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
-    scene_numbers = {key: number.value for key, number in varying.numbers.items()}
-    in_wear = {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
-    values, wear_values = ({key: of[key] for key in names_of_keys if key in of} for of in (scene_numbers, in_wear))
-    values = {key: v for key, v in values.items() if not moves_nodes(varying.numbers[key]) or varying.follows(key)}
-    joints = varying.model.balance.contact.joints
-    gaps = {"contact.gap" if joint.name == "contact" else f"contacts.{joint.name}.gap": joint.rows for joint in joints}
-    gaps = {key: rows for key, rows in gaps.items() if key in names_of_keys}
-    if not (values or wear_values or gaps):
-        return slopes
-
-    def add(find: Callable[[], Derivatives], names: Mapping[str, str]) -> None:
-        with suppress(Refusal, SolverFailure):  # no derivative here, or no model with a changed parameter
-            derivatives_found = find()
-            by = {key: derivatives_found.slopes[:, i] for i, key in enumerate(derivatives_found.parameters)}
-            by |= {key: derivatives_found.by_gap[:, rows].sum(axis=1) for key, rows in gaps.items()}
-            for number, at in (
-                (number, derivatives_found.names.index(n))
-                for number, n in names.items()
-                if n in derivatives_found.names
-            ):
-                slopes.update({(number, key): float(column[at]) for key, column in by.items()})
-
-    places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
-    changes = partial(_changes, varying, values, lambda *_: None, {})
-    if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
-        add(lambda: of_branch(scene, varying.model.balance, response, changes(), places[0].frequency), OF_ROWS)
-    if worn is not None:
-        add(lambda: _of_life(varying, worn, changes(), wear_values), {"life": "life"})
-    return slopes

@@ -24,7 +24,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.file_digests import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies import response_derivatives
+from tribodyn.workflows.studies import derivatives_at_points
 
 Status = Literal["complete", "failed", "refused", "defect", "lost"]
 RUN = "run"  # the column of their numbers
@@ -92,7 +92,7 @@ def solve(task: StudyRun) -> RunRow:
             result = pipeline.run(file, None, Progress(), row_only=True, judge=with_verdict)
             numbers = numbers_of(result)
             if task.slopes and not numbers.get("peak_at_end"):
-                slopes = response_derivatives.of_summary(ParameterVariation(file, Progress()), result, task.slopes)
+                slopes = derivatives_at_points.of_summary(ParameterVariation(file, Progress()), result, task.slopes)
                 numbers |= {slope_column(*of): slope for of, slope in slopes.items()}
         except Exception as error:  # the other runs go on
             return ended(*outcome_of(error))

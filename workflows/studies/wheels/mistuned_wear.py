@@ -30,7 +30,7 @@ from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import where_it_can_be, write_files
 from tribodyn.workflows.studies.study_result import StudyResult
-from tribodyn.workflows.studies.wheels.patterns import MistunedBlades, asked_of
+from tribodyn.workflows.studies.wheels.mistuned_blades import MistunedBlades, asked_of
 
 IMAGES = 32  # of a film
 
