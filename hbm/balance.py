@@ -20,7 +20,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.compliance_point import CompliancePoint
 from tribodyn.hbm.linear.linear_side import compliance_of
-from tribodyn.hbm.linearisation import Linearisation, Rest
+from tribodyn.hbm.linearisation import Linearisation, Remainder
 from tribodyn.hbm.reference_springs import reference_springs
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.residual_flexibility import FlexibleModel
@@ -61,9 +61,8 @@ class HarmonicBalance:
     compliance : the linear side, which problems that differ in contact or load share
     load_factor : on the harmonics >= 1 of the excitation
     at_rest : (n_pair, n_component) displacement under the static loads, where it is known [m]
-    rest : what the residual flexibility of the model is taken to give; None where its factor is asked, or there is none
-    asked : what is known of the residual flexibility along the curve that is followed, see its `recalled`; None where
-        each solution stands for itself
+    remainder : approximation of the residual flexibility; None where its factor serves, or there is none
+    recalled : products with the residual flexibility that the followed curve has computed; None for a single solution
     at_speed : the problem of the same contact at other speeds of rotation [Hz], where a mission asks for them
     """
 
@@ -76,8 +75,8 @@ class HarmonicBalance:
     compliance: ContactCompliance
     load_factor: float = 1.0
     at_rest: np.ndarray | None = None
-    rest: Rest = None
-    asked: list[np.ndarray] | None = None
+    remainder: Remainder = None
+    recalled: list[np.ndarray] | None = None
     at_speed: Mapping[float, HarmonicBalance] = field(default_factory=dict)
 
     @classmethod
@@ -89,14 +88,14 @@ class HarmonicBalance:
         excitation: Excitation,
         omega_max: float,
         memory: np.ndarray | None = None,
-        like: HarmonicBalance | None = None,
+        previous: HarmonicBalance | None = None,
     ) -> HarmonicBalance:
         """The balance of a model with one or several joints; their springs become the stuck reference springs.
 
         Springs of few contacts that are far stiffer than the body get a softer reference: the body would be lost.
         memory : zeros by default: the contact is closed without shear, and a pair that never slips keeps the shear that
             the loads put on it
-        like : a problem that may have the same linear side but for the amplitudes of its loads, which it then shares
+        previous : a balance whose cached linear side is reused if it matches but for the amplitudes of the loads
         Raises  ValueError where joints, loads or frequency do not fit the model
         """
         if not 0 < omega_max < np.inf:
@@ -108,8 +107,8 @@ class HarmonicBalance:
             springs = model.residual.stiffness
         else:
             springs = reference_springs(contact.stiffness, model, basis, omega_max)
-        if like is not None and like._serves(model, springs, basis, excitation, omega_max):
-            compliance = like.compliance.under(excitation)
+        if previous is not None and previous._serves(model, springs, basis, excitation, omega_max):
+            compliance = previous.compliance.under(excitation)
         else:
             compliance = compliance_of(model, springs, basis, excitation, omega_max)
         return cls(model, contact, basis, excitation, omega_max, memory, compliance)
@@ -118,10 +117,10 @@ class HarmonicBalance:
         self, model: ReducedModel, springs: np.ndarray, basis: HarmonicBasis, excitation: Excitation, omega_max: float
     ) -> bool:
         """Whether this has the linear side of another problem but for the amplitudes of its loads."""
-        own, loads = self.compliance, {name for _, name in excitation.loads}
-        if (own.basis, {*own.load_names}, self.omega_max) != (basis, loads, omega_max):
+        side, loads = self.compliance, {name for _, name in excitation.loads}
+        if (side.basis, {*side.load_names}, self.omega_max) != (basis, loads, omega_max):
             return False
-        return np.array_equal(own.k, springs.ravel()) and self.model.matches(model, basis.harmonics)
+        return np.array_equal(side.k, springs.ravel()) and self.model.matches(model, basis.harmonics)
 
     @property
     def n_unknown(self) -> int:
@@ -209,17 +208,17 @@ class HarmonicBalance:
         flat = x.reshape(-1, x.shape[2])
         g = self.reference_stiffness[:, None] * flat - cycle.force.reshape(flat.shape)
         point = self.at(omega)
-        moved = point.apply(g) if self.rest is None else point.nearly(g) + self.rest(g)
-        return State(omega, x, cycle, g, flat - self.x_lin(omega) - moved)
+        displacement = point.apply(g) if self.remainder is None else point.nearly(g) + self.remainder(g)
+        return State(omega, x, cycle, g, flat - self.x_lin(omega) - displacement)
 
     def linearise(self, state: State) -> Linearisation:
         """d R / d x at a state whose contact derivative was asked for."""
-        return Linearisation(self.at(state.omega), self.reference_stiffness, state.x, state.cycle, self.rest)
+        return Linearisation(self.at(state.omega), self.reference_stiffness, state.x, state.cycle, self.remainder)
 
     def frequency_slope(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega at fixed x of R (n_contact, n_coeff) and of the outputs (n_output, n_coeff)."""
-        moved, outputs = self.at(state.omega).slope(state.g, self.load_factor)
-        return -moved, outputs
+        displacement, outputs = self.at(state.omega).slope(state.g, self.load_factor)
+        return -displacement, outputs
 
     def gap_response(self, state: State, opening: np.ndarray) -> np.ndarray:
         """First-order change of x (n_pair, n_component, n_coeff) when each gap opens by (n_pair,) [m].
@@ -233,8 +232,8 @@ class HarmonicBalance:
         jac = state.cycle.jacobian
         assert jac is not None
         g_slope = (jac[:, :, column] * opening[:, None]).reshape(-1, n_coeff)
-        moved, _, _ = self.linearise(state).solve(self.at(state.omega).apply(g_slope), 1e-6)
-        return moved.reshape(state.x.shape)
+        change, _, _ = self.linearise(state).solve(self.at(state.omega).apply(g_slope), 1e-6)
+        return change.reshape(state.x.shape)
 
     def outputs(self, state: State) -> np.ndarray:
         """(n_output, n_coeff) response of the observed outputs [m]."""
@@ -252,8 +251,8 @@ class HarmonicBalance:
         force, x = state.cycle.force[:, t], state.x[:, t]
         work = self.basis.work_per_cycle(force, x).sum(axis=1)
         sizes = [np.linalg.norm(c[..., int(self.basis.has_static) :], axis=(1, 2)) for c in (force, x)]
-        most = np.pi * self.basis.harmonics[-1] * sizes[0] * sizes[1]
-        return np.where((state.cycle.status == STICKS) | (np.abs(work) <= ROUNDING * most), 0.0, work)
+        largest = np.pi * self.basis.harmonics[-1] * sizes[0] * sizes[1]
+        return np.where((state.cycle.status == STICKS) | (np.abs(work) <= ROUNDING * largest), 0.0, work)
 
     def normal_force(self, state: State) -> np.ndarray:
         """(n_pair,) static normal force [N]; zero where the law has no normal component."""

@@ -32,15 +32,15 @@ class Excitation:
             loads.update({(h, name): value for name, value in named.items()})
         return cls(loads)
 
-    def check(self, basis: HarmonicBasis, known: Mapping[str, object]) -> None:
+    def check(self, basis: HarmonicBasis, names: Mapping[str, object]) -> None:
         """Raise ValueError where a load is unknown or no finite number, or its harmonic is not kept."""
         if self.base is not None and not np.all(np.isfinite(self.base)):
             raise Refusal("the prescribed motion of body 2 must be finite")
         for (h, name), value in self.loads.items():
             if not np.isfinite(value):
                 raise Refusal(f"load '{name}' is {value}: give a finite number")
-            if name not in known:
-                raise Refusal(f"no load '{name}' in the model: it has {', '.join(sorted(known)) or 'none'}")
+            if name not in names:
+                raise Refusal(f"no load '{name}' in the model: it has {', '.join(sorted(names)) or 'none'}")
             if value != 0 and h not in basis.harmonics:
                 raise Refusal(f"load '{name}' acts in harmonic {h}, which is not kept: keep it in {basis.harmonics}")
 

@@ -126,13 +126,13 @@ class HarmonicBasis:
 
     def real_matrices(self, matrices: np.ndarray) -> np.ndarray:
         """(..., n n_coeff, m n_coeff) on coefficients, of (n_harmonic, ..., n, m) on complex amplitudes."""
-        *several, n, m = matrices.shape[1:]
-        s, out = int(self.has_static), np.zeros((*several, n, self.n_coeff, m, self.n_coeff))
+        *is_stack, n, m = matrices.shape[1:]
+        s, out = int(self.has_static), np.zeros((*is_stack, n, self.n_coeff, m, self.n_coeff))
         a, b, dynamic = np.arange(s, self.n_coeff, 2), np.arange(s + 1, self.n_coeff, 2), matrices[s:]
         out[..., 0, :, 0] = matrices[0].real
         out[..., a, :, a] = out[..., b, :, b] = dynamic.real
         out[..., a, :, b], out[..., b, :, a] = dynamic.imag, -dynamic.imag
-        return out.reshape(*several, n * self.n_coeff, m * self.n_coeff)
+        return out.reshape(*is_stack, n * self.n_coeff, m * self.n_coeff)
 
     def transfer(self, coefficients: np.ndarray, to: HarmonicBasis) -> np.ndarray:
         """Coefficients (..., n_coeff) in another basis: harmonics that it lacks are dropped, new ones are zero."""

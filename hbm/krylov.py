@@ -67,9 +67,9 @@ def _next(w, v, column, cs, sn, rhs):
     k = len(column)
     column[:] = np.dot(v[:k], w)
     w = w - np.dot(column, v[:k])
-    again = np.dot(v[:k], w)
-    w -= np.dot(again, v[:k])
-    column += again
+    correction = np.dot(v[:k], w)
+    w -= np.dot(correction, v[:k])
+    column += correction
     norm = np.sqrt(np.dot(w, w))
     if norm > 0.0:
         v[k] = w / norm

@@ -15,7 +15,9 @@ from tribodyn.hbm.linear.linear_side import LinearSide
 
 NEARLY_ALL = 0.03  # share of the flexibility that products may leave out and still find Newton's directions alone
 INNER, INNER_PRODUCTS = 0.05, 60  # residual and products of a direction within a direction, where they leave out more
-Rest = Callable[[np.ndarray], np.ndarray] | None  # (n_contact, n_coeff) departures g [N] -> contact displacement [m]
+Remainder = (
+    Callable[[np.ndarray], np.ndarray] | None
+)  # (n_contact, n_coeff) departures g [N] -> contact displacement [m]
 
 
 class Linearisation:
@@ -24,7 +26,9 @@ class Linearisation:
     active : pairs with a derivative; rows : their contact rows
     """
 
-    def __init__(self, point: LinearSide, stiffness: np.ndarray, x: np.ndarray, cycle: ContactCycle, rest: Rest = None):
+    def __init__(
+        self, point: LinearSide, stiffness: np.ndarray, x: np.ndarray, cycle: ContactCycle, remainder: Remainder = None
+    ):
         """G, the stuck springs (n_contact,) [N/m], the contact cycle at x with its derivative, what `nearly` lacks."""
         jac = cycle.jacobian
         if jac is None:
@@ -33,7 +37,7 @@ class Linearisation:
         self.active, self._dg = pair_slopes.departures(jac, stiffness.reshape(n_pair, n_comp))
         self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
         self._shape, self._n_pair = (n_pair * n_comp, n_coeff), n_pair
-        self._point, self._rest = point, rest
+        self._point, self._remainder = point, remainder
         self._product = self._point.jacobian_product(self.rows)
 
     def departure_slope(self, direction: np.ndarray) -> np.ndarray:
@@ -48,14 +52,18 @@ class Linearisation:
 
     def g_slope(self, active_direction: np.ndarray) -> np.ndarray:
         """dg/dx . direction on the rows of active pairs, both (n_active_rows, n_coeff)."""
-        found: np.ndarray = pair_slopes.times(self._dg, active_direction)
-        return found
+        force: np.ndarray = pair_slopes.times(self._dg, active_direction)
+        return force
 
     def product(self, d: np.ndarray) -> np.ndarray:
         """(I - G dg/dx) d on the rows of active pairs, d (n_active_rows, n_coeff)."""
         slope = self.g_slope(d)
-        moved = self._product(slope)
-        return d - (moved if self._rest is None else moved + self._rest(self._in_all_rows(slope))[self.rows])
+        displacement = self._product(slope)
+        return d - (
+            displacement
+            if self._remainder is None
+            else displacement + self._remainder(self._in_all_rows(slope))[self.rows]
+        )
 
     def precondition(self, d: np.ndarray) -> np.ndarray:
         """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs, by blocks or coarse part of G."""
@@ -65,8 +73,8 @@ class Linearisation:
             return solved[self.rows]
         if self._coarse_factors is None:
             return d
-        found: np.ndarray = pair_slopes.preconditioned(d, self._dg, *self._coarse_factors)
-        return found
+        direction: np.ndarray = pair_slopes.preconditioned(d, self._dg, *self._coarse_factors)
+        return direction
 
     @cached_property
     def _block_inverse(self) -> np.ndarray | None:
@@ -113,7 +121,7 @@ class Linearisation:
         if len(self.rows) == self._shape[0]:
             return d
         g = self._in_all_rows(self.g_slope(d))
-        full = rhs + self._point.nearly(g) + (0.0 if self._rest is None else self._rest(g))
+        full = rhs + self._point.nearly(g) + (0.0 if self._remainder is None else self._remainder(g))
         full[self.rows] = d
         return full
 
@@ -126,12 +134,12 @@ class Linearisation:
             return rhs.copy(), 0, 0.0
         shape = (len(self.rows), self._shape[1])
 
-        def nearly(b: np.ndarray, wanted: float, most: int) -> tuple[np.ndarray, int, float]:
+        def nearly(b: np.ndarray, target: float, limit: int) -> tuple[np.ndarray, int, float]:
             return gmres(
                 lambda v: self.product(v.reshape(shape)).ravel(),
                 b,
-                wanted,
-                most,
+                target,
+                limit,
                 lambda v: self.precondition(v.reshape(shape)).ravel(),
             )
 
@@ -177,10 +185,13 @@ class Linearisation:
         for row, pushed in zip(self.rows, slope, strict=True):
             g = np.zeros(self._shape)
             g[row] = unit
-            moved = self._point.apply(g)[..., None]
-            cosine, sine = moved[:, s::2], moved[:, s + 1 :: 2]  # a unit of sine moves by -sine and cosine
+            displacement = self._point.apply(g)[..., None]
+            cosine, sine = (
+                displacement[:, s::2],
+                displacement[:, s + 1 :: 2],
+            )  # a unit of sine moves by -sine and cosine
             block = columns[:, :, row // n_comp]
-            block[:, :s] -= moved[:, :s] * pushed[:s]
+            block[:, :s] -= displacement[:, :s] * pushed[:s]
             block[:, s::2] -= cosine * pushed[s::2] - sine * pushed[s + 1 :: 2]
             block[:, s + 1 :: 2] -= sine * pushed[s::2] + cosine * pushed[s + 1 :: 2]
         return full

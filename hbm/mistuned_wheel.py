@@ -16,7 +16,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.linear.compliance import ContactCompliance
-from tribodyn.hbm.linear.mistuned_compliance import Alike, MistunedCompliance
+from tribodyn.hbm.linear.mistuned_compliance import MistunedCompliance, NominalWheel
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.sector_reduction import ReducedSector
@@ -43,14 +43,12 @@ class MistunedModel(ReducedModel):
 
     def at_harmonic(self, h: int) -> NoReturn:
         """Raise Refusal."""
-        raise Refusal(
-            "sectors that differ have no system of one harmonic: stability and integration in time need one"
-        )
+        raise Refusal("sectors that differ have no system of one harmonic: stability and integration in time need one")
 
 
 @dataclass(frozen=True)
 class MistunedWheel:
-    """Sectors alike, ready to be made different.
+    """Sectors nominal, ready to be made different.
 
     wave : balance of one sector under a travelling wave, whose model has the outputs `ports`, see
         `reduction.nominal_modes.with_ports`
@@ -62,7 +60,7 @@ class MistunedWheel:
     @property
     def n_sectors(self) -> int:
         """Number of sectors."""
-        return self.alike.n_sectors
+        return self.nominal.n_sectors
 
     @property
     def model(self) -> WaveModel:
@@ -70,17 +68,24 @@ class MistunedWheel:
         return as_wave(self.wave.model)
 
     @cached_property
-    def alike(self) -> Alike:
-        """The linear side of sectors alike, made once."""
-        one = self.wave
-        return Alike(self.model, one.contact.stiffness, one.basis, one.excitation, one.omega_max, self.ports)
+    def nominal(self) -> NominalWheel:
+        """The linear side of sectors nominal, made once."""
+        sector_balance = self.wave
+        return NominalWheel(
+            self.model,
+            sector_balance.contact.stiffness,
+            sector_balance.basis,
+            sector_balance.excitation,
+            sector_balance.omega_max,
+            self.ports,
+        )
 
     @cached_property
     def _model(self) -> MistunedModel:
-        n, one = self.n_sectors, self.model
-        i = one.interface
+        n, wave = self.n_sectors, self.model
+        i = wave.interface
         faces = np.concatenate([i.faces + k * i.n_pair for k in range(n)])
-        whole = replace(
+        all_pairs = replace(
             i,
             points=np.tile(i.points, (n, 1)),
             frames=np.tile(i.frames, (n, 1, 1)),
@@ -89,25 +94,33 @@ class MistunedWheel:
             B=np.tile(np.asarray(i.B), (n, 1)),
             faces=faces,
         )
-        return MistunedModel(one.system, whole, one.origin, free_frequency=one.free_frequency)
+        return MistunedModel(wave.system, all_pairs, wave.origin, free_frequency=wave.free_frequency)
 
     def balance(self, deviation: np.ndarray, change: Change | None = None) -> HarmonicBalance:
         """The wheel with relative deviations (N,) of stiffness, and contacts that are the sector's or changed ones.
 
         Raises  ValueError for deviations that cannot be
         """
-        one = self.wave
+        sector_balance = self.wave
         # to a balance it is what a ContactCompliance is; what needs matrices of a harmonic is refused by the model
-        compliance = cast(ContactCompliance, MistunedCompliance(self.alike, one.basis, deviation))
-        joints = one.contact.repeat(self.n_sectors)
+        compliance = cast(ContactCompliance, MistunedCompliance(self.nominal, sector_balance.basis, deviation))
+        joints = sector_balance.contact.repeat(self.n_sectors)
         if change is not None:
-            size = one.contact.n_pair
+            size = sector_balance.contact.n_pair
             joints = tuple(change(joint, joint.rows // size) for joint in joints)
         contact = JointSet.of(self._model, joints)
-        memory = np.tile(one.memory, (self.n_sectors, 1))
-        at_rest = None if one.at_rest is None else np.tile(one.at_rest, (self.n_sectors, 1))
+        memory = np.tile(sector_balance.memory, (self.n_sectors, 1))
+        at_rest = None if sector_balance.at_rest is None else np.tile(sector_balance.at_rest, (self.n_sectors, 1))
         return HarmonicBalance(
-            self._model, contact, one.basis, one.excitation, one.omega_max, memory, compliance, one.load_factor, at_rest
+            self._model,
+            contact,
+            sector_balance.basis,
+            sector_balance.excitation,
+            sector_balance.omega_max,
+            memory,
+            compliance,
+            sector_balance.load_factor,
+            at_rest,
         )
 
     def coordinates(
@@ -118,7 +131,7 @@ class MistunedWheel:
         balance : of this wheel; displacement, force : of its contacts (n_contact, n_coeff) [m], [N]; omega : [rad/s]
         Sector n moves by the sum over the indices j of exp(-i 2 pi j n / N) times what wave j does
         """
-        a, basis, k = self.alike, balance.basis, balance.reference_stiffness
+        a, basis, k = self.nominal, balance.basis, balance.reference_stiffness
         compliance = cast(MistunedCompliance, balance.compliance)
         pushed = np.zeros((len(basis.harmonics), a.n_sectors, a.n_port), complex)
         g = basis.to_complex(k[:, None] * displacement - force)
@@ -127,7 +140,7 @@ class MistunedWheel:
         pushed[:, :, a.loads] = np.where(vibrates, balance.load_factor, 1.0)[:, None, None] * compliance.force
         pushed[:, :, a.ports] = compliance.at(omega).deviating(pushed)
         waves = np.fft.ifft(pushed, axis=1)
-        springs, found = self.wave.reference_stiffness, []
+        springs, amplitudes = self.wave.reference_stiffness, []
         for h, of_harmonic in zip(basis.harmonics, waves, strict=True):
             s, each = 1j * h * omega, []
             for index, wave in enumerate(of_harmonic):
@@ -138,8 +151,8 @@ class MistunedWheel:
                 ports = np.array([system.outputs[name] for name in self.ports]).reshape(-1, len(dynamic))
                 total = B.conj().T @ wave[a.contacts] + wave[a.loads] @ loads + wave[a.ports] @ ports.conj()
                 each.append(np.linalg.solve(dynamic, total))
-            found.append(each)
-        return found
+            amplitudes.append(each)
+        return amplitudes
 
     def full_displacement(
         self,
@@ -154,9 +167,9 @@ class MistunedWheel:
         reduced : that the wave is made of, the ports among its outputs; the others as `coordinates`
         """
         waves = self.coordinates(balance, displacement, force, omega)
-        every = travelling_wave(reduced, 1)  # whose harmonic j is the wave of index j
+        all_waves = travelling_wave(reduced, 1)  # whose harmonic j is the wave of index j
         amplitudes = [
-            np.fft.fft(np.stack([every.reconstruct(q, index) for index, q in enumerate(each)]), axis=0)
+            np.fft.fft(np.stack([all_waves.reconstruct(q, index) for index, q in enumerate(each)]), axis=0)
             for each in waves
         ]
         return balance.basis.to_real(np.stack(amplitudes, axis=-1))

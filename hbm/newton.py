@@ -27,7 +27,7 @@ from tribodyn.reduction.residual_flexibility import FlexibleModel, ResidualFlexi
 
 
 @dataclass(frozen=True)
-class Rules:
+class NewtonRules:
     """What Newton takes for zero, for rounding, and for too large; see docs/accuracy/ablations.md."""
 
     unresisted: float = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
@@ -37,10 +37,10 @@ class Rules:
     closer: float = 0.1  # what a step is to leave over what comes after it, with a residual flexibility
     force_unknown: float = 1e-2  # error of the contact forces from which on a small residual is no solution
     shortest: float = 4e-4  # share of a Newton step that is tried
-    held: float = 1e-3  # contact force over that of the stuck contact from which on the structure leans on it
+    support: float = 1e-3  # contact force over that of the stuck contact from which on the structure leans on it
 
 
-RULES = Rules()
+RULES = NewtonRules()
 CURES = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
 
 
@@ -100,11 +100,11 @@ def solve(
     if isinstance(balance, HarmonicBalance) and isinstance(omega, float):
         model = balance.model
         if isinstance(model, FlexibleModel) and model.residual.left_out <= NEARLY_ALL:
-            return cast(Solved[Evaluated], _solve_with_rest(balance, model.residual, omega, start, options))
+            return cast(Solved[Evaluated], _solve_with_remainder(balance, model.residual, omega, start, options))
     return _solve(balance, omega, balance.evaluate(omega, start), options)
 
 
-def _solve_with_rest(
+def _solve_with_remainder(
     balance: HarmonicBalance, residual: ResidualFlexibility, omega: float, start: np.ndarray, options: NewtonOptions
 ) -> Solution:
     """The same with a residual flexibility R: Newton solves with what is known of it, then R is asked for more.
@@ -113,33 +113,33 @@ def _solve_with_rest(
     differ from these: where the bound is small enough, nothing is asked for. Too many corrections, each smaller by
     about what the modes leave out, give way to Newton's method on all
     """
-    steps, products, solved = 0, 0, False
+    steps, products, is_solved = 0, 0, False
     x_lin = balance.x_lin(omega)
     history: tuple[float, ...] = ()
-    asked = [] if balance.asked is None else balance.asked
-    near = replace(balance, rest=lambda g: residual.recalled(g, asked))
-    state = near.evaluate(omega, start)
+    cache = [] if balance.recalled is None else balance.recalled
+    approximate = replace(balance, remainder=lambda g: residual.recalled(g, cache))
+    state = approximate.evaluate(omega, start)
     for _ in range(2 * RULES.most_corrections):
-        lacking = residual.lacking(state.g, asked)
+        lacking = residual.lacking(state.g, cache)
         unsure, error = residual.at_most(lacking, state.flat), relative_residual(state, x_lin)
-        goal, history = required_residual(balance, state, x_lin, options), (*history, error + unsure)
-        if error + unsure <= goal:
+        target, history = required_residual(balance, state, x_lin, options), (*history, error + unsure)
+        if error + unsure <= target:
             return Solved(state, CONVERGED, steps, products, history)
         if not np.isfinite(unsure):
             break
-        if solved:
-            without = state.residual + residual.recalled(state.g, asked)
-            residual.ask(state.g, asked, RULES.closer * goal / unsure * float(np.linalg.norm(lacking)))
-            state = replace(state, residual=without - residual.recalled(state.g, asked))
+        if is_solved:
+            without = state.residual + residual.recalled(state.g, cache)
+            residual.ask(state.g, cache, RULES.closer * target / unsure * float(np.linalg.norm(lacking)))
+            state = replace(state, residual=without - residual.recalled(state.g, cache))
         else:
-            closer = RULES.closer * max(goal, min(unsure, error))
-            found = _solve(near, omega, state, replace(options, tolerance=closer))
-            steps, products, state = steps + found.steps, products + found.products, found.state
-            if not found.converged:
-                return replace(found, steps=steps, products=products)
-        solved = not solved
-    found = _solve(balance, omega, balance.evaluate(omega, state.x), options)
-    return replace(found, steps=steps + found.steps, products=products + found.products)
+            closer = RULES.closer * max(target, min(unsure, error))
+            newton_result = _solve(approximate, omega, state, replace(options, tolerance=closer))
+            steps, products, state = steps + newton_result.steps, products + newton_result.products, newton_result.state
+            if not newton_result.converged:
+                return replace(newton_result, steps=steps, products=products)
+        is_solved = not is_solved
+    newton_result = _solve(balance, omega, balance.evaluate(omega, state.x), options)
+    return replace(newton_result, steps=steps + newton_result.steps, products=products + newton_result.products)
 
 
 def _solve(
@@ -173,14 +173,14 @@ def _solve(
         if stalled and error <= options.tolerance:
             break
         if stalled and balance.reference_stiffness.size * state.residual.shape[1] > RULES.most_direct:
-            left = f" relative residual {error:.1e}, {spent} products leave {reached:.0%} of it"
-            return Solved(state, SolveEnd.NO_DIRECTION.say(left), step, products, tuple(history))
+            remainder = f" relative residual {error:.1e}, {spent} products leave {reached:.0%} of it"
+            return Solved(state, SolveEnd.NO_DIRECTION.say(remainder), step, products, tuple(history))
         if stalled:  # the direct way
             try:
                 direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
-                why = SolveEnd.SINGULAR.say(f" {error:.1e}")
-                return Solved(state, why, step, products, tuple(history))
+                reason = SolveEnd.SINGULAR.say(f" {error:.1e}")
+                return Solved(state, reason, step, products, tuple(history))
         state, new_error = _search(balance, omega, state, direction, error, x_lin)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
@@ -194,7 +194,7 @@ def _solve(
         outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
     off = error / spring_stretch(balance, state, x_lin)
     stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)  # the contact carries a share of that
-    leans = float(np.linalg.norm(state.cycle.force)) > RULES.held * float(np.linalg.norm(stuck))
+    leans = float(np.linalg.norm(state.cycle.force)) > RULES.support * float(np.linalg.norm(stuck))
     doubtful = error <= options.tolerance and off > CRITERION.force_accuracy and leans
     if doubtful and (off > RULES.force_unknown or _unheld(balance, state)):
         far = float(np.abs(state.x).max())
@@ -248,23 +248,23 @@ def _unheld(balance: Balance[Frequency, Evaluated], state: Evaluated) -> str:
     _, resisted, motions = np.linalg.svd(columns, full_matrices=False)
     if resisted[-1] > RULES.unresisted * resisted[0]:
         return ""
-    moved = motions[-1].reshape(state.x.shape[:2]) ** 2
-    along = int(moved.sum(axis=0).argmax())
-    share = {joint.name: float(moved[joint.rows, along].sum()) for joint in contact.joints}
-    names = ", ".join(name for name, own in share.items() if own >= sum(share.values()) / len(share))
+    share_of_motion = motions[-1].reshape(state.x.shape[:2]) ** 2
+    component = int(share_of_motion.sum(axis=0).argmax())
+    share = {joint.name: float(share_of_motion[joint.rows, component].sum()) for joint in contact.joints}
+    names = ", ".join(name for name, value in share.items() if value >= sum(share.values()) / len(share))
     return (
-        f"every pair of {names or 'the contact'} slips along {contact.components[along]}: hold it by a spring, "
+        f"every pair of {names or 'the contact'} slips along {contact.components[component]}: hold it by a spring, "
         "press it harder, or give more friction or a smaller load"
     )
 
 
 @single
 def solve_from_rest(
-    balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None, rest: Solution | None = None
+    balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None, static: Solution | None = None
 ) -> Solution:
     """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
 
-    rest : the solution without vibration load, searched where it is left out
+    static : the solution without vibration load, searched where it is left out
     The ramp halves its step where Newton fails. Products and steps of the whole way are counted in the Solution.
     """
     first = solve(balance, omega, balance.stuck(omega), options)
@@ -273,24 +273,24 @@ def solve_from_rest(
     steps, products = first.steps, first.products
     start = balance.with_load(0.0).stuck(omega)
     options = options or NewtonOptions()
-    last = rest or solve(balance.with_load(0.0), omega, start, options)
+    last = static or solve(balance.with_load(0.0), omega, start, options)
     if not last.converged and balance.n_unknown <= RULES.most_dense:
         thorough = replace(options, least_motion=True, max_steps=2 * options.max_steps)
         last = solve(balance.with_load(0.0), omega, start, thorough)
-    factor, beyond = 0.0, last
+    factor, attempt = 0.0, last
 
     def loaded(target: float, _: float) -> bool:
-        nonlocal last, beyond, steps, products
-        beyond = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, options)
-        steps, products = steps + beyond.steps, products + beyond.products
-        last = beyond if beyond.converged else last
-        return beyond.converged
+        nonlocal last, attempt, steps, products
+        attempt = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, options)
+        steps, products = steps + attempt.steps, products + attempt.products
+        last = attempt if attempt.converged else last
+        return attempt.converged
 
     if last.converged:
         factor = lead(factor, 1.0, loaded)
     if factor == 1.0:
         return Solution(last.state, CONVERGED, steps, products, last.history)
-    if last.converged and (loose := _unheld(balance, last.state) or _unheld(balance, beyond.state)):
+    if last.converged and (loose := _unheld(balance, last.state) or _unheld(balance, attempt.state)):
         outcome = SolveEnd.NOT_HELD.say(f" {factor:.0%} of the vibration load on: {loose}")
     elif last.converged:
         outcome = first.outcome.kind.say(f"{first.outcome.detail}; load ramp stopped at {factor:.0%}: {CURES}")

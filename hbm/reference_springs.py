@@ -32,14 +32,14 @@ def reference_springs(
     omega_max: float,
     hard: float = 1e5,
     cut: float = 1e2,
-    most: int = 3000,
+    most_unknowns: int = 3000,
 ) -> np.ndarray:
     """Springs (n_pair, n_component) [N/m], those harder than `hard` times the body cut to `cut` times it.
 
     Where body and springs are both zero, as of a mass on a cubic spring, the reference is the inertia at omega_max. All
     that of few contacts only (`most` unknowns): where many stick, all would depart from a reference not their own
     """
-    if not 0 < springs.size * basis.n_coeff <= most:
+    if not 0 < springs.size * basis.n_coeff <= most_unknowns:
         return springs
     body = body_stiffness(model, basis)
     if not (springs + body).all():

@@ -28,9 +28,9 @@ def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None 
     """
     if not balance.basis.has_static:
         raise Refusal("a preload without friction needs harmonic 0: keep it in harmonics.kept")
-    few = balance if 1 not in balance.basis.harmonics else balance.with_harmonics((0, 1))
-    smooth = few.contact.with_friction_scaled(0.0)
-    still = few.with_contact(smooth).with_load(0.0)
+    reduced = balance if 1 not in balance.basis.harmonics else balance.with_harmonics((0, 1))
+    smooth = reduced.contact.with_friction_scaled(0.0)
+    still = reduced.with_contact(smooth).with_load(0.0)
     exact = replace(options or newton.NewtonOptions(), tolerance=EXACT)
 
     def solve(at: HarmonicBalance, start: np.ndarray) -> newton.Solution:
@@ -49,25 +49,25 @@ def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None 
 
 def memory(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
     """Memory (n_pair, n_state) of every joint without shear at the displacement x (n_pair, n_component)."""
-    found = np.zeros((balance.contact.n_pair, balance.contact.n_state))
+    sliders = np.zeros((balance.contact.n_pair, balance.contact.n_state))
     for joint in balance.contact.joints:
-        own = x[np.ix_(joint.rows, balance.contact.columns(joint))]
+        joint_displacement = x[np.ix_(joint.rows, balance.contact.columns(joint))]
         if hasattr(joint.module, "memory_at_rest"):
-            found[joint.rows, : joint.n_state] = joint.module.memory_at_rest(own, joint.parameters)
+            sliders[joint.rows, : joint.n_state] = joint.module.memory_at_rest(joint_displacement, joint.parameters)
         elif joint.n_state == len(joint.parameters.tangential):  # the positions of its sliders
-            found[joint.rows, : joint.n_state] = own[:, joint.parameters.tangential]
-    return found
+            sliders[joint.rows, : joint.n_state] = joint_displacement[:, joint.parameters.tangential]
+    return sliders
 
 
 def tangents(balance: HarmonicBalance, x: np.ndarray) -> dict[str, np.ndarray]:
     """Springs (n_pair, n_component) [N/m] at rest in x, of the joints whose springs follow from their own numbers."""
     contact, basis = balance.contact, balance.basis
-    own = [joint for joint in contact.joints if getattr(joint.module, "STIFFNESS_FROM_NUMBERS", False)]
-    if not own:
+    soft_joints = [joint for joint in contact.joints if getattr(joint.module, "STIFFNESS_FROM_NUMBERS", False)]
+    if not soft_joints:
         return {}
     still = np.zeros((*x.shape, basis.n_coeff))
     still[:, :, 0] = x
     jac = contact.cycle(still, basis, balance.memory).jacobian
     assert jac is not None
     each = np.diagonal(jac, axis1=1, axis2=2).reshape(still.shape)[:, :, basis.harmonics.index(1)]
-    return {joint.name: np.maximum(each[np.ix_(joint.rows, contact.columns(joint))], 0.0) for joint in own}
+    return {joint.name: np.maximum(each[np.ix_(joint.rows, contact.columns(joint))], 0.0) for joint in soft_joints}

@@ -133,10 +133,10 @@ def _work(balance: HarmonicBalance, calls: dict[str, int]) -> tuple[Work, ...]:
     x, n, cores = c.groups[0][0], c.n_contact, len(balance.basis.dynamic)
     matrix, powers = x.columns[:n], x.single[:n]
     core, solved = 16 * cores * x.n_mode**2, 8 * cores * x.n_mode**2
-    exact = {8: 2 * m * (matrix.size + x.left.size) + solved, 4: 2 * (m - balance.basis.has_static) * powers.size}
+    exact = {8: 2 * m * (matrix.size + x.to_ports.size) + solved, 4: 2 * (m - balance.basis.has_static) * powers.size}
     nearly = {8: solved, 4: 2 * m * (n * n + 2 * n * x.n_mode)}
     return (
-        Work("evaluation", calls["apply"], matrix.nbytes + powers.nbytes + x.left.nbytes + core, exact),
+        Work("evaluation", calls["apply"], matrix.nbytes + powers.nbytes + x.to_ports.nbytes + core, exact),
         Work("Krylov product", calls["product"], x.w0_single.nbytes + 2 * x.b_single.nbytes + core, nearly),
     )
 

@@ -42,15 +42,15 @@ def read(path: Path) -> tuple[sp.csr_matrix, Labels | None]:
         raise Refusal(f"{path.name} has lines that are not numbers or not equally many: export it again") from None
     if table.shape[1] not in (3, 5):
         raise Refusal(f"{path.name} has {table.shape[1]} columns: node, dof, node, dof, value or row, column, value")
-    whole = (np.abs(table[:, :-1]) < 2**53) & (table[:, :-1] == np.round(table[:, :-1]))
-    index = np.where(whole, table[:, :-1], 0).astype(np.int64)
-    if not whole.all():
+    full_matrix = (np.abs(table[:, :-1]) < 2**53) & (table[:, :-1] == np.round(table[:, :-1]))
+    index = np.where(full_matrix, table[:, :-1], 0).astype(np.int64)
+    if not full_matrix.all():
         raise Refusal(f"{path.name} has node, dof or row numbers that are not whole: is the last column the value?")
     labels = None
     if table.shape[1] == 5:
-        both = np.concatenate([index[:, :2], index[:, 2:]])
-        known, place = np.unique(both, axis=0, return_inverse=True)
-        labels = tuple((int(node), int(component)) for node, component in known)
+        symmetric = np.concatenate([index[:, :2], index[:, 2:]])
+        kinds, place = np.unique(symmetric, axis=0, return_inverse=True)
+        labels = tuple((int(node), int(component)) for node, component in kinds)
         row, column = place.reshape(2, -1)
         size = len(labels)
     else:
@@ -58,22 +58,22 @@ def read(path: Path) -> tuple[sp.csr_matrix, Labels | None]:
             raise Refusal(f"{path.name} has row {index.min()}: rows count from 1 in FORMAT=COORDINATE")
         row, column = index.T - 1
         size = int(index.max())
-    below, above = (row > column).any(), (row < column).any()
+    lower, above = (row > column).any(), (row < column).any()
     matrix = sp.coo_matrix((table[:, -1], (row, column)), shape=(size, size)).tocsr()
-    if below != above:
+    if lower != above:
         matrix = (matrix + matrix.T - sp.diags(matrix.diagonal())).tocsr()
     return matrix, labels
 
 
-def onto(matrix: sp.csr_matrix, labels: Labels, wanted: Labels, what: str) -> sp.csr_matrix:
+def onto(matrix: sp.csr_matrix, labels: Labels, target_labels: Labels, name: str) -> sp.csr_matrix:
     """The matrix on the rows of another one; rows it lacks (a massless degree of freedom) are zero."""
-    if labels == wanted:
+    if labels == target_labels:
         return matrix
-    place = {label: k for k, label in enumerate(wanted)}
+    place = {label: k for k, label in enumerate(target_labels)}
     unknown = [label for label in labels if label not in place]
     if unknown:
         node, component = unknown[0]
-        raise Refusal(f"the {what} has node {node} component {component}, which the stiffness matrix lacks")
+        raise Refusal(f"the {name} has node {node} component {component}, which the stiffness matrix lacks")
     to = np.array([place[label] for label in labels])
     entries = matrix.tocoo()
-    return sp.coo_matrix((entries.data, (to[entries.row], to[entries.col])), shape=(len(wanted),) * 2).tocsr()
+    return sp.coo_matrix((entries.data, (to[entries.row], to[entries.col])), shape=(len(target_labels),) * 2).tocsr()

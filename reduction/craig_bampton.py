@@ -121,9 +121,9 @@ def fixed_interface_modes(
         raise Refusal("Craig-Bampton: give the number of modes or the cutoff frequency, one of the two")
     if n_modes is not None and not 0 <= n_modes <= n_slave:
         raise Refusal(f"Craig-Bampton: {n_modes} modes were asked of {n_slave} DOFs that are not masters")
-    wanted, below = 16 if n_modes is None else n_modes, None
+    n_computed, n_below = 16 if n_modes is None else n_modes, None
     while True:
-        omega, phi = modes(K_ss, M_ss, min(wanted + 1, n_slave), factor=factor)
+        omega, phi = modes(K_ss, M_ss, min(n_computed + 1, n_slave), factor=factor)
         if cutoff is None or omega[-1] > 2 * np.pi * cutoff or len(omega) == n_slave:
             break
         expected = len(omega) * np.sqrt(2 * np.pi * cutoff / max(omega[-1], 1e-300))
@@ -132,18 +132,20 @@ def fixed_interface_modes(
                 f"the cutoff of the reduction, {cutoff:g} Hz, is beyond what the mesh resolves: mode {len(omega)} of "
                 f"{n_slave} has {omega[-1] / (2 * np.pi):.3g} Hz; lower reduction.cutoff, or look at the material"
             )
-        most = min(n_slave / 2, LIMITS.most_modes)
-        if below is None and len(omega) * 2 * np.pi * cutoff > most * omega[-1]:
-            below = eigenvalues_below(K_ss, M_ss, (2 * np.pi * cutoff) ** 2)  # as for a plate there are too many
-            if below > most:
-                why = "beyond what the mesh resolves" if 2 * below > n_slave else f"above {LIMITS.most_modes} modes"
+        n_max = min(n_slave / 2, LIMITS.most_modes)
+        if n_below is None and len(omega) * 2 * np.pi * cutoff > n_max * omega[-1]:
+            n_below = eigenvalues_below(K_ss, M_ss, (2 * np.pi * cutoff) ** 2)  # as for a plate there are too many
+            if n_below > n_max:
+                reason = (
+                    "beyond what the mesh resolves" if 2 * n_below > n_slave else f"above {LIMITS.most_modes} modes"
+                )
                 raise Refusal(
-                    f"the cutoff of the reduction, {cutoff:g} Hz, is {why}: {below} of its "
+                    f"the cutoff of the reduction, {cutoff:g} Hz, is {reason}: {n_below} of its "
                     f"{n_slave} modes lie below it; lower reduction.cutoff, or look at the material"
                 )
-        wanted *= 2
-    kept = wanted if cutoff is None else int(np.sum(omega <= 2 * np.pi * cutoff))
-    return omega[:kept], phi[:, :kept], float(omega[kept]) if kept < len(omega) else np.inf
+        n_computed *= 2
+    n_retained = n_computed if cutoff is None else int(np.sum(omega <= 2 * np.pi * cutoff))
+    return omega[:n_retained], phi[:, :n_retained], float(omega[n_retained]) if n_retained < len(omega) else np.inf
 
 
 def with_static_shapes(
@@ -162,10 +164,10 @@ def with_static_shapes(
         size = np.sqrt(shape @ (M_ss @ shape))
         for _ in range(2):
             shape = shape - phi @ (phi.T @ (M_ss @ shape))
-        left = np.sqrt(shape @ (M_ss @ shape))
-        if left <= 1e-9 * size:  # the modes hold it already
+        norm = np.sqrt(shape @ (M_ss @ shape))
+        if norm <= 1e-9 * size:  # the modes hold it already
             continue
-        phi = np.column_stack([phi, shape / left])
+        phi = np.column_stack([phi, shape / norm])
         coupling = phi.T @ (K_ss @ phi)
         squares, turn = np.linalg.eigh((coupling + coupling.T) / 2)
         omega, phi = np.sqrt(squares), phi @ turn

@@ -67,18 +67,18 @@ def family(
     return stuck, float(np.sqrt(square[0])), shape[:, 0]
 
 
-def aeroelastic(wave: WaveModel, springs: np.ndarray, flow: Flow, few: int = 20) -> dict[int, complex]:
+def aeroelastic(wave: WaveModel, springs: np.ndarray, flow: Flow, n_modes: int = 20) -> dict[int, complex]:
     """Eigenvalue lambda [1/s] of the family's wave with the stuck wheel in the flow, for every index from -N/2 + 1.
 
     wave : with its damping and Coriolis forces, without the flow; few : modes of each index that take part
     The frequency is Im lambda > 0: the wave of index j runs with the rotation for j > 0. Re lambda > 0 is flutter
     """
     n, flown = wave.n_sectors, with_flow(wave, springs, flow)
-    found = {}
+    eigenvalues = {}
     for index in range(-((n - 1) // 2), n // 2 + 1):
         system, B = flown.at_index(index)
         stuck, _, shape = family(system, np.asarray(B), springs, flow.mode)
-        size = min(few, len(stuck))
+        size = min(n_modes, len(stuck))
         square, shapes = sla.eigh(stuck, np.asarray(system.mass), subset_by_index=(0, size - 1))
         rate, circulatory = system.velocity_matrix, system.circulatory
         stiffness = np.diag(square) + shapes.conj().T @ np.asarray(circulatory) @ shapes
@@ -86,25 +86,25 @@ def aeroelastic(wave: WaveModel, springs: np.ndarray, flow: Flow, few: int = 20)
         values, vectors = np.linalg.eig(np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -damping]]))
         likeness = np.abs((shapes.conj().T @ np.asarray(system.mass) @ shape).conj() @ vectors[:size])
         likeness = likeness / np.linalg.norm(vectors[:size], axis=0) * (values.imag > 0)
-        found[index] = complex(values[int(np.argmax(likeness))])
-    return found
+        eigenvalues[index] = complex(values[int(np.argmax(likeness))])
+    return eigenvalues
 
 
 def parts_of(flow: Flow, index: int, n_sectors: int, omega: float) -> tuple[complex, complex, complex, complex]:
     """Stiffness, damping, gyroscopic and circulatory coefficient of a wave of an index."""
-    here = flow.of_index(index, n_sectors)
+    coefficient = flow.of_index(index, n_sectors)
     if 2 * index % n_sectors == 0:  # its own mirror: all is even, and real
-        return omega**2 * here.real, omega * here.imag, 0.0, 0.0
+        return omega**2 * coefficient.real, omega * coefficient.imag, 0.0, 0.0
     mirror = flow.of_index(-index, n_sectors)
-    even, odd = (here + mirror) / 2, (here - mirror) / 2
+    even, odd = (coefficient + mirror) / 2, (coefficient - mirror) / 2
     return omega**2 * even.real, omega * even.imag, -1j * omega * odd.real, 1j * omega**2 * odd.imag
 
 
 def added(
     system: SecondOrderSystem, stiffness: np.ndarray, damping: np.ndarray, swirl: np.ndarray, flow: np.ndarray
 ) -> SecondOrderSystem:
-    def total(present: np.ndarray | None, more: np.ndarray) -> np.ndarray:
-        return more if present is None else np.asarray(present) + more
+    def total(present: np.ndarray | None, addition: np.ndarray) -> np.ndarray:
+        return addition if present is None else np.asarray(present) + addition
 
     return replace(
         system,

@@ -73,9 +73,12 @@ class MatrixFacts:
     def lines(self) -> list[str]:
         """Sentences, the doubts as warnings."""
         elastic = ", ".join(f"{f:.5g}" for f in self.frequency[self.n_rigid :][:6])
-        held = f"{self.n_rigid} rigid-body modes" if self.n_rigid else "no rigid-body mode: it is held"
+        support = f"{self.n_rigid} rigid-body modes" if self.n_rigid else "no rigid-body mode: it is held"
         free = f", mass {' / '.join(f'{m:.5g}' for m in self.mass)} kg along its free directions" if self.mass else ""
-        return [f"matrices: {held}{free}; first elastic modes {elastic} Hz", *(f"warning: {r}" for r in self.remarks)]
+        return [
+            f"matrices: {support}{free}; first elastic modes {elastic} Hz",
+            *(f"warning: {r}" for r in self.remarks),
+        ]
 
 
 @dataclass(frozen=True)
@@ -127,9 +130,9 @@ class ForeignMatrices:
         n_rigid = int((frequency < 1e-3 * frequency[-1]).sum())
         mass: list[float] = []
         for axis in (1, 2, 3):
-            along = np.array([label[1] == axis for label in self.labels or ()], float)
-            if along.any() and abs(K @ along).max() <= 1e-6 * abs(K).max():
-                mass.append(float(along @ (M @ along)))
+            translation = np.array([label[1] == axis for label in self.labels or ()], float)
+            if translation.any() and abs(K @ translation).max() <= 1e-6 * abs(K).max():
+                mass.append(float(translation @ (M @ translation)))
         remarks = []
         if n_rigid not in (0, 6):
             remarks.append(
@@ -180,8 +183,8 @@ class ForeignMatrices:
         gap : opening before loading [m], one for all or (n_pair,)
         points : (n_pair, 3) positions for pictures [m]; all at the origin where unknown
         """
-        kept = checked_components(components)
-        width = len(kept) if normal is None else 3
+        modelled = checked_components(components)
+        width = len(modelled) if normal is None else 3
         first = self._table(body1, width, "body1")
         second = None if body2 is None else self._table(body2, width, "body2")
         n_pair = len(first)
@@ -189,21 +192,21 @@ class ForeignMatrices:
             raise Refusal(f"body1 has {n_pair} contact nodes but body2 has {len(second)}: they meet in pairs")
         if normal is None:
             frames = np.tile(np.eye(3), (n_pair, 1, 1))
-            weights = np.tile(np.diag(_signs(signs, len(kept))), (n_pair, 1, 1))
+            weights = np.tile(np.diag(_signs(signs, len(modelled))), (n_pair, 1, 1))
         else:
             if signs is not None:
                 raise Refusal("signs and normal are both given: the normal already gives what closes the gap")
             frames = _frames(normal, t1, n_pair)
-            weights = frames[:, [COMPONENTS.index(name) for name in kept]]
-        rows = np.repeat(np.arange(n_pair * len(kept)), width)
-        shape = (n_pair * len(kept), self.n_dof)
+            weights = frames[:, [COMPONENTS.index(name) for name in modelled]]
+        rows = np.repeat(np.arange(n_pair * len(modelled)), width)
+        shape = (n_pair * len(modelled), self.n_dof)
 
         def one_body(dofs: np.ndarray) -> sp.csr_matrix:
-            columns = np.repeat(dofs[:, None], len(kept), axis=1)
+            columns = np.repeat(dofs[:, None], len(modelled), axis=1)
             return sp.coo_matrix((weights.ravel(), (rows, columns.ravel())), shape=shape).tocsr()
 
         motion = one_body(first) if second is None else one_body(first) - one_body(second)
-        return _interface(motion, kept, frames, area, gap, points)
+        return _interface(motion, modelled, frames, area, gap, points)
 
     def contact_rows(
         self,
@@ -220,17 +223,17 @@ class ForeignMatrices:
         components : subset of t1, t2, n in this order; n counts as positive where it closes
         area, gap, points : as in `contact`
         """
-        kept = checked_components(components)
+        modelled = checked_components(components)
         motion = sp.csr_matrix(np.atleast_2d(rows) if not sp.issparse(rows) else rows, dtype=float)
-        if motion.shape[1] != self.n_dof or motion.shape[0] % len(kept) or not motion.shape[0]:
+        if motion.shape[1] != self.n_dof or motion.shape[0] % len(modelled) or not motion.shape[0]:
             raise Refusal(
-                f"contact rows are {motion.shape[0]} x {motion.shape[1]}: give {len(kept)} for each pair "
-                f"({', '.join(kept)}), each with a factor for every one of the {self.n_dof} DOFs"
+                f"contact rows are {motion.shape[0]} x {motion.shape[1]}: give {len(modelled)} for each pair "
+                f"({', '.join(modelled)}), each with a factor for every one of the {self.n_dof} DOFs"
             )
         if not np.isfinite(motion.data).all():
             raise Refusal("contact rows have entries that are not finite")
-        frames = np.tile(np.eye(3), (motion.shape[0] // len(kept), 1, 1))
-        return _interface(motion, kept, frames, area, gap, points)
+        frames = np.tile(np.eye(3), (motion.shape[0] // len(modelled), 1, 1))
+        return _interface(motion, modelled, frames, area, gap, points)
 
     def _vector(self, terms: Terms, name: str) -> np.ndarray:
         if isinstance(terms, np.ndarray):
@@ -257,8 +260,8 @@ def from_arrays(mass: Any, stiffness: Any, damping: Any = None, labels: Labels |
         stiffness of zero for what its contacts alone hold
     Raises  ValueError: not square, not symmetric, not finite, sizes that differ
     """
-    given = {"mass": mass, "stiffness": stiffness, "damping": damping}
-    matrices = {part: matrix_files.real(value, f"{part} matrix") for part, value in given.items() if value is not None}
+    inputs = {"mass": mass, "stiffness": stiffness, "damping": damping}
+    matrices = {part: matrix_files.real(value, f"{part} matrix") for part, value in inputs.items() if value is not None}
     return _checked(matrices, labels, floats=True)
 
 
@@ -286,56 +289,61 @@ def read_matrices(
     if unknown:
         raise Refusal(f"names has the key {unknown[0]}: the keys are mass, stiffness and damping")
     files = {"mass": mass, "stiffness": stiffness, "damping": damping}
-    held = [] if path is None else matrix_files.variables(Path(path))
-    wanted = {part: next((name for name in usual if name in held), usual[0]) for part, usual in NAMES.items()}
-    wanted |= names or {}
+    present = [] if path is None else matrix_files.variables(Path(path))
+    variable_names = {
+        part: next((name for name in candidates if name in present), candidates[0])
+        for part, candidates in NAMES.items()
+    }
+    variable_names |= names or {}
     if path is not None:
-        whole = Path(path)
-        if not held:
-            raise Refusal(f"{whole.name} does not hold several matrices: give mass= and stiffness= as one file each")
-        for part, variable in wanted.items():
+        file_of_all = Path(path)
+        if not present:
+            raise Refusal(
+                f"{file_of_all.name} does not hold several matrices: give mass= and stiffness= as one file each"
+            )
+        for part, variable in variable_names.items():
             optional = part == "damping" and "damping" not in (names or {})
-            if files[part] is None and (variable in held or not optional):
-                files[part] = whole
+            if files[part] is None and (variable in present or not optional):
+                files[part] = file_of_all
     missing = [part for part in ("mass", "stiffness") if files[part] is None]
     if missing:
         raise Refusal(f"no {missing[0]} matrix is given: give path= or {missing[0]}=")
-    read: dict[str, sp.csr_matrix] = {}
+    matrices: dict[str, sp.csr_matrix] = {}
     labels: dict[str, Labels | None] = {}
     for part, file in files.items():
         if file is not None:
             inside = matrix_files.variables(Path(file))
-            alone = inside[0] if len(inside) == 1 and part not in (names or {}) else wanted[part]
-            matrix, labels[part] = matrix_files.read_matrix(Path(file), alone if inside else None)
-            read[part] = matrix * scale
+            variable_name = inside[0] if len(inside) == 1 and part not in (names or {}) else variable_names[part]
+            matrix, labels[part] = matrix_files.read_matrix(Path(file), variable_name if inside else None)
+            matrices[part] = matrix * scale
     rows = labels["stiffness"]
-    for part, own in labels.items():
-        if rows is not None and own is not None:
-            read[part] = abaqus_matrix.onto(read[part], own, rows, f"{part} matrix")
+    for part, file_labels in labels.items():
+        if rows is not None and file_labels is not None:
+            matrices[part] = abaqus_matrix.onto(matrices[part], file_labels, rows, f"{part} matrix")
     if mapping is not None:
         rows = harwell_boeing.read_mapping(Path(mapping))
-    return _checked(read, rows)
+    return _checked(matrices, rows)
 
 
-def _checked(read: dict[str, sp.csr_matrix], rows: Labels | None, floats: bool = False) -> ForeignMatrices:
+def _checked(matrices: dict[str, sp.csr_matrix], rows: Labels | None, floats: bool = False) -> ForeignMatrices:
     """The matrices of one structure, each symmetric and all of one size; a damping of zero is none.
 
     floats : whether a stiffness of zero is meant, as of a mass that only its contacts hold
     """
-    made = {
+    checked = {
         part: _symmetric(matrix, f"{part} matrix", zero=floats and part == "stiffness")
-        for part, matrix in read.items()
+        for part, matrix in matrices.items()
         if part != "damping" or abs(matrix).max() > 0 or matrix.shape[0] != matrix.shape[1]
     }
-    n = made["stiffness"].shape[0]
-    for part, matrix in read.items():
+    n = checked["stiffness"].shape[0]
+    for part, matrix in matrices.items():
         if matrix.shape[0] != n:
             raise Refusal(f"the {part} matrix has {matrix.shape[0]} rows but the stiffness matrix has {n}")
     if rows is not None and len(rows) != n:
         raise Refusal(f"the mapping has {len(rows)} equations but the matrices have {n} rows: is it theirs?")
-    if (made["mass"].diagonal() < 0).any():
+    if (checked["mass"].diagonal() < 0).any():
         raise Refusal("the mass matrix has a negative diagonal entry: are mass and stiffness exchanged?")
-    return _without_constrained(ForeignMatrices(**made, labels=rows))
+    return _without_constrained(ForeignMatrices(**checked, labels=rows))
 
 
 def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> ReducedModel:
@@ -354,21 +362,24 @@ def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> Red
 
 def _without_constrained(matrices: ForeignMatrices, penalty: float = 1e30) -> ForeignMatrices:
     """Leave out the DOFs that Abaqus holds by its penalty of 1e36 N/m, and note it."""
-    held = matrices.stiffness.diagonal() >= penalty
-    if not held.any():
+    constrained = matrices.stiffness.diagonal() >= penalty
+    if not constrained.any():
         return matrices
     if matrices.labels is None:
         raise Refusal(
-            f"{held.sum()} DOFs have a stiffness of {penalty:g} N/m or more, which is how Abaqus constrains: "
+            f"{constrained.sum()} DOFs have a stiffness of {penalty:g} N/m or more, which is how Abaqus constrains: "
             "export with FORMAT=MATRIX INPUT, whose labels allow leaving them out"
         )
-    free = np.flatnonzero(~held)
+    free = np.flatnonzero(~constrained)
     return ForeignMatrices(
         mass=matrices.mass[free][:, free],
         stiffness=matrices.stiffness[free][:, free],
         damping=None if matrices.damping is None else matrices.damping[free][:, free],
         labels=tuple(matrices.labels[k] for k in free),
-        notes=(*matrices.notes, f"{held.sum()} constrained DOFs (stiffness {penalty:g} N/m or more) were left out"),
+        notes=(
+            *matrices.notes,
+            f"{constrained.sum()} constrained DOFs (stiffness {penalty:g} N/m or more) were left out",
+        ),
     )
 
 
@@ -453,4 +464,6 @@ def _frames(normal: Sequence[float] | np.ndarray, t1: Sequence[float] | None, n_
     n = direction / length
     if t1 is not None:
         return contact_frames(n, t1)
-    return np.concatenate([contact_frames(one[None], np.eye(3)[np.abs(one).argmin()].tolist()) for one in n])
+    return np.concatenate(
+        [contact_frames(reference[None], np.eye(3)[np.abs(reference).argmin()].tolist()) for reference in n]
+    )

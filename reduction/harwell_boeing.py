@@ -96,10 +96,10 @@ def read_mapping(path: Path) -> tuple[tuple[int, int], ...]:
 
 def _formats(line: str, path: Path) -> list[tuple[int, int]]:
     """(fields per line, width) of pointers, indices and values from Fortran formats such as (8I10) or (1P,3E25.16)."""
-    found = [_FORTRAN.search(bracket) for bracket in re.findall(r"\(([^)]*)\)", line)]
-    if len(found) < 3 or None in found[:3]:
+    field_match = [_FORTRAN.search(bracket) for bracket in re.findall(r"\(([^)]*)\)", line)]
+    if len(field_match) < 3 or None in field_match[:3]:
         raise Refusal(f"{path.name} gives its formats as '{line.strip()}': three Fortran formats are expected")
-    return [(int(match[1] or 1), int(match[2])) for match in found[:3] if match]
+    return [(int(match[1] or 1), int(match[2])) for match in field_match[:3] if match]
 
 
 def _fields(lines: list[str], layout: tuple[int, int], size: int) -> list[str]:

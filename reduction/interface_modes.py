@@ -22,7 +22,7 @@ from tribodyn.refusal import Refusal
 
 
 def interface_modes(
-    model: ReducedModel, n_modes: int, keep: np.ndarray | None = None, apart: np.ndarray | None = None
+    model: ReducedModel, n_modes: int, keep: np.ndarray | None = None, separate: np.ndarray | None = None
 ) -> ReducedModel:
     """Reduce the masters of a Craig-Bampton model to n_modes characteristic constraint modes.
 
@@ -38,11 +38,11 @@ def interface_modes(
     if not model.has_one_system:
         raise Refusal("interface modes need a model that is the same for all harmonics: leave interface_modes out")
     masters = model.origin.masters
-    kept = np.unique(np.asarray([] if keep is None else keep, dtype=int))
-    if not np.all(np.isin(kept, masters)):
+    retained = np.unique(np.asarray([] if keep is None else keep, dtype=int))
+    if not np.all(np.isin(retained, masters)):
         raise Refusal("interface modes: only DOFs that are masters of the reduction can be kept")
     n_m, n = len(masters), model.system.n_dof
-    a, b = np.flatnonzero(np.isin(masters, kept)), np.flatnonzero(~np.isin(masters, kept))
+    a, b = np.flatnonzero(np.isin(masters, retained)), np.flatnonzero(~np.isin(masters, retained))
     if not 0 < n_modes <= len(b):
         raise Refusal(f"interface modes: {n_modes} were asked of {len(b)} contact DOFs; ask for 1 to {len(b)}")
     K = np.asarray(model.system.stiffness)
@@ -50,10 +50,10 @@ def interface_modes(
 
     contact = phi[:, :n_modes]
     following = _static_shapes(K, a, b) if len(a) else np.zeros((len(b), 0))
-    alone = np.isin(masters[a], np.asarray([] if apart is None else apart, dtype=int))
-    if alone.any():
-        contact = np.hstack([contact, _lacking(contact, following[:, alone], model.system.mass[np.ix_(b, b)])])
-        following = np.where(alone, 0.0, following)
+    is_separate = np.isin(masters[a], np.asarray([] if separate is None else separate, dtype=int))
+    if is_separate.any():
+        contact = np.hstack([contact, _lacking(contact, following[:, is_separate], model.system.mass[np.ix_(b, b)])])
+        following = np.where(is_separate, 0.0, following)
 
     n_contact = contact.shape[1]
     basis = np.zeros((n, len(a) + n_contact + n - n_m))
@@ -65,7 +65,7 @@ def interface_modes(
     reduced = model.projected(basis)
     assert isinstance(reduced.origin, Reduction)
     origin = replace(
-        reduced.origin, kept=masters[a], n_interface_modes=n_modes, interface_omitted_frequency=omitted
+        reduced.origin, master_dofs=masters[a], n_interface_modes=n_modes, interface_omitted_frequency=omitted
     )
     return replace(reduced, origin=origin)
 
@@ -85,7 +85,7 @@ def _lacking(phi: np.ndarray, shapes: np.ndarray, mass: np.ndarray) -> np.ndarra
 
     phi : (n, n_modes) modes, orthonormal in the mass; shapes : (n, k)
     """
-    rest = shapes - phi @ (phi.T @ mass @ shapes)
-    rest -= phi @ (phi.T @ mass @ rest)
-    left, size, _ = np.linalg.svd(rest, full_matrices=False)
-    return left[:, size > LIMITS.new * np.linalg.norm(shapes, 2)]
+    remainder = shapes - phi @ (phi.T @ mass @ shapes)
+    remainder -= phi @ (phi.T @ mass @ remainder)
+    directions, size, _ = np.linalg.svd(remainder, full_matrices=False)
+    return directions[:, size > LIMITS.new_direction * np.linalg.norm(shapes, 2)]

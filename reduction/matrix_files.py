@@ -50,12 +50,12 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
     variable : its name in a container
     Raises  ValueError: no such file or variable, an unknown format, complex or non-finite entries
     """
-    known = variables(path)
+    suffixes = variables(path)
     labels = None
-    if variable is not None and known and variable not in known:
-        raise Refusal(f"{path.name} has no variable '{variable}': it holds {', '.join(known)}")
-    if known and variable is None:
-        raise Refusal(f"{path.name} holds {', '.join(known)}: name the variable that is wanted")
+    if variable is not None and suffixes and variable not in suffixes:
+        raise Refusal(f"{path.name} has no variable '{variable}': it holds {', '.join(suffixes)}")
+    if suffixes and variable is None:
+        raise Refusal(f"{path.name} holds {', '.join(suffixes)}: name the variable that is wanted")
     with _as_one_sentence(path):
         if path.suffix.lower() == ".npz":
             matrix = _from_npz(path, variable)
@@ -63,7 +63,7 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
             matrix = _from_mat(path, str(variable))
         elif path.suffix.lower() == ".op4":
             matrix = nastran_matrix.read_op4(path)[str(variable)]
-        elif known:
+        elif suffixes:
             matrix, labels = nastran_matrix.read_dmig(path)[str(variable)]()
         else:
             matrix, labels = _from_text(path)
@@ -72,15 +72,15 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
 
 def read_array(path: Path, variable: str) -> np.ndarray:
     """A named array of real numbers, such as a list of DOFs, out of a container; raises ValueError."""
-    known = variables(path)
-    if variable not in known:
-        raise Refusal(f"{path.name} has no variable '{variable}': it holds {', '.join(known) or 'one matrix alone'}")
+    suffixes = variables(path)
+    if variable not in suffixes:
+        raise Refusal(f"{path.name} has no variable '{variable}': it holds {', '.join(suffixes) or 'one matrix alone'}")
     with _as_one_sentence(path):
         if path.suffix.lower() not in (".npz", ".mat"):
-            found = read_matrix(path, variable)[0]
+            arrays = read_matrix(path, variable)[0]
         else:
-            found = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
-    array = found.toarray() if sp.issparse(found) else np.asarray(found)
+            arrays = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
+    array = arrays.toarray() if sp.issparse(arrays) else np.asarray(arrays)
     if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
         raise Refusal(f"{path.name} {variable} must hold finite real numbers")
     return array.astype(float)

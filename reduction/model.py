@@ -54,14 +54,15 @@ class Origin:
 class Reduction(Origin):
     """Coordinates that a reduction chose.
 
-    basis : (n_full, n), q_full = basis @ q; kept : the `masters`; n_modes : number of the other coordinates
+    basis : (n_full, n), q_full = basis @ q; master_dofs : (n_masters,) see `masters`
+    n_modes : number of the other coordinates
     factorisation : name of the sparse solver
     first_omitted_frequency : of the fixed-interface modes, inf where all are retained [Hz]
     n_interface_modes, interface_omitted_frequency : modes of the boundary, 0 without, and the first omitted one [Hz]
     """
 
     basis: np.ndarray
-    kept: np.ndarray
+    master_dofs: np.ndarray
     n_modes: int
     factorisation: str
     first_omitted_frequency: float
@@ -71,7 +72,7 @@ class Reduction(Origin):
     @property
     def masters(self) -> np.ndarray:
         """(n_masters,) DOFs of the full system that are coordinates, ascending; they come first."""
-        return self.kept
+        return self.master_dofs
 
     def reconstruct(self, q: np.ndarray) -> np.ndarray:
         """Full displacement (n_full, ...) [m] of reduced coordinates q (n, ...)."""

@@ -33,22 +33,22 @@ def read_op4(path: Path) -> dict[str, sp.csr_matrix]:
     """
     data = path.read_bytes()
     order = {b"\x18\0\0\0": "<", b"\x30\0\0\0": "<", b"\0\0\0\x18": ">", b"\0\0\0\x30": ">"}.get(data[:4])
-    found = {}
+    matrices = {}
     try:
         for name, shape, kind, columns in _ascii(data) if order is None else _binary(data, order):
             rows, cols, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
             for column, row, string in columns:
-                own = string if kind < 3 else string.view(complex)
-                rows.append(np.arange(row - 1, row - 1 + len(own)))
-                cols.append(np.full(len(own), column - 1))
-                values.append(own)
+                matrix_name = string if kind < 3 else string.view(complex)
+                rows.append(np.arange(row - 1, row - 1 + len(matrix_name)))
+                cols.append(np.full(len(matrix_name), column - 1))
+                values.append(matrix_name)
             entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))
-            found[name] = sp.csr_matrix(sp.coo_matrix(entries, shape=shape))
+            matrices[name] = sp.csr_matrix(sp.coo_matrix(entries, shape=shape))
     except (ValueError, IndexError, StopIteration, OverflowError, RuntimeError):
         raise Refusal(f"{path.name} is no OUTPUT4 file, or ends early: export it again with OUTPUT4") from None
-    if not found:
+    if not matrices:
         raise Refusal(f"{path.name} holds no matrix: export it again with OUTPUT4")
-    return found
+    return matrices
 
 
 def _binary(data: bytes, order: str) -> Iterator[Matrix]:
@@ -98,8 +98,8 @@ def _ascii(data: bytes) -> Iterator[Matrix]:
     lines = iter(data.decode("ascii", "replace").splitlines())
 
     def reals(count: int, per_line: int, width: int) -> np.ndarray:
-        taken = [next(lines) for _ in range(-(-count // per_line))]
-        words = [line[i : i + width] for line in taken for i in range(0, min(per_line * width, len(line)), width)]
+        position = [next(lines) for _ in range(-(-count // per_line))]
+        words = [line[i : i + width] for line in position for i in range(0, min(per_line * width, len(line)), width)]
         if len(words) < count:
             raise Refusal("a column that is shorter than announced")
         return np.array([number(word.strip()) for word in words[:count]])
@@ -161,10 +161,10 @@ def write_op4(path: Path, matrices: Mapping[str, np.ndarray]) -> None:
             n_row, n_column = matrix.shape
             square = n_row == n_column and np.array_equal(matrix, matrix.T)
             form = 6 if square else 1 if n_row == n_column else 2
-            whole = np.asarray(matrix, complex if np.iscomplexobj(matrix) else float)
-            record([n_column, n_row, form, 4 if np.iscomplexobj(whole) else 2], f"{name:8s}".encode())
-            for k, column in enumerate(whole.T, start=1):
-                body = np.ascontiguousarray(column).astype(whole.dtype.newbyteorder("<")).tobytes()
+            records = np.asarray(matrix, complex if np.iscomplexobj(matrix) else float)
+            record([n_column, n_row, form, 4 if np.iscomplexobj(records) else 2], f"{name:8s}".encode())
+            for k, column in enumerate(records.T, start=1):
+                body = np.ascontiguousarray(column).astype(records.dtype.newbyteorder("<")).tobytes()
                 record([k, 1, len(body) // 4], body)
             record([n_column + 1, 1, 2], np.array([1.0], "<f8").tobytes())
 
@@ -172,8 +172,8 @@ def write_op4(path: Path, matrices: Mapping[str, np.ndarray]) -> None:
 def holds_dmig(path: Path) -> bool:
     """Whether a text has DMIG entries: near its beginning, or anywhere where its ending is that of bulk data."""
     with path.open(encoding="ascii", errors="replace") as stream:
-        whole = path.suffix.lower() in DECKS
-        return any(line[:4].upper() == "DMIG" for k, line in enumerate(stream) if whole or k < 50)
+        text = path.suffix.lower() in DECKS
+        return any(line[:4].upper() == "DMIG" for k, line in enumerate(stream) if text or k < 50)
 
 
 def read_dmig(path: Path) -> dict[str, Callable[[], tuple[sp.csr_matrix, Labels]]]:

@@ -51,8 +51,8 @@ def nominal_shapes(
             K = np.asarray(stuck_stiffness(system.stiffness, np.asarray(B), share * springs))
             phi = modes(K, system.mass, min(families, len(K)))[1]
             static = sla.solve(K, forces, assume_a="her")
-            moved = seam_map(sector, index) @ np.concatenate([phi, static], axis=1)
-            columns += [moved.real, moved.imag]
+            displacement = seam_map(sector, index) @ np.concatenate([phi, static], axis=1)
+            columns += [displacement.real, displacement.imag]
     return orthonormal(stiffness, np.concatenate(columns, axis=1), left_out)
 
 
@@ -64,9 +64,9 @@ def orthonormal(stiffness: np.ndarray, shapes: np.ndarray, left_out: float) -> n
     resisted = energy > 0
     shapes = shapes[:, resisted] / np.sqrt(energy[resisted])
     share, turn = np.linalg.eigh(shapes.T @ stiffness @ shapes)
-    kept = share > left_out * share[-1]
-    found: np.ndarray = (shapes @ turn[:, kept] / np.sqrt(share[kept]))[:, ::-1]
-    return found
+    independent = share > left_out * share[-1]
+    basis: np.ndarray = (shapes @ turn[:, independent] / np.sqrt(share[independent]))[:, ::-1]
+    return basis
 
 
 def with_ports(reduced: ReducedSector, stiffness: np.ndarray, shapes: np.ndarray) -> ReducedSector:

@@ -94,15 +94,15 @@ def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndar
         move rigidly
     """
     system, B = model.system, np.asarray(model.interface.B)
-    free, held = partition(system.n_dof, dofs, "prescribed displacement")
-    if len(held) == 0:
+    free, fixed = partition(system.n_dof, dofs, "prescribed displacement")
+    if len(fixed) == 0:
         raise Refusal(f"prescribed displacement '{name}' chooses no coordinate; name a node set that is not clamped")
     if name in system.loads:
         raise Refusal(f"prescribed displacement '{name}' has the name of a load; give it another")
-    if np.any(B[:, held]):
+    if np.any(B[:, fixed]):
         raise Refusal(f"prescribed displacement '{name}' acts on contact nodes; choose nodes outside the contact")
-    springs = np.empty(len(held))
-    springs[np.searchsorted(held, np.asarray(dofs, dtype=int))] = support
+    springs = np.empty(len(fixed))
+    springs[np.searchsorted(fixed, np.asarray(dofs, dtype=int))] = support
 
     K = np.asarray(system.stiffness)
     try:
@@ -111,32 +111,34 @@ def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndar
         raise Refusal(
             f"with '{name}' held and the contact open the part can still move rigidly; clamp it or add a spring"
         ) from None
-    psi = np.zeros((system.n_dof, len(held)))
-    psi[held, np.arange(len(held))] = 1.0
-    psi[free] = -sla.cho_solve(factor, K[np.ix_(free, held)])
+    psi = np.zeros((system.n_dof, len(fixed)))
+    psi[fixed, np.arange(len(fixed))] = 1.0
+    psi[free] = -sla.cho_solve(factor, K[np.ix_(free, fixed)])
 
     loads = {**system.loads, name: np.zeros(system.n_dof)}
     dynamic = replace(system, loads=loads)
-    static = _cut(system, free, held, name)
-    reaction = StaticReaction(name, held, psi, psi.T @ K @ psi, springs, model)
+    static = _cut(system, free, fixed, name)
+    reaction = StaticReaction(name, fixed, psi, psi.T @ K @ psi, springs, model)
     return PrescribedModel(
         dynamic, model.interface, model.origin, model.joints, model.free_frequency, static=static, reaction=reaction
     )
 
 
-def _cut(system: SecondOrderSystem, free: np.ndarray, held: np.ndarray, name: str) -> SecondOrderSystem:
+def _cut(system: SecondOrderSystem, free: np.ndarray, fixed: np.ndarray, name: str) -> SecondOrderSystem:
     """The system with the held coordinates cut off; the load `name` moves each of them by its amplitude."""
     K, M = np.array(system.stiffness), np.array(system.mass)
     push = np.zeros(system.n_dof)
-    push[free] = -K[np.ix_(free, held)].sum(axis=1)
-    push[held] = np.diag(K)[held]
+    push[free] = -K[np.ix_(free, fixed)].sum(axis=1)
+    push[fixed] = np.diag(K)[fixed]
     damping = None if system.damping is None else np.array(system.damping)
     for matrix in (K, M, damping):
         if matrix is not None:
-            matrix[np.ix_(free, held)] = 0.0
-            matrix[np.ix_(held, free)] = 0.0
-            matrix[np.ix_(held, held)] = np.diag(np.diag(matrix)[held])
-    loads = {other: np.where(np.isin(np.arange(system.n_dof), held), 0.0, load) for other, load in system.loads.items()}
+            matrix[np.ix_(free, fixed)] = 0.0
+            matrix[np.ix_(fixed, free)] = 0.0
+            matrix[np.ix_(fixed, fixed)] = np.diag(np.diag(matrix)[fixed])
+    loads = {
+        other: np.where(np.isin(np.arange(system.n_dof), fixed), 0.0, load) for other, load in system.loads.items()
+    }
     return SecondOrderSystem(M, K, damping, {**loads, name: push}, system.outputs)
 
 
@@ -152,8 +154,8 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
         return model
     if not isinstance(model.origin, Reduction) or not model.has_one_system:
         raise Refusal("motions can be held only in a model that was reduced from one mesh for all harmonics")
-    held = rows @ model.origin.basis
-    N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
+    constraint = rows @ model.origin.basis
+    N = null_space(constraint / np.linalg.norm(constraint, axis=1, keepdims=True))
     held_model = model.projected(N)
     frequency, _ = linear_modes(held_model, n=min(LIMITS.reported_modes, N.shape[1]))
     return replace(held_model, free_frequency=frequency)

@@ -30,21 +30,21 @@ def relative(
     """
     if interface.components != COMPONENTS:
         raise Refusal(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
-    means, interface = interface, interface.nodes or interface
+    averaged, interface = interface, interface.nodes or interface
     n, n_pair = system.n_dof, interface.n_pair
     B = csr_matrix(interface.B)
-    own, other = body_1_dofs(interface).ravel(), np.ones(n, dtype=bool)
-    if len(np.unique(own)) < len(own):
+    body_1, retained = body_1_dofs(interface).ravel(), np.ones(n, dtype=bool)
+    if len(np.unique(body_1)) < len(body_1):
         raise Refusal("relative coordinates need body-1 nodes of their own, but two pairs share one")
-    other[own] = False
+    retained[body_1] = False
     # x = R u_1 - R u_2, so u_1 = R^T x - R^T (B without its body-1 columns) u
-    rows, columns = np.repeat(own, 3), np.tile(np.arange(3), 3 * n_pair) + np.repeat(3 * np.arange(n_pair), 9)
+    rows, columns = np.repeat(body_1, 3), np.tile(np.arange(3), 3 * n_pair) + np.repeat(3 * np.arange(n_pair), 9)
     back = csr_matrix((interface.frames.transpose(0, 2, 1).ravel(), (rows, columns)), shape=(n, 3 * n_pair))
-    place = csr_matrix((np.ones(len(own)), (np.arange(len(own)), own)), shape=(3 * n_pair, n))
-    keep = csr_matrix(eye_array(n).tocsr().multiply(other[:, None]))
-    T = csr_matrix(keep + back @ place - back @ (B.multiply(other[None, :])))
-    place = place if means.nodes is None else csr_matrix(kron(means.mean, eye_array(3)) @ place)
-    return system.projected(T), replace(means, B=place, nodes=None, mean=None), T
+    place = csr_matrix((np.ones(len(body_1)), (np.arange(len(body_1)), body_1)), shape=(3 * n_pair, n))
+    keep = csr_matrix(eye_array(n).tocsr().multiply(retained[:, None]))
+    T = csr_matrix(keep + back @ place - back @ (B.multiply(retained[None, :])))
+    place = place if averaged.nodes is None else csr_matrix(kron(averaged.mean, eye_array(3)) @ place)
+    return system.projected(T), replace(averaged, B=place, nodes=None, mean=None), T
 
 
 def body_1_dofs(interface: ContactInterface) -> np.ndarray:
@@ -55,7 +55,7 @@ def body_1_dofs(interface: ContactInterface) -> np.ndarray:
     interface = interface.nodes or interface
     n_pair = interface.n_pair
     B = csr_matrix(interface.B)
-    found = np.empty((n_pair, 3), dtype=int)
+    dofs = np.empty((n_pair, 3), dtype=int)
     for axis in range(3):
         weights = csr_matrix(
             (interface.frames[:, :, axis].ravel(), (np.repeat(np.arange(n_pair), 3), np.arange(3 * n_pair))),
@@ -67,5 +67,5 @@ def body_1_dofs(interface: ContactInterface) -> np.ndarray:
             unit = image.indices[row][image.data[row] > 1 - 1e-9]
             if len(unit) != 1:
                 raise Refusal("relative coordinates need body-1 nodes that are free in x, y and z")
-            found[pair, axis] = unit[0]
-    return found
+            dofs[pair, axis] = unit[0]
+    return dofs

@@ -83,53 +83,53 @@ class ResidualFlexibility:
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         """R f: displacement of the contact (n_contact, k) [m] under contact forces (n_contact, k) [N]."""
-        moved: np.ndarray = self.B @ solve_selected(self.factor, self.B.T @ force)
-        return moved - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
+        total: np.ndarray = self.B @ solve_selected(self.factor, self.B.T @ force)
+        return total - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
 
-    def recalled(self, force: np.ndarray, asked: Sequence[np.ndarray]) -> np.ndarray:
+    def recalled(self, force: np.ndarray, cache: Sequence[np.ndarray]) -> np.ndarray:
         """R times the part of forces f (n_contact, k) that it is known of.
 
         asked : none, or one pair (2, n_contact, j): orthonormal k^-1/2 f of forces that R was asked for, and R f
         """
-        basis, moved = asked[0] if asked else np.zeros((2, len(force), 0))
-        known: np.ndarray = moved @ (basis.T @ self.lacking(force))
-        return known
+        basis, displacement = cache[0] if cache else np.zeros((2, len(force), 0))
+        product: np.ndarray = displacement @ (basis.T @ self.lacking(force))
+        return product
 
-    def lacking(self, force: np.ndarray, asked: Sequence[np.ndarray] = ()) -> np.ndarray:
+    def lacking(self, force: np.ndarray, cache: Sequence[np.ndarray] = ()) -> np.ndarray:
         """k^-1/2 times the other part, all where R was not asked; infinite for a force where there is no spring."""
         root = np.sqrt(self.stiffness)[:, None]
         weighted = np.divide(force, root, out=np.where(force == 0.0, 0.0, np.inf), where=root > 0)
-        return weighted - asked[0][0] @ (asked[0][0].T @ weighted) if asked else weighted
+        return weighted - cache[0][0] @ (cache[0][0].T @ weighted) if cache else weighted
 
-    def ask(self, force: np.ndarray, asked: list[np.ndarray], enough: float) -> None:
+    def ask(self, force: np.ndarray, cache: list[np.ndarray], enough: float) -> None:
         """Let R f (n_contact, k) be known but for so much of k^-1/2 f: by the largest directions of what is not."""
         root = np.sqrt(self.stiffness)[:, None]
-        lacking = self.lacking(root * self.lacking(force, asked), asked)  # twice, as it may be small beside f
+        lacking = self.lacking(root * self.lacking(force, cache), cache)  # twice, as it may be small beside f
         direction, size, _ = np.linalg.svd(lacking, full_matrices=False)
         direction = direction[:, np.sqrt(np.cumsum(size[::-1] ** 2))[::-1] > enough]
         if direction.size == 0:
             return
-        new = np.stack([direction, self.apply(root * direction)])
-        columns = np.concatenate([*asked, new], axis=2)
+        columns_added = np.stack([direction, self.apply(root * direction)])
+        columns = np.concatenate([*cache, columns_added], axis=2)
         parts = columns[0].T @ self.lacking(force)
         latest, _ = np.linalg.qr(np.hstack([parts, np.eye(len(parts))]))  # this force, then those before
-        asked[:] = [columns @ latest[:, : LIMITS.recalled * force.shape[1]]]
+        cache[:] = [columns @ latest[:, : LIMITS.recalled * force.shape[1]]]
 
-    def at_most(self, weighted: np.ndarray, moved: np.ndarray) -> float:
+    def at_most(self, weighted: np.ndarray, displacement: np.ndarray) -> float:
         """What |k^1/2 R f| is at most over |k^1/2 x|, Euclidean, for k^-1/2 f and x (n_contact, k), by `left_out`."""
-        size = np.linalg.norm(np.sqrt(self.stiffness)[:, None] * moved) or 1.0
+        size = np.linalg.norm(np.sqrt(self.stiffness)[:, None] * displacement) or 1.0
         return self.left_out * float(np.linalg.norm(weighted) / size)
 
     @cached_property
     def left_out(self) -> float:
         """Largest eigenvalue of k^1/2 R k^1/2: 1 would be a contact that sees nothing else; by a Krylov space."""
-        root, asked = np.sqrt(self.stiffness)[:, None], list[np.ndarray]()
+        root, cache = np.sqrt(self.stiffness)[:, None], list[np.ndarray]()
         force = root * np.random.default_rng(0).standard_normal((len(root), LIMITS.power_vectors))
         for _ in range(LIMITS.power_steps):
-            self.ask(force, asked, LIMITS.new * float(np.linalg.norm(self.lacking(force))))
-            basis, moved = asked[0]
-            force = root**2 * moved[:, : force.shape[1]]
-        inside = basis.T @ (root * moved)
+            self.ask(force, cache, LIMITS.new_direction * float(np.linalg.norm(self.lacking(force))))
+            basis, displacement = cache[0]
+            force = root**2 * displacement[:, : force.shape[1]]
+        inside = basis.T @ (root * displacement)
         return float(max(np.linalg.eigvalsh(0.5 * (inside + inside.T))[-1], 0.0))
 
     def error(self, omega: float) -> float:
@@ -144,10 +144,10 @@ class ResidualFlexibility:
         force = np.concatenate([root * rough, root**2 * smooth / max(np.abs(smooth).max(), 1e-300)], axis=1)
         field = self.field(force)
         push = omega**2 * (self.mass @ field)
-        held = self.at_contact @ (self.shapes.T @ push / self.squares[:, None])
-        more = self.B @ self.factor.solve(push) - held
-        whole = self.B @ field + self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
-        return float(np.max(np.linalg.norm(more, axis=0) / np.linalg.norm(whole, axis=0)))
+        retained = self.at_contact @ (self.shapes.T @ push / self.squares[:, None])
+        correction = self.B @ self.factor.solve(push) - retained
+        compliance = self.B @ field + self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
+        return float(np.max(np.linalg.norm(correction, axis=0) / np.linalg.norm(compliance, axis=0)))
 
 
 @dataclass(frozen=True)
@@ -163,8 +163,8 @@ class FlexibleModel(ReducedModel):
 
     def matches(self, other: ReducedModel, harmonics: Sequence[int]) -> bool:
         """Whether another model has equal matrices and the same residual flexibility."""
-        same = isinstance(other, FlexibleModel) and self.residual is other.residual
-        return same and super().matches(other, harmonics)
+        is_shared = isinstance(other, FlexibleModel) and self.residual is other.residual
+        return is_shared and super().matches(other, harmonics)
 
     def require_masters(self, needed_by: str) -> None:
         """Raise Refusal: the coordinates leave out a part of the contact flexibility."""
@@ -243,12 +243,12 @@ def _bisected(points: np.ndarray, clusters: int) -> np.ndarray:
     parts = [np.arange(len(points))]
     while len(parts) < min(clusters, len(points)):
         widest = int(np.argmax([np.ptp(points[p], axis=0).max() if len(p) > 1 else -1.0 for p in parts]))
-        own = parts.pop(widest)
-        axis = int(np.ptp(points[own], axis=0).argmax())
-        order = own[np.argsort(points[own, axis], kind="stable")]
+        members = parts.pop(widest)
+        axis = int(np.ptp(points[members], axis=0).argmax())
+        order = members[np.argsort(points[members, axis], kind="stable")]
         parts += [order[: len(order) // 2], order[len(order) // 2 :]]
-    for i, own in enumerate(parts):
-        label[own] = i
+    for i, members in enumerate(parts):
+        label[members] = i
     return label
 
 
@@ -276,8 +276,8 @@ def _ritz(
     )
     scale = np.sqrt(np.diag(energy))
     size, turn = sla.eigh(0.5 * (energy + energy.T) / np.outer(scale, scale))
-    kept = size > LIMITS.dependent * size[-1]
-    basis = turn[:, kept] / np.sqrt(size[kept]) / scale[:, None]  # of unit energy
+    independent = size > LIMITS.dependent * size[-1]
+    basis = turn[:, independent] / np.sqrt(size[independent]) / scale[:, None]  # of unit energy
     inertia = basis.T @ inertia @ basis
     nu, y = sla.eigh(0.5 * (inertia + inertia.T))
     nu, y = nu[::-1], y[:, ::-1]

@@ -71,9 +71,7 @@ def in_coordinates(sector: Sector, system: SecondOrderSystem, origin: Reduction)
     if sector.prestress is None:
         return ReducedSector(small, origin)
     static = sector.prestress
-    return ReducedSector(
-        small, origin, {"prestress_residual": static.residual, "prestress_rotation": static.rotation}
-    )
+    return ReducedSector(small, origin, {"prestress_residual": static.residual, "prestress_rotation": static.rotation})
 
 
 def nodal_diameters(
@@ -86,7 +84,7 @@ def nodal_diameters(
         None for open ones
     Returns (n_diameter, n_modes)
     """
-    found = []
+    frequencies = []
     for index in diameters:
         system, B = wave_system(sector, index)
         K = system.stiffness if stiffness is None else stuck_stiffness(system.stiffness, B, stiffness)
@@ -94,24 +92,24 @@ def nodal_diameters(
             omega = modes(K, system.mass, n_modes)[0]
         else:
             omega = turning_frequencies(K, system.mass, system.gyroscopic, n_modes)
-        found.append(omega / (2 * np.pi))
-    return np.array(found)
+        frequencies.append(omega / (2 * np.pi))
+    return np.array(frequencies)
 
 
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:
     """The sector with each row of its contact once, where joints share nodes, and which of them each row was (n_c,)."""
-    right, left = np.asarray(sector.interface.B), np.asarray(sector.left_map)
-    same = (right @ right.T >= 1 - LIMITS.rounding) & (left @ left.T >= 1 - LIMITS.rounding)
-    same[np.arange(len(right)), np.arange(len(right))] = True
-    first, of_row = np.unique(same.argmax(axis=1), return_inverse=True)
-    once = replace(sector, interface=replace(sector.interface, B=right[first]), left_map=left[first])
-    return once, of_row
+    right, left_rows = np.asarray(sector.interface.B), np.asarray(sector.left_map)
+    is_equal = (right @ right.T >= 1 - LIMITS.rounding) & (left_rows @ left_rows.T >= 1 - LIMITS.rounding)
+    is_equal[np.arange(len(right)), np.arange(len(right))] = True
+    first, of_row = np.unique(is_equal.argmax(axis=1), return_inverse=True)
+    unique_rows = replace(sector, interface=replace(sector.interface, B=right[first]), left_map=left_rows[first])
+    return unique_rows, of_row
 
 
 def node_to_node(sector: Sector) -> bool:
     """Whether every contact is one of the neighbours' nodes, each in one pair, as `relative_map` needs it."""
-    right, left = np.asarray(sector.interface.B), np.asarray(sector.left_map)
-    between = np.abs(left).max(axis=1, initial=0.0) > 0
+    right, left_rows = np.asarray(sector.interface.B), np.asarray(sector.left_map)
+    between = np.abs(left_rows).max(axis=1, initial=0.0) > 0
     return bool(between.all()) and np.abs(right @ right.T - np.eye(len(right))).max(initial=0.0) <= LIMITS.rounding
 
 
@@ -124,9 +122,9 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     Raises  ValueError where a right contact face is not made of masters, or shares nodes with a left one or a seam
     """
     S = seam_map(sector, index)
-    right, left = sector.interface.B @ S, sector.left_map @ S
+    right, left_rows = sector.interface.B @ S, sector.left_map @ S
     faces = np.flatnonzero(np.abs(right).max(axis=0))
-    if np.abs(right @ right.conj().T - np.eye(len(right))).max() > LIMITS.rounding or left[:, faces].any():
+    if np.abs(right @ right.conj().T - np.eye(len(right))).max() > LIMITS.rounding or left_rows[:, faces].any():
         raise Refusal(
             "the right contact face of a cyclic part must be of master nodes that lie neither on its left contact face "
             "nor on a cyclic face"
@@ -134,13 +132,13 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     vectors = (*sector.system.loads.values(), *sector.system.outputs.values())
     points = [np.flatnonzero(S.T @ v) for v in vectors if np.count_nonzero(v) <= LIMITS.point_load]
     accessories = np.setdiff1d(np.concatenate([*points, []]).astype(int), faces)
-    rest = np.setdiff1d(np.arange(S.shape[1]), np.concatenate([faces, accessories]))
-    others = np.concatenate([accessories, rest])
+    internal = np.setdiff1d(np.arange(S.shape[1]), np.concatenate([faces, accessories]))
+    remaining = np.concatenate([accessories, internal])
     within = sla.null_space(right[:, faces])  # tangential motion that a contact of fewer components leaves free
-    N = np.zeros((S.shape[1], len(others) + within.shape[1]), dtype=right.dtype)
-    N[others, np.arange(len(others))] = 1.0
-    N[faces, len(others) :] = within
-    follow = N + np.conj(sector.phase(index)) * right.conj().T @ (left @ N)
+    N = np.zeros((S.shape[1], len(remaining) + within.shape[1]), dtype=right.dtype)
+    N[remaining, np.arange(len(remaining))] = 1.0
+    N[faces, len(remaining) :] = within
+    follow = N + np.conj(sector.phase(index)) * right.conj().T @ (left_rows @ N)
     return S @ np.concatenate([right.conj().T, follow], axis=1), len(right) + len(accessories)
 
 
@@ -167,5 +165,5 @@ def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, n_
     forces, shapes = (a[:, size > 0] / np.sqrt(size[size > 0]) for a in (forces, shapes))
     shapes = shapes - phi @ (phi.conj().T @ forces)
     energy, turn = sla.eigh(shapes.conj().T @ (K @ shapes))
-    kept = energy > LIMITS.dependent
-    return np.concatenate([phi / np.sqrt(nu), (shapes @ turn[:, kept]) / np.sqrt(energy[kept])], axis=1)
+    independent = energy > LIMITS.dependent
+    return np.concatenate([phi / np.sqrt(nu), (shapes @ turn[:, independent]) / np.sqrt(energy[independent])], axis=1)

@@ -34,7 +34,7 @@ from tribodyn.reduction.model import ReducedModel
 BLOCKS = 4
 # square of a vector's part outside of a space, over the largest, below which it is left out: peaks of beam and blade
 # move by lengths to 1e-6 as with 1e-12, in a third of the time; a chain to 1e-7, and with 1e-6 to 5e-4
-SAME = 1e-7
+DEPENDENT = 1e-7
 
 
 class Sensitivity:
@@ -60,12 +60,12 @@ class Sensitivity:
 
     def _full(self, slaves: np.ndarray) -> np.ndarray:
         """Values at the slaves, zero at the masters."""
-        found = np.zeros((len(self.shapes), slaves.shape[1]))
-        found[self._s] = slaves
-        return found
+        values = np.zeros((len(self.shapes), slaves.shape[1]))
+        values[self._s] = slaves
+        return values
 
     @cached_property
-    def _seen(self) -> tuple[np.ndarray, list[tuple[str, str]]]:
+    def _observers(self) -> tuple[np.ndarray, list[tuple[str, str]]]:
         """What sees changes of the shapes, at the slaves: (M T_m)_s, then loads and outputs that act there."""
         vectors = {
             (kind, name): v[self._s]
@@ -79,7 +79,7 @@ class Sensitivity:
     @cached_property
     def _following(self) -> np.ndarray:
         """K_ss^-1 of what is seen."""
-        return self._solve(self._seen[0])
+        return self._solve(self._observers[0])
 
     @cached_property
     def _space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -88,23 +88,26 @@ class Sensitivity:
         They are orthogonal to the kept modes and span what is seen after 1, 2, ... solutions
         """
         phi, block = self.shapes[self._s, self._n :], self._following
-        basis, held = phi, self._M_ss @ phi
+        basis, weighted = phi, self._M_ss @ phi
         for count in range(BLOCKS):
             for _ in range(2):
-                block = block - basis @ (held.T @ block)
+                block = block - basis @ (weighted.T @ block)
             image = self._M_ss @ block
             square, axes = np.linalg.eigh(block.T @ image)
-            kept = square > SAME * square[-1]
-            turn = axes[:, kept] / np.sqrt(square[kept])
+            independent = square > DEPENDENT * square[-1]
+            turn = axes[:, independent] / np.sqrt(square[independent])
             block, image = block @ turn, image @ turn
-            left = held.T @ block
-            basis, held = np.column_stack([basis, block - basis @ left]), np.column_stack([held, image - held @ left])
+            overlap = weighted.T @ block
+            basis, weighted = (
+                np.column_stack([basis, block - basis @ overlap]),
+                np.column_stack([weighted, image - weighted @ overlap]),
+            )
             if count < BLOCKS - 1:
                 block = self._solve(image)
-        own = basis[:, phi.shape[1] :]
-        squares, axes = np.linalg.eigh(own.T @ (self._K_ss @ own))
-        own = own @ axes
-        return self._full(own), squares, own.T @ self._seen[0]
+        vectors = basis[:, phi.shape[1] :]
+        squares, axes = np.linalg.eigh(vectors.T @ (self._K_ss @ vectors))
+        vectors = vectors @ axes
+        return self._full(vectors), squares, vectors.T @ self._observers[0]
 
     def towards(self, change: SecondOrderSystem) -> SecondOrderSystem:
         """What the reduced matrices, loads and outputs move by where those of the full system move by `change`.
@@ -117,19 +120,19 @@ class Sensitivity:
         pushed = np.asarray(dK[rows] @ T)
         stiffness, mass = T[rows].T @ pushed, np.zeros((T.shape[1], T.shape[1]))
         stiffness[:n, n:], stiffness[n:, :n] = 0.0, 0.0
-        V, squares, seen = self._space
+        V, squares, projected = self._space
         right = V[rows].T @ pushed[:, n:]
         if dM.nnz:
-            moved = dM @ T
-            mass += T.T @ moved
-            right -= V.T @ moved[:, n:] * self._squares
-        modes = -seen.T @ (right / (squares[:, None] - self._squares))
+            inertia = dM @ T
+            mass += T.T @ inertia
+            right -= V.T @ inertia[:, n:] * self._squares
+        modes = -projected.T @ (right / (squares[:, None] - self._squares))
         masters = -self._full(self._following)[rows].T @ pushed[:, :n]
         mass[:n, :n] += masters[:n] + masters[:n].T
         between = modes[:n] - pushed[:, :n].T @ (T[rows, n:] / self._squares)  # K_ss^-1 M_ss Phi = Phi / w^2
         mass[:n, n:] += between
         mass[n:, :n] += between.T
-        following = dict(zip(self._seen[1], np.column_stack([masters, modes])[n:], strict=True))
+        following = dict(zip(self._observers[1], np.column_stack([masters, modes])[n:], strict=True))
 
         def vectors(kind: str) -> dict[str, np.ndarray]:
             """T^T of loads or outputs, and what the shapes that follow add."""
@@ -140,14 +143,14 @@ class Sensitivity:
 
         return SecondOrderSystem((mass + mass.T) / 2, stiffness, None, vectors("loads"), vectors("outputs"))
 
-    def moved(self, ways: Sequence[tuple[SecondOrderSystem, float]], stiffer: float = 0.0) -> ReducedModel:
+    def model_at(self, ways: Sequence[tuple[SecondOrderSystem, float]], stiffer: float = 0.0) -> ReducedModel:
         """The model at shares of such ways; stiffer : that of all stiffness besides, which changes no shapes."""
-        own = self.model.system
+        base = self.model.system
 
-        def there(kind: str, name: str) -> np.ndarray:
-            return np.asarray(sum((share * getattr(way, kind)[name] for way, share in ways), getattr(own, kind)[name]))
+        def changed(kind: str, name: str) -> np.ndarray:
+            return np.asarray(sum((share * getattr(way, kind)[name] for way, share in ways), getattr(base, kind)[name]))
 
-        vectors = {kind: {name: there(kind, name) for name in getattr(own, kind)} for kind in ("loads", "outputs")}
-        mass = sum((share * way.mass for way, share in ways), own.mass)
-        stiffness = sum((share * way.stiffness for way, share in ways), (1 + stiffer) * own.stiffness)
-        return replace(self.model, system=replace(own, mass=mass, stiffness=stiffness, **vectors))
+        vectors = {kind: {name: changed(kind, name) for name in getattr(base, kind)} for kind in ("loads", "outputs")}
+        mass = sum((share * way.mass for way, share in ways), base.mass)
+        stiffness = sum((share * way.stiffness for way, share in ways), (1 + stiffer) * base.stiffness)
+        return replace(self.model, system=replace(base, mass=mass, stiffness=stiffness, **vectors))

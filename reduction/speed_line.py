@@ -54,8 +54,8 @@ def congruent(K: Any, T: np.ndarray) -> np.ndarray:
 def independent(columns: np.ndarray, stiffness: Any) -> np.ndarray:
     """Shapes (n, k) of unit energy that span columns (n, m), but for the share `LIMITS.dependent` of unit energy."""
     energy, turn = sla.eigh(columns.conj().T @ (stiffness @ columns))
-    kept = energy > LIMITS.dependent
-    return np.asarray((columns @ turn[:, kept]) / np.sqrt(energy[kept]))
+    retained = energy > LIMITS.dependent
+    return np.asarray((columns @ turn[:, retained]) / np.sqrt(energy[retained]))
 
 
 Systems = tuple[tuple[SecondOrderSystem, ...], np.ndarray, np.ndarray]
@@ -79,7 +79,7 @@ class SpeedLine:
     load: str
     nominal: float
     springs: np.ndarray
-    made: dict[int, Systems] = field(default_factory=dict)
+    cache: dict[int, Systems] = field(default_factory=dict)
     damping: Damping | None = None
 
     def __call__(self, omega: float) -> WaveModel:
@@ -92,8 +92,8 @@ class SpeedLine:
 
     def damped(self, make: Damping) -> SpeedLine:
         """The same with another damping."""
-        made = {index: _damped(systems, make) for index, systems in self.made.items()}
-        return replace(self, made=made, damping=make)
+        cache = {index: _damped(systems, make) for index, systems in self.cache.items()}
+        return replace(self, cache=cache, damping=make)
 
     def speed(self, omega: float) -> float:
         """The speed [Hz] whose engine order has a frequency [rad/s]."""
@@ -101,46 +101,50 @@ class SpeedLine:
 
     def between(self, systems: Sequence[SecondOrderSystem], speed: float) -> SecondOrderSystem:
         """The system at a speed from those at `speeds`."""
-        squares, one = np.square(self.speeds), systems[0]
+        squares, first = np.square(self.speeds), systems[0]
         parts = [(speed**2 - np.delete(squares, i)) / (s - np.delete(squares, i)) for i, s in enumerate(squares)]
         return replace(
-            one,
+            first,
             **_summed([float(np.prod(part)) for part in parts], systems),
-            gyroscopic=None if one.gyroscopic is None else speed / self.speeds[0] * one.gyroscopic,
-            loads={**one.loads, self.load: (speed / self.nominal) ** 2 * one.loads[self.load]},
+            gyroscopic=None if first.gyroscopic is None else speed / self.speeds[0] * first.gyroscopic,
+            loads={**first.loads, self.load: (speed / self.nominal) ** 2 * first.loads[self.load]},
         )
 
     def by_frequency(self, systems: Sequence[SecondOrderSystem], speed: float) -> SecondOrderSystem:
         """What `between` gives, differentiated by the frequency [rad/s]."""
-        squares, one, each = np.square(self.speeds), systems[0], self.speed(1.0)
+        squares, first, each = np.square(self.speeds), systems[0], self.speed(1.0)
         weights = []
         for i, s in enumerate(squares):
-            apart = s - np.delete(squares, i)
-            part = (speed**2 - np.delete(squares, i)) / apart
-            weights.append(2 * speed * each * sum(np.prod(np.delete(part, j)) / apart[j] for j in range(len(apart))))
+            distances = s - np.delete(squares, i)
+            part = (speed**2 - np.delete(squares, i)) / distances
+            weights.append(
+                2 * speed * each * sum(np.prod(np.delete(part, j)) / distances[j] for j in range(len(distances)))
+            )
         return replace(
-            one,
-            mass=np.zeros_like(one.mass),
+            first,
+            mass=np.zeros_like(first.mass),
             **_summed(weights, systems),
-            gyroscopic=None if one.gyroscopic is None else each / self.speeds[0] * one.gyroscopic,
-            loads={name: 2 * speed * each / self.nominal**2 * v * (name == self.load) for name, v in one.loads.items()},
-            outputs={name: np.zeros_like(v) for name, v in one.outputs.items()},
+            gyroscopic=None if first.gyroscopic is None else each / self.speeds[0] * first.gyroscopic,
+            loads={
+                name: 2 * speed * each / self.nominal**2 * v * (name == self.load) for name, v in first.loads.items()
+            },
+            outputs={name: np.zeros_like(v) for name, v in first.outputs.items()},
         )
 
     def at_index(self, index: int) -> Systems:
         """Systems at all speeds, contact map and way back of a harmonic index, in few coordinates."""
-        if index not in self.made:
+        if index not in self.cache:
             first, B, T = WaveIndices(self.reduced)(index)
-            if first.n_dof > LIMITS.many_along:
+            if first.n_dof > LIMITS.many_on_line:
                 ends = first, replace(first, stiffness=congruent(self.stiffness[-1], T))
-                shapes = [stuck_ritz(one, B, self.springs, LIMITS.modes_along) for one in ends]
+                shapes = [stuck_ritz(end, B, self.springs, LIMITS.modes_on_line) for end in ends]
                 V = independent(np.concatenate(shapes, axis=1), stuck_stiffness(first.stiffness, B, self.springs))
                 first, B, T = first.projected(V), B @ V, T @ V
             systems = first, *(replace(first, stiffness=congruent(K, T)) for K in self.stiffness[1:])
-            self.made[index] = (systems, B, T) if self.damping is None else _damped((systems, B, T), self.damping)
-        return self.made[index]
+            self.cache[index] = (systems, B, T) if self.damping is None else _damped((systems, B, T), self.damping)
+        return self.cache[index]
 
-    def error(self, speed: float, there: np.ndarray, n_modes: int = 6) -> float:
+    def error(self, speed: float, exact: np.ndarray, n_modes: int = 6) -> float:
         """Largest relative error of the lowest frequencies of the stuck wave that interpolation makes at a speed.
 
         there : (n, n) stiffness at this speed
@@ -150,11 +154,11 @@ class SpeedLine:
             sector = self.reduced.sector
             return wave_system(replace(sector, system=replace(sector.system, stiffness=stiffness)), self.engine_order)
 
-        system, B = wave(there)
+        system, B = wave(exact)
         omega, phi = modes(stuck_stiffness(system.stiffness, B, self.springs), system.mass, n_modes)
-        alike = [replace(self.reduced.sector.system, stiffness=K) for K in self.stiffness]
-        missed, _ = wave(self.between(alike, speed).stiffness - there)
-        return float(np.abs(np.einsum("ij,ij->j", phi.conj(), missed.stiffness @ phi) / (2 * omega**2)).max())
+        sectors = [replace(self.reduced.sector.system, stiffness=K) for K in self.stiffness]
+        difference, _ = wave(self.between(sectors, speed).stiffness - exact)
+        return float(np.abs(np.einsum("ij,ij->j", phi.conj(), difference.stiffness @ phi) / (2 * omega**2)).max())
 
 
 @dataclass(frozen=True)
@@ -190,9 +194,9 @@ class SpeedLineModel(WaveModel):
         return replace(self, system=damped.system, index_of=damped.index_of, line=self.line.damped(make))
 
 
-def _damped(made: Systems, make: Damping) -> Systems:
-    systems, B, T = made
-    return tuple(replace(one, damping=make(one, B)) for one in systems), B, T
+def _damped(systems_of_index: Systems, make: Damping) -> Systems:
+    systems, B, T = systems_of_index
+    return tuple(replace(system, damping=make(system, B)) for system in systems), B, T
 
 
 def _summed(weights: Sequence[float], systems: Sequence[SecondOrderSystem]) -> dict[str, Any]:
@@ -205,15 +209,15 @@ def _summed(weights: Sequence[float], systems: Sequence[SecondOrderSystem]) -> d
 
 @dataclass(frozen=True, eq=False)
 class AtSpeed:
-    """System, contact map and way back of each harmonic index at one speed [Hz]; of : what is made from all speeds."""
+    """System, contact map and way back of each harmonic index at one speed [Hz]; of : what is cache from all speeds."""
 
     line: SpeedLine
     of: Callable[[Sequence[SecondOrderSystem], float], SecondOrderSystem]
     speed: float
-    made: dict[int, IndexSystem] = field(default_factory=dict)
+    cache: dict[int, IndexSystem] = field(default_factory=dict)
 
     def __call__(self, index: int) -> IndexSystem:
-        if index not in self.made:
+        if index not in self.cache:
             systems, B, T = self.line.at_index(index)
-            self.made[index] = self.of(systems, self.speed), B, T
-        return self.made[index]
+            self.cache[index] = self.of(systems, self.speed), B, T
+        return self.cache[index]

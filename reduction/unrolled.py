@@ -38,8 +38,8 @@ def unrolled(model: WaveModel, highest: float) -> ReducedModel:
         lam.append(np.tile(squares, 1 + pair))
         turned = np.stack([rows * np.exp(-2j * np.pi * (index * k % N) / N) for k in range(n)])
         # of amplitudes (u + i v) / sqrt(2) of an index and of their conjugates of its mirror
-        seen = np.sqrt(2) * np.concatenate([turned.real, -turned.imag], axis=-1) if pair else turned.real
-        ports.append(seen / np.sqrt(n))
+        port_rows = np.sqrt(2) * np.concatenate([turned.real, -turned.imag], axis=-1) if pair else turned.real
+        ports.append(port_rows / np.sqrt(n))
         damping.append(_real_matrix(c, pair))
         gyroscopic.append(_real_matrix(g, pair))
         circulatory.append(_real_matrix(flow, pair))
@@ -51,7 +51,7 @@ def unrolled(model: WaveModel, highest: float) -> ReducedModel:
         kind: {sector_name(name, k): rows[k, first + i] for k in range(n) for i, name in enumerate(names)}
         for kind, first, names in (("loads", n_contact, loads), ("outputs", at, outputs))
     }
-    whole = SecondOrderSystem(
+    ring = SecondOrderSystem(
         np.eye(len(squares)),
         np.diag(squares),
         sla.block_diag(*damping) if system.damping is not None else None,
@@ -60,8 +60,8 @@ def unrolled(model: WaveModel, highest: float) -> ReducedModel:
         _together(gyroscopic),
         _together(circulatory),
     )
-    interface = join([replace(model.interface, B=own[:n_contact]) for own in rows])
-    return ReducedModel(whole, interface)
+    interface = join([replace(model.interface, B=sector_rows[:n_contact]) for sector_rows in rows])
+    return ReducedModel(ring, interface)
 
 
 def _modes(
@@ -74,12 +74,12 @@ def _modes(
     rows = np.concatenate([np.asarray(B), *loads, *outputs]) @ phi
     moving = int(np.sum(lam < highest**2))
     if len(lam) - moving > len(rows):
-        rest = rows[:, moving:] / np.sqrt(lam[moving:])
-        size, shapes = sla.eigh(rest @ rest.conj().T)
-        kept = size > LIMITS.negligible * size[-1]
-        still = LIMITS.still * highest
-        rows = np.concatenate([rows[:, :moving], still * np.sqrt(size[kept]) * shapes[:, kept]], axis=1)
-        lam = np.concatenate([lam[:moving], np.full(int(kept.sum()), still**2)])
+        remainder = rows[:, moving:] / np.sqrt(lam[moving:])
+        size, shapes = sla.eigh(remainder @ remainder.conj().T)
+        retained = size > LIMITS.negligible * size[-1]
+        still = LIMITS.static_frequency * highest
+        rows = np.concatenate([rows[:, :moving], still * np.sqrt(size[retained]) * shapes[:, retained]], axis=1)
+        lam = np.concatenate([lam[:moving], np.full(int(retained.sum()), still**2)])
         phi = phi[:, :moving]
 
     def modal(matrix: np.ndarray | None) -> np.ndarray:

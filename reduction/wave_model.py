@@ -133,7 +133,7 @@ def wave_model(reduced: ReducedSector, engine_order: int, index_of: WaveIndex) -
 def travelling_wave(reduced: ReducedSector, engine_order: int, springs: np.ndarray | None = None) -> WaveModel:
     """The model of one sector under a wave of this engine order.
 
-    springs : (n_pair, n_component) contact springs [N/m]; where they are given, more than `LIMITS.many` coordinates are
+    springs : (n_pair, n_component) contact springs [N/m]. If given, more than `LIMITS.many_coordinates` coordinates are
         replaced by those of `stuck_ritz`
     Its coordinates, but for those of `stuck_ritz`, are the relative displacements, then accessories, then the rest
     """
@@ -162,14 +162,14 @@ class WaveIndices:
     def __init__(self, reduced: ReducedSector, springs: np.ndarray | None = None):
         self._sector = reduced.sector
         self._springs = springs
-        self._made: dict[int, IndexSystem] = {}
+        self._cache: dict[int, IndexSystem] = {}
 
     def __call__(self, index: int) -> IndexSystem:
-        if index not in self._made:
-            self._made[index] = self._small(*self._whole(index))
-        return self._made[index]
+        if index not in self._cache:
+            self._cache[index] = self._small(*self._unreduced(index))
+        return self._cache[index]
 
-    def _whole(self, index: int) -> IndexSystem:
+    def _unreduced(self, index: int) -> IndexSystem:
         """The same with all coordinates of the sector."""
         once, of_row = distinct(self._sector)
         if not node_to_node(once):
@@ -180,7 +180,7 @@ class WaveIndices:
 
     def _small(self, system: SecondOrderSystem, B: np.ndarray, T: np.ndarray) -> IndexSystem:
         """The same in fewer coordinates where there are many."""
-        if self._springs is None or system.n_dof <= LIMITS.many:
+        if self._springs is None or system.n_dof <= LIMITS.many_coordinates:
             return system, B, T
         try:
             V = stuck_ritz(system, B, self._springs)

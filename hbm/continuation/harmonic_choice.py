@@ -166,7 +166,7 @@ def widened(balance: HarmonicBalance, highest: int, error: float | None = None) 
         excitation = replace(excitation, base=balance.basis.transfer(excitation.base, basis))
     own, springs = balance.compliance, balance.reference_stiffness
     known = _WIDE.get(own)
-    serves = known is not None and known.basis.harmonics[-1] >= top and (known.wanted or 0.0) <= (error or 0.0)
+    serves = known is not None and known.basis.harmonics[-1] >= top and (known.target_error or 0.0) <= (error or 0.0)
     if known is None or not serves or not np.array_equal(known.k, springs):
         known = _WIDE[own] = compliance_of(balance.model, springs, basis, excitation, balance.omega_max, error)
     return replace(balance, basis=basis, excitation=excitation, compliance=known.restricted(basis), at_rest=None)

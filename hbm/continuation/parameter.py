@@ -59,7 +59,7 @@ def of(problem: HarmonicBalance | Parameter) -> Parameter:
     """The parameter itself, or the frequency of a balance, whose curve recalls what its points asked for."""
     if isinstance(problem, Parameter):
         return problem
-    along = replace(problem, asked=[])
+    along = replace(problem, recalled=[])
     return Parameter(FREQUENCY, lambda _: along, None)
 
 

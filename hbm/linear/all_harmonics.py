@@ -91,21 +91,21 @@ def modal(forces, n_e, ratio, has_static, real, imag, pivots, static):
 
 
 @numba.njit(cache=True)
-def displaced(moved, higher, left, n, n_e, unit, ratio, has_static, real, imag, pivots, static):
+def displaced(products, higher, to_ports, n, n_e, unit, ratio, has_static, real, imag, pivots, static):
     """Displacement (n, n_coeff) from forces times [W_0, modes] and the W_k, as rows; left : (m + n_e m, n_port)."""
-    n_port = left.shape[1]  # this copy and the typed 0 below make one kernel of `modal` serve both: a second each
-    y = modal(moved[:, n_port:].copy(), n_e, ratio, has_static, real, imag, pivots, static)
-    return gathered(np.dot(y, left), moved, higher, n, n_port, unit, ratio, has_static)
+    n_port = to_ports.shape[1]  # this copy and the typed 0 below make one kernel of `modal` serve both: a second each
+    y = modal(products[:, n_port:].copy(), n_e, ratio, has_static, real, imag, pivots, static)
+    return gathered(np.dot(y, to_ports), products, higher, n, n_port, unit, ratio, has_static)
 
 
 @numba.njit(cache=True)
-def displaced_slope(forces, higher, left, unit, omega, s_unit, c, t, ratio, has_static, real, imag, pivots, static):
+def displaced_slope(forces, higher, to_ports, unit, omega, s_unit, c, t, ratio, has_static, real, imag, pivots, static):
     """d / d omega of `displaced`: of (i ratio)^k it is k / omega times that, of the core d S / d s times i h.
 
     forces, higher : times modes and e (n_coeff, m + n_e m), times the W_k; c (m, m), t (n_e, m, m) : of the core
     """
-    m, n_port, s = len(c), left.shape[1], 1 if has_static else 0
-    n_e = len(left) // m - 1
+    m, n_port, s = len(c), to_ports.shape[1], 1 if has_static else 0
+    n_e = len(to_ports) // m - 1
     of_powers = np.repeat(np.arange(n_e + 1) / omega, m)
     y = modal_forces(forces, n_e, ratio, has_static)
     dy = modal_forces(forces * of_powers, n_e, ratio, has_static)
@@ -124,8 +124,8 @@ def displaced_slope(forces, higher, left, unit, omega, s_unit, c, t, ratio, has_
     solve_core(dy, real, imag, pivots, static, has_static)
     rows = modal_rows(dy, n_e, ratio, has_static) + modal_rows(y, n_e, ratio, has_static) * of_powers
     by_powers = higher * np.repeat(np.arange(1, higher.shape[1] // n_port + 1) / omega, n_port)
-    moved = np.dot(rows, left)
-    return gathered(moved, np.zeros(moved.shape), by_powers, n_port, n_port, unit, ratio, has_static)
+    displacement = np.dot(rows, to_ports)
+    return gathered(displacement, np.zeros(displacement.shape), by_powers, n_port, n_port, unit, ratio, has_static)
 
 
 @numba.njit(cache=True)
@@ -149,10 +149,10 @@ def nearly_displaced(force, w0, b, b_turned, ratio, has_static, real, imag, pivo
         if len(w0):
             still += np.dot(rows, w0[start:stop])
     y = modal(pushed[:n_coeff].astype(np.float64), np.int64(0), ratio, has_static, real, imag, pivots, static)
-    moved = np.dot(y.astype(b.dtype), b_turned)
+    displacement = np.dot(y.astype(b.dtype), b_turned)
     if len(w0):
-        moved += still[:n_coeff]
-    return np.ascontiguousarray(moved[:n_coeff].T).astype(np.float64)
+        displacement += still[:n_coeff]
+    return np.ascontiguousarray(displacement[:n_coeff].T).astype(np.float64)
 
 
 @numba.njit(cache=True)
@@ -175,14 +175,14 @@ def modal_rows(y, n_e, ratio, has_static):
 
 
 @numba.njit(cache=True)
-def gathered(modal, moved, higher, n, n_port, unit, ratio, has_static):
+def gathered(modal, static, higher, n, n_port, unit, ratio, has_static):
     """Displacement (n, n_coeff): modes, W_0 f and sum_k (i ratio)^k unit W_k f, rows of `moved` and `higher`.
 
     The rows of `higher` are those of the harmonics >= 1.
     """
     s = 1 if has_static else 0
     n_power = higher.shape[1] // n_port
-    out = np.ascontiguousarray((modal[:, :n] + moved[:, :n]).T)
+    out = np.ascontiguousarray((modal[:, :n] + static[:, :n]).T)
     for h in range(len(ratio)):
         a, b, p, q = s + 2 * h, s + 2 * h + 1, 2 * h, 2 * h + 1
         size, odd_sign, even_sign = unit, 1.0, 1.0

@@ -49,8 +49,7 @@ class ContactCompliance:
     model : reduced model; stiffness : (n_pair, n_component) stuck springs [N/m], of a model with residual flexibility
         those that this was made with
     excitation : loads whose names are ports; omega_max : largest excitation frequency that will be asked for [rad/s]
-    wanted : relative error of dense compliances at the highest harmonic of it that is small enough; None: as a run
-        needs it
+    target_error : relative error of dense compliances at the highest harmonic of omega_max; None for the default
     """
 
     def __init__(
@@ -60,9 +59,9 @@ class ContactCompliance:
         basis: HarmonicBasis,
         excitation: Excitation,
         omega_max: float,
-        wanted: float | None = None,
+        target_error: float | None = None,
     ):
-        self.basis, self.wanted = basis, wanted
+        self.basis, self.target_error = basis, target_error
         self.k = np.asarray(stiffness, float).ravel()
         self.n_contact = len(self.k)
         system, _ = model.at_harmonic(basis.harmonics[-1])
@@ -84,12 +83,12 @@ class ContactCompliance:
         self.shared_real = self._one_real()
         self.coarse = self._coarse_modes()
         self._points: dict[float, CompliancePoint] = {}
-        self._most = RULES.points_kept
+        self._capacity = RULES.points_kept
         self._active: tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
 
     def _expansion(self, system: SecondOrderSystem, b: np.ndarray, ports: np.ndarray, s_max: float) -> Expansion:
         """The expansion of one system with its contact map b."""
-        return Expansion(system, b, self.k, ports, s_max, self.wanted)
+        return Expansion(system, b, self.k, ports, s_max, self.target_error)
 
     def _excite(self, excitation: Excitation) -> None:
         """Take the amplitudes of the loads and the motion of the ground."""
@@ -103,15 +102,15 @@ class ContactCompliance:
     def under(self, excitation: Excitation) -> ContactCompliance:
         """The same under other amplitudes of its loads; takes over the frequencies at hand, and keeps more of them."""
         other = copy(self)
-        for made in ("outside", "excited"):
-            other.__dict__.pop(made, None)
+        for name in ("outside", "excited"):
+            other.__dict__.pop(name, None)
         other._excite(excitation)
         other._check_balance()
         widest = max(e.n_mode if self.shared_real else max(e.n_mode, self.n_contact) for e, _ in self.groups)
         size = 32 * widest**2 * len(self.basis.harmonics)  # of a complex matrix and its parts, or of factors besides
-        other._most = max(RULES.points_kept, int(RULES.shared_room / size))
-        same = np.array_equal(other._load, self._load) and other.base is self.base is None
-        other._points = {omega: point.under(other, same) for omega, point in self._points.items()}
+        other._capacity = max(RULES.points_kept, int(RULES.shared_room / size))
+        is_equal = np.array_equal(other._load, self._load) and other.base is self.base is None
+        other._points = {omega: point.under(other, is_equal) for omega, point in self._points.items()}
         self._points = {}
         return other
 
@@ -149,17 +148,20 @@ class ContactCompliance:
 
     def restricted(self, basis: HarmonicBasis) -> ContactCompliance:
         """The same for fewer of the harmonics; the expansions are shared."""
-        old = self.basis.harmonics
+        all_harmonics = self.basis.harmonics
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other.basis = basis
         other._active, other._points = None, {}
-        for made in ("outside", "coarse_parts", "coarse_shapes", "excited"):
-            other.__dict__.pop(made, None)
-        other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
+        for name in ("outside", "coarse_parts", "coarse_shapes", "excited"):
+            other.__dict__.pop(name, None)
+        other._load = self._load[:, [all_harmonics.index(h) for h in basis.harmonics]]
         other.base = None if self.base is None else self.basis.transfer(self.base, basis)
-        kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
-        other.groups = [(expansion, positions) for expansion, positions in kept if positions]
+        remaining = [
+            (e, [basis.harmonics.index(all_harmonics[p]) for p in ps if all_harmonics[p] in basis.harmonics])
+            for e, ps in self.groups
+        ]
+        other.groups = [(expansion, positions) for expansion, positions in remaining if positions]
         other.shared_real = other._one_real()
         return other
 
@@ -190,8 +192,8 @@ class ContactCompliance:
         shapes = [root[:, None] * e.b[:n] / np.sqrt(e.static_lam) for e, _ in self.groups]
         parts = [part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))]
         columns = np.concatenate(parts, axis=1)
-        left, size, _ = np.linalg.svd(columns, full_matrices=False)
-        return np.ascontiguousarray(left[:, size**2 > RULES.preconditioned_share * len(self.groups)])
+        shapes_of_contact, size, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.ascontiguousarray(shapes_of_contact[:, size**2 > RULES.preconditioned_share * len(self.groups)])
 
     def on_rows(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """W_0, empty where there is none, modes and these transposed of one real system at some contact rows.
@@ -210,7 +212,7 @@ class ContactCompliance:
         """The compliance at one excitation frequency [rad/s]; the last ones are kept."""
         point = self._points.pop(omega, None) or self._make(omega)
         self._points[omega] = point
-        if len(self._points) > self._most:
+        if len(self._points) > self._capacity:
             del self._points[next(iter(self._points))]
         return point
 
@@ -229,17 +231,17 @@ class ContactCompliance:
         x, n = self.groups[0][0], self.n_contact
         stop = n + self.n_load
         rows = np.ascontiguousarray(self.excited[:stop].T)
-        moved, columns = self._static_and_modes(rows)
+        displacement, columns = self._static_and_modes(rows)
         higher = [w[:n, stop:] for w in x.higher]
         return Outside(
-            (moved, self.moving(rows) @ x.single[:stop]),
+            (displacement, self.moving(rows) @ x.single[:stop]),
             columns,
             np.concatenate(higher, axis=1) if higher else x.single[:n],
-            np.ascontiguousarray(x.left[:, stop:]),
+            np.ascontiguousarray(x.to_ports[:, stop:]),
         )
 
     def _static_and_modes(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Port forces `rows` (n_coeff, n) times [W_0, modes], and these (n_contact, n_output + n_left) for outputs."""
+        """Port forces `rows` (n_coeff, n) times [W_0, modes], and these (n_contact, n_output + n_modal) for outputs."""
         x, n = self.groups[0][0], self.n_contact
         stop = n + self.n_load
         return rows @ x.columns[:stop], np.concatenate([x.w0[:n, stop:], x.columns[:n, x.n_port :]], axis=1)
@@ -248,27 +250,27 @@ class ContactCompliance:
     def excited(self) -> np.ndarray:
         """(n_port, n_coeff) port forces of the excitation."""
         base = np.zeros((self.n_contact, self.basis.n_coeff)) if self.base is None else self.base
-        found = self.pushed(self.k[:, None] * base)
-        found[self.n_contact : self.n_contact + self.n_load] = self.basis.to_real(self._load)
-        return found
+        force = self.pushed(self.k[:, None] * base)
+        force[self.n_contact : self.n_contact + self.n_load] = self.basis.to_real(self._load)
+        return force
 
     def pushed(self, g: np.ndarray) -> np.ndarray:
         """(n_port, n_coeff) port forces of contact forces g (n_contact, n_coeff) [N]."""
-        found = np.zeros((self.n_contact + self.n_load + len(self.output_names), self.basis.n_coeff))
-        found[: self.n_contact] = g
-        return found
+        force = np.zeros((self.n_contact + self.n_load + len(self.output_names), self.basis.n_coeff))
+        force[: self.n_contact] = g
+        return force
 
 
 @dataclass(frozen=True)
 class Outside:
     """What the excitation and the outputs of one real system take from its matrices, see `Expansion`.
 
-    excitation : its forces as rows times [W_0, modes] (n_coeff, n_port + n_left), and times the W_k (n_row, n_k n_port)
-    columns : (n_contact, n_output + n_left) [W_0, modes]; single : (n_contact, n_k n_output) the W_k
-    left : (n_left, n_output)
+    excitation : forces as rows times [W_0, modes] (n_coeff, n_port + n_modal), and times the W_k (n_row, n_k n_port)
+    columns : (n_contact, n_output + n_modal) [W_0, modes]; single : (n_contact, n_k n_output) the W_k
+    to_ports : (n_modal, n_output)
     """
 
     excitation: tuple[np.ndarray, np.ndarray]
     columns: np.ndarray
     single: np.ndarray
-    left: np.ndarray
+    to_ports: np.ndarray

@@ -33,11 +33,11 @@ class CompliancePoint:
         self.ports = self._solved()
         self._excite()
 
-    def under(self, compliance: ContactCompliance, same: bool) -> CompliancePoint:
+    def under(self, compliance: ContactCompliance, is_equal: bool) -> CompliancePoint:
         """That of the same expansions under other loads, or under the same again."""
         other = copy(self)
         other.compliance = compliance
-        if not same:
+        if not is_equal:
             other._excite()
         return other
 
@@ -45,8 +45,8 @@ class CompliancePoint:
         compliance, basis = self.compliance, self.compliance.basis
         n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
         if compliance.outside is not None:
-            moved = self._from_rows(*compliance.outside.excitation, compliance.groups[0][0].left)
-            x, self.outputs_lin = moved[:n], moved[stop:]
+            displacement = self._from_rows(*compliance.outside.excitation, compliance.groups[0][0].to_ports)
+            x, self.outputs_lin = displacement[:n], displacement[stop:]
         else:
             excited = slice(n, stop) if compliance.base is None else slice(0, stop)
             ports = self._through_ports(basis.to_complex(compliance.excited[excited]), excited)
@@ -71,7 +71,7 @@ class CompliancePoint:
         """G g: (n_contact, n_coeff) relative displacement [m] under contact forces g (n_contact, n_coeff) [N]."""
         if self.compliance.shared_real:
             return self._apply_shared_real(g)
-        return _moved(self.dense, self.compliance.basis, g)
+        return _product(self.dense, self.compliance.basis, g)
 
     def transposed(self, g: np.ndarray) -> np.ndarray:
         """G^T g; each G_h of one real system is symmetric, so that this is G at the reversed time."""
@@ -104,14 +104,16 @@ class CompliancePoint:
         """The same for one real system: every matrix meets all harmonics in one real product."""
         n, x = self.compliance.n_contact, self.compliance.groups[0][0]
         rows = np.ascontiguousarray(g.T)
-        moved, higher = few_rows(rows, x.columns[:n]), few_rows(self.compliance.moving(rows), x.single[:n])
-        return self._from_rows(moved, higher, x.left, n)
+        products, higher = few_rows(rows, x.columns[:n]), few_rows(self.compliance.moving(rows), x.single[:n])
+        return self._from_rows(products, higher, x.to_ports, n)
 
-    def _from_rows(self, moved: np.ndarray, higher: np.ndarray, left: np.ndarray, n: int | None = None) -> np.ndarray:
+    def _from_rows(
+        self, products: np.ndarray, higher: np.ndarray, to_ports: np.ndarray, n: int | None = None
+    ) -> np.ndarray:
         """(n, n_coeff) displacement of the first n ports of `left` from forces times [W_0, modes] and W_k, as rows."""
-        x, n = self.compliance.groups[0][0], left.shape[1] if n is None else n
-        found: np.ndarray = all_harmonics.displaced(moved, higher, left, n, len(x.e), x.unit, *self.core)
-        return found
+        x, n = self.compliance.groups[0][0], to_ports.shape[1] if n is None else n
+        displacement: np.ndarray = all_harmonics.displaced(products, higher, to_ports, n, len(x.e), x.unit, *self.core)
+        return displacement
 
     @cached_property
     def core(self) -> tuple[np.ndarray, bool, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -130,7 +132,7 @@ class CompliancePoint:
         o = c.outside
         if o is not None and self.outputs_lin.size:
             rows = np.ascontiguousarray(g.T)
-            return self._from_rows(rows @ o.columns, c.moving(rows) @ o.single, o.left)
+            return self._from_rows(rows @ o.columns, c.moving(rows) @ o.single, o.to_ports)
         contacts, outputs = slice(0, c.n_contact), slice(c.n_contact + c.n_load, None)
         return c.basis.to_real(self._through_ports(c.basis.to_complex(g), contacts, outputs))
 
@@ -144,15 +146,17 @@ class CompliancePoint:
         c, x = self.compliance, self.compliance.groups[0][0]
         if c.shared_real:
             rows = np.ascontiguousarray(force.T)
-            pushed = rows @ x.left.T, c.moving(rows) @ x.single
-            moved = all_harmonics.displaced_slope(*pushed, x.left, x.unit, self._turns, x.s_unit, x.c, x.t, *self.core)
+            pushed = rows @ x.to_ports.T, c.moving(rows) @ x.single
+            displacement_slope = all_harmonics.displaced_slope(
+                *pushed, x.to_ports, x.unit, self._turns, x.s_unit, x.c, x.t, *self.core
+            )
         else:
             amplitudes, slopes = c.basis.to_complex(force), np.zeros((len(force), len(self._harmonics)), complex)
             for (_, positions), ports in zip(c.groups, self.ports, strict=True):
                 for p, port in zip(positions, ports, strict=True):
                     slopes[:, p] = port.slope(amplitudes[:, p], 1j * self._harmonics[p])
-            moved = c.basis.to_real(slopes)
-        return moved[: c.n_contact], moved[c.n_contact + c.n_load :]
+            displacement_slope = c.basis.to_real(slopes)
+        return displacement_slope[: c.n_contact], displacement_slope[c.n_contact + c.n_load :]
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """G restricted to contact rows (active ones) times (n_active, n_coeff), as exact as a Newton direction needs.
@@ -165,9 +169,9 @@ class CompliancePoint:
 
         def product(d: np.ndarray) -> np.ndarray:
             if dense is not None:
-                return _moved(dense, c.basis, d)
-            found: np.ndarray = all_harmonics.nearly_displaced(d, *parts, *self.core)
-            return found
+                return _product(dense, c.basis, d)
+            displacement: np.ndarray = all_harmonics.nearly_displaced(d, *parts, *self.core)
+            return displacement
 
         return product
 
@@ -186,10 +190,10 @@ class CompliancePoint:
 
     def _in_coarse(self, modes: np.ndarray, port: Any) -> np.ndarray:
         """(r, r) compliance of the `preconditioned` shapes at one harmonic, through the modes of its system."""
-        found: np.ndarray = modes @ port.through_core(modes.conj().T)
-        return found
+        compliance: np.ndarray = modes @ port.through_core(modes.conj().T)
+        return compliance
 
 
-def _moved(dense: np.ndarray, basis: HarmonicBasis, force: np.ndarray) -> np.ndarray:
+def _product(dense: np.ndarray, basis: HarmonicBasis, force: np.ndarray) -> np.ndarray:
     """Coefficients (n, n_coeff) of G_h (n_harmonic, n, n) times forces (n, n_coeff), as precise as the matrices."""
     return basis.to_real((dense @ basis.to_complex(force).T[..., None].astype(dense.dtype))[..., 0].T)

@@ -77,8 +77,7 @@ class Expansion:
 
     system : dense, b : (n_contact, n) contact map, stiffness : (n_contact,) stuck contact springs [N/m]
     ports : (n_port, n) rows; contact rows first
-    s_max : largest h w that will be asked for [rad/s]; wanted : relative error there that is small enough, None for
-        RULES.wanted_error
+    s_max : largest h w [rad/s]; target_error : relative, at s_max; None for RULES.wanted_error
     w0 : (n_port, n_port) W_0; b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports,
         all three views of `columns` = [w0, b, e_0, ...]
     w0_single, b_single : those of the contacts in single precision
@@ -96,9 +95,9 @@ class Expansion:
         stiffness: np.ndarray,
         ports: np.ndarray,
         s_max: float,
-        wanted: float | None = None,
+        target_error: float | None = None,
     ):
-        wanted = RULES.wanted_error if wanted is None else wanted
+        target_error = RULES.wanted_error if target_error is None else target_error
         self.n_port, self._n_contact = len(ports), len(b)
         self.s_unit = s_max or 1.0
         mass = np.asarray(system.mass)
@@ -107,7 +106,7 @@ class Expansion:
         stuck = 0.5 * (stuck + stuck.conj().T)
         self._system = (mass, damping)
         n = len(mass)
-        loose = SingularStuckSystem(
+        unconstrained = SingularStuckSystem(
             "the part, or a body of it, can move as a rigid body even with all contacts stuck, and its contacts move "
             "with it: join it to the rest by a tie or a link, hold it by a clamp or a spring, or raise the contact "
             "stiffness; a structure that hangs free as a whole needs nothing"
@@ -127,17 +126,17 @@ class Expansion:
                 self.rigid, shift = rigid_motions(stuck, mass)
             except np.linalg.LinAlgError:
                 if lam[0] <= rounding:
-                    raise loose from None
+                    raise unconstrained from None
         if self.rigid.shape[1]:
             try:
                 if np.abs(b @ self.rigid).max(initial=0.0) > RULES.resisted * np.abs(self.rigid).max():
-                    raise loose
-                held = mass @ self.rigid
-                stuck = stuck + shift * held @ held.conj().T
+                    raise unconstrained
+                rigid_momentum = mass @ self.rigid
+                stuck = stuck + shift * rigid_momentum @ rigid_momentum.conj().T
                 factor = sla.cho_factor(stuck)
                 lam, phi = lowest_modes(stuck, mass, count)
             except np.linalg.LinAlgError:
-                raise loose from None
+                raise unconstrained from None
             phi[:, : self.rigid.shape[1]] = self.rigid  # the lowest ones, and no others are as low
         s = 1j * s_max
         probe = np.random.default_rng(0).normal(size=(self.n_port, RULES.n_probe))
@@ -147,22 +146,22 @@ class Expansion:
         if self._flow is not None:
             free = free + self._flow
         if self.rigid.shape[1]:
-            free = free - shift * held @ held.conj().T
+            free = free - shift * rigid_momentum @ rigid_momentum.conj().T
         exact = ports @ np.linalg.solve(free, force)
         del stuck, free
-        few = np.linspace(0, len(ports) - 1, min(len(ports), RULES.compared_ports)).astype(int)
-        tried: list[tuple[int, int, float]] = []
+        probes = np.linspace(0, len(ports) - 1, min(len(ports), RULES.compared_ports)).astype(int)
+        previous: list[tuple[int, int, float]] = []
         rungs, p = [c for c in RULES.truncations if c[0] < len(lam)], self.n_port
         rungs.sort(key=lambda c: (c[1] - 1) * p * (4 * p + 16 * c[0]) + 48 * c[0] ** 2)  # bytes of three harmonics
         for m, order in rungs:  # tried between the probe and a few ports
-            self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
-            moved = self.at(s).matrix(slice(RULES.n_probe, None), slice(0, RULES.n_probe))
-            error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())
+            self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[probes]]))
+            displacement = self.at(s).matrix(slice(RULES.n_probe, None), slice(0, RULES.n_probe))
+            error = float(np.abs(displacement - exact[probes]).max() / np.abs(exact).max())
             # near a resonance rounding of the direct solve itself is what remains: more modes would not help
-            before = min((e for few, low, e in tried if few <= m and low <= order), default=np.inf)
-            if error <= wanted or 0.5 * before < error < RULES.rounding:
+            previous_error = min((e for probes, low, e in previous if probes <= m and low <= order), default=np.inf)
+            if error <= target_error or 0.5 * previous_error < error < RULES.rounding:
                 break
-            tried.append((m, order, error))
+            previous.append((m, order, error))
         else:
             m, order = len(lam), 1 if len(lam) == n else 8
         self._build(lam[:m], phi[:, :m], factor, order, ports)
@@ -208,7 +207,7 @@ class Expansion:
             for k in range(n_e):
                 self.e_in.append(at_ports @ y * self.s_unit ** (k + 1))
                 y_before, y = y, -quasi_static(damping.conj().T @ y + mass @ y_before)
-        self.left = np.ascontiguousarray(self.columns[:, p:].T)
+        self.to_ports = np.ascontiguousarray(self.columns[:, p:].T)
         r = self.rigid.shape[1]
         self.lam = np.concatenate([np.zeros(r), lam[r:]])
         self.static_lam = np.concatenate([np.full(r, np.inf), lam[r:]])  # rigid motions stand still
@@ -222,7 +221,7 @@ class Expansion:
         other = object.__new__(Expansion)
         other.__dict__.update(self.__dict__)
         p, m = self.n_port, self.n_mode
-        for name in ("columns", "single", "t", "left", "c", "w0_single", "b_single", "rigid", "flow"):
+        for name in ("columns", "single", "t", "to_ports", "c", "w0_single", "b_single", "rigid", "flow"):
             value = getattr(self, name)
             setattr(other, name, None if value is None else np.conj(value))
         other.w0, other.b = other.columns[:, :p], other.columns[:, p : p + m]
@@ -245,11 +244,11 @@ class Expansion:
         diagonals += np.where(s[:, None] != 0, self.lam, self.static_lam) + (s * s)[:, None]
         if self.flow is not None:
             cores += self.flow.T
-        found = []
-        for one, core in zip(s, cores, strict=True):
-            diagonal = one == 0 and self.flow is None
+        compliances = []
+        for frequency, core in zip(s, cores, strict=True):
+            diagonal = frequency == 0 and self.flow is None
             factor, pivots = (None, None) if diagonal else sla.lapack.zgetrf(core.T, overwrite_a=True)[:2]
-            found.append(PortCompliance(self, one, factor, pivots))
+            compliances.append(PortCompliance(self, frequency, factor, pivots))
         resonant = np.abs(diagonals).min(axis=1) < RULES.resonance_distance * np.abs(s) ** 2
         if resonant.any():
             hertz = np.abs(s[resonant][0]) / (2 * np.pi)
@@ -257,7 +256,7 @@ class Expansion:
                 f"the stuck structure has an undamped resonance at {hertz:.6g} Hz, where its response "
                 "is infinite: give it damping or take another frequency"
             )
-        return found
+        return compliances
 
 
 @dataclass(frozen=True)
@@ -287,14 +286,14 @@ class PortCompliance:
     def matrix(self, rows: slice = slice(None), columns: slice = slice(None)) -> np.ndarray:
         """Displacement of the ports in `rows` under unit forces at those in `columns`."""
         x, ratio = self.expansion, self.ratio
-        left, right = x.b[rows].astype(complex), x.b[columns].conj().T.astype(complex)
+        modal_left, right = x.b[rows].astype(complex), x.b[columns].conj().T.astype(complex)
         for k, (e, e_in) in enumerate(zip(x.e, x.e_in, strict=True), start=1):
-            left -= ratio**k * e[rows]
+            modal_left -= ratio**k * e[rows]
             right -= ratio**k * e_in[columns].conj().T
-        found: np.ndarray = left @ self.through_core(right) + x.w0[rows, columns]
+        compliance: np.ndarray = modal_left @ self.through_core(right) + x.w0[rows, columns]
         for k, w in enumerate(x.higher, start=1):
-            found += x.unit * ratio**k * w[rows, columns]
-        return found
+            compliance += x.unit * ratio**k * w[rows, columns]
+        return compliance
 
     def slope(self, force: np.ndarray, by: complex) -> np.ndarray:
         """`by` times d / d s of the displacement of all ports under forces (n_port, ...)."""

@@ -56,7 +56,11 @@ class RitzExpansion(Expansion):
         self.b_single = self.b[: len(b)].astype(np.float32)
         self.w0, self.order, self.n_mode = None, 1, len(self.lam)  # type: ignore[assignment]
         self.w0_single = np.zeros((0, 0), np.float32)
-        self.left, self.single, self.unit = np.ascontiguousarray(self.b.T), np.zeros((len(ports), 0), np.float32), 1.0
+        self.to_ports, self.single, self.unit = (
+            np.ascontiguousarray(self.b.T),
+            np.zeros((len(ports), 0), np.float32),
+            1.0,
+        )
         self.e, self.e_in, self.higher, self.t = [], [], [], np.zeros((0, 0, 0))
         self.error = residual.error(s_max)
 
@@ -71,10 +75,10 @@ class FlexibleCompliance(ContactCompliance):
         basis: HarmonicBasis,
         excitation: Excitation,
         omega_max: float,
-        wanted: float | None = None,
+        target_error: float | None = None,
     ):
         self.residual = model.residual
-        super().__init__(model, stiffness, basis, excitation, omega_max, wanted)
+        super().__init__(model, stiffness, basis, excitation, omega_max, target_error)
 
     def _expansion(self, system: SecondOrderSystem, b: np.ndarray, ports: np.ndarray, s_max: float) -> Expansion:
         return RitzExpansion(system, b, self.k, ports, s_max, self.residual)
@@ -89,8 +93,8 @@ class FlexibleCompliance(ContactCompliance):
         static = np.zeros((self.basis.n_coeff, p))
         if self.base is not None:
             static[:, :n] = self.residual.apply(self.excited[:n]).T
-        moved = np.concatenate([static, rows @ x.b[:stop]], axis=1)
-        return moved, np.concatenate([np.zeros((n, p - stop)), x.b[:n]], axis=1)
+        products = np.concatenate([static, rows @ x.b[:stop]], axis=1)
+        return products, np.concatenate([np.zeros((n, p - stop)), x.b[:n]], axis=1)
 
     def _make(self, omega: float) -> CompliancePoint:
         return FlexiblePoint(self, omega)

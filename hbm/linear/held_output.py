@@ -34,11 +34,11 @@ class HeldOutput(ContactCompliance):
     @classmethod
     def of(cls, inner: ContactCompliance, output: str, amplitude: float) -> HeldOutput:
         """The expansions are shared."""
-        held = object.__new__(cls)
-        held.__dict__.update(inner.__dict__)
-        held.inner, held.row, held.amplitude = inner, inner.output_names.index(output), amplitude
-        held._points = {}
-        return held
+        side = object.__new__(cls)
+        side.__dict__.update(inner.__dict__)
+        side.inner, side.row, side.amplitude = inner, inner.output_names.index(output), amplitude
+        side._points = {}
+        return side
 
     def restricted(self, basis: HarmonicBasis) -> HeldOutput:
         """The same for fewer of the harmonics."""
@@ -71,8 +71,8 @@ class HeldPoint(CompliancePoint):
             raise Refusal(f"the loads do not move output '{name}' in harmonic 1: its amplitude cannot be held")
         self._per_output = x / self.receptance, y / self.receptance
         missing = compliance.amplitude - self.receptance
-        self.x_lin = self._moved(self.x_lin, self._per_output[0] * missing)
-        self.outputs_lin = self._moved(self.outputs_lin, self._per_output[1] * missing)
+        self.x_lin = self._with_fundamental(self.x_lin, self._per_output[0] * missing)
+        self.outputs_lin = self._with_fundamental(self.outputs_lin, self._per_output[1] * missing)
 
     @property
     def left_out(self) -> float:
@@ -81,10 +81,10 @@ class HeldPoint(CompliancePoint):
 
     def _fundamental(self, coefficients: np.ndarray) -> np.ndarray:
         """(n,) complex amplitudes of harmonic 1 of coefficients (n, n_coeff)."""
-        found: np.ndarray = self.compliance.basis.to_complex(coefficients)[:, self._first]
-        return found
+        amplitudes: np.ndarray = self.compliance.basis.to_complex(coefficients)[:, self._first]
+        return amplitudes
 
-    def _moved(self, coefficients: np.ndarray, by: np.ndarray) -> np.ndarray:
+    def _with_fundamental(self, coefficients: np.ndarray, by: np.ndarray) -> np.ndarray:
         """Coefficients (n, n_coeff) with complex amplitudes (n,) added to harmonic 1."""
         out = np.array(coefficients, float)
         cosine = int(np.flatnonzero(self.compliance.basis.order == 1)[0])
@@ -97,40 +97,40 @@ class HeldPoint(CompliancePoint):
         return complex(self._fundamental(self.inner.outputs(g))[self.compliance.row])
 
     def force(self, g: np.ndarray, factor: float) -> complex:
-        """The necessary excitation over the given one; factor : on the amplitude held."""
+        """The necessary excitation over the given one; factor : on the amplitude side."""
         return (self.compliance.amplitude * factor - self.contact_motion(g)) / self.receptance
 
     def apply(self, g: np.ndarray) -> np.ndarray:
         """G g."""
-        return self._moved(self.inner.apply(g), -self.contact_motion(g) * self._per_output[0])
+        return self._with_fundamental(self.inner.apply(g), -self.contact_motion(g) * self._per_output[0])
 
     def nearly(self, g: np.ndarray) -> np.ndarray:
         """G g without what needs a solution by a sparse factor."""
-        return self._moved(self.inner.nearly(g), -self.contact_motion(g) * self._per_output[0])
+        return self._with_fundamental(self.inner.nearly(g), -self.contact_motion(g) * self._per_output[0])
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
-        return self._moved(self.inner.outputs(g), -self.contact_motion(g) * self._per_output[1])
+        return self._with_fundamental(self.inner.outputs(g), -self.contact_motion(g) * self._per_output[1])
 
     def slope(self, g: np.ndarray, load_factor: float) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega of contact displacement and outputs under g and what is held, vibrating part times factor."""
         c = self.compliance
         excited, free = self.inner._slope(c.excited), self.inner._slope(c.pushed(g))
         turn, turn_free = (self._fundamental(part[1])[c.row] for part in (excited, free))
-        driven, moved = self.force(g, load_factor), []
+        driven, slopes = self.force(g, load_factor), []
         for e, f, way in zip(excited, free, self._per_output, strict=True):
             first = self._fundamental(e)
             by = driven * (first - way * turn) - way * turn_free - load_factor * first
-            moved.append(self._moved(e * np.where(c.basis.order, load_factor, 1.0) + f, by))
-        return moved[0], moved[1]
+            slopes.append(self._with_fundamental(e * np.where(c.basis.order, load_factor, 1.0) + f, by))
+        return slopes[0], slopes[1]
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The product with G restricted to contact rows (active ones)."""
         free, way = self.inner.jacobian_product(rows), self._per_output[0][rows]
-        whole = np.zeros((self.compliance.n_contact, self.compliance.basis.n_coeff))
+        all_rows = np.zeros((self.compliance.n_contact, self.compliance.basis.n_coeff))
 
         def product(d: np.ndarray) -> np.ndarray:
-            whole[rows] = d
-            return self._moved(free(d), -self.contact_motion(whole) * way)
+            all_rows[rows] = d
+            return self._with_fundamental(free(d), -self.contact_motion(all_rows) * way)
 
         return product

@@ -52,19 +52,19 @@ class LinePoint(CompliancePoint):
 
     def _solved(self) -> list[list[LinePorts]]:
         line = self.compliance
-        there, changes = line.model.line(self.omega), line.model.line.slope(self.omega)
+        model_there, changes = line.model.line(self.omega), line.model.line.slope(self.omega)
 
         def ports(h: int) -> LinePorts:
-            (system, B), (change, _) = there.at_harmonic(h), changes.at_harmonic(h)
-            rows, moved = line.port_rows(system, B), line.port_rows(change, np.zeros_like(B))
-            return LinePorts(system, change, B, line.k, rows, moved, 1j * h * self.omega)
+            (system, B), (change, _) = model_there.at_harmonic(h), changes.at_harmonic(h)
+            rows, row_slopes = line.port_rows(system, B), line.port_rows(change, np.zeros_like(B))
+            return LinePorts(system, change, B, line.k, rows, row_slopes, 1j * h * self.omega)
 
         return [[ports(line.basis.harmonics[p]) for p in positions] for _, positions in line.groups]
 
     def _in_coarse(self, modes: np.ndarray, port: LinePorts) -> np.ndarray:
         c = self.compliance
         shapes = c.preconditioned.T * np.sqrt(c.k)
-        return shapes @ port.moved[: c.n_contact, : c.n_contact] @ shapes.T
+        return shapes @ port.compliance[: c.n_contact, : c.n_contact] @ shapes.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class LinePorts:
         return np.asarray(sla.lu_solve(self.factor, force.astype(complex), check_finite=False))
 
     @cached_property
-    def moved(self) -> np.ndarray:
+    def compliance(self) -> np.ndarray:
         """R D^-1 R^H (n_port, n_port)."""
         return self.rows @ self._under(self.rows.conj().T)
 
@@ -107,4 +107,4 @@ class LinePorts:
 
     def matrix(self, rows: slice = slice(None), columns: slice = slice(None)) -> np.ndarray:
         """Displacement of the ports in `rows` under unit forces at those in `columns`."""
-        return self.moved[rows, columns]
+        return self.compliance[rows, columns]

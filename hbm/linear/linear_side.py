@@ -43,13 +43,13 @@ def compliance_of(
     basis: HarmonicBasis,
     excitation: Excitation,
     omega_max: float,
-    wanted: float | None = None,
+    target_error: float | None = None,
 ) -> ContactCompliance:
     """The contact compliance of a model; arguments as for `ContactCompliance`."""
     if model.follows_frequency:
         from tribodyn.hbm.linear.line_compliance import line_compliance  # only operating lines of wheels need it
 
-        return line_compliance(model, stiffness, basis, excitation, omega_max, wanted)
+        return line_compliance(model, stiffness, basis, excitation, omega_max, target_error)
     if isinstance(model, FlexibleModel):
-        return FlexibleCompliance(model, stiffness, basis, excitation, omega_max, wanted)
-    return ContactCompliance(model, stiffness, basis, excitation, omega_max, wanted)
+        return FlexibleCompliance(model, stiffness, basis, excitation, omega_max, target_error)
+    return ContactCompliance(model, stiffness, basis, excitation, omega_max, target_error)

@@ -31,7 +31,7 @@ from tribodyn.refusal import Refusal
 ROOM = 2e8  # bytes of matrices of sectors alike that are kept for frequencies met again
 
 
-class Alike:
+class NominalWheel:
     """Port compliances of a wheel of sectors alike, contacts stuck and closed; shared by all that deviate from it.
 
     model : a travelling wave whose outputs hold the rows `ports`; springs : (n_pair, n_component) of one sector [N/m]
@@ -55,7 +55,7 @@ class Alike:
         self.load_names = names = tuple(sorted({name for _, name in excitation.loads}))
         self.outputs = tuple(name for name in system.outputs if name not in ports)
         counts = np.cumsum([0, len(self.k), len(names), len(self.outputs), len(ports)])
-        self.contacts, self.loads, self.seen, self.ports = (slice(*pair) for pair in pairwise(counts))
+        self.contacts, self.loads, self.observed, self.ports = (slice(*pair) for pair in pairwise(counts))
         self.n_port = int(counts[-1])
         self._of_index: list[Expansion] = []
         for index in range(N // 2 + 1):
@@ -65,39 +65,39 @@ class Alike:
             together = np.concatenate([np.asarray(B), np.array(rows).reshape(len(rows), -1)])
             s_max = basis.harmonics[-1] * omega_max
             self._of_index.append(Expansion(system, np.asarray(B), self.k, together, s_max))
-        self._mirrored = [None if one.hermitian else one.mirrored() for one in self._of_index]
-        self.error = max(one.error for one in self._of_index)
+        self._mirrored = [None if expansion.hermitian else expansion.mirrored() for expansion in self._of_index]
+        self.error = max(expansion.error for expansion in self._of_index)
         self.force = np.zeros((len(basis.harmonics), N, len(names)), complex)
         order = model.engine_order
         for (h, name), value in excitation.loads.items():
             if h in basis.harmonics:
                 turned = value * np.exp(-2j * np.pi * (h * order * np.arange(N) % N) / N)
                 self.force[basis.harmonics.index(h), :, names.index(name)] = turned
-        self._kept: OrderedDict[complex, np.ndarray] = OrderedDict()
+        self._cache: OrderedDict[complex, np.ndarray] = OrderedDict()
 
     def at(self, s: complex) -> np.ndarray:
         """(N, n_port, n_port) compliance of every wave at s = i h w, index by index."""
-        if s in self._kept:
-            self._kept.move_to_end(s)
-            return self._kept[s]
-        found = self._of_every_index(lambda one: one.at(s).matrix())
-        self._kept[s] = found
-        while len(self._kept) > 1 and len(self._kept) * found.nbytes > ROOM:
-            self._kept.popitem(last=False)
-        return found
+        if s in self._cache:
+            self._cache.move_to_end(s)
+            return self._cache[s]
+        compliance = self._of_every_index(lambda expansion: expansion.at(s).matrix())
+        self._cache[s] = compliance
+        while len(self._cache) > 1 and len(self._cache) * compliance.nbytes > ROOM:
+            self._cache.popitem(last=False)
+        return compliance
 
     def slope(self, s: complex) -> np.ndarray:
         """d (at) / d s."""
-        return self._of_every_index(lambda one: one.at(s).slope(np.eye(self.n_port), 1.0))
+        return self._of_every_index(lambda expansion: expansion.at(s).slope(np.eye(self.n_port), 1.0))
 
     def _of_every_index(self, make: Callable[[Expansion], np.ndarray]) -> np.ndarray:
         N = self.n_sectors
-        found = np.empty((N, self.n_port, self.n_port), complex)
-        for index, (one, other) in enumerate(zip(self._of_index, self._mirrored, strict=True)):
-            found[index] = make(one)
+        matrices = np.empty((N, self.n_port, self.n_port), complex)
+        for index, (expansion, mirror) in enumerate(zip(self._of_index, self._mirrored, strict=True)):
+            matrices[index] = make(expansion)
             if 0 < 2 * index < N:  # without what turns, a wave the other way is reciprocal to this one
-                found[N - index] = found[index].T if other is None else make(other)
-        return found
+                matrices[N - index] = matrices[index].T if mirror is None else make(mirror)
+        return matrices
 
 
 class MistunedCompliance:
@@ -108,16 +108,16 @@ class MistunedCompliance:
 
     base = None
 
-    def __init__(self, alike: Alike, basis: HarmonicBasis, deviation: np.ndarray):
-        self.alike, self.basis = alike, basis
+    def __init__(self, nominal: NominalWheel, basis: HarmonicBasis, deviation: np.ndarray):
+        self.nominal, self.basis = nominal, basis
         self.deviation = np.asarray(deviation, float)
-        if self.deviation.shape != (alike.n_sectors,) or not np.all(self.deviation > -1):
-            raise Refusal(f"mistuning needs {alike.n_sectors} deviations of stiffness above -1, one per sector")
-        self.k = np.tile(alike.k, alike.n_sectors)
+        if self.deviation.shape != (nominal.n_sectors,) or not np.all(self.deviation > -1):
+            raise Refusal(f"mistuning needs {nominal.n_sectors} deviations of stiffness above -1, one per sector")
+        self.k = np.tile(nominal.k, nominal.n_sectors)
         self.n_contact = len(self.k)
-        self.output_names = tuple(sector_name(name, n) for name in alike.outputs for n in range(alike.n_sectors))
-        self.error = alike.error
-        self._force = alike.force
+        self.output_names = tuple(sector_name(name, n) for name in nominal.outputs for n in range(nominal.n_sectors))
+        self.error = nominal.error
+        self._force = nominal.force
         self._points: OrderedDict[float, MistunedPoint] = OrderedDict()
         # stiffness at rest is the same at every frequency
         self._static: tuple[np.ndarray, np.ndarray] | None = None
@@ -136,31 +136,31 @@ class MistunedCompliance:
         """(n_harmonic, N, n_load) amplitudes of the loads [N]."""
         return self._force
 
-    def factor(self, h: float, around: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def factor(self, h: float, coupling: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Factors of I + d P H P^H (N r, N r) of a harmonic, from P H P^H by distance of sectors (N, r, r)."""
         if h == 0 and self._static is not None:
             return self._static
-        matrix = self.matrix(around)
-        found: tuple[np.ndarray, np.ndarray] = lu_factor(matrix, overwrite_a=True, check_finite=False)
+        matrix = self.matrix(coupling)
+        factors: tuple[np.ndarray, np.ndarray] = lu_factor(matrix, overwrite_a=True, check_finite=False)
         if h == 0:
-            self._static = found
-        return found
+            self._static = factors
+        return factors
 
-    def inverse(self, h: float, around: np.ndarray) -> np.ndarray:
+    def inverse(self, h: float, coupling: np.ndarray) -> np.ndarray:
         """(I + d P H P^H)^-1 d of a harmonic in single precision; arguments as for `factor`."""
         if h == 0 and self._static_inverse is not None:
             return self._static_inverse
-        made = inv(self.matrix(around).astype(np.complex64), overwrite_a=True, check_finite=False)
-        found: np.ndarray = made * np.repeat(self.deviation, around.shape[1]).astype(np.float32)
+        inverse_matrix = inv(self.matrix(coupling).astype(np.complex64), overwrite_a=True, check_finite=False)
+        weighted_inverse: np.ndarray = inverse_matrix * np.repeat(self.deviation, coupling.shape[1]).astype(np.float32)
         if h == 0:
-            self._static_inverse = found
-        return found
+            self._static_inverse = weighted_inverse
+        return weighted_inverse
 
-    def matrix(self, around: np.ndarray) -> np.ndarray:
+    def matrix(self, coupling: np.ndarray) -> np.ndarray:
         """I + d P H P^H (N r, N r); see `factor`."""
-        N, r = self.alike.n_sectors, around.shape[1]
-        apart = (np.arange(N)[:, None] - np.arange(N)) % N
-        matrix = around[apart].transpose(0, 2, 1, 3).reshape(N * r, N * r) * np.repeat(self.deviation, r)[:, None]
+        N, r = self.nominal.n_sectors, coupling.shape[1]
+        distance = (np.arange(N)[:, None] - np.arange(N)) % N
+        matrix = coupling[distance].transpose(0, 2, 1, 3).reshape(N * r, N * r) * np.repeat(self.deviation, r)[:, None]
         matrix[np.arange(N * r), np.arange(N * r)] += 1.0
         return matrix
 
@@ -185,19 +185,19 @@ class MistunedPoint:
 
     def __init__(self, compliance: MistunedCompliance, omega: float):
         self.compliance, self.omega = compliance, omega
-        a = compliance.alike
+        a = compliance.nominal
         self._h = np.asarray(compliance.basis.harmonics, float)
         H = np.stack([a.at(1j * h * omega) for h in self._h])
         self._H = H
-        self._moved = np.ascontiguousarray(H[:, :, a.ports])  # of the mistuned shapes, under all forces
-        self._back = np.ascontiguousarray(H[:, :, :, a.ports])  # of all ports, under forces on these shapes
+        self._to_shapes = np.ascontiguousarray(H[:, :, a.ports])  # of the mistuned shapes, under all forces
+        self._from_shapes = np.ascontiguousarray(H[:, :, :, a.ports])  # of all ports, under forces on these shapes
         self._contact = np.ascontiguousarray(H[:, :, a.contacts, a.contacts])
-        self._around = fft.fft(self._moved[:, :, :, a.ports], axis=1) / a.n_sectors  # by distance of two sectors
-        self._factors = [compliance.factor(h, one) for h, one in zip(self._h, self._around, strict=True)]
+        self._coupling = fft.fft(self._to_shapes[:, :, :, a.ports], axis=1) / a.n_sectors  # by distance of two sectors
+        self._factors = [compliance.factor(h, blocks) for h, blocks in zip(self._h, self._coupling, strict=True)]
         load = np.zeros((len(self._h), a.n_sectors, a.n_port), complex)
         load[:, :, a.loads] = compliance.force
-        moved = self._displaced(load)
-        self.x_lin, self.outputs_lin = self._contact_rows(moved), self._output_rows(moved)
+        displacement = self._displaced(load)
+        self.x_lin, self.outputs_lin = self._contact_rows(displacement), self._output_rows(displacement)
 
     def _displaced(self, force: np.ndarray, H: np.ndarray | None = None) -> np.ndarray:
         """Displacement of all ports under forces on all of them, both (n_harmonic, N, n_port) complex.
@@ -205,14 +205,14 @@ class MistunedPoint:
         H : other matrices (n_harmonic, N, n_port, n_port) for the way from the forces, such as slopes
         """
         H = self._H if H is None else H
-        there = np.matmul(H, fft.ifft(force, axis=1)[..., None])[..., 0]
-        reaction = self._reaction(there[:, :, self.compliance.alike.ports])
-        return np.asarray(fft.fft(there - np.matmul(self._back, reaction[..., None])[..., 0], axis=1))
+        waves = np.matmul(H, fft.ifft(force, axis=1)[..., None])[..., 0]
+        reaction = self._reaction(waves[:, :, self.compliance.nominal.ports])
+        return np.asarray(fft.fft(waves - np.matmul(self._from_shapes, reaction[..., None])[..., 0], axis=1))
 
     def deviating(self, force: np.ndarray) -> np.ndarray:
         """Forces (n_harmonic, N, r) of the deviating stiffness on its shapes, under forces (n_harmonic, N, n_port)."""
-        moved = self._displaced(force)[:, :, self.compliance.alike.ports]
-        return -self.compliance.deviation[:, None] * moved
+        displacement = self._displaced(force)[:, :, self.compliance.nominal.ports]
+        return -self.compliance.deviation[:, None] * displacement
 
     def _reaction(self, waves: np.ndarray) -> np.ndarray:
         """Waves of the forces that deviating stiffness adds, from the waves of what sectors alike do (n_h, N, r)."""
@@ -220,34 +220,36 @@ class MistunedPoint:
         if r == 0:
             return waves
         pushed = (fft.fft(waves, axis=1) * self.compliance.deviation[:, None]).reshape(n_h, N * r)
-        found = [lu_solve(factor, one, check_finite=False) for factor, one in zip(self._factors, pushed, strict=True)]
-        return np.asarray(fft.ifft(np.stack(found).reshape(n_h, N, r), axis=1))
+        forces = [
+            lu_solve(factor, force, check_finite=False) for factor, force in zip(self._factors, pushed, strict=True)
+        ]
+        return np.asarray(fft.ifft(np.stack(forces).reshape(n_h, N, r), axis=1))
 
-    def _contact_rows(self, moved: np.ndarray) -> np.ndarray:
-        x = moved[:, :, self.compliance.alike.contacts]
+    def _contact_rows(self, displacement: np.ndarray) -> np.ndarray:
+        x = displacement[:, :, self.compliance.nominal.contacts]
         return self.compliance.basis.to_real(x.reshape(len(x), -1).T)
 
-    def _output_rows(self, moved: np.ndarray) -> np.ndarray:
-        y = moved[:, :, self.compliance.alike.seen].transpose(2, 1, 0)
+    def _output_rows(self, displacement: np.ndarray) -> np.ndarray:
+        y = displacement[:, :, self.compliance.nominal.observed].transpose(2, 1, 0)
         return self.compliance.basis.to_real(y.reshape(-1, y.shape[2]))
 
     def _on_ports(self, g: np.ndarray) -> np.ndarray:
-        a = self.compliance.alike
+        a = self.compliance.nominal
         force = np.zeros((len(self._h), a.n_sectors, a.n_port), complex)
         force[:, :, a.contacts] = self._amplitudes(g)
         return force
 
     def _amplitudes(self, g: np.ndarray) -> np.ndarray:
-        return self.compliance.basis.to_complex(g).T.reshape(len(self._h), self.compliance.alike.n_sectors, -1)
+        return self.compliance.basis.to_complex(g).T.reshape(len(self._h), self.compliance.nominal.n_sectors, -1)
 
     def apply(self, g: np.ndarray) -> np.ndarray:
         """G g: (N n_c, n_coeff) relative displacement [m] under contact forces g (N n_c, n_coeff) [N]."""
-        c = self.compliance.alike.contacts
+        c = self.compliance.nominal.contacts
         waves = fft.ifft(self._amplitudes(g), axis=1)[..., None]
-        reaction = self._reaction(np.matmul(self._moved[:, :, :, c], waves)[..., 0])
-        there = np.matmul(self._contact, waves) - np.matmul(self._back[:, :, c], reaction[..., None])
-        moved = fft.fft(there[..., 0], axis=1)
-        return self.compliance.basis.to_real(moved.reshape(len(moved), -1).T)
+        reaction = self._reaction(np.matmul(self._to_shapes[:, :, :, c], waves)[..., 0])
+        motion = np.matmul(self._contact, waves) - np.matmul(self._from_shapes[:, :, c], reaction[..., None])
+        displacement = fft.fft(motion[..., 0], axis=1)
+        return self.compliance.basis.to_real(displacement.reshape(len(displacement), -1).T)
 
     nearly = apply
 
@@ -257,19 +259,19 @@ class MistunedPoint:
 
     def slope(self, g: np.ndarray, load_factor: float) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega of contact displacement and outputs under g and the excitation, vibrating part times factor."""
-        a = self.compliance.alike
+        a = self.compliance.nominal
         force = self._on_ports(g)
         force[:, :, a.loads] += self.compliance.force * np.where(self._h, load_factor, 1.0)[:, None, None]
         # all forces on sectors alike, those of the deviating stiffness among them
         waves = np.matmul(self._H, fft.ifft(force, axis=1)[..., None])[..., 0]
         force[:, :, a.ports] -= fft.fft(self._reaction(waves[:, :, a.ports]), axis=1)
-        moved = self._displaced(force, self._slopes)
-        return self._contact_rows(moved), self._output_rows(moved)
+        displacement = self._displaced(force, self._slopes)
+        return self._contact_rows(displacement), self._output_rows(displacement)
 
     @cached_property
     def _slopes(self) -> np.ndarray:
         """(n_harmonic, N, n_port, n_port) d / d omega of the matrices of sectors alike."""
-        a = self.compliance.alike
+        a = self.compliance.nominal
         return np.stack([1j * h * a.slope(1j * h * self.omega) for h in self._h])
 
     def jacobian_product(self, rows: np.ndarray) -> JacobianProduct:
@@ -284,28 +286,32 @@ class MistunedPoint:
     def single(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Single precision: contact to contact, contact to shapes, shapes to contact, (I + d P H P^H)^-1 d."""
         c = self.compliance
-        parts = self._contact, self._moved[:, :, :, c.alike.contacts], self._back[:, :, c.alike.contacts]
-        inverse = [c.inverse(h, one) for h, one in zip(self._h, self._around, strict=True)]
-        contact, moved, back = (np.ascontiguousarray(part, np.complex64) for part in parts)
-        return contact, moved, back, np.stack(inverse)
+        parts = self._contact, self._to_shapes[:, :, :, c.nominal.contacts], self._from_shapes[:, :, c.nominal.contacts]
+        inverse = [c.inverse(h, blocks) for h, blocks in zip(self._h, self._coupling, strict=True)]
+        contact, to_shapes, from_shapes = (np.ascontiguousarray(part, np.complex64) for part in parts)
+        return contact, to_shapes, from_shapes, np.stack(inverse)
 
     @cached_property
     def blocks(self) -> np.ndarray:
         """(N, n_c n_coeff, n_c n_coeff) what the contacts of a sector do to themselves, of its own and its neighbours'
         deviations; a preconditioner."""
-        a = self.compliance.alike
-        N, n_c, r = a.n_sectors, len(a.k), self._around.shape[2]
-        found = np.repeat(self._contact.mean(axis=1)[:, None], N, axis=1)  # (n_h, N, n_c, n_c)
+        a = self.compliance.nominal
+        N, n_c, r = a.n_sectors, len(a.k), self._coupling.shape[2]
+        blocks_of_harmonics = np.repeat(self._contact.mean(axis=1)[:, None], N, axis=1)  # (n_h, N, n_c, n_c)
         if r:
-            near = np.unique(np.array([-1, 0, 1]) % N)
-            to = fft.fft(self._back[:, :, a.contacts], axis=1)[:, -near % N] / N  # (n_h, near, n_c, r)
-            out = fft.fft(self._moved[:, :, :, a.contacts], axis=1)[:, near] / N  # (n_h, near, r, n_c)
-            n, m = len(near), len(near) * r
-            around = self._around[:, (near[:, None] - near) % N].transpose(0, 1, 3, 2, 4).reshape(-1, 1, m, m)
-            d = np.repeat(self.compliance.deviation[(np.arange(N)[:, None] + near) % N], r, axis=1)[None, :, :, None]
+            neighbours = np.unique(np.array([-1, 0, 1]) % N)
+            to = fft.fft(self._from_shapes[:, :, a.contacts], axis=1)[:, -neighbours % N] / N  # (n_h, near, n_c, r)
+            out = fft.fft(self._to_shapes[:, :, :, a.contacts], axis=1)[:, neighbours] / N  # (n_h, near, r, n_c)
+            n, m = len(neighbours), len(neighbours) * r
+            coupling = (
+                self._coupling[:, (neighbours[:, None] - neighbours) % N].transpose(0, 1, 3, 2, 4).reshape(-1, 1, m, m)
+            )
+            d = np.repeat(self.compliance.deviation[(np.arange(N)[:, None] + neighbours) % N], r, axis=1)[
+                None, :, :, None
+            ]
             to, out = to.transpose(0, 2, 1, 3).reshape(-1, 1, n_c, m), out.reshape(-1, 1, n * r, n_c)
-            found = found - to @ np.linalg.solve(np.eye(m) + d * around, d * out)
-        return self.compliance.basis.real_matrices(found)
+            blocks_of_harmonics = blocks_of_harmonics - to @ np.linalg.solve(np.eye(m) + d * coupling, d * out)
+        return self.compliance.basis.real_matrices(blocks_of_harmonics)
 
 
 class JacobianProduct:
@@ -313,20 +319,20 @@ class JacobianProduct:
 
     def __init__(self, point: MistunedPoint, rows: np.ndarray):
         self._point, self._rows = point, rows
-        self._contact, self._moved, self._back, self._inverse = point.single
+        self._contact, self._to_shapes, self._from_shapes, self._inverse = point.single
 
     def __call__(self, d: np.ndarray) -> np.ndarray:
         """G d for d (n_rows, n_coeff)."""
         c = self._point.compliance
         full = np.zeros((c.n_contact, d.shape[1]))
         full[self._rows] = d
-        force = c.basis.to_complex(full).astype(np.complex64).T.reshape(len(self._contact), c.alike.n_sectors, -1)
+        force = c.basis.to_complex(full).astype(np.complex64).T.reshape(len(self._contact), c.nominal.n_sectors, -1)
         waves = fft.ifft(force, axis=1)[..., None]
-        there = np.matmul(self._contact, waves)
-        n_h, N, r = self._back.shape[0], self._back.shape[1], self._back.shape[3]
+        wave_motion = np.matmul(self._contact, waves)
+        n_h, N, r = self._from_shapes.shape[0], self._from_shapes.shape[1], self._from_shapes.shape[3]
         if r:
-            moved = fft.fft(np.matmul(self._moved, waves)[..., 0], axis=1).reshape(n_h, N * r, 1)
-            reaction = fft.ifft(np.matmul(self._inverse, moved).reshape(n_h, N, r), axis=1)
-            there -= np.matmul(self._back, reaction[..., None])
-        found = fft.fft(there[..., 0], axis=1).reshape(n_h, -1)
-        return c.basis.to_real(found.T)[self._rows]
+            shape_motion = fft.fft(np.matmul(self._to_shapes, waves)[..., 0], axis=1).reshape(n_h, N * r, 1)
+            reaction = fft.ifft(np.matmul(self._inverse, shape_motion).reshape(n_h, N, r), axis=1)
+            wave_motion -= np.matmul(self._from_shapes, reaction[..., None])
+        displacement = fft.fft(wave_motion[..., 0], axis=1).reshape(n_h, -1)
+        return c.basis.to_real(displacement.T)[self._rows]

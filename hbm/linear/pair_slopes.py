@@ -56,19 +56,19 @@ def projected(slopes, u, n_coeff):
                             for q in range(r):
                                 row[first + q] += value * shape[q]
     inside = np.dot(u.T, through)
-    found = np.ascontiguousarray(inside.reshape(r, n_coeff, n_coeff, r).transpose(0, 1, 3, 2))
-    return found.reshape(r * n_coeff, r * n_coeff)
+    products = np.ascontiguousarray(inside.reshape(r, n_coeff, n_coeff, r).transpose(0, 1, 3, 2))
+    return products.reshape(r * n_coeff, r * n_coeff)
 
 
 @numba.njit(cache=True)
 def times(slopes, d):
     """D d for d (n_active * n_component, n_coeff), of its shape."""
     n, m, _ = slopes.shape
-    moved, out = d.ravel(), np.zeros(n * m)
+    products, out = d.ravel(), np.zeros(n * m)
     for i in range(n):
         for a in range(m):
             for b in range(m):
-                out[i * m + a] += slopes[i, a, b] * moved[i * m + b]
+                out[i * m + a] += slopes[i, a, b] * products[i * m + b]
     return out.reshape(d.shape)
 
 

@@ -21,15 +21,15 @@ def coordinates(
     balance = balance.standing(omega)
     basis, excitation = balance.basis, balance.excitation
     k = balance.reference_stiffness
-    moved = displacement if excitation.base is None else displacement + balance.loaded(excitation.base)
-    g = basis.to_complex(k[:, None] * moved - force)
-    found = []
+    stretch = displacement if excitation.base is None else displacement + balance.loaded(excitation.base)
+    g = basis.to_complex(k[:, None] * stretch - force)
+    amplitudes = []
     for position, h in enumerate(basis.harmonics):
         system, B = balance.model.at_harmonic(h)
         load = (balance.load_factor if h else 1.0) * excitation.force(h, system.loads, system.n_dof)
         total = B.conj().T @ g[:, position] + load
-        found.append(np.linalg.solve(stuck_dynamic_stiffness(system, B, k, 1j * h * omega), total))
-    return found
+        amplitudes.append(np.linalg.solve(stuck_dynamic_stiffness(system, B, k, 1j * h * omega), total))
+    return amplitudes
 
 
 def full_displacement(
@@ -43,10 +43,10 @@ def full_displacement(
     amplitudes = coordinates(balance, displacement, force, omega)
     harmonics = balance.basis.harmonics
     full = [balance.model.reconstruct(q, h) for h, q in zip(harmonics, amplitudes, strict=True)]
-    moved: np.ndarray = balance.basis.to_real(np.stack(full, axis=-1))
+    part_displacement: np.ndarray = balance.basis.to_real(np.stack(full, axis=-1))
     model = balance.model
     if isinstance(model, FlexibleModel):
         base = balance.excitation.base
         stretch = displacement if base is None else displacement + balance.loaded(base)
-        moved += model.residual.field(model.residual.stiffness[:, None] * stretch - force)
-    return moved
+        part_displacement += model.residual.field(model.residual.stiffness[:, None] * stretch - force)
+    return part_displacement

@@ -13,14 +13,15 @@ class RigidModeRules:
     """Which modes are rigid.
 
     suspect : squared frequency over rounding, below which a mode may be rigid
-    gap : squared frequency of a rigid mode over that of the first elastic one, at most
-    rounded : the same where it is the rounding of far stiffer modes; most : those of four bodies that nothing joins
+    gap : squared frequency of a rigid mode over that of the first elastic one, at max_count
+    rounded : the same where it is the rounding of far stiffer modes
+    max_count : of rigid modes; four bodies that nothing joins have so many
     """
 
     suspect: float = 1e3
     gap: float = 1e-10
     rounded: float = 1e-6
-    most: int = 24
+    max_count: int = 24
 
 
 RIGID_MODES = RigidModeRules()
@@ -31,7 +32,7 @@ def rigid_motions(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, 
 
     Raises  LinAlgError where there are none, or the mass is not positive
     """
-    squares, shapes = sla.eigh(stiffness, mass, subset_by_index=(0, min(len(mass), RIGID_MODES.most + 1) - 1))
+    squares, shapes = sla.eigh(stiffness, mass, subset_by_index=(0, min(len(mass), RIGID_MODES.max_count + 1) - 1))
     largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real)) or 1.0
     size = np.maximum.accumulate(np.abs(squares))
     rounding = len(mass) * float(np.finfo(float).eps) * largest
@@ -41,7 +42,7 @@ def rigid_motions(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, 
         for r, next_one in enumerate(above, start=1)
         if size[r - 1] <= max(RIGID_MODES.gap * next_one, min(rounding, RIGID_MODES.rounded * next_one))
     ]
-    if not gaps or gaps[-1] > RIGID_MODES.most:
+    if not gaps or gaps[-1] > RIGID_MODES.max_count:
         raise np.linalg.LinAlgError
     r = gaps[-1]
     # two steps of inverse iteration take the rounding of the stiff modes out of the shapes
@@ -66,8 +67,8 @@ def stuck_modes(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np
             rigid, shift = rigid_motions(stiffness, mass)
         except np.linalg.LinAlgError:
             return squares, shapes, free
-        held = mass @ rigid
-        squares, shapes = sla.eigh(stiffness + shift * held @ held.T, mass)
+        momentum = mass @ rigid
+        squares, shapes = sla.eigh(stiffness + shift * momentum @ momentum.T, mass)
         free[: rigid.shape[1]] = True
         squares[free], shapes[:, free] = 0.0, rigid
     return squares, shapes, free

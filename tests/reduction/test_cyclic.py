@@ -11,7 +11,7 @@ from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.cyclic_symmetry import wave_system
 from tribodyn.fem.modes import modes
-from tribodyn.reduction import sector_reduction as waves
+from tribodyn.reduction import sector_reduction as waves, wave_model
 from tribodyn.reduction.limits import ReductionLimits
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
 from tribodyn.reduction.linear_damping import modal_damping
@@ -126,7 +126,8 @@ def test_stuck_ritz_shapes_keep_statics_exact_and_the_contact_near(reduced, monk
     """Contacts, loads and outputs of a wave in few coordinates, against all of them; above the first mode, too."""
     k = reduced.sector.interface.stiffness(*small.STIFFNESS)
     fine = travelling_wave(reduced, 3)
-    monkeypatch.setattr(waves, "LIMITS", ReductionLimits(many=0, ritz_modes=12))
+    for module in (waves, wave_model):
+        monkeypatch.setattr(module, "LIMITS", ReductionLimits(many_coordinates=0, ritz_modes=12))
     coarse = travelling_wave(reduced, 3, springs=k)
 
     def response(model, h, hertz):

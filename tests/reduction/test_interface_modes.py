@@ -107,7 +107,7 @@ def test_a_displacement_can_be_prescribed_after_the_interface_is_reduced() -> No
 
     exact = answers(full)
     for n, within in ((6, 0.05), (n_contact // 2, 0.02), (n_contact, 1e-6)):
-        reduced = interface_modes(full, n, held, apart=held)
+        reduced = interface_modes(full, n, held, separate=held)
         assert not np.asarray(reduced.interface.B)[:, : len(held)].any()
         for ours, theirs in zip(answers(reduced), exact, strict=True):
             assert np.linalg.norm(ours - theirs) < within * np.linalg.norm(theirs)

@@ -222,7 +222,7 @@ def test_directions_know_what_is_recalled(beam) -> None:
     assert rest is not None
     state = newton.solve_from_rest(balance, OMEGA).state
     rest.ask(state.g, requested, 0.0)
-    nearby = replace(balance, rest=lambda g: rest.recalled(g, requested))
+    nearby = replace(balance, remainder=lambda g: rest.recalled(g, requested))
     path = np.random.default_rng(0).normal(size=state.x.shape) * np.abs(state.x).max()
     high, low = (nearby.evaluate(OMEGA, state.x + h * path) for h in (1e-6, -1e-6))
     expected = (high.residual - low.residual) / 2e-6

@@ -58,7 +58,7 @@ def test_the_reduced_model_follows_as_one_that_is_reduced_anew(key: str) -> None
         return (8 * (at(1) - at(-1)) - (at(2) - at(-2))) / 12
 
     repeated = difference(lambda share: motions(reduced(STEP * share)))
-    result = difference(lambda share: motions(following.moved([(way, share)])))
+    result = difference(lambda share: motions(following.model_at([(way, share)])))
     assert np.abs(result - repeated).max() < 1e-6 * np.abs(repeated).max()
     fixed = difference(lambda share: motions(_projected(system(STEP * share), model)))
     assert np.abs(fixed - repeated).max() > 1e-3 * np.abs(repeated).max()  # shapes that stay would not do

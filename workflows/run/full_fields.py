@@ -71,10 +71,10 @@ def displacement_fields(balance: HarmonicBalance, part: Part, states: States, nu
     balance : the unworn problem under the load that the states come from; numbers : (n_field,) rows or points
     """
     loaded = [balance.with_load(s.load_factor) if isinstance(s, Solved) else balance for s in states]
-    found = [
+    fields = [
         part.field(full_displacement(b, s.displacement, s.force, s.omega)) for b, s in zip(loaded, states, strict=True)
     ]
-    return Fields(np.asarray(numbers), np.stack(found))
+    return Fields(np.asarray(numbers), np.stack(fields))
 
 
 def hysteresis_loops(balance: HarmonicBalance, states: States, numbers: np.ndarray) -> Loops:

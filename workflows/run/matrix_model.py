@@ -89,8 +89,8 @@ def _per_pair(value: float | tuple[float, ...] | Variable, take: Take) -> float 
 
 def _vectors(entries: Mapping[str, DofOutput], take: Take) -> dict[str, Any]:
     """name -> DOF factors: equal shares of the DOFs, or the vector of the file."""
-    found: dict[str, Any] = {}
+    vectors: dict[str, Any] = {}
     for name, entry in entries.items():
         dofs = entry.dofs or ()
-        found[name] = {dof: 1 / len(dofs) for dof in dofs} if entry.vector is None else take(entry.vector).ravel()
-    return found
+        vectors[name] = {dof: 1 / len(dofs) for dof in dofs} if entry.vector is None else take(entry.vector).ravel()
+    return vectors

@@ -119,9 +119,9 @@ def plain_of(file: SceneFile, part: Part) -> ReducedModel:
     """The reduction of a part, not damped and with nothing prescribed; made once on a machine, see kept."""
 
     def made() -> ReducedModel:
-        wanted, own = file.mesh_scene.reduction, part.interface
-        shapes = min(LIMITS.clusters, own.n_pair) * len(own.components)
-        memory.check(part.system.n_dof, wanted.solver, shapes + (wanted.modes or 0))
+        options, contact = file.mesh_scene.reduction, part.interface
+        shapes = min(LIMITS.clusters, contact.n_pair) * len(contact.components)
+        memory.check(part.system.n_dof, options.solver, shapes + (options.modes or 0))
         return plain_model(file.mesh_scene, part)
 
     return model_cache.cached_reduction(file, part, made)
@@ -129,8 +129,8 @@ def plain_of(file: SceneFile, part: Part) -> ReducedModel:
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
-    whole = scene_assembly.assembly(file.mesh_scene, file.folder, folder)
-    return whole, whole.node_sets
+    mesh = scene_assembly.assembly(file.mesh_scene, file.folder, folder)
+    return mesh, mesh.node_sets
 
 
 def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path | None = None) -> Part:
@@ -208,8 +208,8 @@ def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
         values = None if load.field is None else temperature_at(folder / load.field, coordinates(mesh))
         return Heating(material, load.bodies, values)
     if load.acceleration is not None or load.base_acceleration is not None:
-        along = 1.0 if load.acceleration is not None else -1.0
-        return BodyForce([along * c for c in load.direction])
+        sign = 1.0 if load.acceleration is not None else -1.0
+        return BodyForce([sign * c for c in load.direction])
     if load.speed is not None:
         return Centrifugal(load.direction, load.point)
     if load.moment is not None:
@@ -269,20 +269,23 @@ class Problem:
     @classmethod
     def of(cls, scene: Scene, part: Part | None, reduced: ReducedModel) -> Problem:
         """The problem of a scene, its bolts tightened."""
-        made, bolts = joints.make_joints(scene, reduced), {}
+        joints_of_scene, bolts = joints.make_joints(scene, reduced), {}
         if isinstance(scene, MeshScene) and scene.bolts and part is not None:
             from tribodyn.workflows.run import bolt_tightening  # only bolts need it
 
-            top = settings.highest_frequency(scene)
-            alone = bolt_tightening.BoltsAlone(reduced, made, scene.harmonics.samples, top)
-            bolts = bolt_tightening.tightened(scene, shanks(scene, part.mesh, part.node_sets), alone)
-        return cls(scene, part, reduced, made, bolts)
+            bolts_alone = bolt_tightening.BoltsAlone(
+                reduced, joints_of_scene, scene.harmonics.samples, settings.highest_frequency(scene)
+            )
+            bolts = bolt_tightening.tightened(scene, shanks(scene, part.mesh, part.node_sets), bolts_alone)
+        return cls(scene, part, reduced, joints_of_scene, bolts)
 
-    def balance(self, harmonics: tuple[int, ...], like: HarmonicBalance | None = None) -> HarmonicBalance:
+    def balance(self, harmonics: tuple[int, ...], previous: HarmonicBalance | None = None) -> HarmonicBalance:
         """The balance of some harmonics, see `of`; raises ValueError where harmonic 0 is needed and left out."""
-        scene, wanted, gap = self.scene, self.scene.harmonics, self.reduced.interface.gap
-        auto = wanted.transitions == "auto"
-        basis = HarmonicBasis(harmonics, wanted.samples, joint_transitions(self.joints) if auto else wanted.transitions)
+        scene, options, gap = self.scene, self.scene.harmonics, self.reduced.interface.gap
+        auto = options.transitions == "auto"
+        basis = HarmonicBasis(
+            harmonics, options.samples, joint_transitions(self.joints) if auto else options.transitions
+        )
         rounding = 1e-12  # of node positions [m]
         if not basis.has_static and np.any(np.abs(gap) > rounding):
             raise Refusal("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
@@ -293,15 +296,17 @@ class Problem:
         bolts = {(0, name): force for name, force in self.bolts.items()}
         excitation = replace(excitation, loads={**excitation.loads, **bolts})
         top = settings.highest_frequency(scene)
-        made = HarmonicBalance.of(self.reduced, self.joints, basis, excitation, top, like=like)
-        return preloaded(scene, self.reduced, made) if scene.preload.frictionless else made
+        bare = HarmonicBalance.of(self.reduced, self.joints, basis, excitation, top, previous=previous)
+        return preloaded(scene, self.reduced, bare) if scene.preload.frictionless else bare
 
     def choice(self) -> HarmonicChoice:
         """Harmonics chosen at the resonance, beginning with those of the loads."""
-        wanted = self.scene.harmonics
-        options = ChoiceOptions(highest=wanted.highest or HIGHEST, newton=settings.newton_options(self.scene))
-        if wanted.tolerance is not None:
-            options = replace(options, tolerance=wanted.tolerance)
+        settings_of_harmonics = self.scene.harmonics
+        options = ChoiceOptions(
+            highest=settings_of_harmonics.highest or HIGHEST, newton=settings.newton_options(self.scene)
+        )
+        if settings_of_harmonics.tolerance is not None:
+            options = replace(options, tolerance=settings_of_harmonics.tolerance)
         first = self.balance(tuple(sorted({0, 1} | {load.harmonic for load in self.scene.loads.harmonic.values()})))
         return response_curve.choose_harmonics(first, settings.peak_of(self.scene), options)
 
@@ -311,7 +316,7 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     problem = Problem.of(scene, part, reduced)
     choice = problem.choice() if scene.harmonics.automatic and not chosen else None
     harmonics = scene.harmonics.kept or chosen or (choice.harmonics if choice else ())
-    final = model_cache.cached_balance(lambda like: problem.balance(harmonics, like))
+    final = model_cache.cached_balance(lambda previous: problem.balance(harmonics, previous))
     if part is not None and isinstance(scene, MeshScene) and scene.other_speeds:
         final = replace(final, at_speed=_at_speeds(scene, part, harmonics))
     return Model(part, final.model, final, choice)
@@ -319,12 +324,12 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
 
 def _at_speeds(scene: MeshScene, part: Part, harmonics: tuple[int, ...]) -> dict[float, HarmonicBalance]:
     """The problem at every other speed of the wheel that the mission of the scene has."""
-    found = {}
+    balances = {}
     assert scene.wheel is not None
     for speed in scene.other_speeds:
-        there = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"speed": speed}), "wear": None})
-        found[speed] = make_model(there, part, damped(there, plain_model(there, part)), harmonics).balance
-    return found
+        at_speed = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"speed": speed}), "wear": None})
+        balances[speed] = make_model(at_speed, part, damped(at_speed, plain_model(at_speed, part)), harmonics).balance
+    return balances
 
 
 def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> HarmonicBalance:
@@ -334,11 +339,11 @@ def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> 
     """
     x = rest.displacement(balance, settings.newton_options(scene))
     resting = replace(balance, memory=rest.memory(balance, x), at_rest=x)
-    own = rest.tangents(resting, x)
-    if not own:
+    tangent_springs = rest.tangents(resting, x)
+    if not tangent_springs:
         return resting
     tangent = [
-        replace(j, parameters=replace(j.parameters, stiffness=own.get(j.name, j.parameters.stiffness)))
+        replace(j, parameters=replace(j.parameters, stiffness=tangent_springs.get(j.name, j.parameters.stiffness)))
         for j in resting.contact.joints
     ]
     b, springs = balance, np.array(balance.contact.stiffness)
@@ -347,8 +352,8 @@ def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> 
     if scene.damping.given and scene.damping.state == "stuck":
         undamped = replace(reduced, system=replace(reduced.system, damping=None))
         reduced = undamped.with_damping(partial(damping_matrix, scene, springs))
-    again = HarmonicBalance.of(reduced, tangent, b.basis, b.excitation, b.omega_max, resting.memory)
-    return replace(again, at_rest=x)
+    preloaded_balance = HarmonicBalance.of(reduced, tangent, b.basis, b.excitation, b.omega_max, resting.memory)
+    return replace(preloaded_balance, at_rest=x)
 
 
 def ground_motion(scene: MeshScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:

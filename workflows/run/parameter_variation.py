@@ -204,7 +204,7 @@ class ParameterVariation:
         from tribodyn.reduction.wave_model import WaveIndices, as_wave
 
         wave = as_wave(self.plain)
-        has_all = isinstance(wave.index_of, WaveIndices) and wave.reduced.sector.system.n_dof <= LIMITS.many
+        has_all = isinstance(wave.index_of, WaveIndices) and wave.reduced.sector.system.n_dof <= LIMITS.many_coordinates
         return wave.reduced if has_all else None
 
     @cached_property
@@ -225,9 +225,9 @@ class ParameterVariation:
         assert following is not None
         if key == "material.young" and _loaded_alike(scene):  # all stiffness but that of the springs
             springs = [spring for spring, number in self.numbers.items() if isinstance(number.table, SpringTable)]
-            moved = following.moved([(self._way(spring), -share) for spring in springs], share)
+            moved = following.model_at([(self._way(spring), -share) for spring in springs], share)
         else:
-            moved = following.moved([(self._way(key), share)])
+            moved = following.model_at([(self._way(key), share)])
         wave, turned = self._sector, list[Any]()
         if moves_nodes(number):
             there = self.nodes_moved(key)[int(share < 0)]

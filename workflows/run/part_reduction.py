@@ -40,9 +40,9 @@ def components(scene: Scene) -> tuple[str, ...]:
 
 def contacts(scene: MeshScene) -> list[ContactFaces]:
     """The contact of every face; in a wheel some second faces are those of the next sector."""
-    found = []
+    contact_faces = []
     for name, c in scene.joints.items():
-        own = [
+        joint_faces = [
             ContactFaces(
                 face, c.t1, c.opposite, components(scene), c.gap, c.vertices_only, c.face_centres, c.plane,
                 c.inclination, c.pairing, c.reach, name,
@@ -52,57 +52,57 @@ def contacts(scene: MeshScene) -> list[ContactFaces]:
         if c.meets_next and scene.wheel is not None:
             from tribodyn.fem.cyclic_symmetry import with_neighbours  # only wheels need it
 
-            own = with_neighbours(own, scene.wheel.sectors, scene.wheel.axis)
-        found += own
-    return found
+            joint_faces = with_neighbours(joint_faces, scene.wheel.sectors, scene.wheel.axis)
+        contact_faces += joint_faces
+    return contact_faces
 
 
 def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact, load and prescribed nodes and a few modes; not damped yet, nothing prescribed yet."""
-    wanted, system, interface, back = scene.reduction, part.system, part.interface, None
+    options, system, interface, back = scene.reduction, part.system, part.interface, None
     if without_masters(scene, interface.B.shape[0], len(part.held_rows) > 0):
         springs = joints.contact_stiffness(scene, joints.unreduced(part))
-        own = "mumps" if wanted.solver == "mumps" else None
-        return residual_flexibility(system, interface, springs, wanted.modes, wanted.cutoff, solver=own)
-    held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
-    if held and len(part.held_rows):
+        sparse_solver = "mumps" if options.solver == "mumps" else None
+        return residual_flexibility(system, interface, springs, options.modes, options.cutoff, solver=sparse_solver)
+    prescribed_dofs = [part.dofs(table.group, table.axis) for table in scene.prescribed.values()]
+    if prescribed_dofs and len(part.held_rows):
         raise Refusal("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
     relative_dofs = np.zeros(0, int)
-    if wanted.relative:
+    if options.relative:
         relative_dofs = body_1_dofs(interface).ravel()
         system, interface, back = relative(system, interface)
     # a shank sees the whole static shape of the faces that it pulls at, which no few modes have
     shanks = [np.flatnonzero(row) for name, row in part.system.outputs.items() if name.startswith(BOLTS)]
-    extra = np.concatenate([[], *held, *shanks]).astype(int)
-    how: dict[str, Any] = {} if wanted.solver == "direct" else {"solver": wanted.solver}
+    extra = np.concatenate([[], *prescribed_dofs, *shanks]).astype(int)
+    solver_option: dict[str, Any] = {} if options.solver == "direct" else {"solver": options.solver}
     try:
-        reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra, **how)
+        reduced = craig_bampton(system, interface, options.modes, options.cutoff, extra, **solver_option)
     except SingularStiffness:  # a body that no support, joint or load has a master on
         extra = np.union1d(extra, anchors(part, relative_dofs))
-        reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra, **how)
-    if wanted.interface_modes is not None:
+        reduced = craig_bampton(system, interface, options.modes, options.cutoff, extra, **solver_option)
+    if options.interface_modes is not None:
         masters = reduced.origin.masters
         touched = np.flatnonzero(np.abs(np.asarray(reduced.interface.B)[:, : len(masters)]).max(axis=0))
         keep = np.union1d(np.delete(masters, touched), extra)
-        if wanted.interface_keep is not None:
-            named = [part.dofs(group, axis) for group in wanted.interface_keep for axis in "xyz"]
+        if options.interface_keep is not None:
+            named = [part.dofs(group, axis) for group in options.interface_keep for axis in "xyz"]
             keep = np.union1d(np.intersect1d(np.concatenate([[], *named]), masters), extra)
-        reduced = interface_modes(reduced, wanted.interface_modes, keep.astype(int), apart=extra)
+        reduced = interface_modes(reduced, options.interface_modes, keep.astype(int), separate=extra)
     if back is None:
         return reduced
     assert isinstance(reduced.origin, Reduction)
     return replace(reduced, origin=replace(reduced.origin, basis=back @ reduced.origin.basis))
 
 
-def without_masters(scene: MeshScene, contact_dofs: int, held: bool) -> bool:
+def without_masters(scene: MeshScene, contact_dofs: int, has_constraints: bool) -> bool:
     """Whether the contact DOFs are no coordinates: as the scene asks, else where there are thousands of them.
 
     held : whether motions are held besides the clamps
     Raises  ValueError where the scene asks for it and has what needs them
     """
     method = scene.reduction.method
-    needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": held}
-    needed = [name for name, there in needs.items() if there]
+    needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": has_constraints}
+    needed = [name for name, is_present in needs.items() if is_present]
     if method == "residual_flexibility" and needed:
         raise Refusal(f'reduction.method: "residual_flexibility" cannot do {needed[0]}: take "craig_bampton"')
     if method != "auto":
@@ -115,7 +115,7 @@ def anchors(part: Part, relative_dofs: np.ndarray) -> np.ndarray:
 
     relative_dofs : free DOFs that have become relative displacements, which hold nothing
     """
-    found = []
+    dofs = []
     moves = np.full(3 * len(part.points), -1)
     moves[part.free] = np.arange(len(part.free))
     moves[part.free[relative_dofs]] = -1
@@ -128,16 +128,16 @@ def anchors(part: Part, relative_dofs: np.ndarray) -> np.ndarray:
         first = int(np.linalg.norm(x - x.mean(axis=0), axis=1).argmax())
         second = int(np.linalg.norm(x - x[first], axis=1).argmax())
         third = int(np.linalg.norm(np.cross(x - x[first], x[second] - x[first]), axis=1).argmax())
-        found.append(moves.reshape(-1, 3)[nodes[[first, second, third]]].ravel())
-    return np.concatenate([[], *found]).astype(int)
+        dofs.append(moves.reshape(-1, 3)[nodes[[first, second, third]]].ravel())
+    return np.concatenate([[], *dofs]).astype(int)
 
 
 def with_prescribed(scene: MeshScene, part: Part, reduced: ReducedModel) -> ReducedModel:
     """The reduced model with the static displacement that the scene prescribes as a static load of that name."""
-    for name, given in scene.prescribed.items():
-        dofs = part.dofs(given.group, given.axis)
+    for name, table in scene.prescribed.items():
+        dofs = part.dofs(table.group, table.axis)
         support = np.zeros(len(dofs))
-        for spring in (scene.springs[spring] for spring in given.springs):
+        for spring in (scene.springs[spring] for spring in table.springs):
             matrix = Spring(spring.group, spring.direction, spring.stiffness).matrix(part.mesh, part.node_sets)
             support += matrix.diagonal()[part.free[dofs]]
         masters = np.searchsorted(reduced.origin.masters, dofs)

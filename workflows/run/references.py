@@ -47,12 +47,12 @@ def highest_linear(balance: HarmonicBalance, output: str, start: float, stop: fl
     """Largest amplitude of an output between two frequencies [rad/s], free or stuck [m]; infinite if unconstrained."""
     if balance.model.follows_frequency:  # at each of its speeds: more than on the line itself
         speeds = [balance.model.at_frequency(float(omega)) for omega in np.linspace(start, stop, LINEAR.speeds)]
-        return max(highest_linear(replace(balance, model=one), output, start, stop) for one in speeds)
+        return max(highest_linear(replace(balance, model=model_there), output, start, stop) for model_there in speeds)
     states = (None, balance.contact.stiffness)
-    found = np.concatenate([_resonances(balance, springs) for springs in states])
-    if (found < np.sqrt(LINEAR.rigid) * (start + stop) / 2).any():
+    resonances = np.concatenate([_resonances(balance, springs) for springs in states])
+    if (resonances < np.sqrt(LINEAR.rigid) * (start + stop) / 2).any():
         return np.inf  # between free and stuck a part can have any resonance
-    omega = np.unique(np.clip(np.concatenate([np.linspace(start, stop, LINEAR.between), found]), start, stop))
+    omega = np.unique(np.clip(np.concatenate([np.linspace(start, stop, LINEAR.between), resonances]), start, stop))
     return float(max(_amplitudes(balance, springs, output, omega).max() for springs in states))
 
 
@@ -69,7 +69,7 @@ def delta_max(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
 
 def _resonances(balance: HarmonicBalance, springs: np.ndarray | None) -> np.ndarray:
     """Frequencies at which a loaded harmonic meets a mode, free or stuck [rad/s]."""
-    found = [np.zeros(0)]
+    resonances = [np.zeros(0)]
     orders = {order for order, _ in balance.excitation.loads}
     if balance.excitation.base is not None:
         orders.update(balance.basis.harmonics)
@@ -77,21 +77,21 @@ def _resonances(balance: HarmonicBalance, springs: np.ndarray | None) -> np.ndar
         system, B = balance.model.at_harmonic(h)
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
         lam = sla.eigvalsh(stiffness, system.mass, subset_by_index=(0, min(LINEAR.modes, system.n_dof) - 1))
-        found.append(np.sqrt(np.maximum(lam, 0.0)) / h)
-    return np.concatenate(found)
+        resonances.append(np.sqrt(np.maximum(lam, 0.0)) / h)
+    return np.concatenate(resonances)
 
 
 def _on_line(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
     """As `_amplitudes`, where the speed of a wheel goes with the frequency at that speed."""
     if not balance.model.follows_frequency:
         return _amplitudes(balance, springs, output, omega)
-    speeds, found = np.linspace(omega[0], omega[-1], LINEAR.speeds), np.zeros(len(omega))
-    for own in speeds:
-        weight = np.maximum(1 - np.abs(omega - own) / (speeds[1] - speeds[0]), 0.0)
-        near = weight > 0
-        there = replace(balance, model=balance.model.at_frequency(float(own)))
-        found[near] += weight[near] * _amplitudes(there, springs, output, omega[near])
-    return found
+    speeds, amplitudes = np.linspace(omega[0], omega[-1], LINEAR.speeds), np.zeros(len(omega))
+    for speed in speeds:
+        weight = np.maximum(1 - np.abs(omega - speed) / (speeds[1] - speeds[0]), 0.0)
+        is_near = weight > 0
+        balance_there = replace(balance, model=balance.model.at_frequency(float(speed)))
+        amplitudes[is_near] += weight[is_near] * _amplitudes(balance_there, springs, output, omega[is_near])
+    return amplitudes
 
 
 def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
@@ -127,8 +127,8 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         for start in range(0, len(omega), LINEAR.block):
             s = 1j * h * omega[start : start + LINEAR.block, None, None]
             dynamic = np.diag(lam) + s**2 * np.eye(len(lam)) + s * damping
-            moved = np.linalg.solve(dynamic, modal[:, None])[..., 0]
-            amplitudes[start : start + LINEAR.block, position] = remainder + moved @ (row @ phi)
+            modal_amplitudes = np.linalg.solve(dynamic, modal[:, None])[..., 0]
+            amplitudes[start : start + LINEAR.block, position] = remainder + modal_amplitudes @ (row @ phi)
     return amplitude(basis.to_real(amplitudes))
 
 

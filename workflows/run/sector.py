@@ -48,26 +48,26 @@ def sector(scene: MeshScene, part: Part) -> Sector:
     assert wheel is not None
     cuts = [tuple(name for name in part.node_sets if name.rpartition(".")[2] == side) for side in SEAM]
     if wheel.seam is None and all(cuts):
-        (right, *_), (left, *_) = cuts
+        (right, *_), (left_face, *_) = cuts
         raise Refusal(
-            f"wheel.seam is missing, but the part has {right} and {left}, where its disk would be cut open: "
-            f'give wheel.seam = ["{right}", "{left}"]'
+            f"wheel.seam is missing, but the part has {right} and {left_face}, where its disk would be cut open: "
+            f'give wheel.seam = ["{right}", "{left_face}"]'
         )
     try:
-        found = cyclic_symmetry.cut_sector(part, part_reduction.contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+        cut = cyclic_symmetry.cut_sector(part, part_reduction.contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
     except Mismatch as miss:
         raise Refusal(
             f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
         ) from None
-    return spun(scene, part, found) if wheel.speed else found
+    return spun(scene, part, cut) if wheel.speed else cut
 
 
 def check_sectors(scene: MeshScene) -> None:
     """Raise ValueError where a part of the scene is made for another number of sectors than its wheel has."""
     if scene.wheel is None:
         return
-    given = [table.parameters for table in (*scene.bodies.values(), scene.geometry) if table is not None]
-    for parameters in given:
+    tables = [table.parameters for table in (*scene.bodies.values(), scene.geometry) if table is not None]
+    for parameters in tables:
         made_for = parameters.get("n_blades", scene.wheel.sectors)
         if made_for != scene.wheel.sectors:
             raise Refusal(f"wheel.sectors = {scene.wheel.sectors}, but the part is made for n_blades = {made_for}")
@@ -81,8 +81,8 @@ def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
     assert scene.wheel is not None
     speed = scene.wheel.speed
     try:
-        kept = distributed(scene, full) if speed else ()
-        return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff, kept)
+        attached = distributed(scene, full) if speed else ()
+        return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff, attached)
     except ValueError as trouble:
         if not speed:
             raise
@@ -101,7 +101,7 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
     """The model of the wheel's wave on its operating line, not damped: that of the speed in the middle, and `along`.
 
     The sector is reduced at speeds that halve the intervals of their squares until the frequencies which the others
-    foretell at the newest one are right to `LIMITS.speeds_apart`, at most seven of them
+    foretell at the newest one are right to `LIMITS.speed_spacing_error`, at most seven of them
     Raises  ValueError where it cannot stand at one of them
     """
     wheel = scene.wheel
@@ -111,12 +111,12 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
     turning: list[Sector] = []
     speeds = np.sqrt(squares).tolist()
     for speed in speeds:
-        own = wheel.model_copy(update={"speed": speed, "sweep": None})
+        wheel_at_speed = wheel.model_copy(update={"speed": speed, "sweep": None})
         try:
-            turning.append(sector(scene.model_copy(update={"wheel": own}), part))
+            turning.append(sector(scene.model_copy(update={"wheel": wheel_at_speed}), part))
             if len(turning) == 2:
-                kept = (scene.reduction.modes, scene.reduction.cutoff, distributed(scene, turning[0]))
-                ends = reduce_alike(turning, *kept)
+                settings = (scene.reduction.modes, scene.reduction.cutoff, distributed(scene, turning[0]))
+                ends = reduce_alike(turning, *settings)
         except ValueError as trouble:
             raise Refusal(f"at {60 * speed:.6g} rpm of the operating line {trouble}") from None
         if len(turning) == 2:
@@ -124,10 +124,10 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
             stiffness = (ends.sector.system.stiffness,)
             line = SpeedLine(ends, stiffness, (speeds[0],), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
         if len(turning) > 1:
-            there = congruent(turning[-1].system.stiffness, ends.origin.basis)
-            error = line.error(speed, there) if len(turning) > 3 else np.inf
-            line = replace(line, stiffness=(*line.stiffness, there), speeds=(*line.speeds, speed))
-            if error <= LIMITS.speeds_apart:
+            stiffness_there = congruent(turning[-1].system.stiffness, ends.origin.basis)
+            error = line.error(speed, stiffness_there) if len(turning) > 3 else np.inf
+            line = replace(line, stiffness=(*line.stiffness, stiffness_there), speeds=(*line.speeds, speed))
+            if error <= LIMITS.speed_spacing_error:
                 break
     static = [cut.prestress for cut in turning if cut.prestress is not None]
     accuracy = {
@@ -162,10 +162,10 @@ def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
         return replace(cut, system=replace(cut.system, stiffness=stiffness, gyroscopic=turning))
 
     start = stuck_at_rest(scene, stiffened(csr_matrix(cut.system.stiffness + softening)))
-    found = solve_prestress(
+    equilibrium = solve_prestress(
         part, material, lambda k: at_rest(scene, stiffened(k)), start, softening, temperature(scene, part)
     )
-    spinning = replace(stiffened(found.stiffness), prestress=found)
+    spinning = replace(stiffened(equilibrium.stiffness), prestress=equilibrium)
     check_stability(stuck_index_0(scene, spinning))
     return spinning
 
@@ -204,9 +204,9 @@ def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples:
         raise StaticDivergence(UNSTABLE) from None
     model = replace(model, joints=dict(sector.joints))
     basis = HarmonicBasis((0, 1), samples)
-    made = joints.make_joints(scene, model)
+    contact_joints = joints.make_joints(scene, model)
     omega = 2 * np.pi  # any frequency: nothing vibrates
-    balance = HarmonicBalance.of(model, made, basis, Excitation.of(static), omega)
+    balance = HarmonicBalance.of(model, contact_joints, basis, Excitation.of(static), omega)
     options = newton.NewtonOptions(tolerance=tolerance)
     solved = newton.solve_from_rest(balance, omega, options)
     if not solved.converged:
@@ -214,8 +214,8 @@ def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples:
     if not solved.converged:
         raise Refusal(f"the contacts do not settle under the static loads: {solved.outcome}")
     state = solved.state
-    moved = full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), omega)[:, 0]
-    return np.asarray(seam_map(sector, 0) @ moved)
+    field = full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), omega)[:, 0]
+    return np.asarray(seam_map(sector, 0) @ field)
 
 
 def distributed(scene: MeshScene, sector: Sector) -> list[str]:
@@ -235,12 +235,12 @@ def temperature(scene: MeshScene, part: Part) -> np.ndarray | None:
 
     Raises  ValueError for a field from a file
     """
-    found = None
+    change = None
     for name, load in scene.loads.static.items():
         if load.field is not None:
             raise Refusal(f"loads.static.{name}: in a wheel that turns, heat whole bodies instead of a field")
         if load.temperature is not None:
-            found = np.zeros(len(part.points)) if found is None else found
-            heated = [find_group(part.node_sets, body) for body in load.bodies] or [np.arange(len(found))]
-            found[np.concatenate(heated)] += load.temperature
-    return found
+            change = np.zeros(len(part.points)) if change is None else change
+            heated = [find_group(part.node_sets, body) for body in load.bodies] or [np.arange(len(change))]
+            change[np.concatenate(heated)] += load.temperature
+    return change
