@@ -16,7 +16,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import STICKS
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time import period_search
-from tribodyn.hbm.time.period_search import Period, PeriodSearch, push
+from tribodyn.hbm.time.period_search import Period, PeriodSearch, perturb
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import integrate
 from tribodyn.hbm.time.verify import Verification
@@ -92,7 +92,7 @@ def is_unstable(balance: HarmonicBalance, state: State, options: Options | None 
     if modulus <= 1 + RULES.growth:
         return False
     plain = replace(options, accelerate=False, max_periods=RULES.pushed)
-    return any(push(PeriodSearch(stepper, plain, False), period, 8, s * direction).away for s in (1.0, -1.0))
+    return any(perturb(PeriodSearch(stepper, plain, False), period, 8, s * direction).grows for s in (1.0, -1.0))
 
 
 def is_stable(balance: HarmonicBalance, state: State, found: Verification | None, options: Options) -> tuple[bool, str]:

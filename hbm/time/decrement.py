@@ -88,8 +88,8 @@ class _Marched:
         motion, shape = eta @ start, eta_slope @ start
         speed = eta @ basis.rate @ start
         by_size = p.omega * speed @ (p.omega * eta_slope @ basis.rate @ start + omega_slope * speed)
-        held = problem.modes[0].lam * motion - problem.static_load
-        by_size += held @ shape  # d / d ln A of the stuck structure's energy
+        preload = problem.modes[0].lam * motion - problem.static_load
+        by_size += preload @ shape  # d / d ln A of the stuck structure's energy
         quarter = eta @ basis.rate
         weight = np.where(basis.order == 0, 1.0, 0.5)
         dashpots = 2 * np.pi * p.omega * float(np.sum(weight * quarter * (problem.modes[0].damping @ quarter)))

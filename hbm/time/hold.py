@@ -84,8 +84,8 @@ class Hold:
         springs = self.springs if springs is None else springs
         shapes = self._shapes(springs)
         pull = self.load + self.B.T @ (springs * (x + self.base) - f)
-        held: np.ndarray = np.linalg.solve(shapes[self.dofs], self.target - shapes.T @ pull)
-        return held
+        mean_force: np.ndarray = np.linalg.solve(shapes[self.dofs], self.target - shapes.T @ pull)
+        return mean_force
 
     def in_balance(self, state: State) -> np.ndarray:
         """(k,) force that a solved state of the balance takes there [N]."""

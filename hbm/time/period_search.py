@@ -1,6 +1,6 @@
 """The search for a motion that repeats itself after a period, by marching whole periods.
 
-A plain march follows the transient until it has died away. Mixing the states of past periods (Anderson) is much
+A plain march follows the transient until it has died grows. Mixing the states of past periods (Anderson) is much
 shorter, and where it is thrown off a periodic motion that a plain march leaves, Newton's method finds that (shooting).
 Source  Newton-Krylov shooting: Sanchez, Net, Garcia-Archilla and Simo 2004
 """
@@ -30,9 +30,9 @@ class SearchRules:
     krylov: int = 60  # products at most and relative residual of a linear solve
     forcing: float = 0.05
     shortest: float = 1 / 64  # share of a Newton step
-    # push of a periodic motion, relative to its vibration; share of it down to which it must die away; times of it
-    # that tell growth at the end; distance, relative to the vibration, at which the motion has left
-    push: float = 1e-3
+    # perturbation of a periodic motion, relative to its vibration; share of it down to which it must decay; times of it
+    # that mean growth at the end; distance, relative to the vibration, at which the motion has left
+    perturbation: float = 1e-3
     decayed: float = 0.3
     grown: float = 3.0
     left: float = 0.1
@@ -107,30 +107,30 @@ class PeriodSearch:
     def march(self, motion: Moving) -> Period:
         """Plain periods until one repeats itself, or the last one."""
         try:
-            found = self.step(motion)
-            while found.drift > self.options.tolerance:
-                found = self.step(found.end, self.options.patience)
+            period = self.step(motion)
+            while period.drift > self.options.tolerance:
+                period = self.step(period.end, self.options.patience)
         except GivenUp:
             return self._last
-        return found
+        return period
 
     def mix(self, motion: Moving) -> Period:
-        """Periods mixed from past ones, then Newton's method where they lead away; the best one where both fail."""
-        mixing, tried = Anderson(depth=40), None
+        """Periods mixed from past ones, then Newton's method where they lead grows; the best one where both fail."""
+        mixing, trial = Anderson(depth=40), None
         try:
-            found = self.step(motion)
-            while found.drift > self.options.tolerance:
-                if found.drift > RULES.thrown_off * self.best.drift:
+            mixture = self.step(motion)
+            while mixture.drift > self.options.tolerance:
+                if mixture.drift > RULES.thrown_off * self.best.drift:
                     mixing.forget()
-                    if found.drift > RULES.lost * self.best.drift and self.best is not tried:
-                        found = self._shoot(self.best)
-                        tried = self.best
+                    if mixture.drift > RULES.lost * self.best.drift and self.best is not trial:
+                        mixture = self._shoot(self.best)
+                        trial = self.best
                         continue
-                mixed = self.vector.unpack(mixing.propose(found.start, found.image), found.end)
-                found = self.step(mixed, self.options.patience)
+                mixed = self.vector.unpack(mixing.propose(mixture.start, mixture.image), mixture.end)
+                mixture = self.step(mixed, self.options.patience)
         except GivenUp:
             return self.best
-        return found
+        return mixture
 
     def step(self, motion: Moving, patience: float = np.inf) -> Period:
         """March one period.
@@ -154,29 +154,29 @@ class PeriodSearch:
             self.best, self._best_at = self._last, self.periods
         return self._last
 
-    def _shoot(self, here: Period) -> Period:
+    def _shoot(self, state: Period) -> Period:
         """Newton's method on P(z) - z = 0, its linear systems by GMRES on differences of P, as far as drift falls."""
-        while here.drift > self.options.tolerance:
-            miss = here.image - here.start
-            size = RULES.difference * float(np.linalg.norm(here.image))
+        while state.drift > self.options.tolerance:
+            miss = state.image - state.start
+            size = RULES.difference * float(np.linalg.norm(state.image))
 
-            def product(v: np.ndarray, here: Period = here, size: float = size) -> np.ndarray:
+            def product(v: np.ndarray, state: Period = state, size: float = size) -> np.ndarray:
                 length = float(np.linalg.norm(v)) / size
-                there = self.step(self.vector.unpack(here.start + v / length, here.end))
-                return (there.image - here.image) * length - v
+                there = self.step(self.vector.unpack(state.start + v / length, state.end))
+                return (there.image - state.image) * length - v
 
             derivative = LinearOperator((len(miss), len(miss)), product, dtype=float)
             step = gmres(derivative, -miss, rtol=RULES.forcing, restart=RULES.krylov, maxiter=1)[0]
             share = 1.0
             while True:
-                there = self.step(self.vector.unpack(here.start + share * step, here.end))
-                if there.drift < (1 - 0.1 * share) * here.drift:
+                there = self.step(self.vector.unpack(state.start + share * step, state.end))
+                if there.drift < (1 - 0.1 * share) * state.drift:
                     break
                 share *= 0.5
                 if share < RULES.shortest:
-                    return here
-            here = there
-        return here
+                    return state
+            state = there
+        return state
 
 
 class StateVector:
@@ -197,48 +197,49 @@ class StateVector:
     def pack(self, m: Moving) -> np.ndarray:
         return np.concatenate([self._weight * np.concatenate([m.z, m.memory.ravel()]), self._root.T @ m.hold])
 
-    def apart(self, a: np.ndarray, b: np.ndarray) -> float:
-        """Distance of two state vectors, what the sliders and a hold keep left out."""
+    def distance(self, a: np.ndarray, b: np.ndarray) -> float:
+        """Distance of two state vectors in their modes alone, without sliders and hold."""
         n = 2 * self._stepper.n_dynamic
         return float(np.linalg.norm((a - b)[:n]))
 
-    def pushed(self, vector: np.ndarray, length: float, along: np.ndarray | None = None) -> np.ndarray:
-        """A state vector pushed along another, or in all modes alike, the same each time; length : of its modes."""
+    def perturbed(self, vector: np.ndarray, length: float, direction: np.ndarray | None = None) -> np.ndarray:
+        """A state vector moved along another, or in all modes alike, the same each time; length : of its modes."""
         n = 2 * self._stepper.n_dynamic
-        if along is None:
-            along = np.concatenate([np.random.default_rng(0).normal(size=n), np.zeros(len(vector) - n)])
-        moved: np.ndarray = vector + along * (length / np.linalg.norm(along[:n]))
-        return moved
+        if direction is None:
+            direction = np.concatenate([np.random.default_rng(0).normal(size=n), np.zeros(len(vector) - n)])
+        shifted: np.ndarray = vector + direction * (length / np.linalg.norm(direction[:n]))
+        return shifted
 
-    def unpack(self, vector: np.ndarray, near: Moving) -> Moving:
+    def unpack(self, vector: np.ndarray, reference: Moving) -> Moving:
         n = len(self._weight)
-        z, memory = np.split(vector[:n] / self._weight, [len(near.z)])
+        z, memory = np.split(vector[:n] / self._weight, [len(reference.z)])
         hold = np.linalg.solve(self._root.T, vector[n:])
-        return self._stepper.moving(z, memory.reshape(self._shape), near.x, near.f, hold)
+        return self._stepper.moving(z, memory.reshape(self._shape), reference.x, reference.f, hold)
 
 
-class Pushed(NamedTuple):
-    """away : whether the motion has left; motion : after the last period that was marched."""
+class PerturbedMotion(NamedTuple):
+    """grows : whether the perturbation grows; motion : after the last period that was marched."""
 
-    away: bool
+    grows: bool
     motion: Moving
 
 
-def push(plain: PeriodSearch, found: Period, every: int, along: np.ndarray | None = None) -> Pushed:
-    """March on from a periodic motion that is pushed, until it has come back or left, or no more periods are allowed.
+def perturb(plain: PeriodSearch, period: Period, interval: int, direction: np.ndarray | None = None) -> PerturbedMotion:
+    """March a perturbed periodic motion until the perturbation has decayed or grown, or the periods are spent.
 
-    plain : of plain periods; found : the periodic motion; every : periods after which to see whether it came back
-    along : direction of the push as a state vector, by default all modes alike
-    Sliders that come to rest elsewhere leave a part of the push, which does not count as away
+    plain : search that marches plain periods; period : the periodic motion; interval : periods between two checks
+    direction : of the perturbation as a state vector, by default all modes alike
+    Sliders that stop elsewhere leave a part of the perturbation, which does not count as growth
     Raises  IntegrationFailed
     """
-    away, motion = 0.0, plain.vector.unpack(plain.vector.pushed(found.image, RULES.push * found.size, along), found.end)
+    perturbed = plain.vector.perturbed(period.image, RULES.perturbation * period.size, direction)
+    distance, motion = 0.0, plain.vector.unpack(perturbed, period.end)
     while plain.periods < plain.options.max_periods:
         later = plain.step(motion)
         motion = later.end
-        away = plain.vector.apart(later.image, found.image) / found.size
-        if away >= RULES.left:
-            return Pushed(True, motion)
-        if plain.periods % every == 0 and away <= RULES.decayed * RULES.push:
+        distance = plain.vector.distance(later.image, period.image) / period.size
+        if distance >= RULES.left:
+            return PerturbedMotion(True, motion)
+        if plain.periods % interval == 0 and distance <= RULES.decayed * RULES.perturbation:
             break
-    return Pushed(away > RULES.grown * RULES.push, motion)
+    return PerturbedMotion(distance > RULES.grown * RULES.perturbation, motion)

@@ -108,30 +108,31 @@ def hammer(
     m = stepper.n_dynamic
     moving.z[m:] += stepper.h * impulse * (stepper.modes[1][:, :m].T @ np.real(balance.model.system.loads[struck[0]]))
     row = balance.compliance.output_names.index(output)
-    return from_decay(*_marched(stepper, moving, row, periods, least), omega, several=True)
+    return from_decay(*_marched(stepper, moving, row, periods, least), omega, has_other_modes=True)
 
 
 def _marched(
     stepper: TimeStepper, moving: Moving, row: int, periods: int, least: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and output [m] of periods marched, until it swings less than `least`."""
-    found = []
+    marched = []
     for _ in range(periods):
         moving, record, _, _ = stepper.period(moving)
-        found.append(record.y[:, row])
-        if np.ptp(found[-1]) < 2 * least:
+        marched.append(record.y[:, row])
+        if np.ptp(marched[-1]) < 2 * least:
             break
-    displacement = np.concatenate(found)
+    displacement = np.concatenate(marched)
     if not np.isfinite(displacement).all():
         raise IntegrationFailed("the free decay grows without bound: take more steps per period")
     return stepper.h * np.arange(1, len(displacement) + 1), displacement
 
 
-def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float, several: bool = False) -> RingDown:
+def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float, has_other_modes: bool = False) -> RingDown:
     """Frequency and damping by amplitude of a decaying oscillation (n,), sampled at equal steps.
 
     omega : a guess of its frequency [rad/s]
-    several : whether other modes may ring along, which `rest` then tells; those within half of the frequency disturb
+    has_other_modes : whether other modes may be excited, too, which `rest` then states; those within half of the
+        frequency disturb
     Raises  ValueError for a decay that is too short, IntegrationFailed where several modes ring
     """
     step = time[1] - time[0]
@@ -145,21 +146,23 @@ def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float, several
     weight = np.cos(np.pi * inside)  # root of Hann's window
     rate, rows = 1j * omega, []
     for start in range(0, len(time) - n + 1, max(1, round(period / 2))):
-        seen = displacement[start : start + n]
+        observed = displacement[start : start + n]
         for _ in range(RULES.refined):
-            size, slope, left = _fitted(seen, rate * step * n, inside, weight)
+            size, slope, remaining = _fitted(observed, rate * step * n, inside, weight)
             rate += slope / (size * step * n)
-        if not several and not left < RULES.ringing * abs(size):
+        if not has_other_modes and not remaining < RULES.ringing * abs(size):
             raise IntegrationFailed(
-                f"the decay is no single oscillation: {left / abs(size):.0%} of its amplitude is other modes that ring "
-                "too; begin at a smaller amplitude, or end at a larger one"
+                f"the decay is no single oscillation: {remaining / abs(size):.0%} of its amplitude are other modes; "
+                "begin at a smaller amplitude, or end at a larger one"
             )
-        rows.append((abs(size), rate.imag, -rate.real / rate.imag, left / abs(size)))
-    amplitude, frequency, damping, rest = np.array(rows).T
-    return RingDown(time, displacement - displacement.mean(), amplitude, frequency, damping, rest)
+        rows.append((abs(size), rate.imag, -rate.real / rate.imag, remaining / abs(size)))
+    amplitude, frequency, damping, equilibrium = np.array(rows).T
+    return RingDown(time, displacement - displacement.mean(), amplitude, frequency, damping, equilibrium)
 
 
-def _fitted(seen: np.ndarray, rate: complex, inside: np.ndarray, weight: np.ndarray) -> tuple[complex, complex, float]:
+def _fitted(
+    observed: np.ndarray, rate: complex, inside: np.ndarray, weight: np.ndarray
+) -> tuple[complex, complex, float]:
     """Complex amplitude of exp(rate t) at the middle, its slope over the window, and root mean square of the rest."""
     carrier = np.exp(rate * inside)
     parts = [
@@ -169,6 +172,6 @@ def _fitted(seen: np.ndarray, rate: complex, inside: np.ndarray, weight: np.ndar
         *(np.exp(1j * m * rate.imag * inside) for m in RULES.multiples),
     ]
     columns = np.column_stack([np.ones_like(inside), inside, *(c for p in parts for c in (p.real, -p.imag))])
-    found = np.linalg.lstsq(columns * weight[:, None], seen * weight, rcond=None)[0]
-    rest = float(np.sqrt(np.mean((weight * (seen - columns @ found)) ** 2)))
-    return complex(found[2], found[3]), complex(found[4], found[5]), rest
+    fit = np.linalg.lstsq(columns * weight[:, None], observed * weight, rcond=None)[0]
+    equilibrium = float(np.sqrt(np.mean((weight * (observed - columns @ fit)) ** 2)))
+    return complex(fit[2], fit[3]), complex(fit[4], fit[5]), equilibrium

@@ -86,10 +86,10 @@ class TimeStepper:
         lam, phi = self.modes
         self.h = 2 * np.pi / omega / options.steps
         m = self.n_dynamic = max(1, int(np.sum(lam < (RESOLVED / self.h) ** 2)))
-        self.lam, moving, rest = lam[:m], phi[:, :m], phi[:, m:] / np.sqrt(lam[m:])
+        self.lam, moving, static_part = lam[:m], phi[:, :m], phi[:, m:] / np.sqrt(lam[m:])
         self.n_pair, self.c = balance.contact.stiffness.shape
         B = np.asarray(model.interface.B)
-        U, follows = np.ascontiguousarray(B @ moving), B @ rest
+        U, follows = np.ascontiguousarray(B @ moving), B @ static_part
         self.static = follows @ follows.T
         rate = system.velocity_matrix
         full = np.zeros((m, m)) if rate is None else moving.T @ np.asarray(rate) @ moving
@@ -112,11 +112,11 @@ class TimeStepper:
         self.hold = Hold.of(balance, force[:, :static].sum(axis=1), self._base[:, :static].sum(axis=1))
         at = np.zeros((len(phi), 0)) if self.hold is None else self.hold.at
         rows = np.concatenate([rows, at.T])
-        self._seen = rows @ moving, -(rows @ rest) @ follows.T  # outputs of eta and of the contact force
-        self.rest = follows @ (rest.T @ force) - self._base  # (n_contact, n_coeff)
-        self._output_rest = samples @ ((rows @ rest) @ (rest.T @ force)).T  # (n_step, n_output)
+        self._seen = rows @ moving, -(rows @ static_part) @ follows.T  # outputs of eta and of the contact force
+        self.rest = follows @ (static_part.T @ force) - self._base  # (n_contact, n_coeff)
+        self._output_rest = samples @ ((rows @ static_part) @ (static_part.T @ force)).T  # (n_step, n_output)
         modal = moving.T @ at
-        self._of_hold = modal, Q @ modal, follows @ (rest.T @ at), (rows @ rest) @ (rest.T @ at)
+        self._of_hold = modal, Q @ modal, follows @ (static_part.T @ at), (rows @ static_part) @ (static_part.T @ at)
         self.linear = time_step.Linear(
             E, Q, U, np.ascontiguousarray(np.roll(samples, 1, axis=0) @ impulse.T),
             np.ascontiguousarray(samples @ self.rest.T),
@@ -174,14 +174,16 @@ class TimeStepper:
     def _at_rest(self, state: State, hold: np.ndarray) -> np.ndarray:
         """Modal coordinates of harmonic 0, by the stuck system: without contact a part may be loose."""
         k, U = self.balance.compliance.k, self.linear.U
-        modal, _, rest, _ = self._of_hold
-        pull = k * (state.flat[:, 0] - self.rest[:, 0] - rest @ hold) - state.cycle.force.reshape(len(k), -1)[:, 0]
+        modal, _, static_part, _ = self._of_hold
+        pull = (
+            k * (state.flat[:, 0] - self.rest[:, 0] - static_part @ hold) - state.cycle.force.reshape(len(k), -1)[:, 0]
+        )
         pull += k * (self.static @ state.cycle.force.reshape(len(k), -1)[:, 0])
-        found: np.ndarray = np.linalg.solve(
+        solution: np.ndarray = np.linalg.solve(
             np.diag(self.lam) + self.flow + U.T @ (k[:, None] * U),
             self._modal_load[:, 0] + modal @ hold + U.T @ pull,
         )
-        return found
+        return solution
 
     def memory_of(self, x: np.ndarray) -> np.ndarray:
         """Memory of the periodic cycle of x (n_step, n_pair, c) that begins where the balance's load path does."""
@@ -217,9 +219,9 @@ class TimeStepper:
         )  # fmt: skip
         linear, y = self.linear, self._output_rest
         if self.hold is not None:
-            _, impulse, rest, output_rest = self._of_hold
-            impulse, rest = linear.impulse + impulse @ start.hold, linear.rest + rest @ start.hold
-            linear = linear._replace(impulse=impulse, rest=rest)
+            _, impulse, static, output_rest = self._of_hold
+            impulse, static = linear.impulse + impulse @ start.hold, linear.rest + static @ start.hold
+            linear = linear._replace(impulse=impulse, rest=static)
             y = y + output_rest @ start.hold
         failed, spent, speed = time_step.march(self.law, self.contact, linear, end, record, self._space)
         if failed >= 0:
@@ -278,8 +280,8 @@ def _exact_step(
         scale = float(np.abs(load[g]).max()) or 1.0
         rate[n : 2 * n, 3 * n :] = load[g] / scale
         rate[3 * n :, 3 * n :] = turn
-        whole = sla.expm(rate)
-        E[np.ix_(rows, rows)] = whole[: 2 * n, : 2 * n]
-        Q[np.ix_(rows, g)] = h**2 * whole[: 2 * n, 2 * n : 3 * n]
-        impulse[rows] = h**2 * scale * whole[: 2 * n, 3 * n :]
+        matrix = sla.expm(rate)
+        E[np.ix_(rows, rows)] = matrix[: 2 * n, : 2 * n]
+        Q[np.ix_(rows, g)] = h**2 * matrix[: 2 * n, 2 * n : 3 * n]
+        impulse[rows] = h**2 * scale * matrix[: 2 * n, 3 * n :]
     return E, Q, impulse

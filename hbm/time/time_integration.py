@@ -34,7 +34,7 @@ class PeriodicMotion:
     outputs : (n_output, n_step) observed outputs [m]
     energy : (n_pair,) work of the tangential contact force over the period, integral of f dx [J]
     normal_force : (n_pair,) mean over the period [N], zero where the law has no normal component
-    off : (k,) mean of each coordinate that is prescribed in harmonic 0, less what is prescribed [m]
+    hold_error : (k,) mean of each coordinate that is prescribed in harmonic 0, less what is prescribed [m]
     status : (n_pair,) bits of what happened: STICKS | SLIPS | SEPARATES
     drift : change of the state over the period, relative to the vibration (both as square roots of energy)
     periods : periods integrated in all
@@ -49,7 +49,7 @@ class PeriodicMotion:
     outputs: np.ndarray
     energy: np.ndarray
     normal_force: np.ndarray
-    off: np.ndarray
+    hold_error: np.ndarray
     status: np.ndarray
     drift: float
     periods: int
@@ -84,7 +84,7 @@ class PeriodicMotion:
 
 
 @dataclass(frozen=True)
-class LeftAlone:
+class FreeMotion:
     """What a plain march does, without a search for what repeats itself, over its later half.
 
     energy, energy_spread : friction work of the whole contact per period, mean and standard deviation [J]
@@ -118,21 +118,21 @@ def integrate(
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
     options, balance = options or Options(), balance.standing(omega)
-    whole, begin = in_time(balance, omega, start, options)
-    stepper = TimeStepper(whole, omega, options)
+    full_balance, begin = in_time(balance, omega, start, options)
+    stepper = TimeStepper(full_balance, omega, options)
     motion = stepper.start_from(begin) if begin is not None else _rest(stepper)
     return _of_sector(balance, _to_periodic(stepper, motion, options, with_slopes))
 
 
 @single
-def leave_alone(
+def march_freely(
     balance: HarmonicBalance,
     omega: float,
     start: State,
     periods: int,
     options: Options | None = None,
     added: float = 0.0,
-) -> LeftAlone:
+) -> FreeMotion:
     """March from a balance state and see where the motion goes, periodic or not.
 
     added : damping ratio that sustains the start where it is a point of a nonlinear mode, gone at t = 0
@@ -141,25 +141,25 @@ def leave_alone(
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
     options, balance = replace(options or Options(), accelerate=False), balance.standing(omega)
-    whole, begin = in_time(balance, omega, start, options)
+    full_balance, begin = in_time(balance, omega, start, options)
     assert begin is not None
-    stepper = TimeStepper(whole, omega, options)
+    stepper = TimeStepper(full_balance, omega, options)
     search = PeriodSearch(stepper, replace(options, max_periods=periods, patience=periods), False)
     energy, amplitude = [], []
     motion = stepper.start_from(begin, added=added)
     for _ in range(periods):
-        found = search.step(motion)
-        seen = _of_sector(balance, motion_of(stepper, found, search.periods, CONVERGED, motion))
-        motion = found.end
-        energy.append(float(seen.energy.sum()))
-        amplitude.append(seen.amplitude)
+        departed = search.step(motion)
+        observed = _of_sector(balance, motion_of(stepper, departed, search.periods, CONVERGED, motion))
+        motion = departed.end
+        energy.append(float(observed.energy.sum()))
+        amplitude.append(observed.amplitude)
     late, swing = np.array(energy[periods // 2 :]), np.array(amplitude[periods // 2 :])
-    return LeftAlone(
+    return FreeMotion(
         energy=float(late.mean()),
         energy_spread=float(late.std()),
         amplitude=swing.mean(axis=0),
         amplitude_spread=swing.std(axis=0),
-        drift=found.drift,
+        drift=departed.drift,
         periods=periods,
     )
 
@@ -172,8 +172,8 @@ def in_time(
         return balance, start
     from tribodyn.hbm.time import wave_in_time  # only wheels need it
 
-    whole = wave_in_time.unroll(balance, RESOLVED * options.steps * omega / (2 * np.pi))
-    return whole, None if start is None else wave_in_time.state_of(balance, whole, start)
+    full_balance = wave_in_time.unroll(balance, RESOLVED * options.steps * omega / (2 * np.pi))
+    return full_balance, None if start is None else wave_in_time.state_of(balance, full_balance, start)
 
 
 def _of_sector(balance: HarmonicBalance, motion: PeriodicMotion) -> PeriodicMotion:
@@ -202,15 +202,15 @@ def _rest(stepper: TimeStepper) -> Moving:
 
 def _to_periodic(stepper: TimeStepper, motion: Moving, options: Options, with_slopes: bool) -> PeriodicMotion:
     search = PeriodSearch(stepper, options, with_slopes)
-    found = search.mix(motion) if options.accelerate else search.march(motion)
-    if found.drift <= options.tolerance:
-        return motion_of(stepper, found, search.periods, CONVERGED)
+    period = search.mix(motion) if options.accelerate else search.march(motion)
+    if period.drift <= options.tolerance:
+        return motion_of(stepper, period, search.periods, CONVERGED)
     hint = "; is the motion stable there?" if search.periods < options.max_periods else ""
     smallest = search.best.drift
     outcome = SolveEnd.NOT_PERIODIC.say(
-        f" {search.periods} periods: drift {found.drift:.1e}, smallest {smallest:.1e}{hint}"
+        f" {search.periods} periods: drift {period.drift:.1e}, smallest {smallest:.1e}{hint}"
     )
-    return motion_of(stepper, found, search.periods, outcome)
+    return motion_of(stepper, period, search.periods, outcome)
 
 
 def motion_of(
@@ -234,7 +234,7 @@ def motion_of(
     work = 0.5 * (work.sum(axis=0) + (f[0] + f0) * (x[0] - x0))[:, stepper.balance.contact.tangential].sum(axis=1)
     normal = record.f[:, :, components.index("n")].mean(axis=0) if "n" in components else np.zeros(len(work))
     n, hold = len(stepper.balance.compliance.output_names), stepper.hold
-    off = np.zeros(0) if hold is None else record.y[:, n:].mean(axis=0) - hold.target
+    hold_error = np.zeros(0) if hold is None else record.y[:, n:].mean(axis=0) - hold.target
     return PeriodicMotion(
         omega=stepper.omega,
         time=stepper.h * np.arange(1, stepper.options.steps + 1),
@@ -243,7 +243,7 @@ def motion_of(
         outputs=record.y.T[:n],
         energy=work,
         normal_force=normal,
-        off=off,
+        hold_error=hold_error,
         status=record.bits,
         drift=period.drift,
         periods=periods,

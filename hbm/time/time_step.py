@@ -276,7 +276,7 @@ def invert(M, R):
 
 
 @numba.njit(inline="always", **PLAIN)
-def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, work, r, J, M):
+def solve_pair(step, x0, was_open, x, s, p, gap, normal, compliance, b, tolerance, bits, work, r, J, M):
     """Newton on x + own f(x) = b for one pair from the guess x, which is overwritten; returns bits, 0: failed.
 
     bits : of the guess, whose force and memory are in `work` then; 0 where it is not known
@@ -284,25 +284,25 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, wor
     """
     f, slope, matrix = work[0], work[2], work[8]
     c = min(x.size, MOST)
-    known = bits != 0
+    is_evaluated = bits != 0
     for it in range(LOCAL):
-        if not known:
+        if not is_evaluated:
             bits = advance(step, x0, was_open, x, s, p, gap, normal, work, False)
             if differ(slope, J):
                 for a in range(c):
                     for q in range(c):
                         J[a, q], matrix[a, q] = slope[a, q], 1.0 if a == q else 0.0
                         for k in range(c):
-                            matrix[a, q] += own[a, k] * slope[k, q]
+                            matrix[a, q] += compliance[a, k] * slope[k, q]
                 invert(matrix, M)
-        known = False
+        is_evaluated = False
         size = 0.0
         for a in range(c):
             r[a] = x[a] - b[a]
             for q in range(c):
-                r[a] += own[a, q] * f[q]
+                r[a] += compliance[a, q] * f[q]
             size = max(size, abs(r[a]))
-        if size <= near:
+        if size <= tolerance:
             break
         part = 1.0 if it < DAMPED else 0.5
         for a in range(c):
@@ -314,45 +314,45 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, wor
 
 
 @numba.njit(**PLAIN)
-def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, memory, near, backward, work, r, b):
+def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, memory, tolerance, backward, work, r, b):
     """One round of Gauss-Seidel over all pairs; y = A f and all else moves on in place but x and memory of open pairs.
 
     Returns the largest displacement of a pair, negative where one failed
     """
     n_pair, c = x.shape[0], min(x.shape[1], MOST)
     normal, A, gap = contact.normal, contact.A, contact.gap
-    moved, onward, i = (0.0, -1, n_pair) if backward else (0.0, 1, -1)
+    largest_move, onward, i = (0.0, -1, n_pair) if backward else (0.0, 1, -1)
     while True:
         i += onward
         while 0 <= i < n_pair and bits[i] == SEPARATES and x_free[i * c + normal] - y[i * c + normal] < gap[i]:
             i += onward  # exerts no force
         if not 0 <= i < n_pair:
-            return moved
+            return largest_move
         o = i * c
         opened = bits[i] == SEPARATES
-        own = A[o : o + c, o : o + c].T
+        compliance = A[o : o + c, o : o + c].T
         x_i, f_i, free, under = x[i], f[i], x_free[o : o + c], y[o : o + c]
-        known = 0 if opened else bits[i]
+        status = 0 if opened else bits[i]
         off = 0.0
         for a in range(c):
             b[a] = free[a] - under[a]
             off = max(off, abs(b[a] - x_i[a]))
             for q in range(c):
-                b[a] += own[a, q] * f_i[q]
+                b[a] += compliance[a, q] * f_i[q]
         if opened:
             put(b, x_i)
-        elif off <= 0.1 * near and known != 0:
+        elif off <= 0.1 * tolerance and status != 0:
             continue
-        if known != 0:
+        if status != 0:
             put(f_i, work[0])
             put(memory[i], work[1])
         bits[i] = solve_pair(
-            step, x0[i], was_open[i], x_i, s[i], contact.p[i], gap[i], normal, own, b, 0.1 * near, known, work,
-            r, J[i], M[i],
+            step, x0[i], was_open[i], x_i, s[i], contact.p[i], gap[i], normal, compliance, b, 0.1 * tolerance, status,
+            work, r, J[i], M[i],
         )  # fmt: skip
         if bits[i] == 0:
             return -1.0
-        moved = max(moved, off)
+        largest_move = max(largest_move, off)
         for a in range(c):
             b[a] = work[0][a] - f_i[a]
             f_i[a] = work[0][a]
@@ -378,11 +378,11 @@ def add_rows(A, o, f, y):
 @numba.njit(**PLAIN)
 def largest(x):
     """Largest absolute value of x (n_pair, c)."""
-    found = 0.0
+    maximum = 0.0
     for i in range(x.shape[0]):
         for a in range(x.shape[1]):
-            found = max(found, abs(x[i, a]))
-    return found
+            maximum = max(maximum, abs(x[i, a]))
+    return maximum
 
 
 @numba.njit(cache=True)
@@ -411,22 +411,22 @@ def sweeps(step, contact, x_free, x0, was_open, s, x, f, scale, space):
     before = np.inf
     slow = 0
     for it in range(SWEEPS):
-        near = contact.accuracy * scale
-        moved = sweep(
-            step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, memory, near, it % 2 == 1, work, r, b
+        tolerance = contact.accuracy * scale
+        largest_move = sweep(
+            step, contact, x_free, x0, was_open, s, x, f, y, bits, J, M, memory, tolerance, it % 2 == 1, work, r, b
         )
         if it == 0:
             scale = max(scale, largest(x))
-        if 0.0 <= moved <= contact.accuracy * scale:
+        if 0.0 <= largest_move <= contact.accuracy * scale:
             for i in range(n_pair):
                 if bits[i] == SEPARATES:
                     for a in range(c):
                         x[i, a] = x_free[i * c + a] - y[i * c + a]
             return it + 1, scale
-        slow += moved > SLOW * before
-        if moved < 0.0 or slow > 5:
+        slow += largest_move > SLOW * before
+        if largest_move < 0.0 or slow > 5:
             break
-        before = moved
+        before = largest_move
     return -1, scale
 
 
@@ -477,11 +477,11 @@ def chord(step, contact, x_free, x0, was_open, s, x, f, scale, space):
         before = error
         if it > 0:  # Broyden's update: the inverse learns what the last step has shown
             u = np.dot(inverse, r - r_before)
-            along = move @ u
-            if abs(along) > SHORTEST**2 * (move @ move):
+            projection = move @ u
+            if abs(projection) > SHORTEST**2 * (move @ move):
                 row = np.dot(move, inverse)
                 for a in range(move.size):
-                    share = (move[a] - u[a]) / along
+                    share = (move[a] - u[a]) / projection
                     for b in range(move.size):
                         inverse[a, b] += share * row[b]
         move = -np.dot(inverse, r)

@@ -70,7 +70,7 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
     x_ours, x_theirs = _vibration(state.x @ functions.T), _vibration(motion.x)
     floor = energy_floor(motion)
     energy = balance.energy(state)
-    whole = max(abs(motion.energy.sum()), floor)
+    total_energy = max(abs(motion.energy.sum()), floor)
     amplitude = np.array([_relative(a, b) for a, b in zip(_rms(ours), _rms(theirs), strict=True)])
     means = [
         _relative(a, b, scale or abs(b))
@@ -86,10 +86,10 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
         },
         mean=dict(zip(names, means, strict=True)),
         contact=_relative(np.abs(x_ours - x_theirs).max(), 0.0, np.abs(x_theirs).max()),
-        energy=float((energy.sum() - motion.energy.sum()) / whole) if whole > 0 else 0.0,
-        energy_pairs=float(np.abs(energy - motion.energy).max() / whole) if whole > 0 else 0.0,
+        energy=float((energy.sum() - motion.energy.sum()) / total_energy) if total_energy > 0 else 0.0,
+        energy_pairs=float(np.abs(energy - motion.energy).max() / total_energy) if total_energy > 0 else 0.0,
         preload=_relative(balance.preload(state), motion.preload),
-        step_error=_step_error(balance, state, options, motion, whole) if motion.periodic else float("nan"),
+        step_error=_step_error(balance, state, options, motion, total_energy) if motion.periodic else float("nan"),
         drift=motion.drift,
         periods=motion.periods,
         outcome=motion.outcome,
@@ -98,12 +98,12 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
 
 
 def _step_error(
-    balance: HarmonicBalance, state: State, options: Options, motion: PeriodicMotion, whole: float
+    balance: HarmonicBalance, state: State, options: Options, motion: PeriodicMotion, total_energy: float
 ) -> float:
     """Error of the time steps in amplitude and energy, from half as many."""
     coarse = time_integration.integrate(balance, state.omega, state, replace(options, steps=options.steps // 2))
     rms = zip(_rms(_vibration(coarse.outputs)), _rms(_vibration(motion.outputs)), strict=True)
-    energy = (coarse.energy.sum() - motion.energy.sum()) / whole if whole > 0 else 0.0
+    energy = (coarse.energy.sum() - motion.energy.sum()) / total_energy if total_energy > 0 else 0.0
     return float(max(abs(v) / 3 for v in (*(_relative(a, b) for a, b in rms), energy)))
 
 

@@ -17,7 +17,7 @@ def unroll(balance: HarmonicBalance, highest: float) -> HarmonicBalance:
     wave = as_wave(balance.model)
     n = wave.sectors_in_time
     load = waves.on_wheel(balance.excitation, wave.engine_order, wave.n_sectors, n)
-    whole = HarmonicBalance.of(
+    all_sectors = HarmonicBalance.of(
         unrolled(wave, highest),
         balance.contact.repeat(n),
         balance.basis,
@@ -25,12 +25,12 @@ def unroll(balance: HarmonicBalance, highest: float) -> HarmonicBalance:
         balance.omega_max,
         np.tile(balance.memory, (n, 1)),
     )
-    rest = None if balance.at_rest is None else np.tile(balance.at_rest, (n, 1))
-    return replace(whole, load_factor=balance.load_factor, at_rest=rest)
+    harmonics = None if balance.at_rest is None else np.tile(balance.at_rest, (n, 1))
+    return replace(all_sectors, load_factor=balance.load_factor, at_rest=harmonics)
 
 
-def state_of(balance: HarmonicBalance, whole: HarmonicBalance, state: State) -> State:
+def state_of(balance: HarmonicBalance, all_sectors: HarmonicBalance, state: State) -> State:
     """The state of a wave as that of all its sectors."""
     wave, basis = as_wave(balance.model), balance.basis
     x = [waves.at_sector(basis, state.x, wave.engine_order, wave.n_sectors, n) for n in range(wave.sectors_in_time)]
-    return whole.evaluate(state.omega, np.concatenate(x))
+    return all_sectors.evaluate(state.omega, np.concatenate(x))

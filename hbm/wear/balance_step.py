@@ -44,27 +44,29 @@ EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
 SHIFTED = WearEnd.NO_STEP.say(f": the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step")
 
 
-def balance_step(whole: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> WearStep:
+def balance_step(
+    full_problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]
+) -> WearStep:
     """One accepted step from a state, with as many harmonics as a solution follows with.
 
     whole : the problem with all harmonics, which rows have; each step tries more of them again
     """
-    problem, state = start_problem, start = harmonic_fallback.with_most_harmonics(whole, state)
-    while isinstance(step := _implicit_step(problem, tolerance, state, rows, whole), NoSolution):
+    problem, state = start_problem, start = harmonic_fallback.with_most_harmonics(full_problem, state)
+    while isinstance(step := _implicit_step(problem, tolerance, state, rows, full_problem), NoSolution):
         start = replace(start, solves=step.solves)
         fewer = harmonic_fallback.with_fewer(problem)
         if fewer is None:
             problem = start_problem
-            step = _explicit_step(whole, problem, start, tolerance, step.failure, rows)
+            step = _explicit_step(full_problem, problem, start, tolerance, step.failure, rows)
             break
         problem, state = fewer, harmonic_fallback.converted(fewer, start)
     row, following = step.row, step.following()
-    if problem is not whole:
-        shown = harmonic_fallback.converted(whole, start if problem is start_problem else state)
+    if problem is not full_problem:
+        shown = harmonic_fallback.converted(full_problem, start if problem is start_problem else state)
         shown = replace(shown, solves=row.solves, preload_at_rest=row.preload_at_rest)
-        row = row_of(whole, shown, row.cycles_in_step, row.worn, row.work, row.step_error, row.memory)
+        row = row_of(full_problem, shown, row.cycles_in_step, row.worn, row.work, row.step_error, row.memory)
     if step.failure is None:
-        following = harmonic_fallback.converted(whole, following)
+        following = harmonic_fallback.converted(full_problem, following)
     return WearStep(row, lambda: following, step.failure)
 
 
@@ -72,10 +74,15 @@ class _ImplicitStep:
     """A step of two implicit stages from a state, with the harmonics of a problem."""
 
     def __init__(
-        self, problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow], whole: WearProblem
+        self,
+        problem: WearProblem,
+        tolerance: Tolerance,
+        state: WearState,
+        rows: Sequence[WearRow],
+        full_problem: WearProblem,
     ):
         self._problem, self._tolerance, self._state = problem, tolerance, state
-        self._drift, self.slopes = initial_guess(problem, state, rows, whole)
+        self._drift, self.slopes = initial_guess(problem, state, rows, full_problem)
         self._smallest = 1e-9 * tolerance.scale / float(state.rate.max())
         self.shortest = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
         self._has_fewest = harmonic_fallback.with_fewer(problem) is None
@@ -117,18 +124,18 @@ class _ImplicitStep:
 
 
 def _implicit_step(
-    problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow], whole: WearProblem
+    problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow], full_problem: WearProblem
 ) -> WearStep | NoSolution:
     """A step with the harmonics of a problem, where a solution follows; whole : with all, which rows have."""
     if not state.rate.max() > 0:
         top = problem.balance.basis.harmonics[-1]
         return NoSolution(WearEnd.NO_STEP.say(f": no pair slips with harmonics 0 to {top}"), state.solves)
-    method = _ImplicitStep(problem, tolerance, state, rows, whole)
-    scans = harmonic_fallback.scan_problem(whole)  # for peaks, where a step succeeds with fewer
+    method = _ImplicitStep(problem, tolerance, state, rows, full_problem)
+    scans = harmonic_fallback.scan_problem(full_problem)  # for peaks, where a step succeeds with fewer
     searched = max(problem, scans, key=lambda p: len(p.balance.basis.harmonics))
     accuracy = EVENT_RULES.overtaking_accuracy * tolerance.share
     overtaking = OvertakingEvent(problem, searched, accuracy, state, rows)
-    stride = min(predicted_cycles(rows) or 10 * method.shortest, cycles_to_loss_at_rest(whole, state, rows))
+    stride = min(predicted_cycles(rows) or 10 * method.shortest, cycles_to_loss_at_rest(full_problem, state, rows))
     trial = accurate_step(method, stride, PreloadEvent(problem, state, rows), overtaking)
     solves = state.solves + method.solves + overtaking.solves
     if isinstance(trial, NoSolution):
@@ -162,7 +169,7 @@ def _shifts(state: WearState, following: WearState, expected: np.ndarray) -> boo
 
 
 def _explicit_step(
-    whole: WearProblem,
+    full_problem: WearProblem,
     problem: WearProblem,
     state: WearState,
     tolerance: Tolerance,
@@ -177,7 +184,7 @@ def _explicit_step(
     problem : that the state is solved in; the search takes the harmonics of scans, failing that fewer
     """
     memory = StepMemory.empty(len(state.points)).arrays()
-    scans = harmonic_fallback.scan_problem(whole)
+    scans = harmonic_fallback.scan_problem(full_problem)
     fewer = harmonic_fallback.with_fewer(scans)
     candidates = (scans,) if fewer is None else (scans, fewer)
     n_explicit = next((i for i, row in enumerate(reversed(rows)) if predicted_cycles([row]) > 0), len(rows))

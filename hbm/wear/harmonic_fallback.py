@@ -21,20 +21,20 @@ from tribodyn.hbm.wear.wear_state import WearState, worn_state
 LEAST_HARMONIC = 3  # up to which harmonics are kept where no solution with more follows
 
 
-def with_most_harmonics(whole: WearProblem, state: WearState) -> tuple[WearProblem, WearState]:
+def with_most_harmonics(full_problem: WearProblem, state: WearState) -> tuple[WearProblem, WearState]:
     """The problem with as many harmonics as a solution near a state is found with, and the state in it.
 
     A state that was solved with fewer harmonics than the problem has carries zeros in the others.
     """
-    harmonics = whole.balance.basis.harmonics
-    top = top_harmonic(whole.balance.basis, [point.state.x for point in state.points])
+    harmonics = full_problem.balance.basis.harmonics
+    top = top_harmonic(full_problem.balance.basis, [point.state.x for point in state.points])
     count = 1 + harmonics.index(top)
     if count == len(harmonics):
-        return whole, state
-    problem = _with_harmonics(whole, harmonics[:count])
+        return full_problem, state
+    problem = _with_harmonics(full_problem, harmonics[:count])
     state = converted(problem, state)
-    while problem is not whole:
-        finer = _with_harmonics(whole, harmonics[: 2 * len(problem.balance.basis.harmonics)])
+    while problem is not full_problem:
+        finer = _with_harmonics(full_problem, harmonics[: 2 * len(problem.balance.basis.harmonics)])
         refined, solves = _solved_nearby(finer, state)
         if refined is None:
             return problem, replace(state, solves=solves)
@@ -68,10 +68,11 @@ def with_fewer(problem: WearProblem) -> WearProblem | None:
     return None if selected == harmonics else _with_harmonics(problem, selected)
 
 
-def scan_problem(whole: WearProblem) -> WearProblem:
+def scan_problem(full_problem: WearProblem) -> WearProblem:
     """The problem with the harmonics that scans for peaks have."""
     return _with_harmonics(
-        whole, tuple(h for h in whole.balance.basis.harmonics if h <= _needed(whole, AtPeak.scan_harmonic))
+        full_problem,
+        tuple(h for h in full_problem.balance.basis.harmonics if h <= _needed(full_problem, AtPeak.scan_harmonic)),
     )
 
 

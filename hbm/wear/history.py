@@ -14,7 +14,7 @@ from tribodyn.hbm.outcome import Outcome, WearEnd
 
 LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
 LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends unless a scene says where
-OF_MOTION = ("spread", "mean_error", "settled", "periods", "moving")  # of a row whose motion was marched in time
+OF_MOTION = ("spread", "mean_error", "is_stationary", "periods", "moving")  # of a row whose motion was marched in time
 
 
 class StepScheme(StrEnum):
@@ -65,7 +65,7 @@ class WearRow(_State[float, int]):
     growth: float = float("nan")
     spread: float = 0.0
     mean_error: float = 0.0
-    settled: bool = True
+    is_stationary: bool = True
     periods: int = 0
     moving: np.ndarray = field(default_factory=lambda: np.zeros(0))
     memory: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -107,7 +107,7 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
         of the last row with a balance where wear in time went on without one; zero elsewhere. None in a run that
         is nowhere marched, as the four below
     spread : (n_row,) standard deviation of the work of a period, over its mean; mean_error : (n_row,) standard error of
-        that mean, relative; settled : (n_row,) whether the means came to rest
+        that mean, relative; is_stationary : (n_row,) whether the means came to rest
     moving : (n_row, n) what moved before the row's periods, see hbm.time.mean_motion.Follower; zeros where they began
         in the balance
     memory : what the rule remembers from step to step, arrays (n_row, ...) by name, see the rule; empty where nothing
@@ -119,7 +119,7 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
     growth: np.ndarray | None = None
     spread: np.ndarray | None = None
     mean_error: np.ndarray | None = None
-    settled: np.ndarray | None = None
+    is_stationary: np.ndarray | None = None
     periods: np.ndarray | None = None
     moving: np.ndarray | None = None
     memory: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -135,8 +135,8 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
         """Share of the cycles worn along a motion of the balance that a machine leaves; None where it is not known."""
         if self.growth is None:
             return None
-        left = (self.growth > 0) & ~self.in_time
-        return float(self.cycles_in_step[left].sum()) / float(self.cycles_in_step.sum() or 1.0)
+        unstable = (self.growth > 0) & ~self.in_time
+        return float(self.cycles_in_step[unstable].sum()) / float(self.cycles_in_step.sum() or 1.0)
 
     @property
     def jumps(self) -> np.ndarray:
@@ -146,8 +146,8 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
     @property
     def without_balance(self) -> np.ndarray:
         """Rows in time whose balance has no solution: the motion of the row before stays, but not its forces."""
-        stays, same = ((a[1:] == a[:-1]).all(axis=(1, 2)) for a in (self.displacement, self.force))
-        return 1 + np.flatnonzero(self.in_time[1:] & stays & ~same)
+        stays, is_same_force = ((a[1:] == a[:-1]).all(axis=(1, 2)) for a in (self.displacement, self.force))
+        return 1 + np.flatnonzero(self.in_time[1:] & stays & ~is_same_force)
 
     @property
     def scatter(self) -> float:
@@ -201,15 +201,15 @@ def cycles_to_share(cycles: np.ndarray, preload: np.ndarray, share: float, at_re
 
     Between rows along the logarithm of the preload; at rest, where the wear falls on it evenly, along itself
     """
-    below = np.flatnonzero(preload < share * preload[0])
-    if len(below) == 0 or below[0] == 0:
+    rows_below = np.flatnonzero(preload < share * preload[0])
+    if len(rows_below) == 0 or rows_below[0] == 0:
         return None
-    i = int(below[0])
-    high, low, wanted = (float(one / preload[0]) for one in (preload[i - 1], preload[i], share * preload[0]))
+    i = int(rows_below[0])
+    high, low, target = (float(force / preload[0]) for force in (preload[i - 1], preload[i], share * preload[0]))
     if at_rest:
-        part = (high - wanted) / (high - low)
+        part = (high - target) / (high - low)
     else:
-        part = np.log(high / wanted) / np.log(high / max(low, 1e-3 * wanted))
+        part = np.log(high / target) / np.log(high / max(low, 1e-3 * target))
     return float(cycles[i - 1] + part * (cycles[i] - cycles[i - 1]))
 
 
@@ -253,16 +253,16 @@ def events(
 def _crossings(cycles: np.ndarray, value: np.ndarray) -> np.ndarray:
     """(n_pair,) cycles at which a value (n_row, n_pair) last falls below zero to stay; 0 if it never was above."""
     n_row, n_pair = value.shape
-    found = np.full(n_pair, np.nan)
+    crossings = np.full(n_pair, np.nan)
     for i in range(n_pair):
         above = np.flatnonzero(value[:, i] > 0)
         if len(above) == 0:
-            found[i] = 0.0
+            crossings[i] = 0.0
         elif above[-1] + 1 < n_row:
             k = above[-1]
             share = value[k, i] / (value[k, i] - value[k + 1, i])
-            found[i] = cycles[k] + share * (cycles[k + 1] - cycles[k])
-    return found
+            crossings[i] = cycles[k] + share * (cycles[k + 1] - cycles[k])
+    return crossings
 
 
 def first(cycles: np.ndarray) -> float | None:

@@ -89,10 +89,10 @@ class _Points:
     def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """That of every duty, one after the other; see `CompliancePoint.coarse_part`."""
         n_duty = len(self.points)
-        own = self._own_rows(rows)
-        parts = [p.coarse_part(own) for p in self.points]
+        duty_rows = self._own_rows(rows)
+        parts = [p.coarse_part(duty_rows) for p in self.points]
         r, size = parts[0][0].shape[1], len(parts[0][1])
-        u = np.zeros((len(own) // self.n_component, n_duty, self.n_component, n_duty, r))
+        u = np.zeros((len(duty_rows) // self.n_component, n_duty, self.n_component, n_duty, r))
         a = np.zeros((n_duty, size, n_duty, size))
         for i, (shapes, compliance) in enumerate(parts):
             u[:, i, :, i] = shapes.reshape(len(u), self.n_component, r)
@@ -158,10 +158,10 @@ class WearingBalance:
         """First-order change of x when the duties' frequencies move by `moves` [rad/s], the depths following."""
         spread = []
         for balance, omega, part, move in zip(self.balances, state.omegas, self.parts(state.x), moves, strict=True):
-            there = balance.with_gap(balance.contact.gap + state.depth)
-            spread.append(move * there.frequency_slope(there.evaluate(omega, part))[0])
-        moved, _, _ = self.linearise(state).solve(-self.at(state.omegas).join(spread), 1e-4)
-        return moved.reshape(state.x.shape)
+            worn = balance.with_gap(balance.contact.gap + state.depth)
+            spread.append(move * worn.frequency_slope(worn.evaluate(omega, part))[0])
+        change, _, _ = self.linearise(state).solve(-self.at(state.omegas).join(spread), 1e-4)
+        return change.reshape(state.x.shape)
 
     def _wear_along(self, x: np.ndarray) -> tuple[np.ndarray, ContactCycle]:
         """Depth that goes with x, and the contact cycles at it with their derivative along x and depth."""
@@ -173,7 +173,7 @@ class WearingBalance:
         n_pair, n_duty = len(x), len(self.balances)
         force = np.concatenate([s.cycle.force for s in samples], axis=1)
         jacobian = np.zeros((n_pair, n_duty * width, n_duty * width))
-        along = np.zeros((n_pair, n_duty * width))
+        work_slopes = np.zeros((n_pair, n_duty * width))
         column = np.zeros((n_pair, n_duty * width))
         bend, gain = np.ones(n_pair), self.cycles * self.gain
         for i, (share, sample, part) in enumerate(zip(self.shares, samples, parts, strict=True)):
@@ -182,9 +182,9 @@ class WearingBalance:
             assert jac is not None
             jacobian[:, rows, rows] = jac
             column[:, rows] = sample.column
-            along[:, rows] = share * work_slope(first, part, sample.cycle)
+            work_slopes[:, rows] = share * work_slope(first, part, sample.cycle)
             bend = bend + gain * sample.falls
-        slope = gain[:, None] * along / bend[:, None]
+        slope = gain[:, None] * work_slopes / bend[:, None]
         jacobian -= column[:, :, None] * slope[:, None, :]  # a depth acts as a static shift of the normal displacement
         status = samples[0].cycle.status.copy()
         for sample in samples[1:]:
@@ -205,24 +205,24 @@ class WearingBalance:
             bend = 1.0 + gain * sum(s.falls for s in samples)
             low[todo] = np.where(miss < 0, depth[todo], low[todo])
             high[todo] = np.where(miss > 0, depth[todo], high[todo])
-            here, below, above = depth[todo], low[todo], high[todo]
-            trial = here - miss / np.where(bend > 0, bend, 1.0)
-            scale = np.maximum(np.maximum(np.abs(here), size[todo]), 1e-300)
-            done = (miss == 0) | (np.abs(trial - here) <= ROUNDING * scale) | (above - below <= ROUNDING * scale)
-            middle = np.where(np.isfinite(above), 0.5 * (below + above), here - miss)
-            trial = np.where((trial > below) & (trial < above), trial, middle)
+            present, lower, upper = depth[todo], low[todo], high[todo]
+            trial = present - miss / np.where(bend > 0, bend, 1.0)
+            scale = np.maximum(np.maximum(np.abs(present), size[todo]), 1e-300)
+            done = (miss == 0) | (np.abs(trial - present) <= ROUNDING * scale) | (upper - lower <= ROUNDING * scale)
+            middle = np.where(np.isfinite(upper), 0.5 * (lower + upper), present - miss)
+            trial = np.where((trial > lower) & (trial < upper), trial, middle)
             if done.all():
                 break
             todo = todo[~done]
             depth[todo] = trial[~done]
             samples = self._sample(parts, depth, todo)
-            full = [whole.updated(todo, part) for whole, part in zip(full, samples, strict=True)]
+            full = [sample.updated(todo, part) for sample, part in zip(full, samples, strict=True)]
         self._guess = depth
         return depth, full
 
     def _sample(self, parts: Sequence[np.ndarray], depth: np.ndarray, pairs: np.ndarray) -> list[_Sample]:
         """Contact cycles of some pairs at a depth, duty by duty, with their share of the work and its derivative."""
-        made = []
+        samples = []
         for share, balance, part in zip(self.shares, self.balances, parts, strict=True):
             x = part[pairs]
             contact = balance.contact.subset(pairs).with_gap(balance.contact.gap[pairs] + depth[pairs])
@@ -235,16 +235,16 @@ class WearingBalance:
                 column = cycle.jacobian[:, :, self._normal * balance.basis.n_coeff]
             work = share * np.maximum(balance.basis.work_per_cycle(cycle.force, x)[:, t].sum(axis=1), 0.0)
             falls = share * balance.basis.work_per_cycle(column.reshape(x.shape), x)[:, t].sum(axis=1)
-            made.append(_Sample(cycle, column, work, np.where(work > 0, falls, 0.0)))
-        return made
+            samples.append(_Sample(cycle, column, work, np.where(work > 0, falls, 0.0)))
+        return samples
 
 
 def work_slope(balance: HarmonicBalance, x: np.ndarray, cycle: ContactCycle) -> np.ndarray:
     """(n_pair, n_component * n_coeff) d friction work of a pair / d its x, at the gap that it has [N]."""
     basis, t, jac = balance.basis, balance.contact.tangential, cycle.jacobian
     assert jac is not None
-    moved = jac.reshape(*x.shape, -1).transpose(0, 3, 1, 2)
-    slope = basis.work_per_cycle(moved, x[:, None])[:, :, t].sum(axis=2)
+    force_slope = jac.reshape(*x.shape, -1).transpose(0, 3, 1, 2)
+    slope = basis.work_per_cycle(force_slope, x[:, None])[:, :, t].sum(axis=2)
     turned = np.zeros_like(x)  # the work of f against a unit of each coefficient of x
     turned[:, t] = -np.pi * (cycle.force @ basis.rate)[:, t]
     return np.asarray(slope + turned.reshape(len(x), -1))
@@ -266,7 +266,7 @@ class _Sample:
         """This with the rows of some pairs replaced."""
         assert self.cycle.jacobian is not None
         assert part.cycle.jacobian is not None
-        for mine, new in (
+        for target, values in (
             (self.cycle.force, part.cycle.force),
             (self.cycle.jacobian, part.cycle.jacobian),
             (self.cycle.status, part.cycle.status),
@@ -274,5 +274,5 @@ class _Sample:
             (self.work, part.work),
             (self.falls, part.falls),
         ):
-            mine[pairs] = new
+            target[pairs] = values
         return self

@@ -42,8 +42,8 @@ class JointWear:
 
         Raises  ValueError where there is no such law, or a number is missing, unknown or out of its limits
         """
-        given = declarations.complete(declared(law), numbers, f"wear law '{Path(law).stem}'")
-        return cls(law, given)
+        values = declarations.complete(declared(law), numbers, f"wear law '{Path(law).stem}'")
+        return cls(law, values)
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,9 @@ class Exposure:
         """Positions (n_pair, n_slider, n_tangential, n_samples) [m], loads (n_pair, n_slider, n_samples) [N]."""
         joint, balance = self.joint, self.balance
         if hasattr(joint.module, "slider_positions"):
-            own = self.state.x[np.ix_(joint.rows, balance.contact.columns(joint))]
+            x_joint = self.state.x[np.ix_(joint.rows, balance.contact.columns(joint))]
             memory = balance.memory[joint.rows, : joint.n_state]
-            slider, normal = joint.module.slider_positions(own, joint.parameters, memory, balance.basis)
+            slider, normal = joint.module.slider_positions(x_joint, joint.parameters, memory, balance.basis)
             return slider, normal
         x, f = self.history
         t = self.components.index("n")

@@ -39,14 +39,14 @@ def reason_to_stop(
     lost = lost_joint(problem, state, rows) if problem.any_joint else None
     if lost is not None:
         return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value in joint {lost}")
-    left = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
+    survival = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
     if state.rate.max() <= 0.0:
         if state.work.max() > 0.0:
             return WearEnd.NO_LOSS.say()
-        return (WearEnd.NO_SLIP if len(rows) else WearEnd.NEVER_SLIPS).say(left)
+        return (WearEnd.NO_SLIP if len(rows) else WearEnd.NEVER_SLIPS).say(survival)
     fading = rows and state.work.sum() < FADED_SHARE * rows[0].energy.sum()
     if fading and state.rate.max() * ENDLESS < step_depth:
-        return WearEnd.FADED.say(left)
+        return WearEnd.FADED.say(survival)
     return None
 
 
@@ -58,10 +58,10 @@ def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) 
     size = contact.n_pair // problem.copies
     for name in problem.wearing:
         pairs = contact.joint(name).rows
-        first, left = (
+        first, present = (
             np.bincount(pairs // size, force[pairs], problem.copies) for force in (rows[0].normal_force, normal)
         )
-        lost = np.flatnonzero(left < problem.lost_below * first)
+        lost = np.flatnonzero(present < problem.lost_below * first)
         if len(lost):
             return f"{name}@{lost[0]}" if problem.copies > 1 else name
     return None

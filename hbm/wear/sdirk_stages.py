@@ -62,14 +62,14 @@ def solve_stages(
 
 
 def initial_guess(
-    problem: WearProblem, state: WearState, rows: Sequence[WearRow], whole: WearProblem
+    problem: WearProblem, state: WearState, rows: Sequence[WearRow], full_problem: WearProblem
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n_duty,) d omega / d cycles, and d miss / d omega of the searches, that a step begins with."""
     drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), RULES.unknown_slope)
     memory = StepMemory.of_row(rows[-1]) if rows else None
     if memory is not None and memory.next_cycles > 0:
         slopes, top = memory.frequency_slopes, problem.balance.basis.harmonics[-1]
-        if harmonic_fallback.top_harmonic(whole.balance.basis, list(rows[-1].duty_displacement)) == top:
+        if harmonic_fallback.top_harmonic(full_problem.balance.basis, list(rows[-1].duty_displacement)) == top:
             omega = np.array([point.state.omega for point in state.points])
             drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
     return drift, slopes
@@ -89,7 +89,7 @@ def solve_first_stage(
 
 def _stage(
     problem: WearProblem,
-    near: WearState,
+    neighbour: WearState,
     base: np.ndarray,
     stretch: float,
     cycles: float,
@@ -100,18 +100,18 @@ def _stage(
     """Solve depth = base + stretch rate(depth) with every duty at its site; the wear per work of `near` is tried."""
     duties = problem.mission
     unworn = [problem.in_duty(duty) for duty in duties]
-    gain = depth_per_work(problem, near)
-    x, depth = np.concatenate(guess, axis=1), near.depth + stretch * near.rate
+    gain = depth_per_work(problem, neighbour)
+    x, depth = np.concatenate(guess, axis=1), neighbour.depth + stretch * neighbour.rate
     solves = rounds = retreats = 0
-    known: tuple[np.ndarray, np.ndarray] | None = None  # frequencies and x that the search went on from
+    previous: tuple[np.ndarray, np.ndarray] | None = None  # frequencies and x that the search went on from
     for search in searches:
         search.start()
     while True:
         balance = WearingBalance(unworn, [duty.share for duty in duties], base, stretch, gain, depth)
         solution = newton.solve(balance, tuple(omega), x, duties[0].site.newton)
         solves, rounds = solves + len(duties), rounds + 1
-        if not solution.converged and known is not None and retreats < RULES.retreats:
-            omega, x, retreats = 0.5 * (known[0] + omega), 0.5 * (known[1] + x), retreats + 1
+        if not solution.converged and previous is not None and retreats < RULES.retreats:
+            omega, x, retreats = 0.5 * (previous[0] + omega), 0.5 * (previous[1] + x), retreats + 1
             continue
         worn_at = solution.state
         depth = worn_at.depth
@@ -124,18 +124,20 @@ def _stage(
             if solution.converged:
                 corrections.append(duty.site.correction(worn, state))
         solves += sum(c.solves for c in corrections)
-        found = worn_state(problem, depth, cycles, points, solves)
+        stage = worn_state(problem, depth, cycles, points, solves)
         if not solution.converged:
-            return found
+            return stage
         after = np.array([s.next(w, c.distance) for s, w, c in zip(searches, omega, corrections, strict=True)])
-        turned = depth_per_work(problem, found)
-        settled = np.all(np.abs(turned - gain) * found.work * stretch <= RULES.gain_accuracy * np.abs(depth).max())
-        if settled and np.all(np.abs(after - omega) <= [c.accuracy for c in corrections]):
-            return found
+        turned = depth_per_work(problem, stage)
+        is_consistent = np.all(
+            np.abs(turned - gain) * stage.work * stretch <= RULES.gain_accuracy * np.abs(depth).max()
+        )
+        if is_consistent and np.all(np.abs(after - omega) <= [c.accuracy for c in corrections]):
+            return stage
         if rounds > RULES.max_corrections:
             lost = SolveEnd.SITE_NOT_FOUND.say(f" {RULES.max_corrections} solves")
-            return replace(found, points=tuple(replace(p, solution=replace(p.solution, outcome=lost)) for p in points))
-        known = omega, solution.state.x
+            return replace(stage, points=tuple(replace(p, solution=replace(p.solution, outcome=lost)) for p in points))
+        previous = omega, solution.state.x
         x = solution.state.x + balance.follow(worn_at, after - omega)
         omega, gain = after, turned
 
@@ -150,10 +152,10 @@ def depth_per_work(problem: WearProblem, state: WearState) -> np.ndarray:
         if np.any(rate[~works] > 0):
             raise Refusal(f'wear law "{wear.law}" wears pairs without friction work: take rule = "thesis"')
         coefficient = name_of(Role.WEAR_COEFFICIENT, wear_law.declared(wear.law))
-        own = (np.ones(len(pairs)) if coefficient is None else problem.numbers(name)[coefficient]) / area[pairs]
-        known = works & (own > 0)
-        factor = np.mean(rate[known] / (work[known] * own[known])) if known.any() else 1.0
-        gain[pairs] = np.divide(rate, work, out=factor * own, where=works)
+        reference = (np.ones(len(pairs)) if coefficient is None else problem.numbers(name)[coefficient]) / area[pairs]
+        usable = works & (reference > 0)
+        factor = np.mean(rate[usable] / (work[usable] * reference[usable])) if usable.any() else 1.0
+        gain[pairs] = np.divide(rate, work, out=factor * reference, where=works)
     return gain
 
 

@@ -85,9 +85,9 @@ class SteadyMotion:
         """
         balance = self._problem.balance
         contact, basis = balance.contact, balance.basis
-        found = np.zeros((contact.n_pair, contact.n_pair))
+        stiffness = np.zeros((contact.n_pair, contact.n_pair))
         if "n" not in contact.components or not basis.has_static:
-            return found
+            return stiffness
         width = len(contact.components)
         rows = contact.components.index("n") + width * np.arange(contact.n_pair)
         k = balance.reference_stiffness
@@ -95,9 +95,9 @@ class SteadyMotion:
         for i, row in enumerate(rows):
             pull = np.zeros((len(k), basis.n_coeff))
             pull[row, 0] = k[row]
-            found[:, i] = -k[rows] * point.apply(pull)[rows, 0]
-            found[i, i] += k[row]
-        return found
+            stiffness[:, i] = -k[rows] * point.apply(pull)[rows, 0]
+            stiffness[i, i] += k[row]
+        return stiffness
 
     def restore(self, row: WearRow) -> None:
         """What moved when the row of an interrupted run was come to."""
@@ -106,7 +106,7 @@ class SteadyMotion:
         balances = [self._problem.in_duty(duty, row.depth) for duty in self._problem.mission]
         self._followers = [Follower(self._options) for _ in balances]
         for follower, balance, part in zip(self._followers, balances, np.split(row.moving, len(balances)), strict=True):
-            follower.take_up(balance, part)
+            follower.restore(balance, part)
 
     def follow(self, state: WearState, planned: float) -> WearState:
         """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own.
@@ -116,30 +116,30 @@ class SteadyMotion:
         if not self._serves or state.failure or not (self.always or state.growth > 0):
             self._followers, self._moving = [], np.zeros(0)
             return state
-        self._moving = np.concatenate([f.kept() for f in self._followers]) if self._followers else np.zeros(0)
+        self._moving = np.concatenate([f.stored_state() for f in self._followers]) if self._followers else np.zeros(0)
         if not self._followers and not self._begins(state):
             return state
         try:
-            found = self._along(state, state, planned)
+            marched = self._along(state, state, planned)
         except IntegrationFailed as failure:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
-        assert found.means is not None
-        apart = abs(float(found.work.sum() - state.work.sum()))
-        if not self.always and found.means.spread == 0 and apart <= RULES.accuracy * float(state.work.sum()):
+        assert marched.means is not None
+        difference = abs(float(marched.work.sum() - state.work.sum()))
+        if not self.always and marched.means.spread == 0 and difference <= RULES.accuracy * float(state.work.sum()):
             self._followers, self._moving = [], np.zeros(0)
             return state  # the motion has come back to that of the balance
-        return found
+        return marched
 
-    def step(self, state: WearState, there: WearState, stride: float) -> tuple[WearState, np.ndarray, np.ndarray]:
+    def step(self, state: WearState, following: WearState, stride: float) -> tuple[WearState, np.ndarray, np.ndarray]:
         """A step from a state, with the balance at the depth that `predicted_depth` predicts.
 
         Returns the state there with its rates, the depth that wears (n_pair,) and its deviation from a step of first
         order [m]
         """
-        there = self._along(there, state if there.failure else there, stride)
+        following = self._along(following, state if following.failure else following, stride)
         matrix, k1 = self._ahead(state, stride)
-        k2 = np.linalg.solve(matrix, there.rate - 2 * k1)
-        return there, np.maximum(stride * (1.5 * k1 + 0.5 * k2), 0.0), 0.5 * stride * (k1 + k2)
+        k2 = np.linalg.solve(matrix, following.rate - 2 * k1)
+        return following, np.maximum(stride * (1.5 * k1 + 0.5 * k2), 0.0), 0.5 * stride * (k1 + k2)
 
     def predicted_depth(self, state: WearState, stride: float) -> np.ndarray:
         """Depth (n_pair,) [m] at which a step from a state takes its second rate."""
@@ -159,49 +159,49 @@ class SteadyMotion:
             self._followers, self._serves = [], False
         return self._serves
 
-    def _along(self, state: WearState, near: WearState, stride: float) -> WearState:
+    def _along(self, state: WearState, reference: WearState, stride: float) -> WearState:
         """The state with its means at the frequencies of `near`, as exact as `stride` cycles with them ask for."""
         problem, depth, cycles = self._problem, state.depth, state.cycles
         life = float(expected_life(self._tolerance, cycles, depth)) if stride else np.inf
-        asked = self._tolerance.share * life / (stride or 1.0) if self.always else None
-        found: list[MeanMotion] = []
-        for follower, duty, point in zip(self._followers, problem.mission, near.points, strict=True):
+        accuracy = self._tolerance.share * life / (stride or 1.0) if self.always else None
+        means_of_duties: list[MeanMotion] = []
+        for follower, duty, point in zip(self._followers, problem.mission, reference.points, strict=True):
             balance = problem.in_duty(duty, depth)
 
             def wears(motion: PeriodicMotion, balance: HarmonicBalance = balance) -> np.ndarray:
                 return _depth_rate(problem, balance, motion, depth, cycles)
 
-            found.append(follower.mean(balance, point.state.omega, wears, asked))
+            means_of_duties.append(follower.mean(balance, point.state.omega, wears, accuracy))
         shares = [duty.share for duty in problem.mission]
-        rate = np.sum([s * m.seen for s, m in zip(shares, found, strict=True)], axis=0)
-        work = np.sum([s * m.energy for s, m in zip(shares, found, strict=True)], axis=0)
-        works = np.array([s * float(m.energy.sum()) for s, m in zip(shares, found, strict=True)])
+        rate = np.sum([s * m.observed for s, m in zip(shares, means_of_duties, strict=True)], axis=0)
+        work = np.sum([s * m.energy for s, m in zip(shares, means_of_duties, strict=True)], axis=0)
+        works = np.array([s * float(m.energy.sum()) for s, m in zip(shares, means_of_duties, strict=True)])
         weight = works / works.sum() if works.sum() > 0 else works
-        first = found[0]
+        first = means_of_duties[0]
         means = Means(
             energy=first.energy,
             normal_force=first.normal_force,
             amplitude=float(first.amplitude[0]),
-            spread=float(weight @ [m.spread for m in found]),
-            error=float(np.linalg.norm(weight * [m.error for m in found])),
-            settled=all(m.settled for m in found),
-            periods=sum(m.periods for m in found),
+            spread=float(weight @ [m.spread for m in means_of_duties]),
+            error=float(np.linalg.norm(weight * [m.error for m in means_of_duties])),
+            is_stationary=all(m.is_stationary for m in means_of_duties),
+            periods=sum(m.periods for m in means_of_duties),
             moving=self._moving,
         )
         return replace(state, rate=rate, work=work, means=means)
 
-    def _fall(self, here: WearState) -> np.ndarray:
+    def _fall(self, state: WearState) -> np.ndarray:
         """(n_pair, n_pair) - d rate / d depth, about."""
-        assert here.means is not None
-        force = here.means.normal_force
+        assert state.means is not None
+        force = state.means.normal_force
         touches = force > 0
         fall = np.zeros((len(force), len(force)))
-        stiffness, coupled, rest = (
+        stiffness, coupled, separated = (
             self._stiffness[np.ix_(*of)] for of in ((touches, touches), (touches, ~touches), (~touches, ~touches))
         )
         if not touches.all():
-            stiffness = stiffness - coupled @ np.linalg.lstsq(rest, coupled.T, rcond=None)[0]
-        fall[np.ix_(touches, touches)] = (here.rate[touches] / force[touches])[:, None] * stiffness
+            stiffness = stiffness - coupled @ np.linalg.lstsq(separated, coupled.T, rcond=None)[0]
+        fall[np.ix_(touches, touches)] = (state.rate[touches] / force[touches])[:, None] * stiffness
         return fall
 
 
@@ -215,20 +215,20 @@ def with_growth(problem: WearProblem, state: WearState, always: bool = False) ->
     """
     balance = problem.balance
     sectors = balance.model.sectors_in_time
-    few = balance.contact.stiffness.size * balance.basis.n_coeff * sectors <= MOST_UNKNOWNS
-    if state.failure or not (few or (always and not balance.model.is_wave)):
+    is_small = balance.contact.stiffness.size * balance.basis.n_coeff * sectors <= MOST_UNKNOWNS
+    if state.failure or not (is_small or (always and not balance.model.is_wave)):
         return state
     growth = -float("inf")
     try:
         for duty, point in zip(problem.mission, state.points, strict=True):
-            found = exponents.stability(problem.in_duty(duty, state.depth), point.state)
-            growth = max(growth, float(found.exponents[0].real) / found.omega - exponents.RULES.neutral_growth)
+            floquet = exponents.stability(problem.in_duty(duty, state.depth), point.state)
+            growth = max(growth, float(floquet.exponents[0].real) / floquet.omega - exponents.RULES.neutral_growth)
     except ValueError:  # a model without exponents
         return state
     return replace(state, growth=growth)
 
 
-def left_aside(problem: WearProblem, worn: WearHistory, looks: int) -> float:
+def untaken_periodic_share(problem: WearProblem, worn: WearHistory, looks: int) -> float:
     """Relative change of the cycles of a run, had it worn along periodic motions of the first duty that it passed by.
 
     An irregular motion may be a transient of some hundred periods, of which its scatter tells nothing, while a wear
@@ -238,14 +238,16 @@ def left_aside(problem: WearProblem, worn: WearHistory, looks: int) -> float:
     rows = [row for row in worn.rows() if row.spread > 0 and row.cycles_in_step > 0]
     balances = [problem.in_duty(problem.mission[0], row.depth) for row in rows]
     states = [b.evaluate(row.omega, b.shaped(row.displacement)) for b, row in zip(balances, rows, strict=True)]
-    stride, own = np.array([(row.cycles_in_step, row.energy.sum()) for row in rows]).reshape(-1, 2).T
+    stride, work_marched = np.array([(row.cycles_in_step, row.energy.sum()) for row in rows]).reshape(-1, 2).T
     work = np.array([np.sum(b.energy(state)) for b, state in zip(balances, states, strict=True)])
-    by_balance = np.abs(stride * (work - own)) / np.maximum(work, own)
-    whole, change = float(by_balance.sum()), 0.0
-    for i in np.searchsorted(by_balance.cumsum(), whole * (np.arange(looks if whole else 0) + 0.5) / looks):
+    by_balance = np.abs(stride * (work - work_marched)) / np.maximum(work, work_marched)
+    total, change = float(by_balance.sum()), 0.0
+    for i in np.searchsorted(by_balance.cumsum(), total * (np.arange(looks if total else 0) + 0.5) / looks):
         follower = Follower(MeanOptions(_steps(problem), contact=RULES.contact))
-        kept = follower.kept_beside(balances[i], states[i]) or own[i]
-        change -= whole / looks * stride[i] * (kept - own[i]) / max(kept, own[i]) / by_balance[i]
+        periodic = follower.periodic_work_near(balances[i], states[i]) or work_marched[i]
+        change -= (
+            total / looks * stride[i] * (periodic - work_marched[i]) / max(periodic, work_marched[i]) / by_balance[i]
+        )
     return change / float(worn.cycles_in_step.sum() or 1.0)
 
 

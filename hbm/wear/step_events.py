@@ -117,7 +117,7 @@ class OvertakingEvent:
         ]
         self.solves += sum(result.solves for result in results)
         higher = any(result.point for result in results)
-        points = tuple(result.point or old for result, old in zip(results, state.points, strict=True))
+        points = tuple(result.point or tracked for result, tracked in zip(results, state.points, strict=True))
         self.points = points if higher else None
         return max(result.nearness for result in results)
 
@@ -146,12 +146,12 @@ class OvertakingEvent:
             return None
         return self._interpolated(self.jump.stride, accuracy)
 
-    def _interpolated(self, behind: float, accuracy: float) -> float:
+    def _interpolated(self, after: float, accuracy: float) -> float:
         """The stride to try between one before the event and one behind it; their mean where nearness is not known."""
         before, low, high = self._stride_before, self._nearness_before, self._nearness_behind
         if not 0 < low < 1 < high:
-            return 0.5 * (before + behind)
-        estimate = before + (behind - before) * np.log(1 / low) / np.log(high / low)
+            return 0.5 * (before + after)
+        estimate = before + (after - before) * np.log(1 / low) / np.log(high / low)
         offset = RULES.offset * accuracy
-        trial = estimate + (offset if estimate - before < behind - estimate else -offset)
-        return float(np.clip(trial, before + 0.5 * offset, behind - 0.5 * offset))
+        trial = estimate + (offset if estimate - before < after - estimate else -offset)
+        return float(np.clip(trial, before + 0.5 * offset, after - 0.5 * offset))

@@ -80,7 +80,7 @@ def of_life(
     last, n = len(changes) + len(by_law), len(changes) + len(by_law) + 1 + len(joints)
     area, spread = problem.area, np.zeros((len(problem.area), n))
     for i, change in enumerate(changes):  # lengths move the areas that wear
-        up, down = (one.model.interface.area for one in (change.above, change.below))
+        up, down = (inputs.model.interface.area for inputs in (change.above, change.below))
         spread[:, i] = (up - down) / (2 * change.step)
     opens = np.zeros((len(area), n))
     for i, joint in enumerate(joints, last + 1):
@@ -95,11 +95,11 @@ def of_life(
         quiet = PreloadAtRest(problem).quiet(first)
         rests = assess(quiet, first.depth, 0.0, None)
         tangent, ends = replace(tangent, problem=quiet), [rests, assess(quiet, after.depth, 0.0, rests)]
-    had, left = (
+    initial, remaining = (
         tangent.moved(state, base, 0.0)[2] / problem.preload_of(state)
         for state, base in zip(ends, (np.zeros_like(depth), depth), strict=True)
     )
-    longer = (had - left) / left[last]
+    longer = (initial - remaining) / remaining[last]
     ended = depth + np.outer(depth[:, last], longer)
     slopes = np.stack([life * longer, ended[deepest], area @ ended + after.depth @ spread])
     by_gap = np.zeros((3, len(area)))
@@ -120,11 +120,11 @@ def _check(problem: WearProblem, rows: Sequence[WearRow], scheme: str) -> None:
     if problem.any_joint or any(duty.balance is not None for duty in problem.mission):
         raise NoDerivative("cycles at several speeds, or until any joint is lost")
     for row, following in pairwise(rows):
-        where, moved = f"at {following.cycles:.4g} cycles", following.duty_omega / row.duty_omega - 1
+        where, shift = f"at {following.cycles:.4g} cycles", following.duty_omega / row.duty_omega - 1
         if row.periods:
             raise NoDerivative(f"at {row.cycles:.4g} cycles the motion is followed in time")
-        if np.abs(moved).max() > LARGEST_SHIFT:
-            i = int(np.abs(moved).argmax())
+        if np.abs(shift).max() > LARGEST_SHIFT:
+            i = int(np.abs(shift).argmax())
             jump = f"from {row.duty_omega[i] / (2 * np.pi):.5g} to {following.duty_omega[i] / (2 * np.pi):.5g} Hz"
             raise NoDerivative(f"{where} the response jumps {jump}")
         if scheme == StepScheme.IMPLICIT and not StepMemory.of_row(row).next_cycles > 0:
@@ -150,7 +150,7 @@ class _Tangent:
     corners: list[float] = field(default_factory=list)
 
     def along(
-        self, row: WearRow, past: Sequence[WearRow], before: WearState, after: WearState, depth: np.ndarray
+        self, row: WearRow, earlier: Sequence[WearRow], before: WearState, after: WearState, depth: np.ndarray
     ) -> np.ndarray:
         """Derivatives of the depth (n_pair, n) behind a step from those before it; past : the rows before."""
         self._check_status(before, after)
@@ -158,7 +158,7 @@ class _Tangent:
         if self.scheme == StepScheme.EXPLICIT:
             return depth + stride * self.moved(before, depth, 0.0)[1]
         drift, slopes = initial_guess(
-            self.problem, before, past, self.problem
+            self.problem, before, earlier, self.problem
         )  # the first stage again, as the run came to it
         searches = [FrequencySearch(float(slope)) for slope in slopes]
         reach, middle = GAMMA * stride, solve_first_stage(self.problem, before, stride, drift, searches)
@@ -171,10 +171,10 @@ class _Tangent:
     def _check_status(self, before: WearState, after: WearState) -> None:
         """Raise NoDerivative where a wear law jumps with what a pair does, as one of impacts where it lifts."""
         problem = self.problem
-        for duty, old, new in zip(problem.mission, before.points, after.points, strict=True):
-            balance, there = problem.in_duty(duty, after.depth), new.state
-            status = replace(there, cycle=replace(there.cycle, status=old.state.cycle.status))
-            rate, other = (wear_of(problem, balance, s, after.depth, after.cycles)[0] for s in (there, status))
+        for duty, start, end in zip(problem.mission, before.points, after.points, strict=True):
+            balance, end_state = problem.in_duty(duty, after.depth), end.state
+            status = replace(end_state, cycle=replace(end_state.cycle, status=start.state.cycle.status))
+            rate, other = (wear_of(problem, balance, s, after.depth, after.cycles)[0] for s in (end_state, status))
             if np.abs(other - rate).max() > RULES.corner * np.abs(rate).max():
                 raise NoDerivative(f"before {after.cycles:.4g} cycles a wear law jumps as a pair lifts, slips or stops")
 
@@ -185,16 +185,16 @@ class _Tangent:
         """
         problem, n, n_change = self.problem, base.shape[1], len(self.changes)
         cycles = [_Cycle(self, duty, at.state, state) for duty, at in zip(problem.mission, state.points, strict=True)]
-        force, x, along, *rates = zip(*(cycle.slopes(n) for cycle in cycles), strict=True)
-        force, x, along = (np.concatenate(part, axis=1) for part in (force, x, along))
+        force, x, rate_by_x, *rates = zip(*(cycle.slopes(n) for cycle in cycles), strict=True)
+        force, x, rate_by_x = (np.concatenate(part, axis=1) for part in (force, x, rate_by_x))
         rate, by_gap, by_depth = (np.sum(part, axis=0) for part in rates)
         rate = rate + by_gap[:, None] * self.opens
         rate[:, n_change + len(self.by_law)] += state.rate
-        slope = stretch * along / (1 - stretch * by_depth)[:, None]
+        slope = stretch * rate_by_x / (1 - stretch * by_depth)[:, None]
         depth = (base + stretch * rate) / (1 - stretch * by_depth)[:, None]
         duties = [problem.in_duty(duty) for duty in problem.mission]
-        given = (state.depth, 0.0, np.zeros_like(state.depth), state.depth)
-        stage = WearingBalance(duties, [duty.share for duty in problem.mission], *given)
+        fixed = (state.depth, 0.0, np.zeros_like(state.depth), state.depth)
+        stage = WearingBalance(duties, [duty.share for duty in problem.mission], *fixed)
         omegas = tuple(cycle.solved.omega for cycle in cycles)
         solved, side = stage.evaluate(omegas, np.concatenate([c.solved.x for c in cycles], axis=1)), stage.at(omegas)
         jac, n_coeff, components = solved.cycle.jacobian, solved.x.shape[2], problem.balance.contact.components
@@ -203,8 +203,8 @@ class _Tangent:
         gap = -jac[:, :, normal :: len(components) * n_coeff].sum(axis=2)
         opened = force + gap[..., None] * (depth + self.opens)[:, None]
         right = [
-            own.reshape(-1, n_coeff) - side.apply(f.reshape(-1, n_coeff))
-            for own, f in zip(np.moveaxis(x, 2, 0), np.moveaxis(opened, 2, 0), strict=True)
+            x_part.reshape(-1, n_coeff) - side.apply(f.reshape(-1, n_coeff))
+            for x_part, f in zip(np.moveaxis(x, 2, 0), np.moveaxis(opened, 2, 0), strict=True)
         ]
         moving = [cycle for cycle in cycles if not isinstance(cycle.duty.site, AtFrequency)]
         right += [side.join([(c is m) * -c.balance.frequency_slope(c.solved)[0] for c in cycles]) for m in moving]
@@ -219,9 +219,9 @@ class _Tangent:
             omega[:, :n_change] += moves[:, :n_change]
             omega = np.linalg.solve(np.eye(len(moving)) - by_pair @ turn, omega)
             depth, dx = depth + turn @ omega, dx + by_omega @ omega
-        moved = force + jac @ dx + gap[..., None] * (depth + self.opens)[:, None]
-        rate = rate + by_depth[:, None] * depth + np.einsum("pc,pcn->pn", along, dx)
-        return depth, rate, moved[problem.pairs, normal].sum(axis=0)
+        force_change = force + jac @ dx + gap[..., None] * (depth + self.opens)[:, None]
+        rate = rate + by_depth[:, None] * depth + np.einsum("pc,pcn->pn", rate_by_x, dx)
+        return depth, rate, force_change[problem.pairs, normal].sum(axis=0)
 
 
 @dataclass(frozen=True)
@@ -247,33 +247,36 @@ class _Cycle:
         """Changes of force and x (n_pair, n_component * n_coeff, n) at the same x and forces by n columns, d rate / d x
         (n_pair, n_component * n_coeff), d rate (n_pair, n), and d rate (n_pair,) by gap and by depth."""
         effects, problem = ParameterEffects(self.balance, self.solved), self.tangent.problem
-        above, below = effects.of_gap()
-        both, by_work = [(2 * (above - below), above + below)], {w.law for w in problem.wearing.values()} == {"energy"}
+        upper, lower = effects.of_gap()
+        one_sided, by_work = (
+            [(2 * (upper - lower), upper + lower)],
+            {w.law for w in problem.wearing.values()} == {"energy"},
+        )
         if by_work:  # in closed form by x and gap, which is faster; at a corner both are of the same side
             solved, basis, contact = self.solved, self.balance.basis, self.balance.contact
             gain = self.duty.share * depth_per_work(problem, self.state)
-            along = gain[:, None] * work_slope(self.balance, solved.x, solved.cycle)
+            rate_by_x = gain[:, None] * work_slope(self.balance, solved.x, solved.cycle)
             assert solved.cycle.jacobian is not None
             column = -solved.cycle.jacobian[:, :, contact.components.index("n") * basis.n_coeff]
             work = basis.work_per_cycle(column.reshape(solved.x.shape), solved.x)[:, contact.tangential]
             by_gap = by_depth = gain * work.sum(axis=1)
         else:
             by_gap, by_depth = self._by_depth(0.0), self._by_depth(1.0)
-            both.append((self._by_depth(0.0, RULES.law_step) - by_gap, by_gap))
-            along = self._by_x()
-        if any(np.abs(differ).max() > RULES.corner * np.abs(size).max() for differ, size in both):
+            one_sided.append((self._by_depth(0.0, RULES.law_step) - by_gap, by_gap))
+            rate_by_x = self._by_x()
+        if any(np.abs(differ).max() > RULES.corner * np.abs(size).max() for differ, size in one_sided):
             self.tangent.corners.append(self.state.cycles)
-        force, x, rate = (np.zeros((*shape, n)) for shape in (along.shape, along.shape, (len(along),)))
+        force, x, rate = (np.zeros((*shape, n)) for shape in (rate_by_x.shape, rate_by_x.shape, (len(rate_by_x),)))
         for i, change in enumerate(self.changes):
             effect = np.mean(effects.of_change(change), axis=0)
-            force[..., i], x[..., i] = effect[: 2 * along.size].reshape(2, *along.shape)
+            force[..., i], x[..., i] = effect[: 2 * rate_by_x.size].reshape(2, *rate_by_x.shape)
             rate[:, i] = self._by(change)
         for i, (up, down, step) in enumerate(self.tangent.by_law, len(self.changes)):
             rate[:, i] = (self._rate(problem=up) - self._rate(problem=down)) / (2 * step)
         later = RULES.law_step * self.state.cycles  # steps that are longer begin later, too
         aged = (self._rate(later=later) - self._rate(later=-later)) / (2 * RULES.law_step)
         rate[:, len(self.changes) + len(self.tangent.by_law)] = aged
-        return force, x, along, rate, by_gap, by_depth
+        return force, x, rate_by_x, rate, by_gap, by_depth
 
     def _rate(
         self,
@@ -284,33 +287,35 @@ class _Cycle:
         later: float = 0.0,
     ) -> np.ndarray:
         """(n_pair,) share of the duty in the depth per cycle [m], with something changed."""
-        there, x = balance or self.balance, self.solved.x if x is None else x
-        state = replace(self.solved, x=x, cycle=there.contact.cycle(x, there.basis, there.memory, jacobian=False))
+        changed, x = balance or self.balance, self.solved.x if x is None else x
+        state = replace(self.solved, x=x, cycle=changed.contact.cycle(x, changed.basis, changed.memory, jacobian=False))
         depth, cycles = self.state.depth + deeper, self.state.cycles + later
-        return self.duty.share * wear_of(problem or self.tangent.problem, there, state, depth, cycles)[0]
+        return self.duty.share * wear_of(problem or self.tangent.problem, changed, state, depth, cycles)[0]
 
     def _by(self, change: ParameterChange) -> np.ndarray:
         """(n_pair,) d rate by a parameter, at the same x."""
-        own, sides, problem = self.balance, (change.above, change.below), self.tangent.problem
-        found = np.zeros(len(self.solved.x))
+        base, sides, problem = self.balance, (change.above, change.below), self.tangent.problem
+        slope = np.zeros(len(self.solved.x))
         if any(
-            one.contact is not own.contact or one.memory is not own.memory or one.model is not own.model
-            for one in sides
+            inputs.contact is not base.contact or inputs.memory is not base.memory or inputs.model is not base.model
+            for inputs in sides
         ):
             up, down = (
                 self._rate(
-                    replace(own, contact=one.contact, memory=one.memory),
-                    problem=replace(problem, area=problem.area + one.model.interface.area - own.model.interface.area),
+                    replace(base, contact=inputs.contact, memory=inputs.memory),
+                    problem=replace(
+                        problem, area=problem.area + inputs.model.interface.area - base.model.interface.area
+                    ),
                 )
-                for one in sides
+                for inputs in sides
             )
-            found = (up - down) / (2 * change.step)
-        return found if change.contact_part is None else found + self._by(change.contact_part)
+            slope = (up - down) / (2 * change.step)
+        return slope if change.contact_part is None else slope + self._by(change.contact_part)
 
     def _by_depth(self, worn: float, reach: float = RULES.gap_step) -> np.ndarray:
         """(n_pair,) d rate by the gap at the same x, which a depth opens that a law may ask for (worn = 1)."""
-        own, gap, step = self.balance, self.balance.contact.gap, reach * self._size
-        up, down = (self._rate(own.with_gap(gap + s), deeper=worn * s) for s in (step, -step))
+        base, gap, step = self.balance, self.balance.contact.gap, reach * self._size
+        up, down = (self._rate(base.with_gap(gap + s), deeper=worn * s) for s in (step, -step))
         return (up - down) / (2 * step)
 
     def _by_x(self) -> np.ndarray:
@@ -340,7 +345,7 @@ def _by_numbers(
 ) -> tuple[tuple[WearProblem, WearProblem, float], ...]:
     """The problem a step above and a step below each number of the joints' wear laws."""
 
-    found = []
+    pairs = []
     for name, joints in numbers.values():
         value = problem.wearing[joints[0]].numbers[name]
         step = RULES.law_step * float(np.max(value))
@@ -353,8 +358,8 @@ def _by_numbers(
             for s in (step, -step)
         ]
         up, down = (replace(problem, wear={**problem.wearing, **changed}) for changed in laws)
-        found.append((up, down, step))
-    return tuple(found)
+        pairs.append((up, down, step))
+    return tuple(pairs)
 
 
 def _worn(change: ParameterChange, unworn: HarmonicBalance, balance: HarmonicBalance) -> ParameterChange:
@@ -362,12 +367,14 @@ def _worn(change: ParameterChange, unworn: HarmonicBalance, balance: HarmonicBal
     opened = balance.contact.gap - unworn.contact.gap
 
     def there(posed: BalanceInputs) -> BalanceInputs:
-        same = posed.contact is unworn.contact
+        is_unworn = posed.contact is unworn.contact
         return replace(
-            posed, contact=balance.contact if same else posed.contact.with_gap(posed.contact.gap + opened), balance=None
+            posed,
+            contact=balance.contact if is_unworn else posed.contact.with_gap(posed.contact.gap + opened),
+            balance=None,
         )
 
-    twice = None if change.double_step is None else tuple(there(one) for one in change.double_step)
+    twice = None if change.double_step is None else tuple(there(inputs) for inputs in change.double_step)
     touching = None if change.contact_part is None else _worn(change.contact_part, unworn, balance)
     return replace(
         change, above=there(change.above), below=there(change.below), double_step=twice, contact_part=touching
@@ -377,5 +384,7 @@ def _worn(change: ParameterChange, unworn: HarmonicBalance, balance: HarmonicBal
 def _solved(linear: Linearisation, right: Sequence[np.ndarray]) -> np.ndarray:
     """Solutions as columns (n_contact * n_coeff, n), by one factor where the balance is small enough."""
     if right[0].size <= NEWTON.most_dense:
-        return np.asarray(sla.solve(linear.dense(), np.stack([one.ravel() for one in right], axis=1), overwrite_a=True))
-    return np.stack([linear.solve_refined(one, 1e-8).ravel() for one in right], axis=1)
+        return np.asarray(
+            sla.solve(linear.dense(), np.stack([column.ravel() for column in right], axis=1), overwrite_a=True)
+        )
+    return np.stack([linear.solve_refined(column, 1e-8).ravel() for column in right], axis=1)

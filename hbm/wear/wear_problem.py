@@ -70,8 +70,8 @@ class WearProblem:
         if not self.mission or min(shares) < 0 or abs(sum(shares) - 1) > 1e-9:
             raise Refusal(f"the shares of the mission's duties must be >= 0 and sum to 1, not {shares}")
         for duty in self.mission:
-            own = self.balance if duty.balance is None else duty.balance
-            if own.basis != self.balance.basis or own.contact.n_pair != self.balance.contact.n_pair:
+            duty_balance = self.balance if duty.balance is None else duty.balance
+            if duty_balance.basis != self.balance.basis or duty_balance.contact.n_pair != self.balance.contact.n_pair:
                 raise Refusal("every duty of a mission needs the same contact pairs and harmonics")
         if not self.wearing:
             raise Refusal("no joint wears: give at least one of them a wear law")
@@ -91,8 +91,8 @@ class WearProblem:
     def numbers(self, joint: str) -> dict[str, np.ndarray]:
         """The own numbers of a joint's wear law, each (n_pair,) of the joint."""
         n = len(self.balance.contact.joint(joint).rows)
-        given = self.wearing[joint].numbers
-        return {name: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for name, v in given.items()}
+        declared = self.wearing[joint].numbers
+        return {name: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for name, v in declared.items()}
 
     @cached_property
     def pairs(self) -> np.ndarray:
@@ -109,6 +109,6 @@ class WearProblem:
 
     def in_duty(self, duty: Duty, depth: np.ndarray | None = None) -> HarmonicBalance:
         """The problem of a duty with its loads, worn by a depth (n_pair,) [m]; unworn by default."""
-        own = self.balance if duty.balance is None else duty.balance
-        worn = own if depth is None else own.with_gap(own.contact.gap + depth)
+        unworn = self.balance if duty.balance is None else duty.balance
+        worn = unworn if depth is None else unworn.with_gap(unworn.contact.gap + depth)
         return worn.with_load(duty.load)

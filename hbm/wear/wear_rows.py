@@ -53,7 +53,7 @@ def row_of(
     if means is None:
         return row
     of_motion = {name: getattr(means, name) for name in ("energy", "normal_force", "amplitude", "spread", "moving")}
-    return replace(row, **of_motion, mean_error=means.error, periods=means.periods, settled=means.settled)
+    return replace(row, **of_motion, mean_error=means.error, periods=means.periods, is_stationary=means.is_stationary)
 
 
 def state_of(problem: WearProblem, row: WearRow) -> WearState:

@@ -24,7 +24,7 @@ class Means:
 
     energy : (n_pair,) friction work per period [J]; normal_force : (n_pair,) [N]; amplitude : of the first output [m]
     spread : standard deviation of the work of a period, over its mean; error : standard error of that mean, relative
-    settled : whether the means came to rest; periods : marched
+    is_stationary : whether the means came to rest; periods : marched
     moving : what moved before, to begin from again; empty where the motion began in the balance
     """
 
@@ -33,7 +33,7 @@ class Means:
     amplitude: float
     spread: float
     error: float
-    settled: bool
+    is_stationary: bool
     periods: int
     moving: np.ndarray
 
@@ -124,23 +124,23 @@ def _neighbour(
     problem: WearProblem,
     duty: Duty,
     balance: HarmonicBalance,
-    known: OperatingPoint,
+    previous: OperatingPoint,
     known_depth: np.ndarray,
     depth: np.ndarray,
 ) -> OperatingPoint:
-    omega, opening = known.state.omega, depth - known_depth
+    omega, opening = previous.state.omega, depth - known_depth
     before = problem.in_duty(duty, known_depth)
-    guess = known.state.x + before.gap_response(before.evaluate(omega, known.state.x), opening)
+    guess = previous.state.x + before.gap_response(before.evaluate(omega, previous.state.x), opening)
     point = duty.site.solve_near(balance, omega, guess)
     if point.solution.converged:
         return point
-    x, solves = _follow_opening(before, omega, known.state.x, opening)
+    x, solves = _follow_opening(before, omega, previous.state.x, opening)
     solves += point.solves
-    again = duty.site.solve_near(balance, omega, x)
-    if not again.solution.converged:  # the neighbour's branch has ended: look as at the start
-        solves += again.solves
-        again = duty.site.solve(balance)
-    return OperatingPoint(again.solution, again.amplitude, again.response, again.solves + solves)
+    retried = duty.site.solve_near(balance, omega, x)
+    if not retried.solution.converged:  # the neighbour's branch has ended: look as at the start
+        solves += retried.solves
+        retried = duty.site.solve(balance)
+    return OperatingPoint(retried.solution, retried.amplitude, retried.response, retried.solves + solves)
 
 
 def follow_balance(problem: WearProblem, before: WearState, depth: np.ndarray, cycles: float) -> WearState:
@@ -150,14 +150,14 @@ def follow_balance(problem: WearProblem, before: WearState, depth: np.ndarray, c
     the last one stays as it is: to look for another may take longer than all wear steps
     """
     points = []
-    for duty, known in zip(problem.mission, before.points, strict=True):
-        omega, x = known.state.omega, known.state.x
-        near, balance = problem.in_duty(duty, before.depth), problem.in_duty(duty, depth)
-        guess = x + near.gap_response(known.state, depth - before.depth)
-        found = newton.solve(balance, omega, guess, duty.site.newton)
-        if not found.converged:
-            found = replace(known.solution, state=balance.evaluate(omega, x))
-        points.append(OperatingPoint.of(balance, found, duty.site.output, 1))
+    for duty, previous in zip(problem.mission, before.points, strict=True):
+        omega, x = previous.state.omega, previous.state.x
+        previous_balance, balance = problem.in_duty(duty, before.depth), problem.in_duty(duty, depth)
+        guess = x + previous_balance.gap_response(previous.state, depth - before.depth)
+        solved = newton.solve(balance, omega, guess, duty.site.newton)
+        if not solved.converged:
+            solved = replace(previous.solution, state=balance.evaluate(omega, x))
+        points.append(OperatingPoint.of(balance, solved, duty.site.output, 1))
     return worn_state(problem, depth, cycles, points, len(points))
 
 
@@ -169,9 +169,9 @@ def _follow_opening(
 
     def opened(reach: float, done: float) -> bool:
         nonlocal x, solves
-        here, there = before.with_gap(gap + done * opening), before.with_gap(gap + reach * opening)
-        guess = x + here.gap_response(here.evaluate(omega, x), (reach - done) * opening)
-        solution = newton.solve(there, omega, guess)
+        present, opened_further = before.with_gap(gap + done * opening), before.with_gap(gap + reach * opening)
+        guess = x + present.gap_response(present.evaluate(omega, x), (reach - done) * opening)
+        solution = newton.solve(opened_further, omega, guess)
         solves += 1
         x = solution.state.x if solution.converged else x
         return solution.converged

@@ -209,7 +209,7 @@ def test_where_a_life_has_no_derivative_is_a_sentence():
     in_time = {"periods": marched, "moving": moving, "spread": 0.0 * marched, "mean_error": 0.0 * marched}
     for messages, run in (
         ("the response jumps from 66.8", replace(worn, duty_omega=jumped)),
-        ("the motion is followed in time", replace(worn, settled=marched == 0, **in_time)),
+        ("the motion is followed in time", replace(worn, is_stationary=marched == 0, **in_time)),
         ("stepped over the end of a branch", replace(worn, memory={**worn.memory, "next_cycles": stepped})),
     ):
         with pytest.raises(NoDerivative, match=f"cycles.* {messages}"):

@@ -19,7 +19,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time.stepper import Options
-from tribodyn.hbm.time.time_integration import leave_alone
+from tribodyn.hbm.time.time_integration import march_freely
 from tribodyn.reduction.flow import Flow, added, aeroelastic, family, parts_of, with_flow
 from tribodyn.reduction.linear_damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
@@ -114,7 +114,7 @@ def test_the_limit_cycle_of_a_tuned_wheel_is_what_time_integration_comes_to(cycl
     begin = cycle.state.x.copy()
     begin[..., 1:] *= 0.75
     start = problem.evaluate(cycle.omega, begin)
-    single = leave_alone(problem, cycle.omega, start, 160, Options(steps=128))
+    single = march_freely(problem, cycle.omega, start, 160, Options(steps=128))
     expected = np.sqrt((cycle.response[0, 1:] ** 2).sum())
     assert np.sqrt((problem.outputs(start)[0, 1:] ** 2).sum()) < 0.8 * expected
     assert single.amplitude[0] == pytest.approx(expected, rel=0.01)
@@ -153,5 +153,5 @@ def test_the_limit_cycle_of_a_mistuned_wheel_is_what_time_integration_comes_to()
     begin = result[0].state.x.copy()
     begin[..., 1:] *= 0.9
     start = problem.evaluate(result[0].omega, begin)
-    single = leave_alone(problem, result[0].omega, start, 240, Options(steps=128))
+    single = march_freely(problem, result[0].omega, start, 240, Options(steps=128))
     np.testing.assert_allclose(single.amplitude[rows], expected, rtol=0.01)

@@ -55,7 +55,7 @@ def test_motion_in_time_is_that_of_many_harmonics(height: float, force: float) -
     found = verify(balance, state, Options(512, tolerance=1e-8))
     assert found.motion.periodic
     assert found.largest < 1e-3
-    assert np.abs(found.motion.off).max() < 1e-7 * height  # of the displacement as it was marched
+    assert np.abs(found.motion.hold_error).max() < 1e-7 * height  # of the displacement as it was marched
     stepper = TimeStepper(balance, OMEGA, Options(512))
     assert stepper.hold is not None
     assert isinstance(balance.model, PrescribedModel)
@@ -83,8 +83,8 @@ def test_a_force_that_is_known_makes_the_same_motion() -> None:
         Excitation.of({"push": 1.0}, {1: {"shaker": 12.0}}), 2 * OMEGA,
     )  # fmt: skip
     found = time_integration.integrate(pushed, OMEGA, solved(pushed), options)
-    assert len(exact.off) == len(PLATFORM)
-    assert len(found.off) == 0
+    assert len(exact.hold_error) == len(PLATFORM)
+    assert len(found.hold_error) == 0
     np.testing.assert_allclose(found.outputs, exact.outputs, atol=1e-6 * np.abs(exact.outputs).max())
     assert found.energy.sum() == pytest.approx(exact.energy.sum(), rel=1e-6)
 
@@ -102,7 +102,7 @@ def test_a_plain_march_comes_to_the_mean_of_a_stuck_and_of_a_loose_contact(
     found = time_integration.integrate(balance, OMEGA, lower.evaluate(OMEGA, solved(lower).x), options)
     assert found.periodic
     assert (found.status == status).all()
-    assert np.abs(found.off).max() < 1e-6 * HEIGHT
+    assert np.abs(found.hold_error).max() < 1e-6 * HEIGHT
 
 
 def test_the_mean_of_a_motion_that_never_repeats_itself_is_held() -> None:
@@ -110,8 +110,8 @@ def test_the_mean_of_a_motion_that_never_repeats_itself_is_held() -> None:
     state = solved(balance)
     follower = Follower(MeanOptions(128))
     follower.start(balance, state)
-    found = follower.mean(balance, OMEGA, lambda motion: motion.off)
-    assert found.settled
+    found = follower.mean(balance, OMEGA, lambda motion: motion.hold_error)
+    assert found.is_stationary
     assert found.spread > 0.02
     assert 0 < np.abs(found.seen).max() < 1e-3 * 4e-5
     assert found.energy.sum() == pytest.approx(balance.energy(state).sum(), rel=0.02)
@@ -163,5 +163,5 @@ def test_life_in_time_is_that_of_many_harmonics() -> None:
     found = evolve(error_controlled.Rule(problem, Tolerance(0.02, 1e-4), motion="time"))
     assert found.ended is run.ended is WearEnd.PRELOAD_LOST
     assert found.in_time.all()
-    assert found.settled.all()
+    assert found.is_stationary.all()
     assert cycles_to_preload(found, 0.5) == pytest.approx(cycles_to_preload(run, 0.5), rel=0.02)

@@ -11,7 +11,7 @@ from tests.helpers import tiny_wheel as tiny
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact.contact_law import SLIPS
 from tribodyn.hbm.time.stepper import Options
-from tribodyn.hbm.time.time_integration import integrate, leave_alone
+from tribodyn.hbm.time.time_integration import integrate, march_freely
 from tribodyn.hbm.time.verify import verify
 from tribodyn.reduction.unrolled import unrolled
 from tribodyn.reduction.wave_model import travelling_wave
@@ -49,7 +49,7 @@ def test_a_wave_is_verified_and_left_alone_like_any_motion():
     assert observed.largest < 5e-3
     assert observed.step_error < 5e-3
     assert list(observed.amplitude) == ["tip", "side"]
-    single = leave_alone(item, OMEGA, result.state, 20, Options(steps=256))
+    single = march_freely(item, OMEGA, result.state, 20, Options(steps=256))
     assert single.energy == pytest.approx(item.energy(result.state).sum(), rel=1e-2)
 
 

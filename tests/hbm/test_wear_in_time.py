@@ -20,14 +20,14 @@ from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.floquet import HILL, MULTIPLIERS, is_stable
 from tribodyn.hbm.time import mean_motion, time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
-from tribodyn.hbm.time.period_search import Period, PeriodSearch, Pushed, push
+from tribodyn.hbm.time.period_search import Period, PeriodSearch, PerturbedMotion, push
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear import law as wear_law, wear_state
 from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.rules import error_controlled
-from tribodyn.hbm.wear.steady_motion import left_aside
+from tribodyn.hbm.wear.steady_motion import untaken_periodic_share
 from tribodyn.hbm.wear.step_control import Tolerance, measured_error
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
@@ -172,21 +172,21 @@ def test_a_slow_push_drives_a_motion_away_only_if_it_grows_in_finer_steps(
     """finest : steps a period up to which it grows; after : periods in which it has left"""
     seen = []
 
-    def grows(plain: PeriodSearch, found: Period, every: int) -> Pushed:
+    def grows(plain: PeriodSearch, found: Period, every: int) -> PerturbedMotion:
         seen.append(plain.options.steps)
         if plain.options.steps > finest:
             return push(plain, found, every)
         motion = found.end
         while plain.periods < after:
             motion = plain.step(motion).end
-        return Pushed(True, motion)
+        return PerturbedMotion(True, motion)
 
     monkeypatch.setattr(mean_motion, "push", grows)
     balance = balance_of(pressed_body(), (0, 1, 2, 3))
     follower = Follower(MeanOptions(128))
     follower.start(balance, newton.solve_from_rest(balance, 420.0).state)
     follower.mean(balance, 420.0, lambda motion: motion.energy, 0.05)
-    assert bool(follower.kept()[2]) is left  # whether it passes on as a motion that does not repeat itself
+    assert bool(follower.stored_state()[2]) is left  # whether it passes on as a motion that does not repeat itself
     assert seen == [128, 256][: 1 + (after > follower.options.search)]
 
 
@@ -215,7 +215,7 @@ def test_a_motion_that_passes_is_marched_as_far_as_each_place_asks() -> None:
     follower.start(flips, newton.solve_from_rest(flips, FLIPS_AT).state)
     settled, passed, known = (follower.mean(flips, FLIPS_AT, lambda motion: motion.energy, a) for a in (1.0, 1.0, 0.02))
     again = Follower(MeanOptions(128, accuracy=0.02))
-    again.take_up(flips, follower.kept())
+    again.take_up(flips, follower.stored_state())
     assert settled.periods > 2 * passed.periods == 2 * follower.options.block
     assert passed.error > 0.02 >= known.error
     assert passed.energy.sum() == pytest.approx(settled.energy.sum(), rel=0.01)
@@ -237,7 +237,7 @@ def test_periods_go_to_states_by_the_cycles_that_they_stand_for(monkeypatch: pyt
         error = scatter / np.sqrt(periods)
         rate = np.full(len(gap), 1e-14 * (1 + error * rng.normal()))
         force = np.maximum(1 - (balance.contact.gap - gap) / scale, 0.0)
-        return MeanMotion(rate, force, rate, np.zeros(1), scatter, error, settled=True, periods=periods)
+        return MeanMotion(rate, force, rate, np.zeros(1), scatter, error, is_stationary=True, periods=periods)
 
     monkeypatch.setattr(Follower, "mean", mean)
     found = evolve(error_controlled.Rule(problem, Tolerance(0.02, scale), motion="time"))
@@ -264,16 +264,15 @@ def test_the_standard_error_of_a_mean_covers_its_deviation() -> None:
 
 def test_a_periodic_motion_that_a_run_passed_by_is_told(problem: WearProblem, run: WearHistory) -> None:
     """The work of a run halved, as if a transient had been followed; and one whose balance's motion does not stay."""
-    assert (
-        left_aside(problem, evolve(error_controlled.Rule(problem, Tolerance(0.05, 2e-4), motion="time"), 3), 3) == 0.0
-    )
+    short = evolve(error_controlled.Rule(problem, Tolerance(0.05, 2e-4), motion="time"), 3)
+    assert untaken_periodic_share(problem, short, 3) == 0.0
     half = replace(run, energy=0.5 * run.energy, spread=np.full(len(run.cycles), 0.3))
-    assert left_aside(problem, half, 3) == pytest.approx(-0.5, rel=0.02)
+    assert untaken_periodic_share(problem, half, 3) == pytest.approx(-0.5, rel=0.02)
     flips = flipping()
     passed = evolve(error_controlled.Rule(flips, Tolerance(0.05, 1e-6), motion="machine"), 3)
     assert passed.spread is not None
     assert passed.spread.min() > 0.05
-    assert left_aside(flips, passed, 3) == 0.0
+    assert untaken_periodic_share(flips, passed, 3) == 0.0
 
 
 def test_the_largest_multiplier_without_the_monodromy_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -297,7 +296,7 @@ def test_life_is_as_exact_where_little_is_left_to_wear(monkeypatch: pytest.Monke
 
     def mean(self: Follower, balance: HarmonicBalance, omega: float, see: object, asked: float) -> MeanMotion:
         left = np.maximum(1 - (balance.contact.gap - gap) / scale, 0.0)
-        return MeanMotion(left, left, 1e-14 * left, np.zeros(1), 0.0, 0.0, settled=True, periods=8)
+        return MeanMotion(left, left, 1e-14 * left, np.zeros(1), 0.0, 0.0, is_stationary=True, periods=8)
 
     monkeypatch.setattr(Follower, "mean", mean)
     found = evolve(error_controlled.Rule(problem, Tolerance(0.05, scale), motion="time"))

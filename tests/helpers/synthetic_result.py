@@ -98,7 +98,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         end=WearEnd.LOST.say(),
         spread=0.3 * t,
         mean_error=0.01 * t,
-        settled=np.ones(n_row, bool),
+        is_stationary=np.ones(n_row, bool),
         periods=(t > 0.5) * 64,
         moving=np.outer(t, np.arange(5.0)),
     )

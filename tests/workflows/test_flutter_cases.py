@@ -14,7 +14,7 @@ from tribodyn.hbm.continuation.nonlinear_modes import newton_on
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time.stepper import Options
-from tribodyn.hbm.time.time_integration import leave_alone
+from tribodyn.hbm.time.time_integration import march_freely
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import flutter, wheel_model as wheels
 
@@ -73,7 +73,7 @@ def test_every_wave_that_flutters_has_a_limit_cycle_or_a_reason(case: str) -> No
             assert outcome == CONVERGED
             assert begin.zeta < 0  # it grows
             start = balance.evaluate(begin.omega, begin.x)
-            single = leave_alone(balance, cycle.omega, start, PERIODS, Options(steps=128), begin.zeta)
+            single = march_freely(balance, cycle.omega, start, PERIODS, Options(steps=128), begin.zeta)
             expected = np.sqrt((cycle.response[row, 1:] ** 2).sum())
             assert np.sqrt((problem.outputs(begin)[row, 1:] ** 2).sum()) < 0.97 * expected
             print(f"{case}: wave {index}, {expected:.4g} m, time {single.amplitude[row] / expected - 1:+.2%}")

@@ -14,7 +14,7 @@ import numpy as np
 
 from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, StatedQuantity, WearQuantity, with_error
 from tribodyn.hbm.wear import wear_rule
-from tribodyn.hbm.wear.steady_motion import left_aside
+from tribodyn.hbm.wear.steady_motion import untaken_periodic_share
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import operating_states, refine, wear_values
 from tribodyn.workflows.errors.operating_states import OperatingState, Values, relative_change
@@ -207,7 +207,7 @@ def _add_estimates(
     if result.wear.in_time.any():  # scatter changes the cycles, not the depth of a contact that is worn through
         table.estimate(Refinement.MOTION, durations, result.wear.scatter, "standard error of means in time")
         problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
-        difference = abs(left_aside(problem, result.wear, limits.searched_rows))
+        difference = abs(untaken_periodic_share(problem, result.wear, limits.searched_rows))
         text = "periodic motions that the irregular one did not take"
         table.estimate(Refinement.OTHER_MOTION, durations, difference, text)
 

@@ -130,11 +130,11 @@ def compare(state: OperatingState) -> MotionDifference:
     assert start is not None
     follower.start(spanned, start)
     means = follower.mean(spanned, solved.omega, lambda motion: np.array([energy_floor(motion)]))
-    if not means.settled:
+    if not means.is_stationary:
         raise SolverFailure(f"the motion is not stationary after {means.periods} periods")
     sectors = len(means.energy) // balance.contact.n_pair
     energy = means.energy.reshape(sectors, -1).mean(axis=0)
-    motion = MotionInTime(means, sectors, energy, float(means.seen[0]) / sectors)
+    motion = MotionInTime(means, sectors, energy, float(means.observed[0]) / sectors)
     cycle, differences = SolvedCycle.of(balance, solved, settings.OUTPUT), {}
     for quantity in every(CycleQuantity):
         value = quantity.value(cycle)

@@ -19,7 +19,7 @@ from tribodyn.hbm.stability.floquet import is_stable
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time import verify as march
 from tribodyn.hbm.time.stepper import Options
-from tribodyn.hbm.time.time_integration import LeftAlone, leave_alone
+from tribodyn.hbm.time.time_integration import FreeMotion, march_freely
 from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.refusal import Refusal
@@ -59,7 +59,7 @@ class TimeComparison(StudyResult):
     row: int | None
     steps: int
     seconds: float
-    left_alone: LeftAlone | None
+    left_alone: FreeMotion | None
 
     @property
     def hertz(self) -> float:
@@ -95,7 +95,7 @@ class TimeComparison(StudyResult):
                 "largest_pair_difference": integration.energy_pairs,
             },
             "preload": {"balance_N": preload, "time_N": motion.preload, "difference": integration.preload},
-            "mean_off_m": float(np.abs(motion.off).max()) if motion.off.size else None,
+            "mean_off_m": float(np.abs(motion.hold_error).max()) if motion.hold_error.size else None,
             "contact_difference": integration.contact,
             "largest_difference": integration.largest,
             "stable": self.stable,
@@ -109,7 +109,7 @@ class TimeComparison(StudyResult):
             "left_alone": None if self.left_alone is None else self._left_alone(self.left_alone),
         }
 
-    def _left_alone(self, motion: LeftAlone) -> dict[str, Any]:
+    def _left_alone(self, motion: FreeMotion) -> dict[str, Any]:
         names = self.balance.compliance.output_names
         return {
             "energy_J": motion.energy,
@@ -235,13 +235,13 @@ def held_against(
             stable, reason = is_stable(balance, solution.state, integration, options)
             left_alone = None
             if not stable or not integration.motion.periodic:
-                left_alone = leave_alone(balance, target, solution.state, LEFT_ALONE, options)
+                left_alone = march_freely(balance, target, solution.state, LEFT_ALONE, options)
     return TimeComparison(
         balance, solution, integration, stable, reason, row, steps, time.perf_counter() - start, left_alone
     )
 
 
-def march_alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> LeftAlone:
+def march_alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> FreeMotion:
     """What a plain march does from the motion that a wear run had in a row, also where that is no solution.
 
     Raises  ValueError: the result has no such row, or its motion cannot be marched; IntegrationFailed
@@ -249,7 +249,7 @@ def march_alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int,
     with limited(scene.solver.threads):
         balance, omega, x = _start(result, scene, unworn, None, row)
         options = Options(steps or steps_of(balance), tolerance=TOLERANCE)
-        return leave_alone(balance, omega, balance.evaluate(omega, x, jacobian=False), LEFT_ALONE, options)
+        return march_freely(balance, omega, balance.evaluate(omega, x, jacobian=False), LEFT_ALONE, options)
 
 
 def steps_of(balance: HarmonicBalance) -> int:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.stepper import IntegrationFailed
-from tribodyn.hbm.time.time_integration import LeftAlone
+from tribodyn.hbm.time.time_integration import FreeMotion
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
@@ -52,7 +52,7 @@ class WornStates(StudyResult):
 
     wear: WearHistory
     comparisons: Mapping[int, TimeComparison | str]
-    marches: Mapping[int, LeftAlone]
+    marches: Mapping[int, FreeMotion]
 
     def record(self) -> dict[str, Any]:
         """For machines; `comparison` as that of one state, `left_alone_J` mean and spread."""
@@ -149,7 +149,7 @@ def verify(
         omega = None if at is None else 2 * np.pi * at
         return verification.held_against(result, file.scene, unworn, omega, row, steps, report)
     comparisons: dict[int, TimeComparison | str] = {}
-    motions: dict[int, LeftAlone] = {}
+    motions: dict[int, FreeMotion] = {}
     for row in spread(result.wear, states):
         try:
             comparison = verification.held_against(result, file.scene, unworn, None, row, steps, report)
