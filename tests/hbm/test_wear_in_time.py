@@ -20,7 +20,7 @@ from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.floquet import HILL, MULTIPLIERS, is_stable
 from tribodyn.hbm.time import mean_motion, time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
-from tribodyn.hbm.time.period_search import Period, PeriodSearch, PerturbedMotion, push
+from tribodyn.hbm.time.period_search import Period, PeriodSearch, PerturbedMotion, perturb
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear import law as wear_law, wear_state
@@ -175,13 +175,13 @@ def test_a_slow_push_drives_a_motion_away_only_if_it_grows_in_finer_steps(
     def grows(plain: PeriodSearch, found: Period, every: int) -> PerturbedMotion:
         seen.append(plain.options.steps)
         if plain.options.steps > finest:
-            return push(plain, found, every)
+            return perturb(plain, found, every)
         motion = found.end
         while plain.periods < after:
             motion = plain.step(motion).end
         return PerturbedMotion(True, motion)
 
-    monkeypatch.setattr(mean_motion, "push", grows)
+    monkeypatch.setattr(mean_motion, "perturb", grows)
     balance = balance_of(pressed_body(), (0, 1, 2, 3))
     follower = Follower(MeanOptions(128))
     follower.start(balance, newton.solve_from_rest(balance, 420.0).state)
