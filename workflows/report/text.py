@@ -92,7 +92,9 @@ def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
         ):
             continue
         frequency, *following = cycle_answers
-        values = [_value(frequency), *(f"{answer.quantity.label} {_value(answer)}" for answer in following)]
+        is_fixed = word == "operating point"
+        head = f"{frequency.value:g} {frequency.quantity.unit}" if is_fixed else _value(frequency)
+        values = [head, *(f"{answer.quantity.label} {_value(answer)}" for answer in following)]
         if (order := order_of_line(result)) is not None and frequency.value is not None:
             values.insert(1, f"{60 * frequency.value / order:.{frequency.quantity.digits}g} rpm")
         lines.append(f"{word:{WIDTH}}{', '.join(values)}{suffix.get(moment, '')}")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isclose
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 FIRST, LAST, PEAK, STABLE, RUN = "first", "last", "peak", "stable", ""
 """Moments: before wear (at the peak of a response that does not wear), at the end of wear; at the peak of the response
 where wear is taken at another frequency; at its highest stable point; of the whole run."""
+SAME = 0.01  # relative difference of a value and of that of its statement, which is solved again
 EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 
 
@@ -150,8 +152,9 @@ def _of_cycles(result: Result) -> Iterator[Answer]:
             yield Answer(quantity, "", FIRST, None)
         for moment, value in values.items():
             if value is not None:
-                statement = statements.get(quantity.name) if moment == FIRST else None
-                yield Answer(quantity, "", moment, value, statement, reason=cycles[moment][1])
+                statement = statements.get(quantity.name)
+                error = statement if moment == FIRST and _is_value_of(statement, value) else None
+                yield Answer(quantity, "", moment, value, error, reason=cycles[moment][1])
         for joint in _joints(result) if quantity.by_joint else ():
             for moment in (FIRST, LAST):
                 if moment in cycles and cycles[moment][0].joints is not None:
@@ -181,6 +184,11 @@ def _joints(result: Result) -> list[str]:
 
 def _statements(result: Result) -> Mapping[str, Statement]:
     return {} if result.verdict is None else result.verdict.statements
+
+
+def _is_value_of(statement: Statement | None, value: float) -> bool:
+    """Whether a statement is about a value; it is not where the row is of a motion in time, not of the balance."""
+    return statement is not None and statement.value is not None and isclose(statement.value, value, rel_tol=SAME)
 
 
 def _basis(result: Result) -> HarmonicBasis:
