@@ -1,4 +1,4 @@
-"""Alternating frequency/time: march any contact law to its periodic cycle, with derivatives carried along."""
+"""Alternating frequency/time: march any contact law to its periodic cycle, with its derivatives."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ def cycle(
     memory: np.ndarray | None = None,
     jacobian: bool = True,
 ) -> ContactCycle:
-    """Periodic contact cycle of all pairs, by the law's own closed form where it has one, else by its steps.
+    """Periodic contact cycle of all pairs: by a cycle that the law offers, else by its steps.
 
     x : (n_pair, n_component, n_coeff) relative displacement [m]
     memory : (n_pair, n_state) memory at the start of the load path, zeros if None
-    Raises  ValueError where the basis asks for located transitions and the law is one of samples alone
+    Raises  Refusal where the basis has located transitions and the law has samples only
     """
     contact_law.require_order(law, parameters)
     if memory is None:
@@ -44,9 +44,9 @@ def cycle(
         if not contact_law.is_event_based(law):
             name = contact_law.name_of(law)
             raise Refusal(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
-        own = getattr(law, "event_based_cycle", None)
+        closed_form = getattr(law, "event_based_cycle", None)
         arguments = x, parameters, memory, basis, jacobian
-        return event_cycle.cycle(law, *arguments) if own is None else own(*arguments)
+        return event_cycle.cycle(law, *arguments) if closed_form is None else closed_form(*arguments)
     if hasattr(law, "sampled_cycle"):
         return law.sampled_cycle(x, parameters, memory, basis, jacobian)
     return march(law, x, parameters, memory, basis, jacobian)
@@ -82,25 +82,24 @@ def history(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Periodic displacement and force over one period, for loops and checks.
 
-    Where the basis locates transitions the cycle is marched on at least PLOT_SAMPLES samples, of which every n-th is
-    given.
+    For a basis with located transitions the cycle is marched on at least PLOT_SAMPLES samples; every n-th is returned.
     Returns (n_pair, n_component, n_samples) displacement [m] and force [N]
     """
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
-    every = 1 if basis.transitions == "sampled" else -(-PLOT_SAMPLES // basis.n_samples)
-    fine = HarmonicBasis(basis.harmonics, every * basis.n_samples)
+    stride = 1 if basis.transitions == "sampled" else -(-PLOT_SAMPLES // basis.n_samples)
+    fine = HarmonicBasis(basis.harmonics, stride * basis.n_samples)
     samples = fine.to_time(x)
     force = _plain_march(law, samples, parameters.packed(), memory)
     if force is None:
         force = _periodic(law, samples, parameters, memory, fine.synthesis[:, :0], fine.analysis)[0]
-    return samples[..., ::every], force[..., ::every]
+    return samples[..., ::stride], force[..., ::stride]
 
 
 def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np.ndarray) -> np.ndarray | None:
     """Force at the samples of the periodic cycle where the memory repeats after a few cycles, None where it does not.
 
-    Without derivatives there is little to compile, which would take longer than all the marching.
+    Without derivatives little is compiled; compiling more would take longer than the march.
     """
     force, phi = np.zeros(samples.shape), np.zeros((samples.shape[2], 0))
     no_slope, none = np.zeros((0, samples.shape[1], 0)), np.zeros((memory.shape[1], 0))
@@ -128,7 +127,7 @@ def _periodic(
     rows, columns = np.ascontiguousarray(weight.T), np.ascontiguousarray(phi)
     lost = _cycles(pointer(law.step), samples, parameters.packed(), memory, columns, rows, force, jac, status)
     if lost >= 0:
-        raise CycleNotPeriodic(f"contact pair {lost} did not settle to a periodic cycle within {MAX_CYCLES} cycles")
+        raise CycleNotPeriodic(f"contact pair {lost} has no periodic cycle within {MAX_CYCLES} cycles")
     return force, jac, status
 
 
@@ -138,7 +137,7 @@ def _cycles(step, x, p, memory, phi, rows, force, jac, status):
 
     x, force : (n_pair, n_component, n_time); rows : (n_coeff, n_time) analysis of the basis; memory : at the start
     phi : (n_time, n_coeff) basis functions, no columns where no derivative is wanted
-    Returns the first pair that does not settle, -1 where all do
+    Returns the first pair whose memory does not repeat, -1 if all do
     """
     n_pair, n_comp, n_time = x.shape
     n_state, m = memory.shape[1], n_comp * phi.shape[1]
@@ -153,18 +152,18 @@ def _cycles(step, x, p, memory, phi, rows, force, jac, status):
         status[i] = _turn(step, x[i], p[i], phi, start, slopes, slope, force[i])[0]
         if m == 0:
             continue
-        if marched > 0 and _undrifted(slopes, slopes, ds) <= LEAST_CONTRACTION:  # its place depends on its path
+        if marched > 0 and _undrifted(slopes, slopes, ds) <= LEAST_CONTRACTION:  # its memory depends on its path
             s[:], ds[:] = memory[i], 0.0
             for _ in range(marched):
                 _turn(step, x[i], p[i], phi, s, ds, no_slope, no_force)
         product = rows @ slope.reshape(n_time, n_comp * (m + n_state))
         for a in range(len(rows)):
             for c in range(n_comp):
-                own = product[a, c * (m + n_state) : (c + 1) * (m + n_state)]
+                part = product[a, c * (m + n_state) : (c + 1) * (m + n_state)]
                 for b in range(m):
-                    jac[i, c * len(rows) + a, b] = own[b]
+                    jac[i, c * len(rows) + a, b] = part[b]
                     for r in range(n_state):
-                        jac[i, c * len(rows) + a, b] += own[m + r] * ds[r, b]
+                        jac[i, c * len(rows) + a, b] += part[m + r] * ds[r, b]
     return -1
 
 
@@ -179,12 +178,12 @@ def _settle(step, x, p, phi, s, ds):
     distance, which Newton cuts by a third a step until rounding hides the contraction. Otherwise the answer depends on
     the path, and the pair, which has come to stick, is marched on.
 
-    ds : (n_state, n_component * n_coeff) its derivative, filled where its cycle there does not tell it
-    Returns the cycles marched, 0 where ds is filled, -1 where it does not settle
+    ds : (n_state, n_component * n_coeff) its derivative, filled where its cycle does not give it
+    Returns the cycles marched, 0 where ds is filled, -1 where the memory does not repeat
     """
     (n_state, m), n_comp = ds.shape, len(x)
     no_slope, no_force, none = np.zeros((0, n_comp, n_state)), np.zeros((n_comp, 0)), np.zeros((n_state, 0))
-    moved, correction = np.zeros((n_state, 1)), np.zeros((n_state, 1))
+    shift, correction = np.zeros((n_state, 1)), np.zeros((n_state, 1))
     for count in range(1, MAX_CYCLES):
         if _turn(step, x, p, phi, s, none, no_slope, no_force)[1] <= PERIODIC_DRIFT:
             return count
@@ -192,10 +191,10 @@ def _settle(step, x, p, phi, s, ds):
             continue
         trial, firm, closing = s.copy(), s.copy(), False  # closing : a step before, at firm, was small and contracted
         for _ in range(NEWTON_CYCLES):
-            after, slopes = trial.copy(), _unit(n_state, 0)
-            drift = _turn(step, x, p, phi[:, :0].copy(), after, slopes, no_slope, no_force)[1]
-            moved[:, 0] = after - trial
-            isolated = _undrifted(slopes, moved, correction) > LEAST_CONTRACTION
+            following, slopes = trial.copy(), _unit(n_state, 0)
+            drift = _turn(step, x, p, phi[:, :0].copy(), following, slopes, no_slope, no_force)[1]
+            shift[:, 0] = following - trial
+            isolated = _undrifted(slopes, shift, correction) > LEAST_CONTRACTION
             if drift <= PERIODIC_DRIFT or (closing and not isolated and drift < POLISH_DRIFT):
                 if not (isolated or closing):
                     break
@@ -223,7 +222,7 @@ def _unit(n, m):
 
 
 @numba.njit(cache=True)
-def _undrifted(slopes, moved, out):
+def _undrifted(slopes, shift, out):
     """Fill out with (1 - M)^-1 moved, M the last columns of slopes; its columns are the first of moved.
 
     Singular values of 1 - M are raised to LEAST_CONTRACTION. Returns the least of them
@@ -233,16 +232,16 @@ def _undrifted(slopes, moved, out):
     for r in range(n):
         for q in range(n):
             matrix[r, q] -= slopes[r, slopes.shape[1] - n + q]
-    left, size, right = np.linalg.svd(matrix)
+    columns, size, rows = np.linalg.svd(matrix)
     for b in range(out.shape[1]):
         for r in range(n):
             out[r, b] = 0.0
         for i in range(n):
-            along = 0.0
+            share = 0.0
             for r in range(n):
-                along += left[r, i] * moved[r, b]
+                share += columns[r, i] * shift[r, b]
             for r in range(n):
-                out[r, b] += right[i, r] * along / max(size[i], LEAST_CONTRACTION)
+                out[r, b] += rows[i, r] * share / max(size[i], LEAST_CONTRACTION)
     return size[n - 1]
 
 

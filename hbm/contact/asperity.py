@@ -83,13 +83,13 @@ def asperity(numbers: tuple[float, ...]) -> Asperity:
     return Asperity(young / (2 * (1 - nu**2)), radius, young, nu, yield_stress, tangent)
 
 
-def pressure(one: Asperity, table: np.ndarray, u: np.ndarray, deepest: float) -> np.ndarray:
+def pressure(asperity: Asperity, table: np.ndarray, u: np.ndarray, deepest: float) -> np.ndarray:
     """Pressure p(u; u_m) [Pa] at approaches u (n,), the deepest so far being u_m; table : (k, 2) gaps and counts."""
     gap, count = table.T
     pressed = gap < deepest
-    offset, root = one.flattened(deepest - gap[pressed])
+    offset, root = asperity.flattened(deepest - gap[pressed])
     d = np.maximum(u[:, None] - gap[pressed] - offset, 0.0)
-    return (4 / 3 * one.E * root * d**1.5) @ count[pressed]
+    return (4 / 3 * asperity.E * root * d**1.5) @ count[pressed]
 
 
 def heights(table: np.ndarray) -> np.ndarray:
@@ -97,8 +97,8 @@ def heights(table: np.ndarray) -> np.ndarray:
     if len(table) == 1:
         return table
     gap, density = table.T
-    every = -(-HEIGHTS // (len(gap) - 1))
-    fine = np.interp(np.arange(every * (len(gap) - 1) + 1) / every, np.arange(len(gap)), gap)
+    parts = -(-HEIGHTS // (len(gap) - 1))
+    fine = np.interp(np.arange(parts * (len(gap) - 1) + 1) / parts, np.arange(len(gap)), gap)
     width = np.gradient(np.concatenate([[2 * fine[0] - fine[1]], fine, [2 * fine[-1] - fine[-2]]]))[1:-1]
     width[[0, -1]] /= 2
     return np.column_stack([fine, width * np.interp(fine, gap, density)])

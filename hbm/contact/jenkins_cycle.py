@@ -93,7 +93,7 @@ def _cycle(x, load, grid, normal, k, mu, memory, hs, skip, force, jac, status):
     ends, segments = np.empty((6 * room, 3), np.int64), np.empty((6 * room, 3))
     table, slope = np.empty((2, 2, 2 * top + 1)), np.empty((2, m, m))
     none = np.int64(-1)
-    want, kept = jac.shape[0] > 0, m - skip
+    has_slope, n_coeff = jac.shape[0] > 0, m - skip
     n_tangential = n_comp - 1 if normal else n_comp
     for i in range(n_pair):
         N, swing = load[i], bounds(load[i], hs)[0]
@@ -106,7 +106,7 @@ def _cycle(x, load, grid, normal, k, mu, memory, hs, skip, force, jac, status):
         status[i] = 0 if n_contact == 1 and touches else SEPARATES
         if n_contact == 1 and not touches:
             continue
-        on = n_tangential * kept
+        on = n_tangential * n_coeff
         kn = k[i, n_comp - 1] if normal else 0.0
         if normal:  # a spring without friction that is held where the contact is closed
             n_segment = none + 1
@@ -116,7 +116,7 @@ def _cycle(x, load, grid, normal, k, mu, memory, hs, skip, force, jac, status):
                 if j > 0 and (j % 2 == 1) == touches:
                     n_segment = _append(knots, ends, segments, n_segment, j - 1, j, STICK, 0.0, none, 0.0)
             integrate(1.0, 0.0, N, N, hs, knots, waves, ends, segments, n_segment, table, force[i, n_comp - 1], slope)
-            if want:
+            if has_slope:
                 _store(slope[0, skip:, skip:], kn, jac[i, on:, on:])
         if n_tangential == 0:
             status[i] |= STICKS
@@ -132,8 +132,8 @@ def _cycle(x, load, grid, normal, k, mu, memory, hs, skip, force, jac, status):
             for s in range(n_segment):
                 status[i] |= STICKS if segments[s, 0] == STICK else SLIPS
             integrate(kt, mu[i], u, N, hs, knots, waves, ends, segments, n_segment, table, force[i, c], slope)
-            if want:
-                o = c * kept
+            if has_slope:
+                o = c * n_coeff
                 _store(slope[0, skip:, skip:], kt, jac[i, o:, o:])
                 if normal:
                     _store(slope[1, skip:, skip:], mu[i] * kn, jac[i, o:, on:])
@@ -229,18 +229,18 @@ def _segments(w, r, u, load, hs, touching, n_edge, at, wall, knots, waves, ends,
 def _slip(w, r, u, load, hs, before, after, wall, left, right):
     """Angle in an interval, where it is 1e-12 at least, at which the wall u - r N meets the slider w."""
     width = right - left
-    start, stop = before[0] - r * before[2] - w, after[0] - r * after[2] - w
+    first, last = before[0] - r * before[2] - w, after[0] - r * after[2] - w
     slope = (before[1] - r * before[3]) * width
-    if abs(start) * width <= 1e-12 * abs(slope):
+    if abs(first) * width <= 1e-12 * abs(slope):
         return left
     bound = 0.0
     for a in range(u.size):
         wall[a] = u[a] - r * load[a]
         bound += hs[(a - 1) // 2] ** 2 * abs(wall[a]) if a > 0 else 0.0
     # on the parabola through both ends with the slope at the first
-    root = math.sqrt(max(slope * slope - 4 * (stop - start - slope) * start, 0.0))
-    guess = left - 2 * start / (slope + math.copysign(root, stop - start)) * width
-    return crossing(wall, hs, bound, w, stop > start, left, right, guess)
+    root = math.sqrt(max(slope * slope - 4 * (last - first - slope) * first, 0.0))
+    guess = left - 2 * first / (slope + math.copysign(root, last - first)) * width
+    return crossing(wall, hs, bound, w, last > first, left, right, guess)
 
 
 @inlined

@@ -36,9 +36,9 @@ def _products(table, hs, out):
         out[a, 0], out[a + 1, 0], out[0, a], out[0, a + 1] = 2.0 * cosine, 2.0 * sine, cosine, sine
         for p in range(q + 1):
             g, b = hs[p], 1 + 2 * p
-            more, less = half / (h + g), half / (h - g) if h > g else half
-            cosine, sine = more * table[0, h + g], more * table[1, h + g]
-            beat, twist = less * table[0, h - g], less * table[1, h - g] if h > g else 0.0
+            total, difference = half / (h + g), half / (h - g) if h > g else half
+            cosine, sine = total * table[0, h + g], total * table[1, h + g]
+            beat, twist = difference * table[0, h - g], difference * table[1, h - g] if h > g else 0.0
             out[a, b], out[a + 1, b + 1] = beat + cosine, beat - cosine
             out[a + 1, b], out[a, b + 1] = sine + twist, sine - twist
             out[b, a], out[b + 1, a + 1] = beat + cosine, beat - cosine
@@ -69,9 +69,9 @@ def integrate(kt, mu, u, load, hs, knots, waves, ends, segments, n_segment, tabl
     force is integrated by Gauss's rule.
     """
     m, by_u, by_load = u.size, slope[0], slope[1]
-    whole = n_segment == 1 and segments[0, 0] == STICK and knots[ends[0, 1]] - knots[ends[0, 0]] == TURN
+    is_stuck = n_segment == 1 and segments[0, 0] == STICK and knots[ends[0, 1]] - knots[ends[0, 0]] == TURN
     n_short = 0
-    if whole:  # linear, no integral, no rounding
+    if is_stuck:  # linear, no integral, no rounding
         for a in range(m):
             force[a] = kt * u[a]
             for b in range(m):
@@ -79,7 +79,7 @@ def integrate(kt, mu, u, load, hs, knots, waves, ends, segments, n_segment, tabl
     for n in range(table.shape[2]):  # in loops: in the short form numba takes a second to compile
         table[0, 0, n], table[0, 1, n], table[1, 0, n], table[1, 1, n] = 0.0, 0.0, 0.0, 0.0
     for short in (False, True):
-        if whole or (short and n_short == 0):
+        if is_stuck or (short and n_short == 0):
             break
         for s in range(n_segment):
             start, stop, stick = ends[s, 0], ends[s, 1], segments[s, 0] == STICK
@@ -101,7 +101,7 @@ def integrate(kt, mu, u, load, hs, knots, waves, ends, segments, n_segment, tabl
                 force[a] = total
     for s in range(n_segment):
         if segments[s, 0] == STICK:
-            start, stop, rows = ends[s, 0], ends[s, 1], 1 if whole else m
+            start, stop, rows = ends[s, 0], ends[s, 1], 1 if is_stuck else m
             length = knots[stop] - knots[start]
             pull = 0.0 if length * hs[-1] < SHORT else kt * segments[s, 1]
             span = length, waves[start], waves[stop]

@@ -125,12 +125,12 @@ def contact_sides(a: float, b: float, load: float, edge_radius: float, pair: Ela
     """
     sides = (a, b)
     for _ in range(100):
-        old = sides
+        previous = sides
         sides = (
-            2 * half_contact(a / 2, edge_radius, load / old[1], pair),
-            2 * half_contact(b / 2, edge_radius, load / old[0], pair),
+            2 * half_contact(a / 2, edge_radius, load / previous[1], pair),
+            2 * half_contact(b / 2, edge_radius, load / previous[0], pair),
         )
-        if np.allclose(sides, old, rtol=1e-10, atol=0):
+        if np.allclose(sides, previous, rtol=1e-10, atol=0):
             break
     return sides
 
@@ -147,13 +147,13 @@ def half_contact(flat: float, edge_radius: float, load: float, pair: ElasticPair
         return flat
     if flat == 0:
         return sqrt(4 * load * edge_radius / (pi * pair.modulus))
-    wanted = 4 * load * edge_radius / (pair.modulus * flat**2)
-    grown = sqrt(1 + 4 * wanted)  # the contact is never wider than that many a
+    ratio = 4 * load * edge_radius / (pair.modulus * flat**2)
+    grown = sqrt(1 + 4 * ratio)  # the contact is never wider than that many a
 
     def excess(psi: float) -> float:
-        return arc_excess(psi) / (wanted * cos(psi) ** 2) - 1
+        return arc_excess(psi) / (ratio * cos(psi) ** 2) - 1
 
-    low = min((0.1 * wanted) ** (1 / 3), 0.5)
+    low = min((0.1 * ratio) ** (1 / 3), 0.5)
     while excess(low) > 0:
         low /= 2
     return flat / cos(scipy.optimize.brentq(excess, low, acos(1 / (2 * grown)), xtol=1e-300, rtol=1e-14))

@@ -84,28 +84,28 @@ def bounds(c, hs):
 
 
 @compiled
-def crossing(c, hs, bound, level, rising, left, right, angle):
+def crossing(c, hs, bound, level, rising, start, stop, angle):
     """Angle in [left, right] where the polynomial, monotone there, crosses a level; Halley from a guess in a bracket.
 
     bound : of the curvature. An error e is at most (s^2 / 4 + H s / 6) e^3, s = bound / |slope|, after a step of
         Halley's, so the last step need not be looked at
     """
-    if not left < angle < right:
-        angle = 0.5 * (left + right)
+    if not start < angle < stop:
+        angle = 0.5 * (start + stop)
     for _ in range(80):
         value, slope, bend = values_at(c, hs, angle)
         value -= level
         if (value < 0.0) == rising:
-            left = angle
+            start = angle
         else:
-            right = angle
+            stop = angle
         least, steep = 4e-16 * (1.0 + angle), abs(slope)
-        if abs(value) <= least * steep or right - left <= least:
+        if abs(value) <= least * steep or stop - start <= least:
             break
         change = 2.0 * value * slope / (2.0 * slope * slope - value * bend)
         angle -= change
-        if not left < angle < right:
-            angle = 0.5 * (left + right)
+        if not start < angle < stop:
+            angle = 0.5 * (start + stop)
         elif bound * (0.25 * bound + hs[-1] * steep / 6.0) * abs(change) ** 3 <= least * steep * steep:
             break
     return angle
@@ -148,9 +148,9 @@ def roots(c, hs, grid, cells, out, n):
                 bend = 0.0
                 for a in range(1, c.size):
                     bend += c[a] * grid[a, 3 * n_cell + cell]
-            beyond = half * hs[-1] * bound
-            free = abs(value) > half * (abs(slope) + half * (0.5 * abs(bend) + beyond / 6.0))
-            monotone = abs(slope) > half * (abs(bend) + 0.5 * beyond)
+            remainder = half * hs[-1] * bound
+            free = abs(value) > half * (abs(slope) + half * (0.5 * abs(bend) + remainder / 6.0))
+            monotone = abs(slope) > half * (abs(bend) + 0.5 * remainder)
             if not free and not monotone and level < 28:
                 level, cell, width, half = level + 1, 2 * cell, half, 0.5 * half
                 continue
@@ -162,13 +162,13 @@ def roots(c, hs, grid, cells, out, n):
         else:
             after = values_at(c, hs, cell * width)[0] >= 0.0
         if after != positive and n < out.size - 2:
-            left = (cell - 1) * width
+            start = (cell - 1) * width
             if free:
-                out[n] = left
+                out[n] = start
             elif monotone:
-                out[n] = crossing(c, hs, bound, 0.0, after, left, cell * width, left + half - value / slope)
+                out[n] = crossing(c, hs, bound, 0.0, after, start, cell * width, start + half - value / slope)
             else:
-                out[n] = left + half
+                out[n] = start + half
             n += 1
         positive = after
         while cell % 2 == 0 and level > 0:

@@ -12,7 +12,7 @@ import pytest
 from tests.helpers.rough_faces import gaussian
 from tribodyn.geometry.asperities import identify
 from tribodyn.hbm.contact import contact_law
-from tribodyn.hbm.contact.bed_cycle import bed
+from tribodyn.hbm.contact.bed_table import bed_springs
 from tribodyn.hbm.contact.contact_law import ContactParameters
 
 tm = pytest.importorskip("tamaas", reason="tamaas has no wheel for this platform: pip install tamaas")
@@ -36,7 +36,7 @@ def law_pressure(table: np.ndarray, radius: float, approach: np.ndarray) -> np.n
         deepest=float(max(approach.max(), table[:, 0].max())),
     )  # fmt: skip
     p = contact_law.complete("rough", built).packed().repeat(len(approach), axis=0)
-    k, g, _, _ = bed(p, approach)
+    k, g, _, _ = bed_springs(p, approach)
     return (k * np.maximum(approach[:, None] - g, 0.0)).sum(axis=1)
 
 

@@ -10,7 +10,7 @@ import pytest
 from tests.helpers.steel_asperities import ALL, E_STAR, FACE, MU, POISSON, RADIUS, STEEL, YOUNG, G, moving
 from tribodyn.hbm.contact import aft, contact_law
 from tribodyn.hbm.contact.asperity import asperity, heights, pressure
-from tribodyn.hbm.contact.bed_cycle import bed
+from tribodyn.hbm.contact.bed_table import bed_springs
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.contact.laws import rough
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -29,7 +29,7 @@ def face(n_pair: int = 1, components: tuple[str, ...] = ALL, friction: float = 0
 
 def pressed(parameters: ContactParameters, deepest: float) -> tuple[np.ndarray, np.ndarray]:
     """Springs and their touch of the first pair."""
-    k, g, _, _ = bed(parameters.packed()[:1], np.array([deepest]))
+    k, g, _, _ = bed_springs(parameters.packed()[:1], np.array([deepest]))
     return k[0], g[0]
 
 
@@ -191,7 +191,7 @@ def test_the_springs_at_a_pressure_carry_it():
     kt, _, kn = rough.springs(parameters)[0]
     deepest = np.linspace(5e-6, 2e-5, 4000)
     p = parameters.packed().repeat(len(deepest), axis=0)
-    k, g, _, _ = bed(p, deepest)
+    k, g, _, _ = bed_springs(p, deepest)
     at = np.searchsorted((k * (deepest[:, None] - g)).sum(axis=1), 5e6 * 2e-6)
     assert kn == pytest.approx(k[at].sum(), rel=2e-3)
     assert kt == pytest.approx(rough.tangential_ratio(POISSON) * kn)

@@ -116,10 +116,10 @@ def _slip(creep, limit, w, p, f, dfx, dfs, dsx, dss):
         dfx[c, 2] = -f[c] * p[c] * d[c] * normal
         dsx[c, 2] = f[c] * normal + creep * dfx[c, 2]
         for b in range(2):
-            along = f[b] * d[b] * p[b] / fall  # d lambda / d u_b = - d lambda / d w_b
-            dfx[c, b] = (p[c] * d[c] if b == c else 0.0) - f[c] * p[c] * d[c] * along
+            share = f[b] * d[b] * p[b] / fall  # d lambda / d u_b = - d lambda / d w_b
+            dfx[c, b] = (p[c] * d[c] if b == c else 0.0) - f[c] * p[c] * d[c] * share
             dfs[c, b] = -dfx[c, b]
-            dsx[c, b] = f[c] * along + creep * dfx[c, b]
+            dsx[c, b] = f[c] * share + creep * dfx[c, b]
             dss[c, b] = (1.0 if b == c else 0.0) - dsx[c, b]
 
 
@@ -143,10 +143,10 @@ def sampled_cycle(
     jac = spring[..., None] * np.eye(spring.shape[1]) if jacobian else None
     touching = np.concatenate([memory, memory, parameters.gap[:, None]], axis=1)  # without shear, wherever x(0) is
     law = cast(ModuleType, SimpleNamespace(step=chord))
-    found = march(law, x[moving], parameters.subset(moving), touching[moving], basis, jacobian)
-    force[moving], status[moving] = found.force, found.status
+    slipping = march(law, x[moving], parameters.subset(moving), touching[moving], basis, jacobian)
+    force[moving], status[moving] = slipping.force, slipping.status
     if jac is not None:
-        jac[moving] = found.jacobian
+        jac[moving] = slipping.jacobian
     return ContactCycle(force, jac, status)
 
 
@@ -209,10 +209,10 @@ def _lets_go(ax, ay, dx, dy, before, after):
     """
     fall, least = before - after, 1e-12 * before * before
     squared, rises = dx * dx + dy * dy - fall * fall, ax * dx + ay * dy + before * fall
-    beyond = ax * ax + ay * ay - before * before
-    if beyond > least or (beyond >= -least and rises > 0.0):
+    excess = ax * ax + ay * ay - before * before
+    if excess > least or (excess >= -least and rises > 0.0):
         return True, 0.0
-    within = max(-beyond, 0.0)
+    within = max(-excess, 0.0)
     root = rises * rises + squared * within
     if root < 0.0 or (squared <= 0.0 and rises <= 0.0):
         return False, 1.0

@@ -99,12 +99,12 @@ def sampled_cycle(
 @numba.njit(cache=True)
 def _cycle(x, p, memory, phi, product, single, force, jac, status):
     n_pair, n_comp, n_time = x.shape
-    want = jac.shape[0] > 0
-    kind, slider, none = np.empty(n_time, np.int8), np.empty(n_time), np.empty((0, 0))
+    has_slope = jac.shape[0] > 0
+    kind, slider, no_slope = np.empty(n_time, np.int8), np.empty(n_time), np.empty((0, 0))
     for i in range(n_pair):
-        own = jac[i] if want else none
+        slope = jac[i] if has_slope else no_slope
         k = p[i, :n_comp]
-        status[i] = element(k, p[i, 4], p[i, 3], memory[i], x[i], phi, product, single, force[i], own, kind, slider)
+        status[i] = element(k, p[i, 4], p[i, 3], memory[i], x[i], phi, product, single, force[i], slope, kind, slider)
 
 
 @compiled

@@ -28,7 +28,7 @@ import numpy as np
 from tribodyn.declarations import number
 from tribodyn.hbm.contact import bed_cycle
 from tribodyn.hbm.contact.asperity import asperity, tangential_ratio
-from tribodyn.hbm.contact.bed_cycle import ROWS, SPRINGS, TABULATED, bed, look_up, table_of
+from tribodyn.hbm.contact.bed_table import ROWS, SPRINGS, TABULATED, bed_springs, look_up, tabulate_bed
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
@@ -74,14 +74,14 @@ def tabulate(parameters: ContactParameters) -> np.ndarray:
     if (np.diff(given[:, 0]) <= 0).any():
         raise Refusal("contact law 'rough': the gaps in its table must rise from row to row")
     n = parameters.numbers
-    own = np.stack([n[name] for name in ("young", "poisson", "radius", "yield_stress", "tangent_modulus")], axis=1)
+    material = np.stack([n[name] for name in ("young", "poisson", "radius", "yield_stress", "tangent_modulus")], axis=1)
     top = np.where(n["deepest"] > 0, n["deepest"], given[:, 0].max())
     if not (top > 0).all():
         raise Refusal("contact law 'rough': give deepest, where all asperities of the table stand at one height")
     rows = np.empty((parameters.n_pair, 1 + (ROWS + 1) * 2 * (1 + SPRINGS)))
     for i in range(parameters.n_pair):
         rows[i, 0] = top[i]
-        rows[i, 1:] = table_of(asperity(tuple(own[i].tolist())), given.tobytes(), float(top[i])).ravel()
+        rows[i, 1:] = tabulate_bed(asperity(tuple(material[i].tolist())), given.tobytes(), float(top[i])).ravel()
     return rows
 
 
@@ -91,10 +91,10 @@ def springs(parameters: ContactParameters) -> np.ndarray:
     low, high = np.zeros(parameters.n_pair), packed[:, TABULATED].copy()
     for _ in range(60):
         middle = 0.5 * (low + high)
-        kn, g, _, _ = bed(packed, middle)
-        below = (kn * (middle[:, None] - g)).sum(axis=1) < n["pressure"] * n["area"]
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    stiff = bed(packed, low)[0].sum(axis=1)
+        kn, g, _, _ = bed_springs(packed, middle)
+        is_lower = (kn * (middle[:, None] - g)).sum(axis=1) < n["pressure"] * n["area"]
+        low, high = np.where(is_lower, middle, low), np.where(is_lower, high, middle)
+    stiff = bed_springs(packed, low)[0].sum(axis=1)
     ratio = tangential_ratio(n["poisson"])
     return np.stack([stiff if c == "n" else ratio * stiff for c in parameters.components], axis=1)
 
