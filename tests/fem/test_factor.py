@@ -44,15 +44,15 @@ def test_eigenvalues_are_counted_by_one_factorisation(pardiso: bool, monkeypatch
         assert eigenvalues_below(K, M, 0.5 * (values[place - 1] + values[place])) == place
 
 
-@pytest.mark.parametrize(("solver", "most"), [("pardiso", 0.5), ("pardiso", 0.0), ("superlu", 0.5)])
-def test_few_rows_are_those_of_the_whole_solution(solver: str, most: float, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("solver", "largest"), [("pardiso", 0.5), ("pardiso", 0.0), ("superlu", 0.5)])
+def test_few_rows_are_those_of_the_whole_solution(solver: str, largest: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where a force on them vanishes, between solutions in all rows, and where they are too many to pay."""
-    monkeypatch.setattr(Pardiso, "MOST_SELECTED", most)
+    monkeypatch.setattr(Pardiso, "MOST_SELECTED", largest)
     subset = random_array((400, 400), density=0.02, rng=1)
     K = subset @ subset.T + 4 * eye_array(400)
     small = np.array([3, 50, 51, 52, 399])
     built = factorise(K, solver=solver, selected_rows=small)
-    assert getattr(built, "_few", False) == (solver == "pardiso" and most > 0)
+    assert getattr(built, "_selects", False) == (solver == "pardiso" and largest > 0)
     force, complete = np.zeros((400, 7)), np.random.default_rng(2).normal(size=(400, 2))
     force[small[:4], :2] = np.random.default_rng(3).normal(size=(4, 2))
     for _ in range(2):

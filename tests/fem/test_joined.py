@@ -38,7 +38,7 @@ def block(x, y, z, tets=False, linear=False):
     return mesh.with_boundaries(faces), sets
 
 
-def two(x_1, x_2, n_1=(3, 3), n_2=(4, 4), tets=False, materials=(STEEL, STEEL), points=None):
+def two_blocks(x_1, x_2, n_1=(3, 3), n_2=(4, 4), tets=False, materials=(STEEL, STEEL), points=None):
     """Two blocks of section 1 x 1 that meet where the first ends; 8-node hexahedra where a material asks for them."""
     linear = [isinstance(material, Material) and material.linear_reduced for material in materials]
     item = block(x_1, L(0, 1, n_1[0]), L(0, 1, n_1[1]), linear=linear[0])
@@ -46,8 +46,8 @@ def two(x_1, x_2, n_1=(3, 3), n_2=(4, 4), tets=False, materials=(STEEL, STEEL), 
     return Assembly([Body("a", *item, materials[0]), Body("b", *other, materials[1])], points)
 
 
-def part(of, clamps=(), loads=None, outputs=None, **more) -> Part:
-    return build(of, of.node_sets, of.material, clamps, [], loads or {}, outputs or {}, **more)
+def part(of, clamps=(), loads=None, outputs=None, **options) -> Part:
+    return build(of, of.node_sets, of.material, clamps, [], loads or {}, outputs or {}, **options)
 
 
 def static(of: Part, load: str) -> np.ndarray:
@@ -57,7 +57,7 @@ def static(of: Part, load: str) -> np.ndarray:
 @pytest.mark.parametrize(("tets", "linear"), [(False, (0, 0)), (True, (0, 0)), (False, (1, 1)), (True, (1, 0))])
 def test_a_tie_of_different_meshes_carries_a_bar_in_tension_exactly(tets, linear):
     materials = [replace(STEEL, nu=0.0, linear_reduced=bool(item)) for item in linear]
-    bar = two(L(0, 2, 3), L(2, 5, 4), tets=tets, materials=materials)
+    bar = two_blocks(L(0, 2, 3), L(2, 5, 4), tets=tets, materials=materials)
     pull = {"pull": NodalForce("b.x_max", (1, 0, 0), "area")}
     tied = part(bar, [Clamp("a.x_min")], pull, constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
     u = static(tied, "pull")
@@ -97,7 +97,7 @@ def test_a_face_that_another_covers_in_part_follows_its_linear_motions(tets, lin
 
 def frequencies(n: int) -> tuple[float, float]:
     """Second mode in bending of two clamped, tied blocks against that of one piece, both of about n elements."""
-    bar = two(L(0, 2, n + 1), L(2, 5, n + 2), (n + 1, n + 1), (n + 2, n + 2))
+    bar = two_blocks(L(0, 2, n + 1), L(2, 5, n + 2), (n + 1, n + 1), (n + 2, n + 2))
     tied = part(bar, [Clamp("a.x_min")], constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
     mesh, sets = block(L(0, 5, 2 * n + 2), L(0, 1, n + 2), L(0, 1, n + 2))
     full = build(mesh, sets, STEEL, [Clamp("x_min")], [], {}, {})
@@ -113,10 +113,10 @@ def test_a_tie_converges_with_the_mesh_like_the_one_piece_mesh():
 
 
 def test_faces_that_a_tie_cannot_join_are_one_sentence():
-    bar = two(L(0, 2, 3), L(4, 5, 3))
+    bar = two_blocks(L(0, 2, 3), L(4, 5, 3))
     with pytest.raises(ValueError, match=r"ties.t: the two faces do not meet: they are about 2.* m apart"):
         part(bar, constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
-    bar = two(L(0, 2, 3), L(2, 5, 3))
+    bar = two_blocks(L(0, 2, 3), L(2, 5, 3))
     with pytest.raises(ValueError, match=r"ties\.t moves nodes that are clamped"):
         part(bar, [Clamp("a.x_max")], constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
     twice = [Tie("ties.t", "a.x_max", "b.x_min"), Tie("ties.s", "a.x_max", "b.x_min")]
@@ -153,7 +153,7 @@ def test_a_heated_bar_between_walls_and_a_free_one():
         Orthotropic((E,) * 3, (0.0,) * 3, (E / 2,) * 3, 1000.0, expansion=(alpha, 0.0, 0.0))
         for E, alpha in ((210e9, 12e-6), (70e9, 23e-6))
     ]
-    bar = two(L(0, 2, 3), L(2, 5, 3), materials=path)
+    bar = two_blocks(L(0, 2, 3), L(2, 5, 3), materials=path)
     heat = {"heat": Heating(bar.material)}
     tie = [Tie("ties.t", "a.x_max", "b.x_min")]
     free = part(bar, [Clamp("a.x_min")], heat, constraints=tie)
@@ -168,9 +168,9 @@ def test_a_heated_bar_between_walls_and_a_free_one():
     assert meeting == pytest.approx(2 * 12e-6 - force * 2 / 210e9, rel=1e-9)
 
 
-def crystal(**more):
+def crystal(**options):
     numbers = {"young": (120e9, 80e9, 60e9), "poisson": (0.3, 0.25, 0.2), "shear": (40e9, 30e9, 20e9), "rho": 5000.0}
-    return Orthotropic(**numbers, **more)
+    return Orthotropic(**numbers, **options)
 
 
 def test_an_orthotropic_bar_and_its_turned_axes():
@@ -234,12 +234,12 @@ def test_a_link_joins_the_points_of_two_bodies_in_all_motions_or_leaves_one_free
 
 
 def test_tied_faces_that_are_apart_are_refused_by_name_unless_a_reach_bridges_them():
-    bar = two(L(0, 2, 3), L(2.02, 5, 3))
+    bar = two_blocks(L(0, 2, 3), L(2.02, 5, 3))
     with pytest.raises(ValueError, match=r"ties\.t: a\.x_max and b\.x_min are 20 mm apart"):
         part(bar, constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
     bridged = part(bar, constraints=[Tie("ties.t", "a.x_max", "b.x_min", 0.05)])
     assert abs(modes(bridged.system.stiffness, bridged.system.mass, 7)[0][:6]).max() < 1e-2
-    neighbour = two(L(0, 2, 3), L(0, 2, 3))
+    neighbour = two_blocks(L(0, 2, 3), L(0, 2, 3))
     for tied in (("a.x_max", "b.x_max"), ("a.x_max", "b.y_min"), ("a.y_max", "b.x_min")):
         with pytest.raises(ValueError, match=r"ties\.t: the two faces"):
             part(neighbour, constraints=[Tie("ties.t", *tied)])

@@ -50,8 +50,8 @@ def test_contacts_of_eight_node_hexahedra_carry_constant_tractions():
             assert np.abs(B.T @ pressure.ravel() - consistent).max() < 1e-12 * np.abs(consistent).max()
 
 
-def halves(of, first, second, **more):
-    return ContactFaces(first, (1, 0, 0), second, **more).halves(of)
+def halves(of, first, second, **options):
+    return ContactFaces(first, (1, 0, 0), second, **options).halves(of)
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.2])

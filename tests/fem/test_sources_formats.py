@@ -53,7 +53,7 @@ def test_every_format_gives_the_same_frequencies_and_set(name, kind, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "old", "new", "sentence"),
+    ("name", "original", "replacement", "sentence"),
     [
         ("d.bdf", "GRID*                  1", "GRID*                  x", "expects a whole number"),
         ("d.bdf", "210.+9", "stiff", "expects a number, got 'stiff'"),
@@ -66,24 +66,24 @@ def test_every_format_gives_the_same_frequencies_and_set(name, kind, tmp_path):
         ("c.inp", "*NODE\n1, ", "*NODE\n9999, ", "names node 1, which the deck has not"),
     ],
 )
-def test_broken_files_are_refused_in_one_sentence(name, old, new, sentence, tmp_path):
+def test_broken_files_are_refused_in_one_sentence(name, original, replacement, sentence, tmp_path):
     path = foreign_files.write(reference()[0], tmp_path / name, "")
     data = path.read_bytes()
-    assert old.encode() in data
-    path.write_bytes(data.replace(old.encode(), new.encode(), 1))
+    assert original.encode() in data
+    path.write_bytes(data.replace(original.encode(), replacement.encode(), 1))
     with pytest.raises(ValueError, match=sentence) as message:
         foreign_file.read(path)
     assert "\n" not in str(message.value)
 
 
-@pytest.mark.parametrize("more", ["", ",7."])
-def test_a_free_line_with_a_star_has_four_fields(more, tmp_path):
+@pytest.mark.parametrize("extra_fields", ["", ",7."])
+def test_a_free_line_with_a_star_has_four_fields(extra_fields, tmp_path):
     plain = foreign_files.write(foreign_files.bricks(tmp_path), tmp_path / "d.bdf", "").read_text()
     at = re.compile(r"GRID\*   (.{16})(.{16})(.{16})(.{16})\*\n\*       (.{16})")
-    free = at.sub(lambda g: f"GRID*,{g[1]},{g[2]},{g[3]},{g[4]},*1{more}\n*1,{g[5]}", plain)
+    free = at.sub(lambda g: f"GRID*,{g[1]},{g[2]},{g[3]},{g[4]},*1{extra_fields}\n*1,{g[5]}", plain)
     assert free != plain
     (tmp_path / "free.bdf").write_text(free)
-    if more:
+    if extra_fields:
         with pytest.raises(ValueError, match="more than the four fields of a star"):
             foreign_file.read(tmp_path / "free.bdf")
         return

@@ -201,7 +201,7 @@ def test_pairs_at_face_centres_are_means_of_their_corners():
 
 
 @pytest.mark.parametrize(
-    ("face", "t1", "changes", "why"),
+    ("face", "t1", "changes", "message"),
     [
         ("none", (1, 0, 0), {}, "empty"),
         ("inner", (1, 0, 0), {}, "inside the body"),
@@ -215,11 +215,11 @@ def test_pairs_at_face_centres_are_means_of_their_corners():
         ("bottom", (1, 0, 0), {"opposite": "top", "plane": (0, 0, -1)}, "exclude each other"),
     ],
 )
-def test_contact_refuses(face, t1, changes, why):
+def test_contact_refuses(face, t1, changes, message):
     mesh = block()
     extra = {"none": np.zeros(0, int), "inner": np.flatnonzero(mesh.f2t[1] >= 0)}
     mesh = mesh.with_boundaries({**mesh.boundaries, **extra})
-    with pytest.raises(ValueError, match=why):
+    with pytest.raises(ValueError, match=message):
         ContactFaces(face, t1, **changes).build(mesh)
 
 

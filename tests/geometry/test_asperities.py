@@ -15,7 +15,7 @@ from tests.helpers.rough_faces import caps, gaussian
 from tribodyn.geometry.asperities import Moments, identify, moments, summits
 from tribodyn.geometry.height_map import HeightMap
 
-RADIUS, APART, STEP = 200e-6, 41e-6, 1e-6
+RADIUS, SPACING_OF_SUMMITS, STEP = 200e-6, 41e-6, 1e-6
 
 
 def some_heights(n: int = 8) -> np.ndarray:
@@ -27,15 +27,15 @@ def some_heights(n: int = 8) -> np.ndarray:
 
 def test_caps_give_their_radius_density_and_gaps():
     heights = some_heights()
-    fit = identify(caps(RADIUS, heights, APART, STEP))
+    fit = identify(caps(RADIUS, heights, SPACING_OF_SUMMITS, STEP))
     assert len(fit.height) == heights.size
     assert fit.radius == pytest.approx(RADIUS, rel=1e-4)
-    assert fit.density == pytest.approx(1 / APART**2, rel=0.02)  # the rim is left out
+    assert fit.density == pytest.approx(1 / SPACING_OF_SUMMITS**2, rel=0.02)  # the rim is left out
     np.testing.assert_allclose(np.sort(fit.gap), np.sort(heights.max() - heights.ravel()), atol=1e-12)
 
 
 def test_two_faces_of_caps_that_meet_have_half_the_radius_and_both_heights():
-    first = caps(RADIUS, some_heights(), APART, STEP)
+    first = caps(RADIUS, some_heights(), SPACING_OF_SUMMITS, STEP)
     single, two_results = td.studies.asperities(first).found, td.studies.asperities(first, first).found
     assert two_results.radius == pytest.approx(RADIUS / 2, rel=1e-4)
     np.testing.assert_allclose(np.sort(two_results.gap), 2 * np.sort(single.gap), atol=1e-12)
@@ -100,8 +100,8 @@ def stepped() -> HeightMap:
     ("call", "words"),
     [
         (lambda: identify(stepped()), "its heights come in steps .*: give `shortest`"),
-        (lambda: identify(caps(RADIUS, some_heights(4), APART, STEP)), "16 summits are too few"),
-        (lambda: identify(caps(RADIUS, np.full((8, 8), 5e-7), APART, STEP)).table(1), "a table of 1 rows"),
+        (lambda: identify(caps(RADIUS, some_heights(4), SPACING_OF_SUMMITS, STEP)), "16 summits are too few"),
+        (lambda: identify(caps(RADIUS, np.full((8, 8), 5e-7), SPACING_OF_SUMMITS, STEP)).table(1), "a table of 1 rows"),
         (lambda: summits(HeightMap(*2 * (np.arange(5.0),), np.full((5, 5), np.nan))), "without height"),
         (lambda: td.studies.asperities(stepped(), mirror="x"), "one face only"),
     ],

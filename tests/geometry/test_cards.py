@@ -30,7 +30,7 @@ FACES = "*SURFACE, NAME=END\n2, S4\n*SURFACE, NAME=START\n1, S6\n"
 BASES = {
     "inp": bricks(SMALL, straight) + STEEL,
     "bdf": bulk(SMALL, straight) + "PSOLID,1,1\nMAT1,1,200000.,,.3,7.8-9\n",
-    "cdb": archive(SMALL, straight, held="") + "MP,EX,1,200000.\nMP,NUXY,1,.3\nMP,DENS,1,7.8E-9\n",
+    "cdb": archive(SMALL, straight, support="") + "MP,EX,1,200000.\nMP,NUXY,1,.3\nMP,DENS,1,7.8E-9\n",
 }
 BASES["parts"] = PART
 # card -> (base, what is added to it); the card's own lines are then taken away
@@ -122,7 +122,7 @@ READ = {
     },
 }  # fmt: skip
 FRAMES = ("END PART", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY")  # of what stands between them
-MORE = {"inp": "*NSET, NSET=MORE\n2\n", "bdf": "SET1,77,1\n", "cdb": ""}
+FURTHER_CARDS = {"inp": "*NSET, NSET=MORE\n2\n", "bdf": "SET1,77,1\n", "cdb": ""}
 
 
 def without(text: str, card: str, ending: str) -> str:
@@ -136,11 +136,11 @@ def without(text: str, card: str, ending: str) -> str:
 
 
 @cache
-def said(text: str, ending: str) -> tuple[object, ...]:
+def outcome_of(text: str, ending: str) -> tuple[object, ...]:
     """All that a deck gives: meshes, groups, what else it holds, and what is told of it."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / f"more.{ending}").write_text(MORE[ending])
+        (folder / f"more.{ending}").write_text(FURTHER_CARDS[ending])
         (folder / f"own.{ending}").write_text(text)
         content = foreign_file.read(folder / f"own.{ending}", "mm")
     bodies = {
@@ -172,29 +172,29 @@ def test_a_card_that_is_read_matters(ending: str, card: str) -> None:
     text = built(ending, card)
     smaller = without(text, card, ending)
     assert smaller != text
-    *_, refused = full = said(text, ending)
+    *_, refused = full = outcome_of(text, ending)
     assert not refused or card in ("ET", "KEYOPT", "KEYOP", "CSYS", "LOCAL")  # what these choose is refused
     with suppress(ValueError):  # of a deck that lacks what it cannot do without
-        assert card in FRAMES or said(smaller, ending) != full
+        assert card in FRAMES or outcome_of(smaller, ending) != full
 
 
 @pytest.mark.parametrize("ending", TABLES)
 def test_harmless_cards_are_named_and_others_refused(ending: str) -> None:
-    table, base = TABLES[ending], said(BASES[ending], ending)
+    table, base = TABLES[ending], outcome_of(BASES[ending], ending)
     line = {"inp": "*{}\n", "bdf": "{},1\n", "cdb": "{},1\n"}[ending]
     for card in table.spares:
         kind = card.replace("PARAM ", "PARAM,").replace("MP ", "MP,")
-        result, _, unused, refused = said(BASES[ending] + line.format(kind), ending)
+        result, _, unused, refused = outcome_of(BASES[ending] + line.format(kind), ending)
         assert result == base[0], card
         assert card in unused[-1], card
         assert not refused, card
     for card in table.silents - {"BEGIN", "RESTART"}:
-        assert said(BASES[ending] + line.format(card), ending) == base, card
-    assert list(said(BASES[ending] + line.format("OTHER"), ending)[-1]) == [line.format("OTHER").strip(",1\n")]
+        assert outcome_of(BASES[ending] + line.format(card), ending) == base, card
+    assert list(outcome_of(BASES[ending] + line.format("OTHER"), ending)[-1]) == [line.format("OTHER").strip(",1\n")]
 
 
 # the same structure in the words of two formats
-HELD = {"inp": "*BOUNDARY\nFOOT, 1, 3\n"}
+SUPPORTED = {"inp": "*BOUNDARY\nFOOT, 1, 3\n"}
 COUNTS = (4, 1, 1)
 STEEL_BDF, STEEL_CDB = BASES["bdf"][BASES["bdf"].index("PSOLID") :], BASES["cdb"][BASES["cdb"].index("MP,") :]
 PLY = "".join(
@@ -214,7 +214,7 @@ PLY_INP = """*MATERIAL, NAME=PLY
 1.6e-9
 *SOLID SECTION, ELSET=ALL, MATERIAL=PLY"""
 TURNED = "*ORIENTATION, NAME=OWN\n.8660254037844387, .5, 0., -.5, .8660254037844387, 0.\n"
-SAME = {
+EQUAL_DECKS = {
     "PS": ("bdf", bulk(COUNTS, straight, "123456") + STEEL_BDF, STEEL),
     "GRDSET": (
         "bdf",
@@ -274,10 +274,10 @@ SAME = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", SAME)
+@pytest.mark.parametrize("case", EQUAL_DECKS)
 def test_a_structure_is_the_same_in_every_format(case: str, tmp_path: Path) -> None:
-    ending, text, cards = SAME[case]
-    expected = frequencies(bricks(COUNTS, straight) + cards + HELD["inp"], 4, tmp_path)
+    ending, text, cards = EQUAL_DECKS[case]
+    expected = frequencies(bricks(COUNTS, straight) + cards + SUPPORTED["inp"], 4, tmp_path)
     np.testing.assert_allclose(frequencies(text, 4, tmp_path, ending), expected, rtol=1e-6)
 
 
@@ -315,7 +315,7 @@ def test_supports_along_axes_of_nodes_turn_with_the_body(ending: str, tmp_path: 
         if ending == "bdf":
             text = bulk((6, 1, 1), shape, "23", "7") + STEEL_BDF + "CORD2C,7,,0.,0.,0.,0.,0.,1.\n+,1.,0.,0.\n"
         else:
-            text = archive((6, 1, 1), shape, () if shape is ring else (30.0, 0.0, 0.0), held="UY") + STEEL_CDB
+            text = archive((6, 1, 1), shape, () if shape is ring else (30.0, 0.0, 0.0), support="UY") + STEEL_CDB
             text += "".join(f"D,{n},UZ,0\n" for n in foot)
         rows.append(frequencies(text, 8, tmp_path, ending))
     assert rows[0][0] < 1e-2 * rows[0][1]  # it can slide along the radius

@@ -14,7 +14,7 @@ from tribodyn.workflows.cases.brb import lap_beam
 HEXAGON = np.sqrt(3) / 2 * 12.7e-3**2  # area by the width across flats
 
 
-def made(part, path: Path, **changes):
+def build_part(part, path: Path, **changes):
     parameters = replace(part.Parameters(), **changes)
     part.build(parameters, path / "part.msh")
     return *mesh.read(path / "part.msh"), parameters
@@ -25,21 +25,21 @@ def disk(diameter: float) -> float:
 
 
 def test_volumes_are_those_of_the_drawing(tmp_path):
-    body, _, p = made(lap_beam, tmp_path, n_side=4)
+    body, _, p = build_part(lap_beam, tmp_path, n_side=4)
     expected = (
         p.width * p.height * (p.length - p.lap) + p.width * p.height / 2 * p.lap - 3 * disk(p.hole) * p.height / 2
     )
     assert mesh.facts(body).volume == pytest.approx(expected, rel=1e-6)
-    body, _, q = made(bolt, tmp_path)
+    body, _, q = build_part(bolt, tmp_path)
     assert mesh.facts(body).volume == pytest.approx(disk(q.diameter) * q.length + HEXAGON * q.head_height, rel=3e-4)
-    body, _, n = made(nut, tmp_path)
+    body, _, n = build_part(nut, tmp_path)
     assert mesh.facts(body).volume == pytest.approx((HEXAGON - disk(n.bore)) * n.height, rel=1e-4)
-    body, _, w = made(washer, tmp_path)
+    body, _, w = build_part(washer, tmp_path)
     assert mesh.facts(body).volume == pytest.approx((disk(w.diameter) - disk(w.bore)) * w.thickness, rel=3e-4)
 
 
 def test_the_lap_meets_itself_turned_by_half_a_turn(tmp_path):
-    body, sets, p = made(lap_beam, tmp_path)
+    body, sets, p = build_part(lap_beam, tmp_path)
     lap = body.doflocs.T[sets["lap"]]
     assert np.abs(lap[:, 2]).max() < 1e-12
     turned = lap * [-1, 1, -1]

@@ -27,7 +27,7 @@ def test_a_card_that_changes_the_structure_is_refused(name: str, tmp_path: Path)
         frequencies(BAR + CARDS[name], 2, tmp_path)
     assert f'"{name}"' in str(raised.value)
     assert list(foreign_file.read(tmp_path / "own.inp", "mm").refused) == [name]
-    made = decks.structure("d", DeckTable(file="own.inp", unit=1e-3, ignore=(name,)), {}, tmp_path)
-    assert any("by ignore" in note for note in made.notes)
+    deck_text = decks.structure("d", DeckTable(file="own.inp", unit=1e-3, ignore=(name,)), {}, tmp_path)
+    assert any("by ignore" in note for note in deck_text.notes)
     with pytest.raises(ValueError, match="ignore"):
         decks.structure("d", DeckTable(file="own.inp", unit=1e-3, ignore=(name, "*NOWHERE")), {}, tmp_path)

@@ -99,11 +99,11 @@ def test_parts_that_share_no_nodes_are_bodies_named_by_their_groups():
         blocks,
         volumes={"all": np.arange(start), "left": number[0], "half": number[1][:2], "rest": number[1][2:]},
     )
-    found = solid_body.bodies(raw)
-    assert set(found) == {"left", "half+rest", "body1"}
-    np.testing.assert_array_equal(found["left"], number[0])
-    np.testing.assert_array_equal(found["body1"], number[2])
-    body = solid_body.build(raw, found["half+rest"])
+    source = solid_body.bodies(raw)
+    assert set(source) == {"left", "half+rest", "body1"}
+    np.testing.assert_array_equal(source["left"], number[0])
+    np.testing.assert_array_equal(source["body1"], number[2])
+    body = solid_body.build(raw, source["half+rest"])
     assert set(body.mesh.subdomains) == {"all", "half", "rest"}
     assert quality(body.mesh).volume == pytest.approx(3.0)
 

@@ -71,7 +71,7 @@ def problem(
     height: float,
     force: float,
     gap: Sequence[float] = (0.0, 1e-5, -1e-5),
-    kept: tuple[int, ...] = (0, 1, 2, 3),
+    harmonics: tuple[int, ...] = (0, 1, 2, 3),
     friction: float = 0.4,
 ) -> HarmonicBalance:
     """Their contact under a shaker force [N], at a height [m]."""
@@ -80,5 +80,5 @@ def problem(
     )
     excitation = Excitation.of({"height": height}, {1: {"shaker": force}})
     return HarmonicBalance.of(
-        model, Joint("contact", "jenkins", parameters), HarmonicBasis(kept, 128), excitation, 2 * OMEGA
+        model, Joint("contact", "jenkins", parameters), HarmonicBasis(harmonics, 128), excitation, 2 * OMEGA
     )

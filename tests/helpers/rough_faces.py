@@ -8,9 +8,9 @@ from tribodyn.geometry.asperities import Moments
 from tribodyn.geometry.height_map import HeightMap
 
 
-def caps(radius: float, heights: np.ndarray, apart: float, step: float) -> HeightMap:
+def caps(radius: float, heights: np.ndarray, distance: float, step: float) -> HeightMap:
     """Spheres of one radius on a square lattice, cut by a plane; heights : (n, n) of their summits above it."""
-    per_cell = round(apart / step)
+    per_cell = round(distance / step)
     cell = (np.arange(per_cell) - per_cell // 2) * step
     lower = np.hypot(cell[:, None], cell) ** 2
     drop = radius - np.sqrt(np.maximum(radius**2 - lower, 0.0))

@@ -60,12 +60,12 @@ def bricks(counts: tuple[int, int, int], shape: Shape) -> str:
     return "\n".join([*lines, "*NSET, NSET=FOOT", *map(str, foot), ""])
 
 
-def bulk(counts: tuple[int, int, int], shape: Shape, held: str = "", system: str = "") -> str:
+def bulk(counts: tuple[int, int, int], shape: Shape, support: str = "", system: str = "") -> str:
     """The same for Nastran: GRID, held at the foot by its PS field along a system, and CHEXA of property 1."""
     points, cells, foot = cut(counts, shape)
     lines = []
     for n, (x, y, z) in enumerate(points, 1):
-        lines.append(f"GRID,{n},,{x:.9f},{y:.9f},{z:.9f},{system},{held if n in foot else ''}")
+        lines.append(f"GRID,{n},,{x:.9f},{y:.9f},{z:.9f},{system},{support if n in foot else ''}")
     for e, c in enumerate(cells, 1):
         row = [str(n) for n in [*c[:12], *c[16:], *c[12:16]]]
         lines += [f"CHEXA,{e},1,{','.join(row[:6])}", f"+,{','.join(row[6:14])}", f"+,{','.join(row[14:])}"]
@@ -73,7 +73,7 @@ def bulk(counts: tuple[int, int, int], shape: Shape, held: str = "", system: str
 
 
 def archive(
-    counts: tuple[int, int, int], shape: Shape, angles: tuple[float, ...] = (), system: int = 0, held: str = "ALL"
+    counts: tuple[int, int, int], shape: Shape, angles: tuple[float, ...] = (), system: int = 0, support: str = "ALL"
 ) -> str:
     """The same for ANSYS: NBLOCK, whose nodes are turned by angles, EBLOCK in a local system, D at the foot."""
     points, cells, foot = cut(counts, shape)
@@ -85,7 +85,7 @@ def archive(
         head = [1, 1, 1, 1, system, 0, 0, 0, 20, 0, e]
         lines += ["".join(f"{n:9d}" for n in [*head, *c[:8]]), "".join(f"{n:9d}" for n in c[8:])]
     lines.append("       -1")
-    return "\n".join([*lines, *(f"D,{n:8d},{held},  0.00000000" for n in foot if held), ""])
+    return "\n".join([*lines, *(f"D,{n:8d},{support},  0.00000000" for n in foot if support), ""])
 
 
 def frequencies(deck: str, count: int, folder: Path, ending: str = "inp", unit: str = "mm") -> np.ndarray:

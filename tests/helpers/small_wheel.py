@@ -22,12 +22,12 @@ from tribodyn.workflows.cases.blade import blade
 
 N = 8
 STEEL = Material(210e9, 0.3, 7860.0)
-AROUND = (0.0, 1.0, 0.0)
+CIRCUMFERENCE = (0.0, 1.0, 0.0)
 STIFFNESS = (93e6, 113e6)  # tangential and normal, of a whole face
 CONTACT = ContactFaces("shroud_right", (1, 0, 0), "shroud_left", vertices_only=True)
-FORCES = (NodalForce("couple_trailing", AROUND), 1.0), (NodalForce("couple_leading", AROUND), -1.0)
-LOADS = {"couple": Sum(FORCES), "shaker": NodalForce("excitation", AROUND)}
-OUTPUTS = {"tip": NodalForce("tip", AROUND), "driven": NodalForce("excitation", AROUND)}
+FORCES = (NodalForce("couple_trailing", CIRCUMFERENCE), 1.0), (NodalForce("couple_leading", CIRCUMFERENCE), -1.0)
+LOADS = {"couple": Sum(FORCES), "shaker": NodalForce("excitation", CIRCUMFERENCE)}
+OUTPUTS = {"tip": NodalForce("tip", CIRCUMFERENCE), "driven": NodalForce("excitation", CIRCUMFERENCE)}
 CLAMPS = (Clamp("clamp"),)
 SEAM = ("cyclic_right", "cyclic_left")
 

@@ -72,8 +72,8 @@ def wave_and_wheel(
     return balance(item, 1, load), balance(wheel, n, on_wheel(load, order, n))
 
 
-def spread(one: HarmonicBalance, coefficients: np.ndarray, order: int, n_sectors: int = N) -> np.ndarray:
+def spread(wheel: HarmonicBalance, coefficients: np.ndarray, order: int, n_sectors: int = N) -> np.ndarray:
     """Coefficients (n, ..., n_coeff) of every sector from those of sector 0 (..., n_coeff)."""
     return np.stack(
-        [one.basis.shift(coefficients, -2 * np.pi * (order * n % n_sectors) / n_sectors) for n in range(n_sectors)]
+        [wheel.basis.shift(coefficients, -2 * np.pi * (order * n % n_sectors) / n_sectors) for n in range(n_sectors)]
     )

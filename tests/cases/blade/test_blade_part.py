@@ -33,13 +33,13 @@ def test_contact_face_is_plane_and_as_published(sector):
         assert np.ptp(face.normals, axis=0).max() < 1e-9
 
 
-@pytest.mark.parametrize(("along", "up"), [(5, 4), (7, 3)])
-def test_left_face_is_the_right_one_turned(tmp_path, along, up):
-    mesh, nodes = read(tmp_path, n_along=along, n_up=up, n_span=4)
+@pytest.mark.parametrize(("chord", "up"), [(5, 4), (7, 3)])
+def test_left_face_is_the_right_one_turned(tmp_path, chord, up):
+    mesh, nodes = read(tmp_path, n_along=chord, n_up=up, n_span=4)
     points = mesh.doflocs.T
     right, remaining = points[nodes["shroud_right"]], points[nodes["shroud_left"]]
-    assert len(right) == (2 * along - 1) * (2 * up - 1)
-    assert len(surface(mesh, mesh.boundaries["shroud_right"], vertices_only=True).nodes) == along * up
+    assert len(right) == (2 * chord - 1) * (2 * up - 1)
+    assert len(surface(mesh, mesh.boundaries["shroud_right"], vertices_only=True).nodes) == chord * up
     refined = turned(right, 2 * np.pi / 40)
     assert np.linalg.norm(refined[:, None] - remaining, axis=2).min(axis=1).max() < 1e-12
 

@@ -130,7 +130,7 @@ def test_the_beam_rings_down_from_one_amplitude_to_the_other(
     """From --to down to --from, along the backbone of faces that have yielded: frequency 0.1 %, damping 3 %."""
     model, follow, rows = built("flat"), time_ring_down.ring_down, []
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)
-    monkeypatch.setattr(time_ring_down, "ring_down", lambda *asked: rows.append(follow(*asked)) or rows[-1])
+    monkeypatch.setattr(time_ring_down, "ring_down", lambda *arguments: rows.append(follow(*arguments)) or rows[-1])
     words = ["--from", "11um", "--to", "16um", "--points", "8", "--steps", "96", "--out", str(tmp_path), "--json"]
     code, out, err = leave(["curve", "ring-down", "brb_flat", *words], capsys)
     assert code == 0, err

@@ -129,9 +129,9 @@ def test_the_scene_has_the_stiffnesses_that_suit_its_leaf_best():
 def test_the_fit_stays_at_the_leaf_of_the_scene():
     scene = scene_file.read("leaf_seal_thesis").scene
     shape = leaf_fit.shape_of(leaf_fit.dimensions(scene))
-    found = leaf_fit.fit(scene, 3, shape, max_steps=2)
-    assert found.rms == pytest.approx(leaf_fit.of_scene(scene).rms, rel=0.003)
-    np.testing.assert_allclose(leaf_fit.shape_of(found.parameters), shape, rtol=0.015)
+    fitted = leaf_fit.fit(scene, 3, shape, max_steps=2)
+    assert fitted.rms == pytest.approx(leaf_fit.of_scene(scene).rms, rel=0.003)
+    np.testing.assert_allclose(leaf_fit.shape_of(fitted.parameters), shape, rtol=0.015)
 
 
 def test_a_leaf_gives_way_only_to_one_that_the_numbers_tell_apart():
@@ -295,16 +295,18 @@ def test_wear_by_impacts_grows_where_the_leaf_chatters(tmp_path):
 @pytest.mark.slow
 def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_path):
     scene = scene_file.read("leaf_seal_thesis").scene
-    every = cases(scene)
-    assert len(every) == 31
-    count = {group: sum(case.group == group for case in every) for group in dict.fromkeys(c.group for c in every)}
+    all_cases = cases(scene)
+    assert len(all_cases) == 31
+    count = {
+        group: sum(case.group == group for case in all_cases) for group in dict.fromkeys(c.group for c in all_cases)
+    }
     assert count == {
         "liner": 7, "excitation": 4, "liner without force": 4, "K_n": 4, "K_spring": 4, "inclination": 4, "bow": 4,
     }  # fmt: skip
-    for case in every:
+    for case in all_cases:
         scene_file.read("leaf_seal_thesis", case.overrides)
     impossible = Case("bow", "impossible", ("contact.plane=", "contact.inclination=1 deg"))
-    small = [every[0], impossible, next(case for case in every if case.label == "+4°")]
+    small = [all_cases[0], impossible, next(case for case in all_cases if case.label == "+4°")]
     results = []
     records = leaf_study.study(small, tmp_path, tell=results.append)
     assert [record.complete for record in records] == [True, False, True]
@@ -315,10 +317,10 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
     assert rows[0]["fold_hz"].split() == ["174.74", "132.24"]
     assert rows[0]["end"] == "reached 450 Hz"
     assert "give its plane" in rows[1]["end"]
-    again = leaf_study.study(small[:2], tmp_path, resume=True)
-    assert again[0].response is None
-    assert again[0].numbers == records[0].numbers
-    np.testing.assert_array_equal(again[0].amplitude, records[0].amplitude)
+    repeated = leaf_study.study(small[:2], tmp_path, resume=True)
+    assert repeated[0].response is None
+    assert repeated[0].numbers == records[0].numbers
+    np.testing.assert_array_equal(repeated[0].amplitude, records[0].amplitude)
     assert (
         leaf_record.load(small[0], scene_file.read("leaf_seal_thesis", small[2].overrides).scene, tmp_path / "x")
         is None

@@ -53,7 +53,7 @@ def test_the_force_at_the_screws_is_the_preload(rig):
 def test_forces_at_rest_leave_a_prescribed_height_to_what_holds_the_part():
     """Both contact faces are of the one part: what they give to it adds up to nothing."""
     (part,) = forces("rig_thesis", overrides=COARSE).bodies
-    assert part.held
+    assert part.is_supported
     assert not part.load.any()
     assert np.abs(part.joints["contact"]).max() < 1e-9
 
@@ -147,18 +147,18 @@ def test_the_height_is_found_from_the_preload(rig):
 def test_life_and_work_tell_the_coefficient(rig):
     run = wear_down(Rig.of(scene_file.read("rig_thesis", QUICK)), 0.0, lambda sentence: None)
     assert run.lost
-    found = rig_fit.fit_coefficient(run, 5.5e-15)
+    fitted = rig_fit.fit_coefficient(run, 5.5e-15)
     ratios = [run.history.cycles[-1] / published.LIFE_MEASURED, run.spent[-1] / published.WORK]
-    assert found.values[0] == pytest.approx(5.5e-15 * np.sqrt(np.prod(ratios)), rel=1e-6)
-    np.testing.assert_allclose(found.sensitivity, [[-1.0], [-1.0]], rtol=2 * STEP**2)  # of differences of 1 / x
+    assert fitted.values[0] == pytest.approx(5.5e-15 * np.sqrt(np.prod(ratios)), rel=1e-6)
+    np.testing.assert_allclose(fitted.sensitivity, [[-1.0], [-1.0]], rtol=2 * STEP**2)  # of differences of 1 / x
     stopped = replace(run.history, end=WearEnd.STEPS_DONE.say(" 3 wear steps"))
     with pytest.raises(ValueError, match="a run that loses its preload"):
         rig_fit.fit_coefficient(replace(run, history=stopped), 5.5e-15)
 
 
 def test_both_wear_rules_use_up_the_preload_alike():
-    def run(*more: str) -> RigWear:
-        return wear_down(Rig.of(scene_file.read("rig_thesis", (*QUICK, *more))), 0.0, lambda sentence: None)
+    def run(*overrides: str) -> RigWear:
+        return wear_down(Rig.of(scene_file.read("rig_thesis", (*QUICK, *overrides))), 0.0, lambda sentence: None)
 
     explicit, controlled = run("wear.step=4 %"), run("wear.rule=error_controlled", "wear.tolerance=5 %")
     level = np.linspace(0.9, 0.4, 6) * explicit.rest[0]

@@ -31,10 +31,10 @@ def write(folder: Path, damage=lambda z: z, lateral: float = MICRO, height: floa
     return scene
 
 
-def run(scene: Path, capsys: pytest.CaptureFixture[str], *more: str) -> tuple[int, str, str]:
+def run(scene: Path, capsys: pytest.CaptureFixture[str], *overrides: str) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of a small run of the scene."""
     words = ["run", str(scene), "--no-pictures", "--out", str(scene.parent / "out")]
-    for override in (*SMALL, *more):
+    for override in (*SMALL, *overrides):
         words += ["--set", override]
     return leave(words, capsys)
 
@@ -74,7 +74,7 @@ def test_a_measured_face_is_taken_and_each_repair_is_told(damage, repairs, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("change", "more", "words"),
+    ("change", "overrides", "words"),
     [
         ({"damage": holes(0.5)}, (), "have no height"),
         ({"damage": lambda z: np.full_like(z, np.nan)}, (), "no point has a height"),
@@ -92,8 +92,8 @@ def test_a_measured_face_is_taken_and_each_repair_is_told(damage, repairs, tmp_p
     ids=["half holes", "nothing", "noise", "too small", "millimetres", "metres", "height", "flat", "turned", "cutoff",
          "no file", "no unit"],
 )  # fmt: skip
-def test_garbage_is_one_sentence_and_exit_code_2(change, more, words, tmp_path, capsys):
-    code, _, err = run(write(tmp_path, **change), capsys, *more)
+def test_garbage_is_one_sentence_and_exit_code_2(change, overrides, words, tmp_path, capsys):
+    code, _, err = run(write(tmp_path, **change), capsys, *overrides)
     assert code == 2
     sentence = err.strip().splitlines()[-1]
     assert sentence.startswith("tribodyn: ")

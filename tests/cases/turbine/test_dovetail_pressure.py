@@ -20,15 +20,15 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
-HERE = Path(__file__).parent
-RECORDED = HERE / "dovetail_calculix.json"
+FOLDER = Path(__file__).parent
+RECORDED = FOLDER / "dovetail_calculix.json"
 SPRINGS, FRICTION, SPEED = (1.2e9, 1.0e9), 0.5, 2 * np.pi * 100  # of the scene
 STATIONS = 1e-4  # distance within which nodes stand at one place along the flank [m]
 
 
 @pytest.fixture(scope="module")
 def model() -> modelling.Model:
-    return modelling.build(scene_file.read(str(HERE / "dovetail.toml")), Progress())
+    return modelling.build(scene_file.read(str(FOLDER / "dovetail.toml")), Progress())
 
 
 @pytest.fixture(scope="module")

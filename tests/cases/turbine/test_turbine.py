@@ -25,28 +25,28 @@ JOINTS = {"root_right", "root_left", "damper_right", "damper_left", "shroud"}
 
 
 @pytest.fixture(scope="module")
-def found() -> dict[str, BodyForces]:
-    return {one.body: one for one in td.studies.forces("turbine", overrides=COARSE).bodies}
+def forces_of() -> dict[str, BodyForces]:
+    return {body_forces.body: body_forces for body_forces in td.studies.forces("turbine", overrides=COARSE).bodies}
 
 
 @pytest.mark.parametrize("body", ["blade", "damper"])
-def test_contact_forces_carry_the_centrifugal_load(found: dict[str, BodyForces], body: str) -> None:
+def test_contact_forces_carry_the_centrifugal_load(forces_of: dict[str, BodyForces], body: str) -> None:
     """Forces on a body that only contact holds, to 1e-8."""
-    item = found[body]
-    assert not item.held
+    item = forces_of[body]
+    assert not item.is_supported
     assert item.imbalance < 1e-8
     assert set(item.joints) == (JOINTS if body == "blade" else {"damper_right", "damper_left"})
-    assert found["disk"].held
+    assert forces_of["disk"].is_supported
 
 
-def test_centrifugal_load_of_the_damper_is_that_of_its_drawing(found: dict[str, BodyForces]) -> None:
+def test_centrifugal_load_of_the_damper_is_that_of_its_drawing(forces_of: dict[str, BodyForces]) -> None:
     """Mass of the trapezoidal prism times speed squared times the radius of its centre; it moves out by some 1e-3."""
     p, speed, density = bladed_sector.Parameters(), 2 * np.pi * 100, 8200.0
     low, high = (p.gap_bottom + share * (p.gap_top - p.gap_bottom) for share in (p.damper_low, p.damper_high))
     tall = p.platform_height * (p.damper_high - p.damper_low)
     centre = p.under + p.damper_low * p.platform_height + tall * (low + 2 * high) / (3 * (low + high))
     expected = density * p.damper_length * tall * (low + high) / 2 * speed**2 * centre
-    assert np.linalg.norm(found["damper"].load) == pytest.approx(expected, rel=2e-3)
+    assert np.linalg.norm(forces_of["damper"].load) == pytest.approx(expected, rel=2e-3)
 
 
 @pytest.fixture(scope="module")
