@@ -25,10 +25,10 @@ BAD_INPUT, FAILED_SOLVE, DEFECT, INTERRUPTED = 2, 3, 70, 130
 FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))  # Windows has no quota
 READER_LEFT = 128 + 13  # as a shell counts the end by SIGPIPE, which Windows has not
 WORDS = {  # word -> where it is, its help on the page of all of them
-    "cases": ("scene_words:cases", "List the scenes that come with the program."),
-    "new": ("scene_words:new", "Begin a scene from a mesh, a deck or a CAD file."),
+    "cases": ("cases_word:cases", "List the scenes that come with the program."),
+    "new": ("file_words:new", "Begin a scene from a mesh, a deck or a CAD file."),
     "run": ("scene_words:run", "Run a scene and leave its result and pictures in a folder."),
-    "inspect": ("scene_words:inspect", "Show what a mesh, a deck, a CAD file or a scene holds."),
+    "inspect": ("file_words:inspect", "Show what a mesh, a deck, a CAD file or a scene holds."),
     "plan": ("scene_words:plan", "Show what a scene will model, and what it will cost, before running it."),
     "show": ("scene_words:show", "Show what a result holds."),
     "draw": ("scene_words:draw", "Draw pictures or films of a result."),

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from tribodyn.refusal import Refusal, SolverFailure
-from tribodyn.workflows.command.word import QUIET, Flag, Json, Overrides, make_room, word
+from tribodyn.workflows.command.word import QUIET, Flag, Json, Overrides, make_room
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.number_format import named_lines
@@ -19,16 +19,12 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import console_progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import draft, front_door, inspection
+from tribodyn.workflows.studies import front_door
 
 Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
 Targets = Annotated[tuple[str, ...], Parameter(name="--to", negative=(), consume_multiple=True)]
 Verbose = Annotated[Flag, Parameter(name=("--verbose", "-v"))]
 Films = Annotated[tuple[Literal["wear", "cycle"], ...], Parameter(name="--film", negative=(), consume_multiple=True)]
-
-new = word(draft.draft, "new", into="here")
-inspect = word(inspection.inspect, "inspect", into="asked")
-
 
 def run(
     scene: str,
@@ -96,12 +92,6 @@ def _stop_message(path: Path, scene: str, overrides: Sequence[str]) -> str:
         return "stopped before anything was computed"
     words = [scene, "--out", str(path.parent), *(word for text in overrides for word in ("--set", text))]
     return f"stopped, {store.load(path).state}, kept in {path}: resume with tribodyn run {shlex.join(words)} --resume"
-
-
-def cases() -> None:
-    """List the scenes that come with the program."""
-    for name in scene_file.names():
-        print(f"{name:12} {scene_file.title(name)}")
 
 
 def plan(scene: str, *, overrides: Overrides = (), picture: Path | None = None) -> None:

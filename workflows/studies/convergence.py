@@ -31,7 +31,7 @@ from tribodyn.workflows.errors.ladder_table import (
     SolvedSetting,
     measure_ladders,
 )
-from tribodyn.workflows.pictures.theme import BLUE, GREEN, GREY, INK, ORANGE, STYLE
+from tribodyn.workflows.pictures.theme import CYCLE, GREY, INK, STYLE
 from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
@@ -262,8 +262,7 @@ def picture(scene: str, settling: LadderTable) -> Figure:
 
 
 def _draw_errors(pane: Any, ladder: LadderTable) -> None:
-    drawn = (("peak_frequency", GREY, "^"), ("amplitude", BLUE, "o"), ("energy", ORANGE, "s"), ("life", GREEN, "D"))
-    for quantity, colour, mark in drawn:
+    for quantity, colour, mark in zip(names_with_error(), CYCLE, MARKERS, strict=False):
         points = [(len(row.solved.area), b) for row in ladder.rows if (b := ladder.bound(row, quantity))]
         if points:
             style = {"marker": mark, "markersize": 4, "color": colour, "label": _name(quantity)}

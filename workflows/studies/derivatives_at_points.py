@@ -17,6 +17,7 @@ from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives
 from tribodyn.hbm.derivatives.parameter_change import ParameterChange
 from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.quantity import CycleQuantity, with_error
 from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.refusal import Refusal, SolverFailure
@@ -27,8 +28,6 @@ from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.wear import Place
 
 Advance = Callable[[float, str], None]
-
-OF_ROWS = {"peak_frequency_first": "peak_frequency", "amplitude_first": "amplitude", "preload_first": "preload"}
 
 
 def changes_of(
@@ -117,22 +116,21 @@ def of_summary(
     if not (values or wear_values or gaps):
         return slopes
 
-    def add(find: Callable[[], Derivatives], names: Mapping[str, str]) -> None:
+    def add(find: Callable[[], Derivatives], columns: Mapping[str, str]) -> None:
+        """Put the slopes of a point into the table; columns : quantity -> its column."""
         with suppress(Refusal, SolverFailure):  # no derivative here, or no model with a changed parameter
-            derivatives_found = find()
-            by = {key: derivatives_found.slopes[:, i] for i, key in enumerate(derivatives_found.parameters)}
-            by |= {key: derivatives_found.by_gap[:, rows].sum(axis=1) for key, rows in gaps.items()}
-            for number, at in (
-                (number, derivatives_found.names.index(n))
-                for number, n in names.items()
-                if n in derivatives_found.names
-            ):
-                slopes.update({(number, key): float(column[at]) for key, column in by.items()})
+            point = find()
+            by_key = {key: point.slopes[:, i] for i, key in enumerate(point.parameters)}
+            by_key |= {key: point.by_gap[:, rows].sum(axis=1) for key, rows in gaps.items()}
+            for at, name in enumerate(point.names):
+                if name in columns:
+                    slopes.update({(columns[name], key): float(column[at]) for key, column in by_key.items()})
 
     places = [Place(peak=1.0)] if scene.wear is None else [duty.at for duty in scene.wear.duties]
     changes = partial(changes_of, varying, values, lambda *_: None, {})
+    firsts = {quantity.name: f"{quantity.name}_first" for quantity in with_error(CycleQuantity)}
     if response is not None and len(places) == 1 and places[0].peak in (None, 1.0):
-        add(lambda: of_branch(scene, varying.model.balance, response, changes(), places[0].frequency), OF_ROWS)
+        add(lambda: of_branch(scene, varying.model.balance, response, changes(), places[0].frequency), firsts)
     if worn is not None:
         add(lambda: of_life(varying, worn, changes(), wear_values), {"life": "life"})
     return slopes

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy import stats
 
+from tribodyn.hbm.quantity import StatedQuantity, every, names_with_error
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED, STYLE
@@ -21,12 +22,6 @@ if TYPE_CHECKING:
     from tribodyn.workflows.studies.many.study_table import StudyTable
 
 WIDE_SCALE = 30.0  # largest over least value, from which on a scale is logarithmic
-SHOWN = {
-    "peak_frequency_first": "peak / Hz",
-    "amplitude_first": "amplitude / m",
-    "depth": "depth / m",
-    "life": "life / cycles",
-}
 TICKS = (1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 
 
@@ -70,19 +65,26 @@ def _progress(optimum: Optimum, axes: Any) -> None:
 
 def _label(optimum: Optimum, at: int) -> str:
     aim = optimum.aims[at]
-    return f"{SHOWN.get(aim.number, aim.number)}, wanted {aim.want}"
+    return f"{_axis_label(aim.number)}, wanted {aim.want}"
+
+
+def _axis_label(column: str) -> str:
+    """A column that is a quantity by its label and unit, another one by its name."""
+    quantity = next((q for q in every(StatedQuantity) if column in (q.name, f"{q.name}_first")), None)
+    return column if quantity is None else f"{quantity.label} / {quantity.unit}"
 
 
 def shown(study: StudyTable) -> dict[str, str]:
     """Columns that a run has a number in, with their labels; empty where there is nothing to draw."""
     columns = study.columns
-    return {name: label for name, label in SHOWN.items() if name in columns and np.isfinite(columns[name]).any()}
+    names = [name for q in names_with_error() for name in (q, f"{q}_first") if name in columns]
+    return {name: _axis_label(name) for name in names if np.isfinite(columns[name]).any()}
 
 
 def panes(study: StudyTable) -> Figure:
-    """Peak, amplitude, depth and life, as far as there are any, against the keys; rank correlation in each title."""
+    """Quantities with a stated error, as far as there are any, against the keys; rank correlation in each title."""
     if not (labels := shown(study)):
-        raise Refusal(f"{study.name}: no run has a peak, a depth or a life, there is nothing to draw")
+        raise Refusal(f"{study.name}: no run has a number to draw")
     influence = study.influence()
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(3.4 * len(study.varied) + 0.8, 2.6 * len(labels) + 0.3), layout="constrained")
@@ -137,7 +139,7 @@ def picture_of_lives(distribution: LifeDistribution) -> Figure:
             paper_axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             paper_axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             paper_axes.xaxis.set_minor_formatter(NullFormatter())
-        paper_axes.set(xlabel=SHOWN.get(distribution.number, distribution.number), ylabel="share of the parts below")
+        paper_axes.set(xlabel=_axis_label(distribution.number), ylabel="share of the parts below")
         paper_axes.set_title(f"{distribution.name}: {distribution.runs} runs")
         paper_axes.legend(loc="upper left", fontsize=9)
         order = distribution.influences[::-1]

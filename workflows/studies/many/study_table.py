@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
-from tribodyn.hbm.quantity import StatedQuantity, every
+from tribodyn.hbm.quantity import StatedQuantity, every, names_with_error
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.store import replacing, set_aside
 from tribodyn.workflows.studies.many import study_pictures
@@ -117,7 +117,7 @@ class StudyTable(StudyResult):
         counts = self.record()["runs"].items()
         lines = ["runs: " + ", ".join(f"{count} {status}" for status, count in counts if count), *self.troubles()]
         for number, by_key in self.influence().items():
-            if number.endswith("_first") or number in (LIFE, "depth"):
+            if number.removesuffix("_first") in names_with_error():
                 ranks = sorted(by_key.items(), key=lambda item: -abs(item[1]))
                 lines.append(f"{number:14} rank correlation with {', '.join(f'{k} {rank:+.2f}' for k, rank in ranks)}")
         return lines
