@@ -34,7 +34,7 @@ RULES: dict[str, dict[str, Any]] = {
     },
     "continuation.methods.arc_length.ArcLengthRules": {"max_gaps": 0, "max_rewinds": 0, "max_landings": 0},
     "continuation.methods.adaptive.AdaptiveRules": {
-        "least_error_share": 0.0, "jump_error": NEVER, "taken": 1.0, "crawled": 10**9, "rejected_error": 1.0,
+        "least_error_share": 0.0, "jump_error": NEVER, "snap_steps": 1.0, "crawled": 10**9, "rejected_error": 1.0,
     },
     "continuation.methods.natural.NaturalRules": {
         "least_spacing": 0.0, "max_fold_points": 10**9, "abrupt": NEVER, "max_corner_points": 200,

@@ -245,12 +245,12 @@ def as_text(rows: list[Curve]) -> str:
     lines = ["vibrating over static load  problems  followed  refused  wrong  with lift-off  with folds  seconds"]
     edges = (*LOADS, np.inf)
     for low, high in pairwise(edges):
-        of = [row for row in rows if low <= row.load < high]
-        if not of:
+        group = [row for row in rows if low <= row.load < high]
+        if not group:
             continue
-        counts = "".join(f"{sum(row.outcome == end for row in of):{width}d}" for end, width in ENDS)
+        counts = "".join(f"{sum(row.outcome == end for row in group):{width}d}" for end, width in ENDS)
         span = f"{low:g} to {high:g}" if high < np.inf else f"from {low:g}"
-        lifts, folds = sum(row.lifts for row in of), sum(row.folds > 0 for row in of)
-        lines.append(f"{span:>26}{len(of):10d}{counts}{lifts:15d}{folds:12d}{sum(r.seconds for r in of):9.0f}")
+        lifts, folds = sum(row.lifts for row in group), sum(row.folds > 0 for row in group)
+        lines.append(f"{span:>26}{len(group):10d}{counts}{lifts:15d}{folds:12d}{sum(r.seconds for r in group):9.0f}")
     lines += [f"problem {row.seed}, {row.outcome}: {row.reason}" for row in rows if row.outcome != FOLLOWED]
     return "\n".join(lines)

@@ -19,7 +19,8 @@ DEPARTURE = 0.3  # relative change of amplitude that means that a motion has lef
 class Coexisting:
     """A solution that shares its frequency with others, and a plain march in time that began there.
 
-    amplitude : by harmonic balance; in_time : after the march of `periods` [m]; stays : whether it ended where it began
+    amplitude : by harmonic balance; in_time : after the march of `periods` [m]; returns : whether it ended where it
+        began
     growth : largest real part of Hill's exponents [1/s]
     """
 
@@ -28,7 +29,7 @@ class Coexisting:
     growth: float
     in_time: float
     periods: int
-    stays: bool
+    returns: bool
 
 
 @single
@@ -51,7 +52,7 @@ def coexisting(
             motion = march(balance, state, omega)
             ours = float(np.linalg.norm(balance.outputs(state)[row, balance.basis.order > 0]))
             theirs = amplitude_in_time(balance, motion, output)
-            growth, stays = float(spectrum.exponents.real.max()), abs(theirs / ours - 1) < DEPARTURE
-            solutions.append(Coexisting(ours, spectrum.stable, growth, theirs, motion.periods, stays))
+            growth, returns = float(spectrum.exponents.real.max()), abs(theirs / ours - 1) < DEPARTURE
+            solutions.append(Coexisting(ours, spectrum.stable, growth, theirs, motion.periods, returns))
         return float(omega), solutions
     return float("nan"), []

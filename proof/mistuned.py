@@ -83,18 +83,18 @@ def is_in(state: str, status: np.ndarray) -> bool:
     return bool((status == (SEPARATES if state == "open" else STICKS)).all())
 
 
-def run(count: int, dense: int, aside: Callable[[str], None], states: Sequence[str] = tuple(STATES)) -> list[Group]:
+def run(count: int, dense: int, report: Callable[[str], None], states: Sequence[str] = tuple(STATES)) -> list[Group]:
     """All groups, each told as it comes; `count` patterns of each, the first `dense` on the dense wheel too."""
     rows = []
     for group in groups(count, dense, states):
-        aside(group.line())
+        report(group.line())
         rows.append(group)
     return rows
 
 
-def as_records(found: Sequence[Group]) -> list[dict[str, object]]:
+def as_records(groups: Sequence[Group]) -> list[dict[str, object]]:
     """For machines."""
-    return [asdict(group) | {"dense_error": group.dense_error if group.compared else None} for group in found]
+    return [asdict(group) | {"dense_error": group.dense_error if group.compared else None} for group in groups]
 
 
 def groups(count: int, dense: int, states: Sequence[str] = tuple(STATES)) -> Iterator[Group]:

@@ -44,7 +44,7 @@ def match_modes(first: np.ndarray, second: np.ndarray, weight: np.ndarray | None
 def match_kinds(
     frequency: np.ndarray,
     share: np.ndarray,
-    wanted: Sequence[tuple[int, float]],
+    targets: Sequence[tuple[int, float]],
     dominant: float = 0.4,
     stranger: float = 10.0,
 ) -> np.ndarray:
@@ -56,9 +56,9 @@ def match_kinds(
     Returns indices into frequency, no two the same; where there are too few modes of a kind, one of another kind stands
     Raises  ValueError where there are fewer modes than wanted ones
     """
-    if len(wanted) > len(frequency):
-        raise ValueError(f"{len(wanted)} modes are wanted of {len(frequency)}: compute more modes")
-    distance = np.log(np.asarray(frequency)[None, :] / np.array([[value] for _, value in wanted])) ** 2
-    for row, (kind, _) in zip(distance, wanted, strict=True):
+    if len(targets) > len(frequency):
+        raise ValueError(f"{len(targets)} modes are wanted of {len(frequency)}: compute more modes")
+    distance = np.log(np.asarray(frequency)[None, :] / np.array([[value] for _, value in targets])) ** 2
+    for row, (kind, _) in zip(distance, targets, strict=True):
         row[share[:, kind] < dominant] = stranger
     return np.asarray(linear_sum_assignment(distance)[1])

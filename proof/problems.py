@@ -85,13 +85,13 @@ def wear(file: SceneFile, balance: HarmonicBalance) -> WearHistory:
 
     Raises  ValueError for a scene without [wear] or without what its steps are measured by
     """
-    wanted = file.scene.wear
-    if wanted is None:
+    table = file.scene.wear
+    if table is None:
         raise ValueError(f"{file.name} has no [wear]: say how it wears")
-    at_rest = wanted.end_at == "at_rest"
-    problem = wear_run.wear_problem(file.scene, file.folder, balance, wanted.lost_below, at_rest)
+    at_rest = table.end_at == "at_rest"
+    problem = wear_run.wear_problem(file.scene, file.folder, balance, table.lost_below, at_rest)
     scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)
-    return evolve(wear_run.rule_of(file.scene, problem, scale), wanted.max_steps)
+    return evolve(wear_run.rule_of(file.scene, problem, scale), table.max_steps)
 
 
 def impact_work(balance: HarmonicBalance, state: State) -> np.ndarray:

@@ -139,7 +139,7 @@ def _response(balance: HarmonicBalance, *omegas: float) -> Numbers:
         state = solution.state
         if not solution.converged:
             raise RuntimeError(str(solution.outcome))
-        of = {
+        at_point = {
             "response": balance.outputs(state)[:, 1:],
             "static response": balance.outputs(state)[:, :1],
             "forces": state.cycle.force,
@@ -147,8 +147,8 @@ def _response(balance: HarmonicBalance, *omegas: float) -> Numbers:
             "slope over frequency": balance.frequency_slope(state)[1],
         }
         if "n" in balance.contact.components:
-            of["preload"] = np.array([balance.preload(state)])
-        result |= {f"{name} at point {number + 1}": np.asarray(value) for name, value in of.items()}
+            at_point["preload"] = np.array([balance.preload(state)])
+        result |= {f"{name} at point {number + 1}": np.asarray(value) for name, value in at_point.items()}
     return result
 
 
@@ -224,8 +224,8 @@ def pairs() -> Numbers:
     for transitions in ("located", "sampled"):
         for gap in (0.0, -2e-6):
             setting = replace(body.ordinary, harmonics=(0, 1, 2, 3), transitions=transitions, gap=gap)
-            of = _response(body.balance(setting), setting.omega)
-            result |= {f"{name}, {transitions}, gap {gap:g} m": value for name, value in of.items()}
+            at_gap = _response(body.balance(setting), setting.omega)
+            result |= {f"{name}, {transitions}, gap {gap:g} m": value for name, value in at_gap.items()}
     plain = body.balance(replace(body.ordinary, harmonics=(0, 1)))
     base = np.zeros((plain.compliance.n_contact, 3))
     base[::3, 1] = 2e-6
@@ -296,7 +296,7 @@ def in_time() -> Numbers:
 
 
 RUNS: Mapping[str, Callable[[], Numbers]] = {
-    one.__name__: one for one in (bodies, blade, leaf_seal, beam, pairs, peak, wear, in_time, stated)
+    scene_run.__name__: scene_run for scene_run in (bodies, blade, leaf_seal, beam, pairs, peak, wear, in_time, stated)
 }
 
 

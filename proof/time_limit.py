@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
 COMPILERS = ("numba", "llvmlite")
-AGAIN = 0.2  # processor seconds after which TimeUp comes again where the body goes on: longer than any clearing up
+# processor seconds after which TimeUp is raised again where the body continues: longer than any clearing up
+REPEAT_SECONDS = 0.2
 
 
 class TimeUp(BaseException):
@@ -47,13 +48,13 @@ def processor_seconds(limit: float) -> Iterator[None]:
             raised = True
             raise end
 
-    def lost(what: UnraisableHookArgs) -> None:
-        if what.exc_value is not end:
-            hook(what)
+    def lost(unraisable: UnraisableHookArgs) -> None:
+        if unraisable.exc_value is not end:
+            hook(unraisable)
 
     hook, sys.unraisablehook = sys.unraisablehook, lost
     before = signal.signal(signal.SIGPROF, up)
-    signal.setitimer(signal.ITIMER_PROF, limit, AGAIN)
+    signal.setitimer(signal.ITIMER_PROF, limit, REPEAT_SECONDS)
     try:
         yield
     except Exception as made_of_it:

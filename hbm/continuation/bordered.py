@@ -157,9 +157,9 @@ def tangent(
     balance, _ = path.place(value)
     linear = balance.linearise(state)
     zero = np.zeros_like(state.residual)
-    found, _ = solve(linear, path.slope(value, state), border, metric, (zero, 1.0), tolerance, options.max_products)
-    side = 1.0 if metric.dot(found, border) >= 0 else -1.0
-    return metric.unit(found) * side
+    direction, _ = solve(linear, path.slope(value, state), border, metric, (zero, 1.0), tolerance, options.max_products)
+    side = 1.0 if metric.dot(direction, border) >= 0 else -1.0
+    return metric.unit(direction) * side
 
 
 def correct(
@@ -190,13 +190,13 @@ def correct(
             outcome = SolveEnd.NO_DIRECTION.say(f" {reason}")
             break
         products += spent
-        new = place.search(path, direction)
-        history.append(new.error)
-        if new.error >= place.error * (1 - 1e-10):
+        trial = place.search(path, direction)
+        history.append(trial.error)
+        if trial.error >= place.error * (1 - 1e-10):
             outcome = SolveEnd.NO_DESCENT.say(f" {place.error:.1e}")
             break
-        forcing = 0.5 * (new.error / place.error) ** 1.5
-        place = new
+        forcing = 0.5 * (trial.error / place.error) ** 1.5
+        place = trial
     return Solution(place.state, outcome, len(history) - 1, products, tuple(history)), place.value
 
 

@@ -71,8 +71,8 @@ class Branch:
         """(n_point,) complex amplitude a_1 - i b_1 of an output [m]."""
         row = self.response[:, self.output_names.index(output)]
         static = row.shape[1] % 2
-        found: np.ndarray = row[:, static] - 1j * row[:, static + 1]
-        return found
+        amplitudes: np.ndarray = row[:, static] - 1j * row[:, static + 1]
+        return amplitudes
 
     @property
     def controlled(self) -> bool:
@@ -93,10 +93,10 @@ class Branch:
         best = int(np.argmax(self.height(output)))
         if best in (0, len(self.omega) - 1):
             return "the response is highest at an end of response.frequency, widen it"
-        beside = [
+        unsolved = [
             hertz for hertz, end in zip(self.frequency, self.outcome, strict=True) if end.kind is SolveEnd.BESIDE_PEAK
         ]
-        return f"none was found beside the point at {beside[0]:.5g} Hz; more response.points" if beside else ""
+        return f"none was found beside the point at {unsolved[0]:.5g} Hz; more response.points" if unsolved else ""
 
     def inserted(self, at: int, point: BranchPoint) -> Branch:
         """The branch with one more point before point `at`."""
@@ -182,11 +182,11 @@ class BranchBuilder:
         del self.value[n_point:], self.x[n_point:], self.points[n_point:]
         self.folds = [i for i in self.folds if i < n_point]
 
-    def tell(self, on_point: OnPoint | None, stop: float, most: int) -> None:
+    def tell(self, on_point: OnPoint | None, stop: float, max_points: int) -> None:
         """Call `on_point`, where there is one, with points done, points expected at the present pace, the last one."""
         if on_point is not None:
             done, share = len(self.value), abs(self.value[-1] - self.value[0]) / abs(stop - self.value[0])
-            on_point(done, max(done, min(most, round(done / max(share, 1e-3)))), self.points[-1])
+            on_point(done, max(done, min(max_points, round(done / max(share, 1e-3)))), self.points[-1])
 
     def finish(self, end: Outcome[BranchEnd]) -> Branch:
         """The branch; `end` says why it ends where it ends."""

@@ -37,15 +37,15 @@ def constant_response(balance: HarmonicBalance, output: str, amplitude: float) -
     return replace(balance, compliance=HeldOutput.of(balance.compliance, output, amplitude), load_factor=1.0)
 
 
-def driven(held: HarmonicBalance, branch: Branch) -> Branch:
+def driven(controlled: HarmonicBalance, branch: Branch) -> Branch:
     """A curve of `constant_response` with the load factor of each point, in the phase of the loads as they stand."""
     force = np.empty(len(branch.omega), complex)
     for i, omega in enumerate(branch.omega):
-        state = held.evaluate(omega, held.shaped(branch.contact[i]), jacobian=False)
-        point = held.at(omega)
+        state = controlled.evaluate(omega, controlled.shaped(branch.contact[i]), jacobian=False)
+        point = controlled.at(omega)
         assert isinstance(point, HeldPoint)
-        force[i] = point.force(state.g, held.load_factor)
-    return _in_phase(held, branch, force)
+        force[i] = point.force(state.g, controlled.load_factor)
+    return _in_phase(controlled, branch, force)
 
 
 class PhaseResonance(FreeVibration):
@@ -63,8 +63,8 @@ class PhaseResonance(FreeVibration):
         self._range, self._name = (low, high), output
         super().__init__(balance, 0, output)
         self.column = self._load()
-        moved = self._output_row()
-        self.row = moved / (moved @ self.reference)
+        output_row = self._output_row()
+        self.row = output_row / (output_row @ self.reference)
         self.sustained, self.push = 0.0, complex(self.reference.conj() @ self.column)
 
     def driving(self, omega: float, zeta: float, a: float) -> complex:
@@ -75,15 +75,15 @@ class PhaseResonance(FreeVibration):
         """(n,) modal force of the vibrating loads."""
         system, _ = self.balance.model.at_harmonic(1)
         force = self.balance.excitation.force(1, system.loads, system.n_dof)
-        found: np.ndarray = self.modes[self.first].shapes.conj().T @ force
-        return found
+        modal_force: np.ndarray = self.modes[self.first].shapes.conj().T @ force
+        return modal_force
 
     def _output_row(self) -> np.ndarray:
         row: np.ndarray = self.modes[self.first].O[self.balance.compliance.output_names.index(self._name)]
         return row
 
-    def _reference(self, mode: int | None, apart: np.ndarray) -> tuple[np.ndarray, float, float]:
-        squares, shapes = self._at_rest(apart)
+    def _reference(self, mode: int | None, open_rows: np.ndarray) -> tuple[np.ndarray, float, float]:
+        squares, shapes = self._at_rest(open_rows)
         omega = np.sqrt(np.maximum(squares, 0.0))
         low, high = self._range
         inside = np.flatnonzero((omega >= low) & (omega <= high) & (omega > 0))
@@ -91,7 +91,7 @@ class PhaseResonance(FreeVibration):
         if not len(inside) or not reached.max() > 0:
             span = f"{low / (2 * np.pi):.6g} and {high / (2 * np.pi):.6g} Hz"
             raise Refusal(f"no mode that the loads move the output in lies between {span}: give another range")
-        return super()._reference(int(inside[np.argmax(reached / squares[inside])]), apart)
+        return super()._reference(int(inside[np.argmax(reached / squares[inside])]), open_rows)
 
 
 @single
@@ -143,8 +143,8 @@ def _require_one_force(balance: HarmonicBalance) -> None:
 def _in_phase(balance: HarmonicBalance, branch: Branch, force: np.ndarray) -> Branch:
     """The points with their complex factors on the loads (n_point,), moved in time until these are real and > 0."""
     angles = -np.angle(force)
-    moved = [
+    shifted = [
         np.stack([balance.basis.shift(row, angle) for row, angle in zip(rows, angles, strict=True)])
         for rows in (branch.response, branch.contact)
     ]
-    return replace(branch, response=moved[0], contact=moved[1], load_factor=np.abs(force))
+    return replace(branch, response=shifted[0], contact=shifted[1], load_factor=np.abs(force))

@@ -30,13 +30,13 @@ from tribodyn.hbm.threads import single
 class CurvePeakRules:
     """How peaks of a curve are refined.
 
-    tried : maxima of a curve, the highest foreseen first
+    max_refined : maxima of a curve, the highest foreseen first
     trials : solves along the arc, after which the maximum is left as it is
     shortest : arc length between two points, of what they were apart at first, beside a kink where no slope vanishes
     tangent : relative accuracy of tangents
     """
 
-    tried: int = 3
+    max_refined: int = 3
     trials: int = 40
     shortest: float = 1e-6
     tangent: float = 1e-8
@@ -64,22 +64,22 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
     A maximum that no solve makes higher stays the point that it is, marked where the search for its peak has failed or
     ended lower and that is foreseen higher than all that is solved
     """
-    found: list[tuple[int, BranchPoint]] = []
+    insertions: list[tuple[int, BranchPoint]] = []
     failed: list[_Candidate] = []
     heights = branch.amplitude(site.output)
     highest = float(branch.height(site.output).max())
-    for candidate in _candidates(balance, branch, site)[: RULES.tried]:
+    for candidate in _candidates(balance, branch, site)[: RULES.max_refined]:
         i = candidate.point
         if candidate.turns:
-            point = along_arc(balance, branch, i, site)
+            point = peak_on_arc(balance, branch, i, site)
         else:
             three = [k for k in range(len(heights))[max(i - 1, 0) : i + 2] if k == i or k not in branch.folds]
-            known = {float(branch.omega[k]): balance.shaped(branch.contact[k]) for k in three}
+            solved_x = {float(branch.omega[k]): balance.shaped(branch.contact[k]) for k in three}
             point = None
             with suppress(NoPeak):  # it still rises at the highest frequency that is modelled
-                point = site.solve_between(balance, float(branch.omega[i]), known, candidate.low, candidate.high)
-        same = (1 - site.tolerance) * heights[i]  # lower than that lies on another part of the curve
-        if point is None or not point.solution.converged or point.amplitude < same:
+                point = site.solve_between(balance, float(branch.omega[i]), solved_x, candidate.low, candidate.high)
+        lowest = (1 - site.tolerance) * heights[i]  # lower than that lies on another part of the curve
+        if point is None or not point.solution.converged or point.amplitude < lowest:
             failed += [candidate]
             continue
         state, inside = point.state, candidate.turns or candidate.low < point.state.omega < candidate.high
@@ -88,12 +88,12 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
         at = i + 1 if _lies_behind(branch, i, state.omega, state.flat) else i
         energy = float(balance.energy(state).sum())
         solved = BranchPoint(state.omega, state.x, state.omega, point.response, energy, CONVERGED, point.solves)
-        found.append((at, solved))
+        insertions.append((at, solved))
         highest = max(highest, point.amplitude)
-    beside = {candidate.point for candidate in failed if max(candidate.height, heights[candidate.point]) >= highest}
-    marked = (SolveEnd.BESIDE_PEAK.say() if i in beside else outcome for i, outcome in enumerate(branch.outcome))
+    unsolved = {candidate.point for candidate in failed if max(candidate.height, heights[candidate.point]) >= highest}
+    marked = (SolveEnd.BESIDE_PEAK.say() if i in unsolved else outcome for i, outcome in enumerate(branch.outcome))
     branch = replace(branch, outcome=tuple(marked))
-    for at, solved in sorted(found, key=lambda item: -item[0]):
+    for at, solved in sorted(insertions, key=lambda item: -item[0]):
         branch = branch.inserted(at, solved)
     return branch
 
@@ -103,19 +103,19 @@ def _candidates(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> list[
     omega, height = branch.omega, np.where(branch.converged, branch.amplitude(site.output), -1.0)
     inner = (height[1:-1] > 0) & (height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])
     tops = np.flatnonzero(inner & (height[:-2] >= 0) & (height[2:] >= 0)) + 1
-    found = []
+    candidates = []
     for i in map(int, tops):
-        foreseen = vertex(omega[i - 1 : i + 2], height[i - 1 : i + 2])[1]
+        predicted = vertex(omega[i - 1 : i + 2], height[i - 1 : i + 2])[1]
         low, high = sorted((float(omega[i - 1]), float(omega[i + 1])))
         turns = bool((omega[i] - omega[i - 1]) * (omega[i + 1] - omega[i]) <= 0)
-        found.append(_Candidate(foreseen, i, low, high, turns))
+        candidates.append(_Candidate(predicted, i, low, high, turns))
     for i in map(int, np.flatnonzero((height[:-1] > 0) & (height[1:] > 0))):
         if i not in tops and i + 1 not in tops:
-            foreseen = _hidden(balance, branch, i, site)
-            if foreseen > 0:
+            predicted = _hidden(balance, branch, i, site)
+            if predicted > 0:
                 low, high = sorted((float(omega[i]), float(omega[i + 1])))
-                found.append(_Candidate(foreseen, i if height[i] > height[i + 1] else i + 1, low, high))
-    return sorted(found, key=lambda candidate: -candidate.height)
+                candidates.append(_Candidate(predicted, i if height[i] > height[i + 1] else i + 1, low, high))
+    return sorted(candidates, key=lambda candidate: -candidate.height)
 
 
 def _hidden(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> float:
@@ -142,16 +142,16 @@ def _hidden(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> f
 
 def _lies_behind(branch: Branch, i: int, omega: float, flat: np.ndarray) -> bool:
     """Whether a point beside point i comes after it on the way of the branch."""
-    beside = branch.omega[max(i - 1, 0) : i + 2]
-    steps = np.diff(beside)
+    neighbours = branch.omega[max(i - 1, 0) : i + 2]
+    steps = np.diff(neighbours)
     if steps[0] * steps[-1] > 0:
         return bool((omega - branch.omega[i]) * steps[0] > 0)
-    there = flat - branch.contact[i]
+    offset = flat - branch.contact[i]
     before, after = branch.contact[i - 1] - branch.contact[i], branch.contact[i + 1] - branch.contact[i]
-    return bool(np.vdot(there, after) / np.linalg.norm(after) > np.vdot(there, before) / np.linalg.norm(before))
+    return bool(np.vdot(offset, after) / np.linalg.norm(after) > np.vdot(offset, before) / np.linalg.norm(before))
 
 
-def along_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> OperatingPoint | None:
+def peak_on_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> OperatingPoint | None:
     """The peak beside point i of a curve that turns back there; None where a solve fails."""
     path = parameter.of(balance)
     span = float(np.ptp(branch.omega[i - 1 : i + 2]))
@@ -172,16 +172,16 @@ def along_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) ->
 
     spent = 0
     try:
-        here = solved(places[1], metric.unit(places[2] - places[0]))
+        middle = solved(places[1], metric.unit(places[2] - places[0]))
         spent += 1
-        if here is None:
+        if middle is None:
             return None
-        rises = here[1].slope > 0
-        other = solved(places[2] if rises else places[0], here[0].tangent)
+        rises = middle[1].slope > 0
+        other = solved(places[2] if rises else places[0], middle[0].tangent)
         spent += 1
-        if other is None or other[1].slope * here[1].slope > 0:
+        if other is None or other[1].slope * middle[1].slope > 0:
             return None
-        ends = [here, other] if rises else [other, here]  # the amplitude rises at the first, falls at the second
+        ends = [middle, other] if rises else [other, middle]  # the amplitude rises at the first, falls at the second
         weight, best = [1.0, 1.0], min(ends, key=lambda end: end[1].miss)
         first = metric.norm(ends[1][0].place - ends[0][0].place)
         while best[1].miss > site.tolerance and spent < RULES.trials:
@@ -189,13 +189,13 @@ def along_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) ->
             if segment.length <= RULES.shortest * first:
                 break
             up, down = weight[0] * ends[0][1].slope, -weight[1] * ends[1][1].slope
-            there = solved(segment.at(float(np.clip(up / (up + down), 0.02, 0.98))), segment.along)
+            trial = solved(segment.at(float(np.clip(up / (up + down), 0.02, 0.98))), segment.mean_tangent)
             spent += 1
-            if there is None:
+            if trial is None:
                 return None
-            k = 0 if there[1].slope > 0 else 1
-            ends[k], weight[k], weight[1 - k] = there, 1.0, 0.5 * weight[1 - k]  # Illinois
-            best = min(best, there, key=lambda end: end[1].miss)
+            k = 0 if trial[1].slope > 0 else 1
+            ends[k], weight[k], weight[1 - k] = trial, 1.0, 0.5 * weight[1 - k]  # Illinois
+            best = min(best, trial, key=lambda end: end[1].miss)
         solutions = (end[1].solution for end in [*ends, best])
         points = (OperatingPoint.of(balance, solution, site.output, spent) for solution in solutions)
         return max(points, key=lambda point: point.amplitude)

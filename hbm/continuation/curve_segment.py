@@ -87,23 +87,29 @@ class Segment:
         return float(np.arccos(np.clip(self.metric.dot(self.start.tangent, self.end.tangent), -1.0, 1.0)))
 
     @cached_property
-    def along(self) -> Direction:
+    def mean_tangent(self) -> Direction:
         """Unit direction along which both ends advance alike, so that hyperplanes normal to it cut the curve once."""
         return self.metric.unit(self.start.tangent + self.end.tangent)
 
     @cached_property
     def slant(self) -> float:
-        """Angle between the chord and `along` [rad]: zero on a circle, at most half of the turn round a kink."""
-        advance = self.metric.dot(self.chord, self.along)
+        """Angle between the chord and `mean_tangent` [rad]: zero on a circle, at most half of the turn round a kink."""
+        advance = self.metric.dot(self.chord, self.mean_tangent)
         return float(np.arctan2(np.sqrt(max(self.length**2 - advance**2, 0.0)), advance))
 
     @cached_property
     def corner(self) -> tuple[float, float, float]:
         """Where the tangents of the ends come closest: ahead of the start, before the end, and how far apart."""
         cosine = np.cos(self.angle)
-        ahead, behind = self.metric.dot(self.chord, self.start.tangent), self.metric.dot(self.chord, self.end.tangent)
+        advance_at_start, advance_at_end = (
+            self.metric.dot(self.chord, self.start.tangent),
+            self.metric.dot(self.chord, self.end.tangent),
+        )
         sine2 = max(1.0 - cosine**2, 1e-30)  # parallel tangents meet far away, not beyond all numbers
-        a, b = (ahead - cosine * behind) / sine2, (behind - cosine * ahead) / sine2
+        a, b = (
+            (advance_at_start - cosine * advance_at_end) / sine2,
+            (advance_at_end - cosine * advance_at_start) / sine2,
+        )
         miss = self.chord - self.start.tangent * a - self.end.tangent * b
         return a, b, self.metric.norm(miss)
 
@@ -136,7 +142,7 @@ class Segment:
         """The segment without the solutions at its ends."""
         return Segment(self.start.bare(), self.end.bare(), self.metric)
 
-    def near(self, other: Segment) -> bool:
+    def meets(self, other: Segment) -> bool:
         """Whether the ranges of the parameter of two segments meet."""
         low, high = sorted((self.start.value, self.end.value))
         a, b = sorted((other.start.value, other.end.value))
@@ -186,10 +192,10 @@ class Segment:
         border = metric.unit(point.tangent)
         if not 0.0 <= s <= 1.0 or sense * metric.dot(border, self.chord) < 0.9 * self.length:
             return False
-        here = self.at(s)
-        if metric.norm(point.place - here) > 0.05 * self.length:
+        point_on_segment = self.at(s)
+        if metric.norm(point.place - point_on_segment) > 0.05 * self.length:
             return False
-        guess = here + border * metric.dot(point.place - here, border)
+        guess = point_on_segment + border * metric.dot(point.place - point_on_segment, border)
         solution, value = bordered.correct(path, guess, border, metric, options)
         miss = metric.norm(Direction(solution.state.flat, value) - point.place)
         return solution.converged and miss < 1e-4 * self.length
@@ -210,13 +216,13 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
         segment, weight, corner = Segment(ends[0], ends[1], metric), [1.0, 1.0], np.inf
         for _ in range(RULES.fold_trials):
             before, corner = corner, _corner_value(segment)
-            settled = abs(corner - before) <= 0.1 * tolerance * abs(corner)
-            guess = segment.at(_share(segment, weight, settled))
-            solution, value = bordered.correct(path, guess, segment.along, metric, tight)
+            is_stationary = abs(corner - before) <= 0.1 * tolerance * abs(corner)
+            guess = segment.at(_share(segment, weight, is_stationary))
+            solution, value = bordered.correct(path, guess, segment.mean_tangent, metric, tight)
             if min(solution.history) > options.tolerance:
                 return None
             tangent = bordered.tangent(
-                path, value, solution.state, segment.along, metric, tight, RULES.fold_tangent_accuracy
+                path, value, solution.state, segment.mean_tangent, metric, tight, RULES.fold_tangent_accuracy
             )
             point = CurvePoint.of(value, replace(solution, outcome=CONVERGED), tangent, fold=True)
             if tangent.p * segment.start.tangent.p > 0:  # Illinois: halve the weight of an end that stays
@@ -225,7 +231,7 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
                 segment, weight = Segment(segment.start, point, metric), [0.5 * weight[0], 1.0]
             steepest = max(abs(segment.start.tangent.p), abs(segment.end.tangent.p))
             slope = abs(tangent.p) if segment.angle < RULES.kink_angle else steepest
-            if settled or slope * segment.length <= tolerance * abs(value) or segment.length < 1e-13:
+            if is_stationary or slope * segment.length <= tolerance * abs(value) or segment.length < 1e-13:
                 return point
     except BorderFailed:
         return None
@@ -248,7 +254,7 @@ def _corner_value(segment: Segment) -> float:
     return segment.start.value + a * segment.start.tangent.p
 
 
-def _share(segment: Segment, weight: list[float], settled: bool) -> float:
+def _share(segment: Segment, weight: list[float], is_stationary: bool) -> float:
     """Where between its ends to look for the fold of a segment, 0..1.
 
     Round a corner it is on the longer leg, close to where the tangents meet, so that both legs get short in turn and
@@ -258,7 +264,7 @@ def _share(segment: Segment, weight: list[float], settled: bool) -> float:
         a, b, _ = segment.corner
         if min(a, b) <= 0:
             return 0.5
-        if settled:
+        if is_stationary:
             return a / (a + b)
         return (0.9 * a if a > b else a + 0.1 * b) / (a + b)
     a, b = abs(segment.start.tangent.p) * weight[0], abs(segment.end.tangent.p) * weight[1]

@@ -62,7 +62,7 @@ class CurveStepper:
         self._metric = self._measure(self._reference)
         onward = Direction(np.zeros_like(self._reference), float(np.sign(stop - start)))
         forward = self._metric.unit(heading or onward)
-        self._here = CurvePoint.of(start, first, self._tangent(start, first, forward) or forward)
+        self._point = CurvePoint.of(start, first, self._tangent(start, first, forward) or forward)
         self._bend: Direction | None = None
         self._step = options.step
         self.segments: list[Segment] = []
@@ -71,8 +71,8 @@ class CurveStepper:
     def _measure(self, flat: np.ndarray) -> Metric:
         """The metric at a point: its length is the size of the vibration or the way that x has gone, of late."""
         vibration = np.linalg.norm(flat[:, self._order > 0])
-        away = float(np.linalg.norm(flat - self._reference))
-        self._length = max(float(vibration), away, RULES.least_length_ratio * self._length)
+        distance = float(np.linalg.norm(flat - self._reference))
+        self._length = max(float(vibration), distance, RULES.least_length_ratio * self._length)
         length = self._length or float(np.linalg.norm(flat)) or 1.0
         return Metric(length, self._width)
 
@@ -87,13 +87,13 @@ class CurveStepper:
     @property
     def sense(self) -> float:
         """Sign of the way that the parameter goes at the point reached."""
-        return float(np.sign(self._here.tangent.p))
+        return float(np.sign(self._point.tangent.p))
 
     def rewind(self, index: int) -> None:
         """Go back to the start of an earlier segment, and on from there in shorter steps."""
         segment = self.segments[index]
         del self.segments[index:]
-        self._here, self._metric, self._bend = segment.start, segment.metric, None
+        self._point, self._metric, self._bend = segment.start, segment.metric, None
         self._step = max(0.25 * segment.length, self._options.min_step)
 
     def advance(self) -> list[Segment]:
@@ -114,19 +114,19 @@ class CurveStepper:
 
     def _ahead(self, step: float) -> Direction:
         """Where the curve is expected after a step."""
-        there = self._here.place + self._here.tangent * step
-        return there if self._bend is None else there + self._bend * (0.5 * step * step)
+        prediction = self._point.place + self._point.tangent * step
+        return prediction if self._bend is None else prediction + self._bend * (0.5 * step * step)
 
     def _straight(self, step: float) -> Segment | None:
         """One step in the hyperplane normal to the tangent; None where no solution is found there."""
-        here = self._here
-        solution, value = bordered.correct(self._path, self._ahead(step), here.tangent, self._metric, self._newton)
+        start = self._point
+        solution, value = bordered.correct(self._path, self._ahead(step), start.tangent, self._metric, self._newton)
         if not solution.converged:
             self.trouble = f"no solution found in a step of {step:.1e}: {solution.outcome}"
             return None
-        moved = Direction(solution.state.flat, value) - here.place
-        tangent = self._tangent(value, solution, here.tangent) or self._metric.unit(moved)
-        return Segment(here, CurvePoint.of(value, solution, tangent), self._metric)
+        chord = Direction(solution.state.flat, value) - start.place
+        tangent = self._tangent(value, solution, start.tangent) or self._metric.unit(chord)
+        return Segment(start, CurvePoint.of(value, solution, tangent), self._metric)
 
     def _fitting(self, trial: Segment, step: float) -> list[Segment] | None:
         """The pieces of a step that is short for the curve, or turns at a corner whose legs are straight and meet."""
@@ -155,17 +155,17 @@ class CurveStepper:
             return [part]
         if part.slant > 0.5 * curve_segment.RULES.kink_angle:
             return None
-        solution, value = bordered.correct(self._path, part.at(0.5), part.along, part.metric, self._newton)
-        tangent = self._tangent(value, solution, part.along) if solution.converged else None
+        solution, value = bordered.correct(self._path, part.at(0.5), part.mean_tangent, part.metric, self._newton)
+        tangent = self._tangent(value, solution, part.mean_tangent) if solution.converged else None
         if tangent is None:
             return None
         middle = CurvePoint.of(value, solution, tangent)
         pieces: list[Segment] = []
         for half in (Segment(part.start, middle, part.metric), Segment(middle, part.end, part.metric)):
-            found = self._pieces(half, halvings - 1)
-            if found is None:
+            half_pieces = self._pieces(half, halvings - 1)
+            if half_pieces is None:
                 return None
-            pieces += found
+            pieces += half_pieces
         return pieces
 
     def arrives(self, part: Segment, value: float, solution: Solution) -> bool:
@@ -180,8 +180,8 @@ class CurveStepper:
 
     def _is_straight(self, point: CurvePoint, step: float) -> bool:
         """Whether the curve keeps the tangent of a point over a step, as a leg of a corner does."""
-        there = point.place + point.tangent * step
-        solution, value = bordered.correct(self._path, there, point.tangent, self._metric, self._newton)
+        prediction = point.place + point.tangent * step
+        solution, value = bordered.correct(self._path, prediction, point.tangent, self._metric, self._newton)
         tangent = self._tangent(value, solution, point.tangent)
         return solution.converged and tangent is not None and self._metric.dot(tangent, point.tangent) > 0.99
 
@@ -193,17 +193,17 @@ class CurveStepper:
         curve goes. A point is sought in the hyperplane that both legs cross in their sense, and none that lies on
         the leg we came on.
         """
-        here, metric = self._here, self._metric
-        ahead = here.place + here.tangent * step
+        start, metric = self._point, self._metric
+        ahead = start.place + start.tangent * step
         for leg in self._legs(ahead) if trial is None else [trial.end.tangent]:
-            along = here.tangent + leg
-            if metric.norm(along) < 1e-3:
+            border = start.tangent + leg
+            if metric.norm(border) < 1e-3:
                 continue
-            solution, value = bordered.correct(self._path, ahead, metric.unit(along), metric, self._newton)
+            solution, value = bordered.correct(self._path, ahead, metric.unit(border), metric, self._newton)
             tangent = self._tangent(value, solution, leg) if solution.converged else None
             if tangent is None:
                 continue
-            segment = Segment(here, CurvePoint.of(value, solution, tangent), metric)
+            segment = Segment(start, CurvePoint.of(value, solution, tangent), metric)
             if curve_segment.RULES.kink_angle < segment.angle < np.pi - 1e-3 - 2 * step:
                 return segment
         return None
@@ -215,7 +215,7 @@ class CurveStepper:
         o = self._options.newton
         try:
             leg = bordered.tangent(
-                self._path, ahead.p, state, self._here.tangent, self._metric, o, RULES.tangent_accuracy
+                self._path, ahead.p, state, self._point.tangent, self._metric, o, RULES.tangent_accuracy
             )
         except BorderFailed:
             return []
@@ -247,7 +247,7 @@ class CurveStepper:
         assert segment.end.solution is not None
         self.segments.append(segment.bare())
         self._metric = self._measure(segment.end.place.x)
-        self._here = replace(segment.end, tangent=self._metric.unit(segment.end.tangent))
+        self._point = replace(segment.end, tangent=self._metric.unit(segment.end.tangent))
         factor = 2.0 ** np.clip((o.newton_target - segment.end.solution.steps) / 2, -1, 2)
         if segment.angle > curve_segment.RULES.kink_angle:
             self._bend = None

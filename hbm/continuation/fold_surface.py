@@ -63,13 +63,13 @@ class NoFold(SolverFailure):
 class FoldPoint:
     """A fold with the direction in which its line continues.
 
-    value : of the parameter; solution : at the fold; along : unit tangent of the response curve
+    value : of the parameter; solution : at the fold; response_tangent : unit tangent of the response curve
     tangent, change : of (x, omega) and of the parameter along the line of folds, of unit length together
     """
 
     value: float
     solution: Solution
-    along: Direction
+    response_tangent: Direction
     tangent: Direction
     change: float
 
@@ -99,59 +99,59 @@ class SolutionSurface:
     def first(self, value: float, guess: Direction, sense: float) -> FoldPoint:
         """The fold nearest to a guess (x, omega) at a value, with its line towards `sense`; raises NoFold."""
         metric = self._metric(guess.x, self._path.make(value))
-        along = self._null(self._response(value), guess, metric)
-        point = self._searched(value, guess, along, metric)
-        solution, along = point.solution, point.tangent
+        response_tangent = self._null(self._response(value), guess, metric)
+        point = self._searched(value, guess, response_tangent, metric)
+        solution, response_tangent = point.solution, point.tangent
         assert solution is not None
         try:
-            across = self._across(value, solution, along, metric)
-            scalar, slopes = self._slopes(value, point.place, along, across, metric)
+            across = self._across(value, solution, response_tangent, metric)
+            scalar, slopes = self._slopes(value, point.place, response_tangent, across, metric)
         except BorderFailed as reason:
             raise NoFold(str(reason)) from None
         shares = (-slopes[1], slopes[0]) if abs(scalar) <= self._options.residual and slopes[0] != 0 else (0.0, 1.0)
         sign = -1.0 if shares[1] * sense < 0 else 1.0
-        tangent = along * shares[0] + across * shares[1]
-        return self._unit(FoldPoint(value, solution, along, tangent, shares[1]), metric, sign)
+        tangent = response_tangent * shares[0] + across * shares[1]
+        return self._unit(FoldPoint(value, solution, response_tangent, tangent, shares[1]), metric, sign)
 
-    def ahead(self, here: FoldPoint, step: float) -> FoldPoint:
+    def ahead(self, point: FoldPoint, step: float) -> FoldPoint:
         """The next fold of the line: by Newton, or where kinks forbid that by search at a value; raises NoFold."""
-        metric = self._metric(here.place.x, self._path.make(here.value))
-        value, guess = here.value + step * here.change, here.place + here.tangent * step
+        metric = self._metric(point.place.x, self._path.make(point.value))
+        value, guess = point.value + step * point.change, point.place + point.tangent * step
         try:
-            there = self._newton_fold(value, guess, here.along)
-            moved, change = there.place - here.place, there.value - here.value
-            dot = metric.dot(moved, there.tangent) + change * there.change / self._span**2
-            if 0.3 * step < self._length(metric, moved, change) < 2 * step and abs(dot) > 0.7 * step:
-                return self._unit(there, metric, float(np.sign(dot)))
+            following = self._newton_fold(value, guess, point.response_tangent)
+            chord, change = following.place - point.place, following.value - point.value
+            dot = metric.dot(chord, following.tangent) + change * following.change / self._span**2
+            if 0.3 * step < self._length(metric, chord, change) < 2 * step and abs(dot) > 0.7 * step:
+                return self._unit(following, metric, float(np.sign(dot)))
         except NoFold:
             pass
-        return self.at(value, guess, here)
+        return self.at(value, guess, point)
 
-    def at(self, value: float, guess: Direction, here: FoldPoint) -> FoldPoint:
+    def at(self, value: float, guess: Direction, neighbour: FoldPoint) -> FoldPoint:
         """The fold at a value, next to the fold `here` on its line; raises NoFold."""
-        metric = self._metric(here.place.x, self._path.make(here.value))
-        reach = 2 * self._length(metric, guess - here.place, value - here.value)
-        point = self._searched(value, guess, here.along, metric)
-        moved = point.place - here.place
-        if value == here.value or self._length(metric, moved, value - here.value) > reach:
+        metric = self._metric(neighbour.place.x, self._path.make(neighbour.value))
+        reach = 2 * self._length(metric, guess - neighbour.place, value - neighbour.value)
+        point = self._searched(value, guess, neighbour.response_tangent, metric)
+        chord = point.place - neighbour.place
+        if value == neighbour.value or self._length(metric, chord, value - neighbour.value) > reach:
             raise NoFold(f"the next fold, at {self._path.say(value)}, lies on another line")
         assert point.solution is not None
-        return self._unit(FoldPoint(value, point.solution, point.tangent, moved, value - here.value), metric, 1.0)
+        return self._unit(FoldPoint(value, point.solution, point.tangent, chord, value - neighbour.value), metric, 1.0)
 
-    def _newton_fold(self, value: float, guess: Direction, along: Direction) -> FoldPoint:
+    def _newton_fold(self, value: float, guess: Direction, response_tangent: Direction) -> FoldPoint:
         """Newton for the fold near a guess (x, omega), normal to the line of folds; raises NoFold."""
         row = np.zeros(2)
         for trial in range(self._options.trials):
             response = self._response(value)
             metric = self._metric(guess.x, response.make(value))
-            solution = self._solved(response, guess, along, metric)
-            here = Direction(solution.state.flat, solution.state.omega)
+            solution = self._solved(response, guess, response_tangent, metric)
+            place = Direction(solution.state.flat, solution.state.omega)
             try:
-                along = bordered.tangent(
-                    response, here.p, solution.state, along, metric, self._newton, self._options.accuracy
+                response_tangent = bordered.tangent(
+                    response, place.p, solution.state, response_tangent, metric, self._newton, self._options.accuracy
                 )
-                across = self._across(value, solution, along, metric)
-                scalar, slopes = self._slopes(value, here, along, across, metric)
+                across = self._across(value, solution, response_tangent, metric)
+                scalar, slopes = self._slopes(value, place, response_tangent, across, metric)
             except BorderFailed as reason:
                 raise NoFold(str(reason)) from None
             size = float(np.hypot(*slopes))
@@ -161,14 +161,14 @@ class SolutionSurface:
             if trial == 0:
                 row = line
             if abs(scalar) <= self._options.residual:
-                tangent = along * float(line[0]) + across * float(line[1])
-                return FoldPoint(value, solution, along, tangent, float(line[1]))
+                tangent = response_tangent * float(line[0]) + across * float(line[1])
+                return FoldPoint(value, solution, response_tangent, tangent, float(line[1]))
             matrix = np.array([slopes, row])
             if abs(np.linalg.det(matrix)) < 1e-12 * size:
                 break
             move = np.linalg.solve(matrix, [-scalar, 0.0])
             move *= min(1.0, 0.3 / max(abs(move[0]), abs(move[1]) / self._span, 1e-300))
-            guess = here + along * float(move[0]) + across * float(move[1])
+            guess = place + response_tangent * float(move[0]) + across * float(move[1])
             value += float(move[1])
         raise NoFold(f"Newton found no fold near {self._path.say(value)}")
 
@@ -188,17 +188,17 @@ class SolutionSurface:
         except BorderFailed as reason:
             raise NoFold(str(reason)) from None
 
-    def _across(self, value: float, solution: Solution, along: Direction, metric: Metric) -> Direction:
+    def _across(self, value: float, solution: Solution, tangent: Direction, metric: Metric) -> Direction:
         """d (x, omega) / d value at constant position along the response curve."""
         state, response = solution.state, self._response(value)
         force = replace(self._path, omega=state.omega).slope(value, state)
         linear, slope = response.make(value).linearise(state), response.slope(state.omega, state)
         return bordered.solve(
-            linear, slope, along, metric, (-force, 0.0), self._options.accuracy, self._newton.max_products
+            linear, slope, tangent, metric, (-force, 0.0), self._options.accuracy, self._newton.max_products
         )[0]
 
     def _slopes(
-        self, value: float, here: Direction, along: Direction, across: Direction, metric: Metric
+        self, value: float, origin: Direction, border: Direction, across: Direction, metric: Metric
     ) -> tuple[float, tuple[float, float]]:
         """The scalar (share of the frequency in the unit tangent) and its derivatives along and across."""
 
@@ -207,33 +207,34 @@ class SolutionSurface:
             balance = response.make(v)
             state = balance.evaluate(place.p, balance.shaped(place.x))
             return (
-                bordered.tangent(response, place.p, state, along, metric, self._newton, self._options.accuracy).p
+                bordered.tangent(response, place.p, state, border, metric, self._newton, self._options.accuracy).p
                 / metric.width
             )
 
         reach = 1.0 / max(metric.norm(across), 1.0 / self._span)  # change of the parameter that counts as one
-        central = scalar(value, here)
-        one = (scalar(value, here + along * self._options.difference) - central) / self._options.difference
+        central = scalar(value, origin)
+        slope_along = (scalar(value, origin + border * self._options.difference) - central) / self._options.difference
         step = self._options.difference * reach
-        two = (scalar(value + step, here + across * step) - central) / step
-        return central, (one, two)
+        slope_across = (scalar(value + step, origin + across * step) - central) / step
+        return central, (slope_along, slope_across)
 
-    def _length(self, metric: Metric, moved: Direction, change: float) -> float:
-        return float(np.hypot(metric.norm(moved), change / self._span))
+    def _length(self, metric: Metric, step: Direction, change: float) -> float:
+        return float(np.hypot(metric.norm(step), change / self._span))
 
     def _unit(self, fold: FoldPoint, metric: Metric, sign: float) -> FoldPoint:
         """The fold with its direction of unit length, turned round where the sign is negative."""
         factor = sign / self._length(metric, fold.tangent, fold.change)
         return replace(fold, tangent=fold.tangent * factor, change=fold.change * factor)
 
-    def _searched(self, value: float, guess: Direction, along: Direction, metric: Metric) -> CurvePoint:
+    def _searched(self, value: float, guess: Direction, tangent: Direction, metric: Metric) -> CurvePoint:
         """The fold nearest to a guess at a value: the response curve is walked both ways; raises NoFold."""
         response = self._response(value)
-        solution = self._solved(response, guess, along, metric)
+        solution = self._solved(response, guess, tangent, metric)
         omega = solution.state.omega
         options = Options(step=self._options.search_step, width=1.0, newton=self._options.newton)
         ways = [
-            CurveStepper(response, options, solution, omega, omega + self._width, along * sign) for sign in (1.0, -1.0)
+            CurveStepper(response, options, solution, omega, omega + self._width, tangent * sign)
+            for sign in (1.0, -1.0)
         ]
         for _ in range(self._options.search_steps):
             for way in ways:
@@ -242,8 +243,8 @@ class SolutionSurface:
                         return part.end
         raise NoFold(f"the response has no fold any more at {self._path.say(value)}")
 
-    def next_step(self, here: FoldPoint, there: FoldPoint, step: float) -> float:
+    def next_step(self, point: FoldPoint, following: FoldPoint, step: float) -> float:
         """The step after one that went from here to there, by the turn of the line."""
-        metric = self._metric(there.place.x, self._path.make(there.value))
-        turned = self._length(metric, there.tangent - here.tangent, there.change - here.change)
-        return step * float(np.clip(0.25 / max(turned, 1e-9), 0.5, 2.0))
+        metric = self._metric(following.place.x, self._path.make(following.value))
+        turn = self._length(metric, following.tangent - point.tangent, following.change - point.change)
+        return step * float(np.clip(0.25 / max(turn, 1e-9), 0.5, 2.0))

@@ -22,7 +22,7 @@ from tribodyn.hbm.continuation.bordered_modes import Bordered, DenseBordered, Di
 from tribodyn.hbm.krylov import gmres
 from tribodyn.refusal import Refusal
 
-FEW = 120  # lowest modes among which the reference mode of a turning or a flown-about structure is looked for
+LOWEST_MODES = 120  # lowest modes among which the reference mode of a turning or a flown-about structure is looked for
 
 
 @dataclass(frozen=True)
@@ -73,14 +73,14 @@ class FreeVibration:
         if not names or (output is not None and output not in names):
             raise Refusal(f"no output '{output}' to measure the amplitude: the model has {', '.join(names) or 'none'}")
         self.k = balance.compliance.k
-        made: dict[int, StuckModes] = {}
+        modes_of_system: dict[int, StuckModes] = {}
         self.modes: list[StuckModes] = []
         for h in self.basis.harmonics:
             system, b = model.at_harmonic(h)
-            if id(system) not in made:
-                made[id(system)] = StuckModes(system, np.asarray(b), self.k, names)
-            self.modes.append(made[id(system)])
-        self.one_system = len(made) == 1
+            if id(system) not in modes_of_system:
+                modes_of_system[id(system)] = StuckModes(system, np.asarray(b), self.k, names)
+            self.modes.append(modes_of_system[id(system)])
+        self.one_system = len(modes_of_system) == 1
         self.first = self.basis.harmonics.index(1)
         self.n = len(self.modes[self.first].lam)
         static, b = model.at_harmonic(self.basis.harmonics[0])
@@ -89,11 +89,11 @@ class FreeVibration:
         self.base = np.zeros(len(b)) if base is None or not self.basis.has_static else base[:, 0]
         still = self.modes[0]
         self.static_load = np.real(still.shapes.conj().T @ load + still.UH @ (self.k * self.base))
-        self.rest, apart = self._static_state()
-        self.reference, self.reference_omega, self.reference_damping = self._reference(mode, apart)
+        self.rest_x, open_rows = self._static_state()
+        self.reference, self.reference_omega, self.reference_damping = self._reference(mode, open_rows)
         self.output = output or names[0]
-        moved = self.modes[self.first].O @ self.reference
-        self.per_amplitude = float(abs(moved[names.index(self.output)]))
+        output_motion = self.modes[self.first].O @ self.reference
+        self.per_amplitude = float(abs(output_motion[names.index(self.output)]))
         if self.per_amplitude <= 1e-9 * np.abs(self.modes[self.first].O).max():
             raise Refusal(f"output '{self.output}' does not move in mode {mode}: choose another output")
         self.column, self.row = self.reference, self.reference.conj()
@@ -103,10 +103,10 @@ class FreeVibration:
         """Factor on what acts in the column, besides what the border needs; none in free vibration."""
         return 0j
 
-    def _reference(self, mode: int | None, apart: np.ndarray) -> tuple[np.ndarray, float, float]:
+    def _reference(self, mode: int | None, open_rows: np.ndarray) -> tuple[np.ndarray, float, float]:
         """Modal shape (n,) of unit mass, frequency [rad/s] and damping ratio of the reference mode."""
         m = self.modes[self.first]
-        squares, shapes = self._still = self._at_rest(apart)
+        squares, shapes = self._still = self._at_rest(open_rows)
         if mode is not None and not 0 <= mode < self.n:
             raise Refusal(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
         system, _ = self.balance.model.at_harmonic(1)
@@ -115,20 +115,20 @@ class FreeVibration:
                 raise Refusal(f"mode {mode} is a rigid-body motion at rest: choose one that vibrates")
             shape, omega = shapes[:, mode], float(np.sqrt(squares[mode]))
             return shape, omega, float(np.real(shape.conj() @ m.damping @ shape)) / (2 * omega)
-        few = shapes[:, : min(self.n, FEW)]  # what turns and what flows couples the lowest ones
-        stiffness = np.diag(squares[: few.shape[1]]) + (0.0 if m.flow is None else few.conj().T @ m.flow @ few)
-        rate = few.conj().T @ m.damping @ few
-        size = few.shape[1]
+        lowest = shapes[:, : min(self.n, LOWEST_MODES)]  # what turns and what flows couples the lowest ones
+        stiffness = np.diag(squares[: lowest.shape[1]]) + (0.0 if m.flow is None else lowest.conj().T @ m.flow @ lowest)
+        rate = lowest.conj().T @ m.damping @ lowest
+        size = lowest.shape[1]
         values, vectors = np.linalg.eig(np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -rate]]))
         values, vectors = values[values.imag > 0], vectors[:size, values.imag > 0]
         order = np.argsort(values.imag) if mode is not None else np.argsort(-values.real)
-        value, shape = values[order[mode or 0]], few @ vectors[:, order[mode or 0]]
+        value, shape = values[order[mode or 0]], lowest @ vectors[:, order[mode or 0]]
         return shape / np.linalg.norm(shape), float(value.imag), float(-value.real / abs(value))
 
-    def _at_rest(self, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _at_rest(self, open_rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Squared frequencies and modal shapes of the structure stuck where it is closed at rest."""
         m = self.modes[self.first]
-        open_springs = m.UH[:, apart] @ (self.k[apart, None] * m.U[apart])
+        open_springs = m.UH[:, open_rows] @ (self.k[open_rows, None] * m.U[open_rows])
         squares, shapes = np.linalg.eigh(np.diag(m.lam) - open_springs)
         return squares, shapes
 
@@ -149,12 +149,12 @@ class FreeVibration:
         solution = newton.solve(still, still.omega_max, still.stuck(still.omega_max))
         if not solution.converged:
             raise Refusal(f"no static equilibrium for a nonlinear mode to vibrate about: {solution.outcome}")
-        apart = solution.state.cycle.status & SEPARATES > 0
-        return solution.state.x, np.repeat(apart, solution.state.x.shape[1])
+        is_open = solution.state.cycle.status & SEPARATES > 0
+        return solution.state.x, np.repeat(is_open, solution.state.x.shape[1])
 
     def first_guess(self, a: float) -> ModePoint:
         """The reference mode about the static equilibrium."""
-        x = self.rest.copy()
+        x = self.rest_x.copy()
         shape = (self.modes[self.first].U @ self.reference).reshape(x.shape[:2])
         cosine = int(np.flatnonzero(self.basis.order == 1)[0])
         x[:, :, cosine] += a * shape.real
@@ -173,7 +173,7 @@ class FreeVibration:
     def _units(self, a: float) -> np.ndarray:
         """(n_coeff,) displacement per coordinate: for x_0 that of rest, for the rest the amplitude."""
         vibration = float(np.linalg.norm(self.modes[self.first].U @ self.reference))
-        still = float(np.linalg.norm(self.rest[:, :, 0])) if self.basis.has_static else 0.0
+        still = float(np.linalg.norm(self.rest_x[:, :, 0])) if self.basis.has_static else 0.0
         return np.where(self.basis.order == 0, still or a * vibration, a * vibration)
 
     def weights(self, a: float) -> np.ndarray:
@@ -186,25 +186,25 @@ class FreeVibration:
         omega, a = (float(np.exp(c)) for c in coordinates[[-3, -1]])
         zeta = float(coordinates[-2])
         flat = coordinates[:-3].reshape(self._shape) * self._units(a)
-        x = flat.reshape(self.rest.shape)
+        x = flat.reshape(self.rest_x.shape)
         cycle = self.balance.contact.cycle(x, self.basis, self.balance.memory)
         g = self.k[:, None] * flat - cycle.force.reshape(flat.shape)
         factors: list[Bordered] = []
         for h, m in zip(self.basis.harmonics, self.modes, strict=True):
             s = 1j * h * omega
-            undamped = (m.lam if h else m.held) + s * s - 2 * self.sustained * zeta * omega * s
+            undamped = (m.lam if h else m.static_lam) + s * s - 2 * self.sustained * zeta * omega * s
             none = np.zeros(self.n)
-            border, corner, left = (self.column, 0.0, self.row) if h == 1 else (none, 1.0, none)
+            border, corner, border_row = (self.column, 0.0, self.row) if h == 1 else (none, 1.0, none)
             if m.proportional or (not h and m.flow is None):
-                factors.append(DiagonalBordered(undamped + s * np.diag(m.damping), border, corner, left))
+                factors.append(DiagonalBordered(undamped + s * np.diag(m.damping), border, corner, border_row))
             else:
                 flow = 0.0 if m.flow is None else m.flow
-                factors.append(DenseBordered(s * m.damping + np.diag(undamped) + flow, border, corner, left))
+                factors.append(DenseBordered(s * m.damping + np.diag(undamped) + flow, border, corner, border_row))
         rhs = self._rhs(self._modal(self.basis.to_complex(g)), a)
         if self.basis.has_static:
             rhs[:-1, 0] += self.static_load
         eta, mismatch = self._solve(factors, rhs)
-        move = self._moved(eta)
+        move = self._contact_motion(eta)
         if self.basis.has_static:
             move[:, 0] -= self.base
         residual = self._residual(a, flat - move, mismatch + self.driving(omega, zeta, a))
@@ -219,7 +219,7 @@ class FreeVibration:
             return to_modes @ force
         return np.stack([m.UH @ force[:, i] for i, m in enumerate(self.modes)], axis=1)
 
-    def _moved(self, eta: np.ndarray) -> np.ndarray:
+    def _contact_motion(self, eta: np.ndarray) -> np.ndarray:
         """Contact displacement (n_contact, n_coeff) of modal amplitudes (n, n_harmonic)."""
         if self.one_system:
             from_modes = self.modes[0].U
@@ -248,7 +248,7 @@ class FreeVibration:
         return np.concatenate([(x / scale).ravel(), [relative.real, relative.imag]])
 
     def correction(
-        self, p: ModePoint, normal: np.ndarray, tolerance: float, most: int, along: float = 0.0
+        self, p: ModePoint, normal: np.ndarray, tolerance: float, max_products: int, distance: float = 0.0
     ) -> np.ndarray:
         """Newton direction for the coordinates to the hyperplane normal to `normal`, `along` of it away from p."""
         jac = p.cycle.jacobian
@@ -262,10 +262,10 @@ class FreeVibration:
             d = y[:-3].reshape(self._shape) * units + y[-1] * dynamic
             dg = self.k[:, None] * d - np.matmul(jac, d.reshape(len(jac), -1, 1)).reshape(d.shape)
             eta, mismatch = self._solve(p.factors, self._rhs(self._modal(self.basis.to_complex(dg)), 0.0))
-            out = self._residual(p.a, d - self._moved(eta), mismatch)
+            out = self._residual(p.a, d - self._contact_motion(eta), mismatch)
             return np.append(out + y[-3] * by_omega + y[-2] * by_zeta + y[-1] * by_a, normal @ y / size)
 
-        return gmres(product, np.append(-p.residual, along / size), tolerance, most)[0]
+        return gmres(product, np.append(-p.residual, distance / size), tolerance, max_products)[0]
 
     def _slopes(self, p: ModePoint) -> tuple[np.ndarray, ...]:
         """Derivatives of the residual at fixed x by the logarithm of omega, by zeta and by the logarithm of a."""
@@ -274,15 +274,15 @@ class FreeVibration:
         by_omega = 1j * h * damped + (-2 * h**2 * p.omega - 4j * self.sustained * p.zeta * h * p.omega) * p.eta
         by_zeta = (-2j * self.sustained * h * p.omega**2) * p.eta
         drive, per_zeta = (self.driving(p.omega, zeta, p.a) for zeta in (p.zeta, 1.0))
-        found = []
-        for rhs, more in (
+        slopes = []
+        for rhs, by_drive in (
             (self._rhs(-p.omega * by_omega, 0.0), 2 * drive),  # it goes as omega^2 zeta a
             (self._rhs(-by_zeta, 0.0), per_zeta),
             (self._rhs(0.0, p.a), drive),
         ):
             eta, mismatch = self._solve(p.factors, rhs)
-            found.append(self._residual(p.a, -self._moved(eta), mismatch + more))
-        return tuple(found)
+            slopes.append(self._residual(p.a, -self._contact_motion(eta), mismatch + by_drive))
+        return tuple(slopes)
 
     def outputs(self, p: ModePoint) -> np.ndarray:
         """(n_output, n_coeff) response of the observed outputs [m]."""

@@ -113,40 +113,40 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
     loaded = {h for (h, _), value in balance.excitation.loads.items() if value != 0}
     if balance.basis.has_static:
         loaded.add(0)
-    kept = tuple(sorted(loaded | {1}))
-    trial = _Trial.of(wide, kept, omega, None, options)
-    history = [(kept, trial.error)]
+    harmonics = tuple(sorted(loaded | {1}))
+    trial = _Trial.of(wide, harmonics, omega, None, options)
+    history = [(harmonics, trial.error)]
     for _ in range(options.rounds):
-        wanted = trial.wanted(options)
-        if trial.error <= options.tolerance or not wanted:
+        additions = trial.additions(options)
+        if trial.error <= options.tolerance or not additions:
             break
-        kept = tuple(sorted({*kept, *wanted}))
-        trial = _Trial.of(wide, kept, omega, trial, options)
-        history.append((kept, trial.error))
+        harmonics = tuple(sorted({*harmonics, *additions}))
+        trial = _Trial.of(wide, harmonics, omega, trial, options)
+        history.append((harmonics, trial.error))
     useful = 0
-    least_first = [trial.kept[i] for i in np.argsort(trial.content)]
+    least_first = [trial.harmonics[i] for i in np.argsort(trial.content)]
     for h in [h for h in least_first if h not in loaded and h != 1]:
         if trial.error > options.tolerance or useful == options.useful_in_a_row:
             break
-        fewer = tuple(k for k in kept if k != h)
+        fewer = tuple(k for k in harmonics if k != h)
         attempt = _Trial.of(wide, fewer, omega, trial, options, shrinking=True)
         history.append((fewer, attempt.error))
         useful += 1
         if attempt.error <= options.tolerance:
-            kept, trial, useful = fewer, attempt, 0
+            harmonics, trial, useful = fewer, attempt, 0
     if not trial.worst.shares:
-        trial = _Trial.of(wide, kept, omega, trial, options)
-    met = trial.error <= options.tolerance
-    outcome = f"harmonics {', '.join(map(str, kept))}: estimated truncation error {trial.error:.1e}"
-    if not met:
+        trial = _Trial.of(wide, harmonics, omega, trial, options)
+    is_accurate = trial.error <= options.tolerance
+    outcome = f"harmonics {', '.join(map(str, harmonics))}: estimated truncation error {trial.error:.1e}"
+    if not is_accurate:
         outcome += f", above the tolerance {options.tolerance:.1e}: allow harmonics above {options.highest}"
     return HarmonicChoice(
-        kept,
+        harmonics,
         trial.worst,
         options.tolerance,
         tuple(omega),
         tuple(history),
-        wide.with_harmonics(kept),
+        wide.with_harmonics(harmonics),
         tuple(trial.x),
         outcome,
     )
@@ -164,21 +164,23 @@ def widened(balance: HarmonicBalance, highest: int, error: float | None = None) 
     excitation = balance.excitation
     if excitation.base is not None:
         excitation = replace(excitation, base=balance.basis.transfer(excitation.base, basis))
-    own, springs = balance.compliance, balance.reference_stiffness
-    known = _WIDE.get(own)
-    serves = known is not None and known.basis.harmonics[-1] >= top and (known.target_error or 0.0) <= (error or 0.0)
-    if known is None or not serves or not np.array_equal(known.k, springs):
-        known = _WIDE[own] = compliance_of(balance.model, springs, basis, excitation, balance.omega_max, error)
-    return replace(balance, basis=basis, excitation=excitation, compliance=known.restricted(basis), at_rest=None)
+    linear, springs = balance.compliance, balance.reference_stiffness
+    wide = _WIDE.get(linear)
+    serves = wide is not None and wide.basis.harmonics[-1] >= top and (wide.target_error or 0.0) <= (error or 0.0)
+    if wide is None or not serves or not np.array_equal(wide.k, springs):
+        wide = _WIDE[linear] = compliance_of(balance.model, springs, basis, excitation, balance.omega_max, error)
+    return replace(balance, basis=basis, excitation=excitation, compliance=wide.restricted(basis), at_rest=None)
 
 
-def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.ndarray, split: bool = True) -> Estimate:
+def estimate(
+    wide: HarmonicBalance, kept_harmonics: tuple[int, ...], omega: float, x: np.ndarray, split: bool = True
+) -> Estimate:
     """What the harmonics of a wide balance would change in a solution with some of them.
 
     wide : from `widened`; kept : harmonics of the solution x (n_pair, n_component, n_coeff) [m] at omega [rad/s]
     split : whether the shares are wanted too, at the cost of one linear solve each
     """
-    narrow = wide.with_harmonics(kept)
+    narrow = wide.with_harmonics(kept_harmonics)
     response = narrow.basis.transfer(narrow.outputs(narrow.evaluate(omega, x, jacobian=False)), wide.basis)
     state = wide.evaluate(omega, narrow.basis.transfer(x, wide.basis))
     linear, point = wide.linearise(state), wide.at(omega)
@@ -191,11 +193,11 @@ def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.n
         return float((np.linalg.norm(change, axis=1) / scale).max(initial=0.0))
 
     def change(of: set[int]) -> np.ndarray:
-        own = np.isin(wide.basis.order, list(of))
-        moved, _, _ = linear.solve(np.where(own, -state.residual, 0.0), RULES.linear_accuracy)
-        return point.outputs(linear.departure_slope(moved)) + np.where(own, direct, 0.0)
+        rows = np.isin(wide.basis.order, list(of))
+        dx, _, _ = linear.solve(np.where(rows, -state.residual, 0.0), RULES.linear_accuracy)
+        return point.outputs(linear.departure_slope(dx)) + np.where(rows, direct, 0.0)
 
-    absent = set(wide.basis.harmonics) - set(kept)
+    absent = set(wide.basis.harmonics) - set(kept_harmonics)
     if not split:
         return Estimate(measure(change(absent)), {})
     changes = {h: change({h}) for h in sorted(absent)}
@@ -206,7 +208,7 @@ def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.n
 class _Trial:
     """One set of harmonics, solved and estimated at every frequency."""
 
-    kept: tuple[int, ...]
+    harmonics: tuple[int, ...]
     x: list[np.ndarray]
     content: np.ndarray
     estimates: list[Estimate]
@@ -215,7 +217,7 @@ class _Trial:
     def of(
         cls,
         wide: HarmonicBalance,
-        kept: tuple[int, ...],
+        kept_harmonics: tuple[int, ...],
         omega: Sequence[float],
         before: _Trial | None,
         options: ChoiceOptions,
@@ -225,26 +227,26 @@ class _Trial:
 
         shrinking : only whether the tolerance is met matters, not the shares; ends at the first frequency where not
         """
-        narrow = wide.with_harmonics(kept)
+        narrow = wide.with_harmonics(kept_harmonics)
         solved, estimates = [], []
-        content = np.zeros(len(kept))
+        content = np.zeros(len(kept_harmonics))
         for i, w in enumerate(omega):
             if before is not None:
-                old = replace(wide.basis, harmonics=before.kept)
-                solution = newton.solve(narrow, w, old.transfer(before.x[i], narrow.basis), options.newton)
+                basis_before = replace(wide.basis, harmonics=before.harmonics)
+                solution = newton.solve(narrow, w, basis_before.transfer(before.x[i], narrow.basis), options.newton)
             if before is None or not solution.converged:
                 solution = arc_length.solve_along_load(narrow, w, options.newton)
             if not solution.converged:
-                where = f"{w / (2 * np.pi):.6g} Hz with harmonics {', '.join(map(str, kept))}"
+                where = f"{w / (2 * np.pi):.6g} Hz with harmonics {', '.join(map(str, kept_harmonics))}"
                 raise NotSolved(f"harmonics cannot be chosen: no solution at {where}: {solution.outcome}")
             x = solution.state.x
             solved.append(x)
-            estimates.append(estimate(wide, kept, w, x, split=not shrinking))
-            size = np.array([np.linalg.norm(x[..., narrow.basis.order == h]) for h in kept])
-            content = np.maximum(content, size / size[np.array(kept) > 0].max(initial=1e-300))
+            estimates.append(estimate(wide, kept_harmonics, w, x, split=not shrinking))
+            size = np.array([np.linalg.norm(x[..., narrow.basis.order == h]) for h in kept_harmonics])
+            content = np.maximum(content, size / size[np.array(kept_harmonics) > 0].max(initial=1e-300))
             if shrinking and estimates[-1].error > options.tolerance:
                 break
-        return cls(kept, solved, content, estimates)
+        return cls(kept_harmonics, solved, content, estimates)
 
     @property
     def worst(self) -> Estimate:
@@ -256,17 +258,17 @@ class _Trial:
         """The largest estimated error."""
         return self.worst.error
 
-    def wanted(self, options: ChoiceOptions) -> set[int]:
+    def additions(self, options: ChoiceOptions) -> set[int]:
         """Harmonics to take in: the fewest that leave the shares of the others below the tolerance everywhere."""
-        wanted: dict[int, float] = {}
-        for found in self.estimates:
-            if found.error <= options.tolerance:
+        largest_share: dict[int, float] = {}
+        for estimate in self.estimates:
+            if estimate.error <= options.tolerance:
                 continue
-            allowed = sorted((h for h in found.shares if h <= options.highest), key=lambda h: -found.shares[h])
-            rest = np.array([found.shares[h] for h in allowed])
-            remaining = np.sqrt(np.cumsum(rest[::-1] ** 2))[::-1]  # of this one and all smaller ones
-            for h, left in zip(allowed, remaining, strict=True):
-                if left > options.allowed_share * options.tolerance:
-                    wanted[h] = max(wanted.get(h, 0.0), found.shares[h])
-        first = sorted(wanted, key=lambda h: -wanted[h])
-        return set(first[: max(2, len(self.kept))])  # a rough solution tells little about the rest
+            allowed = sorted((h for h in estimate.shares if h <= options.highest), key=lambda h: -estimate.shares[h])
+            share_values = np.array([estimate.shares[h] for h in allowed])
+            remaining = np.sqrt(np.cumsum(share_values[::-1] ** 2))[::-1]  # of this one and all smaller ones
+            for h, residual in zip(allowed, remaining, strict=True):
+                if residual > options.allowed_share * options.tolerance:
+                    largest_share[h] = max(largest_share.get(h, 0.0), estimate.shares[h])
+        first = sorted(largest_share, key=lambda h: -largest_share[h])
+        return set(first[: max(2, len(self.harmonics))])  # a rough solution tells little about the rest

@@ -22,10 +22,10 @@ from tribodyn.hbm.continuation.resonance_peak import AtPeak
 class HighestPeakRules:
     """Which peaks are refined, and when one is met."""
 
-    tried: int = 3  # peaks that are refined, the highest first
-    nearly: float = 0.9  # of the highest peak foreseen, from which on a peak may be the highest
+    max_refined: int = 3  # peaks that are refined, the highest first
+    candidate_share: float = 0.9  # of the highest peak foreseen, from which on a peak may be the highest
     # errors of the heights foreseen, as the first peak has it, by which another must be lower to be left out
-    sure: float = 3.0
+    error_margin: float = 3.0
     least_doubt: float = 5e-3  # of a height foreseen
 
 
@@ -48,15 +48,19 @@ def vertex(omega: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
 
 
 def candidates(omega: np.ndarray, heights: np.ndarray) -> list[tuple[int, int]]:
-    """Points and outputs of the peaks that may be the highest, the highest foreseen first; at most RULES.tried.
+    """Points and outputs of the peaks that may be the highest, the highest foreseen first; at most RULES.max_refined.
 
     omega : (n_point,) [rad/s]; heights : (n_point, n_output) [m]
     """
-    inner, found = heights[1:-1], []
+    inner, peaks = heights[1:-1], []
     for i, output in np.argwhere((inner >= heights[:-2]) & (inner >= heights[2:]) & (inner > 0)):
-        found.append((vertex(omega[i : i + 3], heights[i : i + 3, output])[1], int(i) + 1, int(output)))
-    found.sort(reverse=True)
-    return [(point, output) for height, point, output in found[: RULES.tried] if height > RULES.nearly * found[0][0]]
+        peaks.append((vertex(omega[i : i + 3], heights[i : i + 3, output])[1], int(i) + 1, int(output)))
+    peaks.sort(reverse=True)
+    return [
+        (point, output)
+        for height, point, output in peaks[: RULES.max_refined]
+        if height > RULES.candidate_share * peaks[0][0]
+    ]
 
 
 def highest(
@@ -69,18 +73,21 @@ def highest(
     """
     heights = amplitude(branch.response[:, [branch.output_names.index(name) for name in outputs]])
     best: OperatingPoint | None = None
-    solves, doubt, which = len(heights), RULES.least_doubt, 0
+    solves, doubt, row = len(heights), RULES.least_doubt, 0
     for point, output in candidates(branch.omega, heights):
-        near = slice(point - 1, point + 2)
-        omega, height = branch.omega[near].tolist(), vertex(branch.omega[near], heights[near, output])[1]
+        neighbours = slice(point - 1, point + 2)
+        omega, height = (
+            branch.omega[neighbours].tolist(),
+            vertex(branch.omega[neighbours], heights[neighbours, output])[1],
+        )
         if best is not None and (1 + doubt) * height < best.amplitude:
             continue
-        known = dict(zip(omega, map(balance.shaped, branch.contact[near]), strict=True))
-        found = replace(site, output=outputs[output]).solve_between(balance, omega[1], known, min(omega), max(omega))
-        solves += found.solves
-        if not found.solution.converged:
+        solved_x = dict(zip(omega, map(balance.shaped, branch.contact[neighbours]), strict=True))
+        peak = replace(site, output=outputs[output]).solve_between(balance, omega[1], solved_x, min(omega), max(omega))
+        solves += peak.solves
+        if not peak.solution.converged:
             continue
-        doubt = max(doubt, RULES.sure * abs(height / found.amplitude - 1))
-        if best is None or found.amplitude > best.amplitude:
-            best, which = found, output
-    return None if best is None else replace(best, solves=solves), which
+        doubt = max(doubt, RULES.error_margin * abs(height / peak.amplitude - 1))
+        if best is None or peak.amplitude > best.amplitude:
+            best, row = peak, output
+    return None if best is None else replace(best, solves=solves), row

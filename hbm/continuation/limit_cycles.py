@@ -80,38 +80,38 @@ def limit_cycles(
     low, high = np.log(np.array([start, stop]) / problem.per_amplitude)
     solved, end = walk(problem, float(low), float(high), options)
     points = [point for point, outcome, _ in solved if outcome == CONVERGED]
-    found: list[LimitCycle] = []
+    cycles: list[LimitCycle] = []
     missing: list[str] = []
     for before, after in pairwise(points):
         if np.sign(before.zeta) != np.sign(after.zeta):
             share = before.zeta / (before.zeta - after.zeta)
             between = before.coordinates + share * (after.coordinates - before.coordinates)
             guesses = between, after.coordinates, before.coordinates  # two where friction has a kink between them
-            tried = (_without_damping(problem, guess, options) for guess in guesses)
-            if (cycle := next((one for one in tried if one is not None), None)) is None:
+            trials = (_without_damping(problem, guess, options) for guess in guesses)
+            if (cycle := next((other for other in trials if other is not None), None)) is None:
                 missing.append(f"one near {before.a * problem.per_amplitude:.3g} m was not solved")
-            elif not any(np.allclose(cycle.point.coordinates, one.point.coordinates, 1e-4, 1e-4) for one in found):
-                found.append(cycle)  # a backbone that turned back may pass it twice
+            elif not any(np.allclose(cycle.point.coordinates, other.point.coordinates, 1e-4, 1e-4) for other in cycles):
+                cycles.append(cycle)  # a backbone that turned back may pass it twice
     if end.kind is not BranchEnd.REACHED:
         reached = max((point.a for point in points), default=0.0) * problem.per_amplitude
         missing.append(f"the damping was followed up to {reached:.3g} m only: the backbone {end}")
-    elif not found and not missing:
+    elif not cycles and not missing:
         first, last = points[0].zeta, points[-1].zeta
-        does, beyond = ("decays", "below the first") if first > 0 else ("grows", "above the last")
+        does, place = ("decays", "below the first") if first > 0 else ("grows", "above the last")
         missing.append(
             f"none between these amplitudes: the motion {does} at all of them (damping {first:+.3%} to {last:+.3%}), "
-            f"so that one can only lie {beyond}"
+            f"so that one can only lie {place}"
         )
-    return sorted(found, key=lambda cycle: cycle.amplitude), "; ".join(missing)
+    return sorted(cycles, key=lambda cycle: cycle.amplitude), "; ".join(missing)
 
 
 def _without_damping(problem: FreeVibration, guess: np.ndarray, options: BackboneOptions) -> LimitCycle | None:
     """The point of zero damping near a guess, None where Newton's method does not find it."""
-    held = np.zeros(len(guess))
-    held[-2] = 1.0  # the damping among the coordinates of a point
+    normal = np.zeros(len(guess))
+    normal[-2] = 1.0  # the damping among the coordinates of a point
     begin = guess.copy()
     begin[-2] = 0.0
-    point, outcome, _ = newton_on(problem, problem.evaluate(begin), held, options.newton)
+    point, outcome, _ = newton_on(problem, problem.evaluate(begin), normal, options.newton)
     if outcome != CONVERGED:
         return None
     still = replace(problem.balance, load_factor=0.0)
@@ -132,18 +132,18 @@ def in_time(balance: HarmonicBalance, cycle: LimitCycle, output: str, options: O
     the load left just at their limit rest
     Raises  ValueError for problems with no equation of motion in time or too large for multipliers; IntegrationFailed
     """
-    whole, start = time_integration.in_time(replace(balance, load_factor=0.0), cycle.omega, cycle.state, options)
-    stepper, state = TimeStepper(whole, cycle.omega, options), start or cycle.state
+    wheel, start = time_integration.in_time(replace(balance, load_factor=0.0), cycle.omega, cycle.state, options)
+    stepper, state = TimeStepper(wheel, cycle.omega, options), start or cycle.state
     angle = 2 * np.pi * np.arange(1, options.steps + 1) / options.steps
-    x = np.ascontiguousarray((state.x @ whole.basis.functions(angle).T).transpose(2, 0, 1))
-    memory, bits = time_step.memory_after(stepper.law, x, stepper.contact, whole.memory)
+    x = np.ascontiguousarray((state.x @ wheel.basis.functions(angle).T).transpose(2, 0, 1))
+    memory, bits = time_step.memory_after(stepper.law, x, stepper.contact, wheel.memory)
     (n_pair, c), n_state = x.shape[1:], memory.shape[1]
     slopes = np.zeros((len(x), n_pair, c + n_state, 2 * c + n_state))
-    less = (1 - INSIDE) * x + INSIDE * x.mean(axis=0)
-    time_step.along(stepper.law, stepper.contact, less[-1], less, memory, bits, less[:0], slopes)
+    reduced = (1 - INSIDE) * x + INSIDE * x.mean(axis=0)
+    time_step.along(stepper.law, stepper.contact, reduced[-1], reduced, memory, bits, reduced[:0], slopes)
     multipliers = np.linalg.eigvals(floquet.monodromy(stepper, slopes))
-    others = np.delete(multipliers, np.abs(multipliers - 1).argmin())  # the phase is free
-    seen = PeriodSearch(stepper, options, False).march(stepper.start_from(state)).record.y
+    disturbances = np.delete(multipliers, np.abs(multipliers - 1).argmin())  # the phase is free
+    marched = PeriodSearch(stepper, options, False).march(stepper.start_from(state)).record.y
     row = balance.compliance.output_names.index(output)
-    swing = float(np.sqrt(2 * seen[:, row].var() / (cycle.response[row, 1:] ** 2).sum()))
-    return replace(cycle, moved=swing - 1, growth=float(np.abs(others).max()) - 1)
+    swing = float(np.sqrt(2 * marched[:, row].var() / (cycle.response[row, 1:] ** 2).sum()))
+    return replace(cycle, moved=swing - 1, growth=float(np.abs(disturbances).max()) - 1)

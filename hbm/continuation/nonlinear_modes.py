@@ -97,8 +97,8 @@ class Backbone:
     def first_harmonic(self) -> np.ndarray:
         """(n_point,) amplitude of the chosen output in the first harmonic [m]."""
         row = self.response[:, self.output_names.index(self.output)]
-        found: np.ndarray = np.linalg.norm(row[:, self.order == 1], axis=1)
-        return found
+        magnitudes: np.ndarray = np.linalg.norm(row[:, self.order == 1], axis=1)
+        return magnitudes
 
     @property
     def acceleration(self) -> np.ndarray:
@@ -137,7 +137,7 @@ def backbone(
 
 
 def walk(
-    problem: FreeVibration, start: float, goal: float, options: BackboneOptions, below: int = 4
+    problem: FreeVibration, start: float, goal: float, options: BackboneOptions, decades: int = 4
 ) -> tuple[list[_Solved], Outcome[BranchEnd]]:
     """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends.
 
@@ -148,66 +148,71 @@ def walk(
     fixed[-1] = 1.0
     solved = [newton_on(problem, first, fixed, options.newton)]
     if solved[0][1] != CONVERGED:
-        why = BranchEnd.ENDED.say(f" the start: {solved[0][1]}")
-        if below == 0:
-            return solved, why
-        lower, end = walk(problem, start - np.log(10.0), start, options, below - 1)
+        reason = BranchEnd.ENDED.say(f" the start: {solved[0][1]}")
+        if decades == 0:
+            return solved, reason
+        lower, end = walk(problem, start - np.log(10.0), start, options, decades - 1)
         if end.kind is not BranchEnd.REACHED:
-            return solved, why
+            return solved, reason
         solved = lower[-1:]
     longest = abs(goal - start) / max(options.n_points - 1, 1)
     step, tangent = longest, np.sign(goal - start) * fixed
     weight = np.ones(len(fixed))
     weight[-3:-1] = options.frequency_weight**2
     while len(solved) < options.max_points:
-        here = solved[-1][0].coordinates
+        origin = solved[-1][0].coordinates
         weight[:-3] = problem.weights(solved[-1][0].a)
-        ahead = here + step * tangent
+        ahead = origin + step * tangent
         last = (ahead[-1] - goal) * (start - goal) <= 0
         if last:
-            ahead = here + (goal - here[-1]) / tangent[-1] * tangent
-        found = newton_on(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
+            ahead = origin + (goal - origin[-1]) / tangent[-1] * tangent
+        trial = newton_on(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
         corner = step < options.corner_step * longest
-        if found[1] != CONVERGED and corner:
-            found, last = _turned_back(problem, here, step * tangent, weight * tangent, found, options.newton), False
-        turned = found[0].coordinates - here
+        if trial[1] != CONVERGED and corner:
+            trial, last = _turned_back(problem, origin, step * tangent, weight * tangent, trial, options.newton), False
+        turned = trial[0].coordinates - origin
         size = np.sqrt(turned @ (weight * turned))
         smooth = turned @ (weight * tangent) > 0.5 * size or corner
-        if found[1] != CONVERGED or not smooth:
+        if trial[1] != CONVERGED or not smooth:
             step *= 0.5
             if step < options.min_step * longest:
-                return [*solved, found], BranchEnd.ENDED.say(f" its last point: {found[1]}")
+                return [*solved, trial], BranchEnd.ENDED.say(f" its last point: {trial[1]}")
             continue
-        missed = np.abs(found[0].coordinates - ahead)[-3:-1].max()
+        missed = np.abs(trial[0].coordinates - ahead)[-3:-1].max()
         if missed > options.misses * options.between and not corner:
             step *= 0.5
             continue
-        solved.append(found)
+        solved.append(trial)
         if last:
             return solved, BranchEnd.REACHED.say(" the amplitude asked for")
-        if (found[0].coordinates[-1] - start) * (goal - start) < 0:
+        if (trial[0].coordinates[-1] - start) * (goal - start) < 0:
             return solved, BranchEnd.TURNED_BACK.say(" where it began")
         tangent = turned / size
-        if found[2] <= options.few_steps:
+        if trial[2] <= options.few_steps:
             step = min(longest, 1.6 * step)
-        elif found[2] >= options.many_steps:
+        elif trial[2] >= options.many_steps:
             step *= 0.6
     return solved, BranchEnd.POINTS_DONE.say(f" {options.max_points} points")
 
 
 def _turned_back(
-    problem: FreeVibration, here: np.ndarray, move: np.ndarray, normal: np.ndarray, missed: _Solved, how: NewtonOptions
+    problem: FreeVibration,
+    origin: np.ndarray,
+    move: np.ndarray,
+    normal: np.ndarray,
+    missed: _Solved,
+    options: NewtonOptions,
 ) -> _Solved:
     """The point behind a corner at which the curve leaves by more than a right angle, `missed` where there is none.
 
     Where a pair begins to slip or to part, the other branch is that of the contact state just beyond: its straight line
     is followed to as far behind the corner as `move` goes beyond it.
     """
-    beyond = problem.evaluate(here + move)
-    behind = problem.correction(beyond, normal, 1e-8, how.max_products, -2 * (normal @ move))
-    found = newton_on(problem, problem.evaluate(beyond.coordinates + behind), normal, how)
-    return_way = np.linalg.norm(found[0].coordinates - here + move) < 0.5 * np.linalg.norm(move)
-    return missed if return_way else found
+    overshoot = problem.evaluate(origin + move)
+    jump = problem.correction(overshoot, normal, 1e-8, options.max_products, -2 * (normal @ move))
+    trial = newton_on(problem, problem.evaluate(overshoot.coordinates + jump), normal, options)
+    return_way = np.linalg.norm(trial[0].coordinates - origin + move) < 0.5 * np.linalg.norm(move)
+    return missed if return_way else trial
 
 
 def newton_on(problem: FreeVibration, point: ModePoint, normal: np.ndarray, options: NewtonOptions) -> _Solved:

@@ -59,8 +59,8 @@ def of(problem: HarmonicBalance | Parameter) -> Parameter:
     """The parameter itself, or the frequency of a balance, whose curve recalls what its points asked for."""
     if isinstance(problem, Parameter):
         return problem
-    along = replace(problem, recalled=[])
-    return Parameter(FREQUENCY, lambda _: along, None)
+    recording = replace(problem, recalled=[])
+    return Parameter(FREQUENCY, lambda _: recording, None)
 
 
 def load(balance: HarmonicBalance, omega: float) -> Parameter:

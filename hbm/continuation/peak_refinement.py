@@ -37,13 +37,13 @@ class PeakRefinement:
         condition: AtPeak,
         balance: HarmonicBalance,
         omega: float,
-        known: dict[float, np.ndarray],
+        solved_x: dict[float, np.ndarray],
         stride: float | None = None,
         limits: tuple[float, float] = (0.0, np.inf),
     ):
-        self._condition, self._balance, self._known = condition, balance, known
+        self._condition, self._balance, self._solved_x = condition, balance, solved_x
         self._solves = 0
-        self._point = self._best = self._solve(omega, known[omega])
+        self._point = self._best = self._solve(omega, solved_x[omega])
         self._previous: AmplitudeSlope | None = None
         self._bracket: tuple[AmplitudeSlope, AmplitudeSlope] | None = None  # the curve rises from both to the other
         self._share = 1.0  # of the way to the peak in the bracket, halved where a solve fails
@@ -64,8 +64,8 @@ class PeakRefinement:
             if target is None or abs(target - self._best.omega) <= self._resolution:
                 break
             guess = self._bracket[0].between(self._bracket[1], target) if self._bracket else self._point.predict(target)
-            following = self._solve(target, self._known.get(target, guess))
-            rises_on = target in self._known and following.slope * self._point.slope > 0
+            following = self._solve(target, self._solved_x.get(target, guess))
+            rises_on = target in self._solved_x and following.slope * self._point.slope > 0
             if following.solution.converged and not rises_on:
                 self._advance(following)
             elif not self._shorten(target):
@@ -91,7 +91,7 @@ class PeakRefinement:
                 zero = previous.zero_with(point)
                 peak = zero if low < zero < high else peak
             target = point.omega + self._share * (peak - point.omega)
-        elif previous is None and bound in self._known:
+        elif previous is None and bound in self._solved_x:
             target = bound
         elif previous is None:
             target = point.omega + (point.distance if abs(point.distance) < 20 * self._stride else side * self._stride)
@@ -115,7 +115,7 @@ class PeakRefinement:
 
     def _shorten(self, target: float) -> bool:
         """Shorten the next step after a solve that failed or lies on another branch; False where it is short enough."""
-        self._known = {}
+        self._solved_x = {}
         if self._bracket:
             self._share *= 0.5
             return self._miss > self._condition.near_peak

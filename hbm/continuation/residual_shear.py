@@ -117,8 +117,8 @@ def stuck(balance: HarmonicBalance, state: State) -> np.ndarray:
     t = _check(balance)
     linear = balance.contact.stiffness[:, t, None] * state.x[:, t, 1:]
     error = np.abs(state.cycle.force[:, t, 1:] - linear).max(axis=2)
-    held = error <= SPRING_DEVIATION * np.abs(balance.contact.stiffness[:, t, None] * state.x[:, t]).max()
-    return held & balance.contact.has_component[:, t]
+    is_stuck = error <= SPRING_DEVIATION * np.abs(balance.contact.stiffness[:, t, None] * state.x[:, t]).max()
+    return is_stuck & balance.contact.has_component[:, t]
 
 
 @single
@@ -136,8 +136,8 @@ def amplitude_slope(balance: HarmonicBalance, state: State, output: str, toleran
     for pair, c in np.argwhere(stuck(balance, state)):
         g = np.zeros(state.g.shape)
         g[pair * state.x.shape[1] + t[c], 0] = -1.0  # one newton more of shear, g = k x - f
-        moved, _, _ = linear.solve(point.apply(g), tolerance)
-        change = point.outputs(g + linear.departure_slope(moved))[row]
+        dx, _, _ = linear.solve(point.apply(g), tolerance)
+        change = point.outputs(g + linear.departure_slope(dx))[row]
         slope[pair, c] = y[1:] @ change[1:]
     return slope / max(float(amplitude(y)), np.finfo(float).tiny)
 
@@ -159,10 +159,10 @@ def _check(balance: HarmonicBalance) -> list[int]:
     """Positions of the components whose sliders are the memory of the law."""
     tangential = balance.contact.tangential
     for joint in balance.contact.joints:
-        own = joint.parameters.tangential
-        if joint.n_state != len(own) or not tangential:
+        tangential_of_joint = joint.parameters.tangential
+        if joint.n_state != len(tangential_of_joint) or not tangential:
             raise Refusal(f"contact law '{joint.law}' keeps no slider: there is no residual shear to bound")
-        if [balance.contact.columns(joint)[c] for c in own] != tangential[: len(own)]:
+        if [balance.contact.columns(joint)[c] for c in tangential_of_joint] != tangential[: len(tangential_of_joint)]:
             raise Refusal(f"joint '{joint.name}' sees {joint.parameters.components}: give it t1 to bound its shear")
     if not balance.basis.has_static:
         raise Refusal("residual shear is a static force: keep harmonic 0 to bound the response")

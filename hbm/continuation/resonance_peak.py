@@ -101,10 +101,10 @@ class AtPeak:
         return PeakRefinement(self, balance, omega, {omega: x}).run()
 
     def solve_between(
-        self, balance: HarmonicBalance, omega: float, known: dict[float, np.ndarray], low: float, high: float
+        self, balance: HarmonicBalance, omega: float, solved_x: dict[float, np.ndarray], low: float, high: float
     ) -> OperatingPoint:
         """Refine a maximum of a curve between two frequencies [rad/s]; known : x by frequency, of no fold."""
-        return PeakRefinement(self, balance, omega, known, 0.25 * (high - low), (low, high)).run()
+        return PeakRefinement(self, balance, omega, solved_x, 0.25 * (high - low), (low, high)).run()
 
     @single
     def dominant_peak(self, balance: HarmonicBalance, point: OperatingPoint) -> DominantPeak:
@@ -118,9 +118,13 @@ class AtPeak:
             return DominantPeak()
         low, high = sorted((self.start, self.stop))
         tracked = float(np.clip(point.state.omega, low, high))
-        below = self._with_harmonics_to(balance, self.scan_harmonic)
-        above = self._with_harmonics_to(balance, min(self.scan_harmonic_above, self.scan_harmonic))
-        ranges = [(low, tracked, below), (tracked, high, above)] if below.basis != above.basis else [(low, high, below)]
+        lower_balance = self._with_harmonics_to(balance, self.scan_harmonic)
+        upper_balance = self._with_harmonics_to(balance, min(self.scan_harmonic_above, self.scan_harmonic))
+        ranges = (
+            [(low, tracked, lower_balance), (tracked, high, upper_balance)]
+            if lower_balance.basis != upper_balance.basis
+            else [(low, high, lower_balance)]
+        )
         result = DominantPeak()
         for start, stop, reduced in ranges:
             if result.point is None and stop > start:
@@ -153,8 +157,8 @@ class AtPeak:
             return DominantPeak(None, solves)
         threshold = self.dominance * point.amplitude
         height = branch.amplitude(self.output)[maxima]
-        others = height[np.abs(branch.omega[maxima] / point.state.omega - 1) > self.same_peak]
-        nearness = float(others.max(initial=0.0)) / threshold
+        other_heights = height[np.abs(branch.omega[maxima] / point.state.omega - 1) > self.same_peak]
+        nearness = float(other_heights.max(initial=0.0)) / threshold
         candidates = maxima[height > (1 - self.scan_miss) * threshold]
         if not len(candidates):
             return DominantPeak(None, solves, nearness)
@@ -232,8 +236,8 @@ class AtPeak:
             reach = self.outside_reach * width
             limits = float(neighbours.min()) - reach, float(neighbours.max()) + reach
             omega = float(branch.omega[row])
-            known = {omega: balance.shaped(branch.contact[row])}
-            peak = PeakRefinement(self, balance, omega, known, 0.5 * width, limits).run()
+            solved_x = {omega: balance.shaped(branch.contact[row])}
+            peak = PeakRefinement(self, balance, omega, solved_x, 0.5 * width, limits).run()
             solves += peak.solves
             if peak.solution.converged:
                 break

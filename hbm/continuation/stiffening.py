@@ -42,7 +42,7 @@ class StiffeningRules:
     agrees : residual at the end from the contact's own springs, whose compliance is known less well beside them
     closer : tolerance at the end over the wanted one: a step more, as a soft support multiplies what is left
     least_length : of a damped step
-    near : next step over the displacement at the end: beside stiff springs a residual alone says too little
+    closeness : next step over the displacement at the end: beside stiff springs a residual alone says too little
     rounding : relative change of the displacement that may be rounding
     force_known : change of the contact forces by that, beyond which they are not known
     """
@@ -53,7 +53,7 @@ class StiffeningRules:
     agrees: float = 1e-6
     closer: float = 1e-3
     least_length: float = 1e-4
-    near: float = 1e-6
+    closeness: float = 1e-6
     rounding: float = 1e-15
     force_known: float = 1e-5
 
@@ -68,7 +68,7 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
         return None
     spent, soft = 0, None
     hasty = replace(options, max_steps=min(options.max_steps, RULES.hasty))
-    known: list[tuple[float, np.ndarray]] = []  # levels and solutions of the way so far
+    path: list[tuple[float, np.ndarray]] = []  # levels and solutions of the way so far
 
     def solved(level: float, start: np.ndarray | None = None) -> bool:
         nonlocal soft, spent
@@ -76,17 +76,17 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
             soft = _softened(balance, level, soft)
         except SingularStuckSystem:  # so soft that what the contact alone holds counts as free
             return False
-        found, steps = _damped(soft, omega, soft.stuck(omega) if start is None else start, hasty)
+        soft_state, steps = _damped(soft, omega, soft.stuck(omega) if start is None else start, hasty)
         spent += steps
-        if found is not None:
-            known.append((level, found.x))
-        return found is not None
+        if soft_state is not None:
+            path.append((level, soft_state.x))
+        return soft_state is not None
 
     def stiffer(target: float, level: float) -> bool:
-        x = known[-1][1]
+        x = path[-1][1]
         starts = [x]
-        if len(known) > 1:
-            before, x_before = known[-2]
+        if len(path) > 1:
+            before, x_before = path[-2]
             starts = [x + (x - x_before) * (target - level) / (level - before), x]
         return spent < RULES.most_steps and any(solved(target, start) for start in starts)
 
@@ -94,7 +94,7 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
     first = next((level for level in levels if spent < RULES.most_steps and solved(level)), None)
     if first is None or lead(first, 0.0, stiffer) < 0.0:
         return None
-    x = known[-1][1]
+    x = path[-1][1]
     soft = _softened(balance, 0.0, soft)
     closer, steps = _damped(soft, omega, x, replace(options, tolerance=RULES.closer * options.tolerance))
     state = balance.evaluate(omega, x if closer is None else closer.x)
@@ -106,10 +106,13 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
 
 def _rounded(balance: HarmonicBalance, state: State) -> float:
     """Largest change of a component of the contact forces, over its own size, when x changes by rounding."""
-    beside = np.random.default_rng(0).uniform(-1, 1, state.x.shape)
-    x = state.x * (1 + RULES.rounding * beside)
-    moved = balance.evaluate(state.omega, x, False).cycle.force - state.cycle.force
-    sizes = [(np.linalg.norm(moved[:, i]), np.linalg.norm(state.cycle.force[:, i])) for i in range(moved.shape[1])]
+    noise = np.random.default_rng(0).uniform(-1, 1, state.x.shape)
+    x = state.x * (1 + RULES.rounding * noise)
+    force_change = balance.evaluate(state.omega, x, False).cycle.force - state.cycle.force
+    sizes = [
+        (np.linalg.norm(force_change[:, i]), np.linalg.norm(state.cycle.force[:, i]))
+        for i in range(force_change.shape[1])
+    ]
     return max((float(change / size) for change, size in sizes if size > 0), default=0.0)
 
 
@@ -118,8 +121,8 @@ def _softened(balance: HarmonicBalance, level: float, other: HarmonicBalance | N
 
     other : one of another level, whose linear side it shares where that is the same
     """
-    most = float(balance.contact.stiffness.max()) * 10.0**level
-    contact = balance.contact.with_parameters(lambda p: replace(p, stiffness=np.minimum(p.stiffness, most)))
+    stiffest = float(balance.contact.stiffness.max()) * 10.0**level
+    contact = balance.contact.with_parameters(lambda p: replace(p, stiffness=np.minimum(p.stiffness, stiffest)))
     if isinstance(balance.model, FlexibleModel):  # made with springs of its own
         reference = balance.model.residual.stiffness
     else:
@@ -145,9 +148,9 @@ def _damped(
         with np.errstate(all="ignore"):
             direction = sla.lu_solve(factor, -state.residual.ravel(), check_finite=False)
         size, length = float(np.linalg.norm(direction)), 1.0
-        near = size <= RULES.near * float(np.linalg.norm(state.x))
-        if not np.isfinite(size) or (small and near):
-            return (state if small and near else None), step
+        is_close = size <= RULES.closeness * float(np.linalg.norm(state.x))
+        if not np.isfinite(size) or (small and is_close):
+            return (state if small and is_close else None), step
         while length > RULES.least_length:
             trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
             following = sla.lu_solve(factor, trial.residual.ravel(), check_finite=False)
@@ -171,21 +174,21 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
     if not balance.contact.has_friction:
         return None
     x, spent, products = balance.stuck(omega), 0, 0
-    found: Solution | None = None
+    solution: Solution | None = None
 
     def rougher(level: float, _: float = np.nan) -> bool:
-        nonlocal found, x, spent, products
+        nonlocal solution, x, spent, products
         if spent >= SLIDING_STEPS:
             return False
-        found = newton.solve(_with_friction(balance, level), omega, x, options)
-        spent, products = spent + found.steps, products + found.products
-        x = found.state.x if found.converged else x
-        return found.converged
+        solution = newton.solve(_with_friction(balance, level), omega, x, options)
+        spent, products = spent + solution.steps, products + solution.products
+        x = solution.state.x if solution.converged else x
+        return solution.converged
 
     first = next((level for level in ROUGH if rougher(level)), None)
-    if first is None or lead(first, 0.0, rougher) > 0.0 or found is None:
+    if first is None or lead(first, 0.0, rougher) > 0.0 or solution is None:
         return None
-    return replace(found, steps=spent, products=products)
+    return replace(solution, steps=spent, products=products)
 
 
 def _with_friction(balance: HarmonicBalance, level: float) -> HarmonicBalance:

@@ -141,7 +141,7 @@ class Gradient:
             weights.append(q.by_force - through - point.transposed(solutions[-1]))
         l = basis.to_complex(np.array(solutions))
         harmonics = enumerate(zip(systems, observed, strict=True))
-        v = [own + s.adjoint(s.B.conj().T @ l[:, :, i].T) for i, (s, own) in harmonics]
+        v = [output_part + s.adjoint(s.B.conj().T @ l[:, :, i].T) for i, (s, output_part) in harmonics]
         return np.reshape(solutions, (-1, *shape)), v, np.reshape(weights, (-1, *shape))
 
     @cached_property

@@ -73,8 +73,8 @@ def at_peak(
 
     def gradient_near(end: AmplitudeSlope, widths: float) -> Gradient:
         omega = end.omega + widths * width
-        near = exact_state(balance, omega, end.predict(omega), options)
-        return Gradient(balance, near, tuple(cycle_numbers(balance, near, output, wear)))
+        neighbours = exact_state(balance, omega, end.predict(omega), options)
+        return Gradient(balance, neighbours, tuple(cycle_numbers(balance, neighbours, output, wear)))
 
     if len(ends) == 2:
         low, high = (
@@ -82,10 +82,10 @@ def at_peak(
             for end, side in zip(ends, RULES.corner_sides, strict=True)
         )
         return _at_corner(low, high, changes)
-    gradient, *near = (gradient_near(ends[0], side) for side in (0.0, -RULES.curve_step, RULES.curve_step))
+    gradient, *neighbours = (gradient_near(ends[0], side) for side in (0.0, -RULES.curve_step, RULES.curve_step))
     row = _amplitude_row(gradient.numbers)
-    near = [replace(g, numbers=(g.numbers[_amplitude_row(g.numbers)],)) for g in near]
-    parameters, (point, *points) = point_slopes([gradient, *near], changes)
+    neighbours = [replace(g, numbers=(g.numbers[_amplitude_row(g.numbers)],)) for g in neighbours]
+    parameters, (point, *points) = point_slopes([gradient, *neighbours], changes)
     slope = point.by_frequency[row] / point.values[row]
     curvature, moves = _curvature_and_moves(points, width, float(slope))
     point = replace(point, values=point.values - slope / curvature * point.by_frequency)
@@ -101,13 +101,13 @@ def peak_moves(
         (peak, *corner), _ = exact_peak(balance, state, output, options)
         if corner:
             raise NoDerivative("the peak is a corner of the curve, where a contact transition begins")
-    near = []
+    neighbours = []
     for side in (-RULES.curve_step, RULES.curve_step):
         omega = peak.omega + side * peak.width
         neighbour = exact_state(balance, omega, peak.predict(omega), options)
         numbers = cycle_numbers(balance, neighbour, output)
-        near.append(Gradient(balance, neighbour, (numbers[_amplitude_row(numbers)],)))
-    return _curvature_and_moves(point_slopes(near, changes)[1], peak.width, peak.distance / peak.width**2)[1]
+        neighbours.append(Gradient(balance, neighbour, (numbers[_amplitude_row(numbers)],)))
+    return _curvature_and_moves(point_slopes(neighbours, changes)[1], peak.width, peak.distance / peak.width**2)[1]
 
 
 def _amplitude_row(numbers: Sequence[CycleNumber]) -> int:
@@ -138,10 +138,10 @@ def _at_corner(low: Sequence[Gradient], high: Sequence[Gradient], changes: Chang
     gradients = [replace(g, numbers=tuple(q for q in g.numbers if q.name in common)) for g in (*low, *high)]
     row = _amplitude_row(gradients[0].numbers)
     parameters, points = point_slopes(gradients, changes)
-    below, above = PointSlopes.limit(points[:4]), PointSlopes.limit(points[4:])
-    moves = (above.columns[row] - below.columns[row]) / (below.by_frequency[row] - above.by_frequency[row])
-    along = [side.columns + side.by_frequency[:, None] * moves for side in (below, above)]
-    size = np.abs(along).max(axis=(0, 2), keepdims=True)[0]
-    if (np.abs(along[1] - along[0]) > RULES.corner * size).any():
+    lower, upper = PointSlopes.limit(points[:4]), PointSlopes.limit(points[4:])
+    moves = (upper.columns[row] - lower.columns[row]) / (lower.by_frequency[row] - upper.by_frequency[row])
+    both_sides = [side.columns + side.by_frequency[:, None] * moves for side in (lower, upper)]
+    size = np.abs(both_sides).max(axis=(0, 2), keepdims=True)[0]
+    if (np.abs(both_sides[1] - both_sides[0]) > RULES.corner * size).any():
         raise NoDerivative("the peak is a corner of the curve where more than one contact transition begins")
-    return replace(derivatives_at(gradients[0], parameters, below, moves), follows_corner=True)
+    return replace(derivatives_at(gradients[0], parameters, lower, moves), follows_corner=True)

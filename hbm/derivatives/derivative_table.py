@@ -88,8 +88,8 @@ def point_slopes(
     points = []
     for slopes, gradient in zip(sides, gradients, strict=True):
         values = np.array([number.value for number in gradient.numbers])
-        above, below = np.moveaxis(np.reshape(slopes, (len(slopes), 2, len(values))), 1, 0)
-        points.append(PointSlopes(values, gradient.by_frequency(), above.T, below.T, gradient.by_gap()))
+        upper, lower = np.moveaxis(np.reshape(slopes, (len(slopes), 2, len(values))), 1, 0)
+        points.append(PointSlopes(values, gradient.by_frequency(), upper.T, lower.T, gradient.by_gap()))
     return ParameterSteps(tuple(names), np.array(steps)), points
 
 
@@ -100,13 +100,13 @@ def derivatives_at(
     columns, by_frequency = point.columns, point.by_frequency
     if moves is not None:
         columns, by_frequency = columns + by_frequency[:, None] * moves, np.zeros(len(columns))
-    n, above, below = len(parameters.names), point.above, point.below
-    effect = np.abs(above + below) * parameters.steps
+    n, upper, lower = len(parameters.names), point.above, point.below
+    effect = np.abs(upper + lower) * parameters.steps
     size = np.maximum(effect, RULES.least_effect * effect.max(axis=1, initial=0.0, keepdims=True))
-    corner = (2 * np.abs(above - below) * parameters.steps > RULES.corner * size).any(axis=0)
+    corner = (2 * np.abs(upper - lower) * parameters.steps > RULES.corner * size).any(axis=0)
     return Derivatives(
         tuple(number.name for number in gradient.numbers), point.values, parameters.names, columns[:, :n], corner,
-        above, below, by_frequency, columns[:, n:], gradient.state,
+        upper, lower, by_frequency, columns[:, n:], gradient.state,
     )  # fmt: skip
 
 

@@ -26,8 +26,8 @@ def exact_peak(
     Two points where the slope does not vanish but jumps: those on both sides of the corner
     """
 
-    def solve_at(omega: float, near: AmplitudeSlope) -> AmplitudeSlope:
-        return slope_at(balance, exact_state(balance, omega, near.predict(omega), options), output)
+    def solve_at(omega: float, origin: AmplitudeSlope) -> AmplitudeSlope:
+        return slope_at(balance, exact_state(balance, omega, origin.predict(omega), options), output)
 
     row = balance.compliance.output_names.index(output)
     start = previous = slope_at(balance, exact_state(balance, state.omega, state.x, options), output)

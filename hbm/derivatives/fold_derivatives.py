@@ -37,11 +37,11 @@ def at_fold(
     parameters, (point,) = point_slopes([gradient], changes)
     quantities = [(q, q.slope) for q in every(FoldQuantity) if q.slope is not None]
     slopes = np.array([[slope(state.omega)] for _, slope in quantities]) / -point.by_frequency[0]
-    along = PointSlopes(
+    fold_slopes = PointSlopes(
         np.array([q.value(state.omega) for q, _ in quantities]), np.zeros(len(quantities)),
         slopes * point.above, slopes * point.below, slopes * point.by_gap,
     )  # fmt: skip
-    derivatives = derivatives_at(gradient, parameters, along)
+    derivatives = derivatives_at(gradient, parameters, fold_slopes)
     return replace(derivatives, names=tuple(q.name for q, _ in quantities))
 
 

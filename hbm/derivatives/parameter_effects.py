@@ -90,11 +90,11 @@ class ParameterEffects:
             up, down = mean + jump / 2, jump / 2 - mean
         elif change.double_step is not None:
             up, down = (up - down) / 2, (down - up) / 2
-        above, below = up / change.step, -down / change.step
+        upper, lower = up / change.step, -down / change.step
         if change.contact_part is None:
-            return above, below
+            return upper, lower
         contact_above, contact_below = self.of_change(change.contact_part)
-        return above + contact_above, below + contact_below
+        return upper + contact_above, lower + contact_below
 
     def of_gap(self) -> tuple[np.ndarray, np.ndarray]:
         """(n_pair, n_component, n_coeff) d force / d gap of each pair at the same x, above and below it [N/m]."""
@@ -102,14 +102,14 @@ class ParameterEffects:
         if "n" not in balance.contact.components or not balance.basis.has_static:
             return np.zeros_like(self.state.x), np.zeros_like(self.state.x)
         step, gap = RULES.gap_step * float(np.abs(self.state.x).max()), balance.contact.gap
-        above, below = (
+        upper, lower = (
             self._force_change(balance.contact.with_gap(gap + side), balance.memory) / side for side in (step, -step)
         )
-        return above, below
+        return upper, lower
 
-    def _differences(self, above: BalanceInputs, below: BalanceInputs) -> list[np.ndarray]:
+    def _differences(self, upper: BalanceInputs, lower: BalanceInputs) -> list[np.ndarray]:
         """Vectors of `of_change` for the inputs on both sides, without the step."""
-        sides = ((self._force_change(i.contact, i.memory), *self._linear_change(i)) for i in (above, below))
+        sides = ((self._force_change(i.contact, i.memory), *self._linear_change(i)) for i in (upper, lower))
         return [np.concatenate([part.ravel() for part in side]) for side in sides]
 
     def _force_change(self, contact: JointSet, memory: np.ndarray) -> np.ndarray:

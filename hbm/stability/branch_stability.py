@@ -77,25 +77,25 @@ def stability_along(
     path = parameter.of(problem)
     if path.name != branch.parameter_name:
         raise Refusal(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
-    found: list[Stability | None] = []
+    results: list[Stability | None] = []
     for value, flat, converged in zip(branch.parameter, branch.contact, branch.converged, strict=True):
-        here = None
+        result = None
         if converged:
             balance, omega = path.place(float(value))
             state = balance.evaluate(omega, balance.shaped(flat))
-            here = stability(balance, state)
-        found.append(here)
+            result = stability(balance, state)
+        results.append(result)
         if on_point is not None:
-            on_point(len(found), len(branch.outcome))
+            on_point(len(results), len(branch.outcome))
     places = [Direction(x, float(value)) for x, value in zip(branch.contact, branch.parameter, strict=True)]
     changes = [
         _locate(path, i, (before, now), (places[i], places[i + 1]))
-        for i, (before, now) in enumerate(itertools.pairwise(found))
+        for i, (before, now) in enumerate(itertools.pairwise(results))
         if before is not None and now is not None and before.n_unstable != now.n_unstable
     ]
     return BranchStability(
-        stable=np.array([s is not None and s.stable for s in found]),
-        growth=np.array([np.nan if s is None else s.exponents[0].real for s in found]),
+        stable=np.array([s is not None and s.stable for s in results]),
+        growth=np.array([np.nan if s is None else s.exponents[0].real for s in results]),
         omega=np.array([b.value for b in changes]),
         position=np.array([b.position for b in changes]),
         kinds=tuple(b.kind for b in changes),
@@ -153,7 +153,7 @@ def _zero_of_growth(
             low, weights = (share, rate), [1.0, 0.5 * weights[1]]
         else:
             high, weights = (share, rate), [0.5 * weights[0], 1.0]
-        near = abs(rate) <= ACCURACY * max(abs(rates[0]), abs(rates[1]))
-        if near or high[0] - low[0] <= ACCURACY:
+        is_small = abs(rate) <= ACCURACY * max(abs(rates[0]), abs(rates[1]))
+        if is_small or high[0] - low[0] <= ACCURACY:
             break
     return share, value

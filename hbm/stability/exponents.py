@@ -45,7 +45,7 @@ class HillRules:
     most_modes: int = 30
     copy_distance: float = 0.02  # over omega: how far truncation may drive copies of one exponent apart
     equally_central: float = 1e-5  # difference of the mean harmonics of two perturbations that is rounding
-    most_settled: int = 500  # coefficients of the contact up to which exponents that grow are solved for again
+    most_refined: int = 500  # coefficients of the contact up to which exponents that grow are solved for again
 
 
 RULES = HillRules()
@@ -131,13 +131,13 @@ def _moving(balance: HarmonicBalance, state: State, n_modes: int | None, top: in
 
 def _of_wave(balance: HarmonicBalance, state: State, n_modes: int | None, top: int | None) -> Stability:
     basis, linear = _perturbed(balance, top), balance.compliance
-    wanted = _moving(balance, state, n_modes, basis.harmonics[-1])
+    n_modes_moving = _moving(balance, state, n_modes, basis.harmonics[-1])
     modes = _WAVES.get(linear)
-    if modes is None or modes.m != wanted:
-        modes = _WAVES[linear] = WaveModes(balance.model, linear.k, wanted)
+    if modes is None or modes.m != n_modes_moving:
+        modes = _WAVES[linear] = WaveModes(balance.model, linear.k, n_modes_moving)
     slope, answer = _departure_slope(balance, state, basis), _answer(balance, state, basis)
-    found, diameters = wave_exponents.exponents(balance, modes, state.omega, slope, answer)
-    exponents, order = _sorted(found, state.omega)
+    values, diameters = wave_exponents.exponents(balance, modes, state.omega, slope, answer)
+    exponents, order = _sorted(values, state.omega)
     return Stability(state.omega, exponents, diameters[order])
 
 
@@ -146,8 +146,8 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     expansion = balance.compliance.groups[-1][0]  # a displacement prescribed in harmonic 0 alone is free to grow
     m = min(_moving(balance, state, n_modes, basis.harmonics[-1]), len(expansion.lam))
     n_contact = balance.compliance.n_contact
-    phi, rest = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]
-    static = expansion.w0[:n_contact, :n_contact] + (rest / expansion.lam[m:]) @ rest.T
+    phi, residual_shapes = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]
+    static = expansion.w0[:n_contact, :n_contact] + (residual_shapes / expansion.lam[m:]) @ residual_shapes.T
     slope, answer = _departure_slope(balance, state, basis), _answer(balance, state, basis)
     coupling = _contact_in_modes(slope, phi, static)
     nc = basis.n_coeff
@@ -160,21 +160,21 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     constant = turn @ turn + damping @ turn + spring / state.omega**2
     companion = np.block([[np.zeros_like(turn), np.eye(len(turn))], [-constant, -2 * turn - damping]])
     values, vectors = np.linalg.eig(companion)
-    found = _central(values, *_centre(vectors[: m * nc], m, basis), 2 * m)
+    exponents = _central(values, *_centre(vectors[: m * nc], m, basis), 2 * m)
     if answer is not None:
         flow = np.zeros((m, m)) if expansion.flow is None else expansion.flow[:m, :m]
         modes = expansion.lam[:m], expansion.c[:m, :m], flow, phi, static
-        one, of = np.unique(
-            np.where(found.imag < 0, found.conj(), found), return_inverse=True
+        distinct, of = np.unique(
+            np.where(exponents.imag < 0, exponents.conj(), exponents), return_inverse=True
         )  # each with its conjugate
-        one = wave_exponents.settled(one, (lambda index: modes, 0, 0, state.omega), slope, answer)[of]
-        found = np.where(found.imag < 0, one.conj(), one)
-    return found * state.omega
+        distinct = wave_exponents.refined(distinct, (lambda index: modes, 0, 0, state.omega), slope, answer)[of]
+        exponents = np.where(exponents.imag < 0, distinct.conj(), distinct)
+    return exponents * state.omega
 
 
 def _answer(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> wave_exponents.Answer | None:
     """The contact's answer to a perturbation; None of large contacts and several laws."""
-    if balance.contact.stiffness.size * basis.n_coeff > RULES.most_settled:
+    if balance.contact.stiffness.size * basis.n_coeff > RULES.most_refined:
         return None
     with suppress(ValueError):
         return perturbed_contact.answer_of(balance, state, basis.harmonics[-1])
@@ -185,11 +185,11 @@ def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasi
     """dg/dx of every pair with all harmonics of the perturbation: (n_pair, c, n_coeff, c, n_coeff)."""
     n_pair, c, _ = state.x.shape
     x = np.zeros((n_pair, c, basis.n_coeff))
-    seen: dict[int, int] = {}
+    has_cosine: dict[int, int] = {}
     for i, h in enumerate(balance.basis.order):
         if h <= basis.harmonics[-1]:
-            x[:, :, 0 if h == 0 else 2 * h - 1 + seen.get(h, 0)] = state.x[:, :, i]
-            seen[h] = 1
+            x[:, :, 0 if h == 0 else 2 * h - 1 + has_cosine.get(h, 0)] = state.x[:, :, i]
+            has_cosine[h] = 1
     cycle = balance.contact.cycle(x, basis, balance.memory)
     jac = cycle.jacobian
     assert jac is not None
@@ -215,8 +215,8 @@ def _contact_in_modes(slope: np.ndarray, phi: np.ndarray, static: np.ndarray) ->
     n, m = len(rows), phi.shape[1]
     series = np.einsum("ipc,pcadb->iapdb", static[np.ix_(rows, rows)].reshape(n, len(active), c), d).reshape(n * nc, -1)
     modal = np.kron(phi[rows], np.eye(nc))
-    moved = np.linalg.solve(np.eye(n * nc) - series, modal).reshape(len(active), c * nc, m * nc)
-    return modal.T @ (d.reshape(len(active), c * nc, c * nc) @ moved).reshape(n * nc, m * nc)
+    dx = np.linalg.solve(np.eye(n * nc) - series, modal).reshape(len(active), c * nc, m * nc)
+    return modal.T @ (d.reshape(len(active), c * nc, c * nc) @ dx).reshape(n * nc, m * nc)
 
 
 def _centre(vectors: np.ndarray, m: int, basis: HarmonicBasis) -> tuple[np.ndarray, np.ndarray]:
@@ -233,7 +233,7 @@ def _centre(vectors: np.ndarray, m: int, basis: HarmonicBasis) -> tuple[np.ndarr
     return h @ (plus - minus) / size, h**2 @ (plus + minus) / size
 
 
-def _central(values: np.ndarray, centre: np.ndarray, spread: np.ndarray, wanted: int) -> np.ndarray:
+def _central(values: np.ndarray, centre: np.ndarray, spread: np.ndarray, count: int) -> np.ndarray:
     """The `wanted` exponents, in units of omega, with the most central perturbations, none of them twice.
 
     (lambda + i k, centre - k) is the same perturbation as (lambda, centre), for every whole k. Where even and odd
@@ -243,9 +243,9 @@ def _central(values: np.ndarray, centre: np.ndarray, spread: np.ndarray, wanted:
     chosen: list[int] = []
     for i in np.lexsort((-spread, np.round(np.abs(centre) / RULES.equally_central))):
         shift = np.round(values[i].imag - values[chosen].imag)
-        same = np.abs(values[i] - values[chosen] - 1j * shift) < RULES.copy_distance
-        if not np.any(same & (shift != 0) & (np.abs(centre[i] - centre[chosen] + shift) < 0.25)):
+        is_copy = np.abs(values[i] - values[chosen] - 1j * shift) < RULES.copy_distance
+        if not np.any(is_copy & (shift != 0) & (np.abs(centre[i] - centre[chosen] + shift) < 0.25)):
             chosen.append(int(i))
-        if len(chosen) == wanted:
+        if len(chosen) == count:
             break
     return values[chosen]

@@ -24,7 +24,7 @@ from tribodyn.refusal import Refusal
 
 MULTIPLIERS = "its Floquet multipliers in time"
 HILL = "Hill's method"
-SAME = 0.2  # largest difference of the vibration at the contact, relative, up to which both motions are one
+MOTION_TOLERANCE = 0.2  # largest difference of the vibration at the contact, relative, up to which both motions are one
 
 
 @dataclass(frozen=True)
@@ -95,15 +95,19 @@ def is_unstable(balance: HarmonicBalance, state: State, options: Options | None 
     return any(perturb(PeriodSearch(stepper, plain, False), period, 8, s * direction).grows for s in (1.0, -1.0))
 
 
-def is_stable(balance: HarmonicBalance, state: State, found: Verification | None, options: Options) -> tuple[bool, str]:
+def is_stable(
+    balance: HarmonicBalance, state: State, verification: Verification | None, options: Options
+) -> tuple[bool, str]:
     """Whether no perturbation of the motion near a balance state grows, and the method that says so.
 
     found : the state beside time integration, which may have come to another motion, or to none; None: not compared
     Hill's method takes the contact's answer to a perturbation as that to a steady vibration. Where pairs slip and lift
     in a cycle that may miss what grows, so that it serves only where there are no multipliers
     """
-    same = found is not None and found.motion.periodic and found.contact <= SAME
-    if same and not balance.model.is_wave:
+    is_confirmed = (
+        verification is not None and verification.motion.periodic and verification.contact <= MOTION_TOLERANCE
+    )
+    if is_confirmed and not balance.model.is_wave:
         with suppress(ValueError):
             return not is_unstable(balance, state, options), MULTIPLIERS
     return stability(balance, state).stable, HILL
@@ -125,8 +129,8 @@ def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tup
     moves[2 * stepper.n_dynamic :][:n_memory] = np.repeat(period.record.bits != STICKS, balance.memory.shape[1])
 
     def product(v: np.ndarray) -> np.ndarray:
-        there = plain.step(plain.vector.unpack(base.start + size * v, period.end))
-        return np.where(moves, (there.image - base.image) / size, 0.0)
+        disturbed = plain.step(plain.vector.unpack(base.start + size * v, period.end))
+        return np.where(moves, (disturbed.image - base.image) / size, 0.0)
 
     start = np.where(moves, np.random.default_rng(0).normal(size=len(moves)), 0.0)
     return *_largest_ritz(product, start), period
@@ -145,11 +149,11 @@ def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray
         h[k, k - 1] = np.linalg.norm(w)
         values, vectors = np.linalg.eig(h[:k, :k])
         top = int(np.argmax(np.abs(values)))
-        found, miss = float(np.abs(values[top])), float(h[k, k - 1] * np.abs(vectors[-1, top]))
-        if miss <= RULES.accuracy * found or (k >= RULES.fewest_products and found + miss < 1):
-            return found, np.real(np.array(v).T @ vectors[:, top])
+        modulus, miss = float(np.abs(values[top])), float(h[k, k - 1] * np.abs(vectors[-1, top]))
+        if miss <= RULES.accuracy * modulus or (k >= RULES.fewest_products and modulus + miss < 1):
+            return modulus, np.real(np.array(v).T @ vectors[:, top])
         v.append(w / h[k, k - 1])
-    raise Refusal(f"the largest multiplier did not converge: {found:.3g}, off by up to {miss:.1g}")
+    raise Refusal(f"the largest multiplier did not converge: {modulus:.3g}, off by up to {miss:.1g}")
 
 
 def _size(stepper: TimeStepper) -> int:
@@ -173,18 +177,18 @@ def monodromy(stepper: TimeStepper, slopes: np.ndarray | None) -> np.ndarray:
         of_x, of_s, of_x0 = (
             _block_diagonal(part) for part in np.split(D, [c, c + n_state], axis=2)
         )  # each of (f, memory), pair by pair
-        known = of_s @ s + of_x0 @ x
+        free_part = of_s @ s + of_x0 @ x
         force = np.arange(len(of_x)).reshape(-1, c + n_state)[:, :c].ravel()
-        x_free = linear.U @ free[: n // 2] - A @ known[force]
+        x_free = linear.U @ free[: n // 2] - A @ free_part[force]
         x = np.linalg.solve(np.eye(n_contact) + A @ of_x[force], x_free)
-        both = of_x @ x + known
-        f, s = both[force], np.delete(both, force, axis=0)
+        outputs = of_x @ x + free_part
+        f, s = outputs[force], np.delete(outputs, force, axis=0)
         z = free - 0.5 * linear.Q @ (linear.U.T @ f)
-    whole = np.concatenate([z, f, x, s])
-    fixed = np.zeros(len(whole), bool)
+    result = np.concatenate([z, f, x, s])
+    fixed = np.zeros(len(result), bool)
     first = n + 2 * n_contact
-    fixed[first:] = np.all(whole[first:] == np.eye(len(whole))[first:], axis=1)
-    return whole[np.ix_(~fixed, ~fixed)]
+    fixed[first:] = np.all(result[first:] == np.eye(len(result))[first:], axis=1)
+    return result[np.ix_(~fixed, ~fixed)]
 
 
 def _block_diagonal(blocks: np.ndarray) -> np.ndarray:

@@ -47,7 +47,7 @@ class FoldInTime:
     outcome: Outcome[SolveEnd]
 
     @property
-    def found(self) -> bool:
+    def is_located(self) -> bool:
         """Whether the end of the branch in time was found within the bracket."""
         return self.outcome.kind is SolveEnd.CONVERGED
 
@@ -71,15 +71,15 @@ def solutions_at(
     points : first and last point of the stretch that is looked at, the whole curve by default
     """
     first, last = (0, len(branch.omega) - 1) if points is None else points
-    beyond = branch.omega[first : last + 1] - omega
-    found = []
-    for i in np.flatnonzero(beyond[:-1] * beyond[1:] < 0):
-        share = beyond[i] / (beyond[i] - beyond[i + 1])
+    offset = branch.omega[first : last + 1] - omega
+    states = []
+    for i in np.flatnonzero(offset[:-1] * offset[1:] < 0):
+        share = offset[i] / (offset[i] - offset[i + 1])
         x = (1 - share) * branch.contact[first + i] + share * branch.contact[first + i + 1]
         solution = newton.solve(balance, omega, balance.shaped(x))
         if solution.converged:
-            found.append(solution.state)
-    return found
+            states.append(solution.state)
+    return states
 
 
 @single
@@ -100,29 +100,33 @@ def fold_in_time(
     """
     if fold not in branch.folds:
         raise Refusal(f"point {fold} of the branch is no fold, the folds are {list(branch.folds)}")
-    own, partner = _stable_side(balance, branch, fold)
-    elsewhere = [stretch for stretch in _stretches(branch) if stretch not in (own, partner)]
+    stable_stretch, partner = _stable_side(balance, branch, fold)
+    other_stretches = [
+        other_stretch for other_stretch in _stretches(branch) if other_stretch not in (stable_stretch, partner)
+    ]
     at_fold = balance.evaluate(branch.omega[fold], balance.shaped(branch.contact[fold]))
     side = np.sign(branch.omega[fold - 1] - branch.omega[fold])
     inside, outside = (float(branch.omega[fold] * (1 + s * bracket)) for s in (side, -side))
-    last, stayed, left = float(branch.amplitude(output)[fold]), False, False
+    last, stayed, has_left = float(branch.amplitude(output)[fold]), False, False
     for _ in range(bisections):
         omega = 0.5 * (inside + outside)
-        here = solutions_at(balance, branch, omega, own)
-        start = (here[-1] if own[1] == fold else here[0]) if here else at_fold
-        others = [state for stretch in elsewhere for state in solutions_at(balance, branch, omega, stretch)]
+        solutions = solutions_at(balance, branch, omega, stable_stretch)
+        start = (solutions[-1] if stable_stretch[1] == fold else solutions[0]) if solutions else at_fold
+        other_states = [
+            state for other_stretch in other_stretches for state in solutions_at(balance, branch, omega, other_stretch)
+        ]
         motion = march(balance, start, omega, options)
-        moved = motion.coefficients(motion.x, balance.basis)
-        near = np.linalg.norm(moved - start.x)
-        if motion.periodic and all(near < np.linalg.norm(moved - other.x) for other in others):
+        final_x = motion.coefficients(motion.x, balance.basis)
+        distance = np.linalg.norm(final_x - start.x)
+        if motion.periodic and all(distance < np.linalg.norm(final_x - other.x) for other in other_states):
             inside, last, stayed = omega, amplitude_in_time(balance, motion, output), True
         else:
-            outside, left = omega, True
+            outside, has_left = omega, True
     hertz = branch.omega[fold] / (2 * np.pi)
     outcome = CONVERGED
     if not stayed:
         outcome = SolveEnd.LEAVES_BRANCH.say(f" {100 * bracket:g} % of its fold at {hertz:.6g} Hz")
-    elif not left:
+    elif not has_left:
         outcome = SolveEnd.STAYS_ON_BRANCH.say(f" {100 * bracket:g} % beyond its fold at {hertz:.6g} Hz")
     return FoldInTime(fold, float(branch.omega[fold]), inside, last, 2 * bracket / 2**bisections, outcome)
 

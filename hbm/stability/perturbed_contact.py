@@ -46,12 +46,12 @@ def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[com
         turn = np.exp(-rate * 2 * np.pi / STEPS)
         driven = of_x @ p + turn * (of_x0 @ np.roll(p, 1, axis=0))
         passed_on = turn * of_s
-        kept = np.zeros((STEPS + 1, n_pair, n_state, c * nc + n_state), complex)  # from no memory, and of one
-        kept[0, :, :, c * nc :] = np.eye(n_state)
+        remembered = np.zeros((STEPS + 1, n_pair, n_state, c * nc + n_state), complex)  # from no memory, and of one
+        remembered[0, :, :, c * nc :] = np.eye(n_state)
         for j in range(STEPS):
-            np.matmul(passed_on[j, :, c:], kept[j], out=kept[j + 1])
-            kept[j + 1, :, :, : c * nc] += driven[j, :, c:]
-        s, of_one = kept[..., : c * nc], kept[..., c * nc :]
+            np.matmul(passed_on[j, :, c:], remembered[j], out=remembered[j + 1])
+            remembered[j + 1, :, :, : c * nc] += driven[j, :, c:]
+        s, of_one = remembered[..., : c * nc], remembered[..., c * nc :]
         # as a period before; a slider that rests does so
         first = np.linalg.pinv(np.eye(n_state) - of_one[-1], rcond=1e-9) @ s[-1]
         now = driven[:, :, :c] + passed_on[:, :, :c] @ (s[:-1] + of_one[:-1] @ first)

@@ -51,17 +51,17 @@ class WaveModes:
         wave = as_wave(model)
         self.n_sectors, self.engine_order = wave.n_sectors, wave.engine_order
         self._per_index, self._k, self.m = wave.at_index, np.asarray(stiffness, float).ravel(), n_modes
-        self._made: dict[int, _Index] = {}
+        self._cache: dict[int, _Index] = {}
 
     def __call__(self, index: int) -> _Index:
         """Squared frequencies (m,), damping and flow (m, m), contact shapes (n_contact, m), W of the rest."""
         index = index % self.n_sectors
         mirror = 2 * index > self.n_sectors
         key = self.n_sectors - index if mirror else index
-        if key not in self._made:
-            self._made[key] = self._make(key)
-        lam, *others = self._made[key]
-        c, flow, phi, static = (part.conj() for part in others) if mirror else others
+        if key not in self._cache:
+            self._cache[key] = self._make(key)
+        lam, *matrices = self._cache[key]
+        c, flow, phi, static = (part.conj() for part in matrices) if mirror else matrices
         return lam, c, flow, phi, static
 
     def _make(self, index: int) -> _Index:
@@ -90,7 +90,7 @@ def exponents(
     """Floquet exponents of a travelling wave against perturbations of every nodal diameter.
 
     slope : (n_pair, c, n_coeff, c, n_coeff) dg/dx with coefficients [x_0, a_1, b_1, ...] up to the highest harmonic of
-        the perturbation; answer : as of `settled`
+        the perturbation; answer : as of `refined`
     Returns exponents (n,) [1/s] and the index d (n,) of each perturbation, from -N/2 + 1 to N/2
     """
     order, n = modes.engine_order, modes.n_sectors
@@ -100,57 +100,57 @@ def exponents(
     rows = (active[:, None] * c + np.arange(c)).ravel()
     values, centres, diameters = [], [], []
     for d in range(n // 2 + 1):
-        found, centre = _of_index(modes, order, d, omega, blocks, rows)
+        values_of_index, centre = _of_index(modes, order, d, omega, blocks, rows)
         for sign in (1, -1) if 0 < 2 * d < n else (1,):
-            values.append(found if sign > 0 else found.conj())
+            values.append(values_of_index if sign > 0 else values_of_index.conj())
             centres.append(sign * centre)
-            diameters.append(np.full(len(found), sign * d))
-    every = np.concatenate(values), np.concatenate(centres), np.concatenate(diameters)
-    chosen = _once(*every, order, n, sum(2 * len(modes(d)[0]) for d in range(n)))
-    values, waves = every[0][chosen], every[2][chosen]
+            diameters.append(np.full(len(values_of_index), sign * d))
+    candidates = np.concatenate(values), np.concatenate(centres), np.concatenate(diameters)
+    chosen = _once(*candidates, order, n, sum(2 * len(modes(d)[0]) for d in range(n)))
+    values, waves = candidates[0][chosen], candidates[2][chosen]
     if answer is not None:
         for d in np.unique(np.abs(waves[values.real > GROWS])):  # what is solved for d holds for -d, conjugated
-            here, back = np.abs(waves) == d, waves < 0
-            one, of = np.unique(np.where(back, values.conj(), values)[here], return_inverse=True)
-            found = settled(one, (modes, order, int(d), omega), slope, answer)[of]
-            values[here] = np.where(back[here], found.conj(), found)
+            rows_of_index, back = np.abs(waves) == d, waves < 0
+            distinct, of = np.unique(np.where(back, values.conj(), values)[rows_of_index], return_inverse=True)
+            values_of_index = refined(distinct, (modes, order, int(d), omega), slope, answer)[of]
+            values[rows_of_index] = np.where(back[rows_of_index], values_of_index.conj(), values_of_index)
     return values * omega, waves
 
 
-def settled(exponents: np.ndarray, at: Place, slope: np.ndarray, answer: Answer) -> np.ndarray:
+def refined(exponents: np.ndarray, at: Place, slope: np.ndarray, answer: Answer) -> np.ndarray:
     """Exponents (n,), in units of omega: those that grow by the answer `slope` to a steady vibration solved for again.
 
     Each is followed to the contact's answer to just that exponent, and stays where that leads nowhere
     """
-    rows, steady, found = np.arange(slope.shape[0] * slope.shape[1]), of_exponentials(slope), exponents.copy()
+    rows, steady, result = np.arange(slope.shape[0] * slope.shape[1]), of_exponentials(slope), exponents.copy()
     for i in np.flatnonzero(exponents.real > GROWS):
-        now = exponents[i]
+        exponent = exponents[i]
         for share in SHARES:
-            before, now = now, _nearest(now, *at, (1 - share) * steady + share * answer(now), rows)
-            if share == 1 and abs(now - before) < ACCURACY:
-                found[i] = now
+            before, exponent = exponent, _nearest(exponent, *at, (1 - share) * steady + share * answer(exponent), rows)
+            if share == 1 and abs(exponent - before) < ACCURACY:
+                result[i] = exponent
                 break
-    return found
+    return result
 
 
 def _once(
-    values: np.ndarray, centre: np.ndarray, diameters: np.ndarray, order: int, n_sectors: int, wanted: int
+    values: np.ndarray, centre: np.ndarray, diameters: np.ndarray, order: int, n_sectors: int, limit: int
 ) -> np.ndarray:
     """The `wanted` exponents, in units of omega, with the most central perturbations, none of them twice.
 
     (lambda - i s, d - s EO) with harmonics renumbered by s is the same perturbation as (lambda, d), for whole s
     """
-    chosen, count = np.empty(min(wanted, len(values)), int), 0
+    chosen, count = np.empty(min(limit, len(values)), int), 0
     for i in np.argsort(np.abs(centre), kind="stable"):
         before = chosen[:count]
-        away = values[before] - values[i]
-        shift = np.round(away.imag)
-        same = np.abs(away - 1j * shift) < COPY_DISTANCE
-        same &= (shift != 0) & ((diameters[before] - diameters[i] - shift * order) % n_sectors == 0)
-        if not np.any(same & (np.abs(centre[i] - centre[before] - shift) < SAME_CENTRE)):
+        offsets = values[before] - values[i]
+        shift = np.round(offsets.imag)
+        is_copy = np.abs(offsets - 1j * shift) < COPY_DISTANCE
+        is_copy &= (shift != 0) & ((diameters[before] - diameters[i] - shift * order) % n_sectors == 0)
+        if not np.any(is_copy & (np.abs(centre[i] - centre[before] - shift) < SAME_CENTRE)):
             chosen[count] = i
             count += 1
-        if count == wanted:
+        if count == limit:
             break
     return chosen[:count]
 
@@ -192,8 +192,10 @@ def _nearest(now: complex, *problem: Any) -> complex:
 
     values = np.empty(0)
     if n > 10:
-        found, vectors = eigs(LinearOperator((2 * n, 2 * n), inverse, dtype=complex), 4, v0=np.ones(2 * n), tol=1e-11)
-        values, _ = _central(numbers, shift + 1 / found, vectors)
+        inverse_values, vectors = eigs(
+            LinearOperator((2 * n, 2 * n), inverse, dtype=complex), 4, v0=np.ones(2 * n), tol=1e-11
+        )
+        values, _ = _central(numbers, shift + 1 / inverse_values, vectors)
     if len(values) == 0:
         values, _ = _of_index(*problem)
     return complex(values[np.argmin(np.abs(values - now))])
@@ -205,12 +207,12 @@ def _quadratic(
     """k of each harmonic (nc,), constant and linear matrix (nc m, nc m) of the eigenproblem, in units of omega."""
     nc = blocks.shape[-1]
     numbers = np.arange(nc) - nc // 2
-    seen = [modes(int(k) * order + d) for k in numbers]
-    coupling = _contact_in_modes(blocks, rows, seen)
-    rate = np.repeat(1j * numbers, len(seen[0][0]))
-    damping = sla.block_diag(*(c / omega for _, c, *_ in seen))
-    spring = np.diag(np.concatenate([lam for lam, *_ in seen])) - coupling
-    spring = spring + sla.block_diag(*(flow for _, _, flow, _, _ in seen))
+    modes_of_harmonic = [modes(int(k) * order + d) for k in numbers]
+    coupling = _contact_in_modes(blocks, rows, modes_of_harmonic)
+    rate = np.repeat(1j * numbers, len(modes_of_harmonic[0][0]))
+    damping = sla.block_diag(*(c / omega for _, c, *_ in modes_of_harmonic))
+    spring = np.diag(np.concatenate([lam for lam, *_ in modes_of_harmonic])) - coupling
+    spring = spring + sla.block_diag(*(flow for _, _, flow, _, _ in modes_of_harmonic))
     return numbers, np.diag(rate**2) + damping * rate + spring / omega**2, np.diag(2 * rate) + damping
 
 
@@ -219,23 +221,23 @@ def _central(numbers: np.ndarray, values: np.ndarray, vectors: np.ndarray) -> tu
     shapes = vectors[: len(vectors) // 2].reshape(len(numbers), -1, len(values))
     weight = (np.abs(shapes) ** 2).sum(axis=1)
     centre = numbers @ weight / weight.sum(axis=0)
-    near = np.abs(centre) < 1.0
-    return values[near], centre[near]
+    is_central = np.abs(centre) < 1.0
+    return values[is_central], centre[is_central]
 
 
-def _contact_in_modes(blocks: np.ndarray, rows: np.ndarray, seen: list[_Index]) -> np.ndarray:
+def _contact_in_modes(blocks: np.ndarray, rows: np.ndarray, modes: list[_Index]) -> np.ndarray:
     """Phi^H dg of modal displacements, the flexibility W of what follows in series: (nc m, nc m), harmonic by harmonic.
 
     blocks : (n_active, c, nc, c, nc)
     """
     n_active, c, nc = blocks.shape[:3]
-    m, n = len(seen[0][0]), len(rows)
+    m, n = len(modes[0][0]), len(rows)
     if n == 0:
         return np.zeros((nc * m, nc * m))
-    phi = [shapes[rows] for *_, shapes, _ in seen]
+    phi = [shapes[rows] for *_, shapes, _ in modes]
     driven = np.empty((n, nc, nc, m), complex)  # (dg/dx) Phi
     series = np.empty((n, nc, n, nc), complex)  # (dg/dx) W
-    for k, (*_, static) in enumerate(seen):
+    for k, (*_, static) in enumerate(modes):
         slope = blocks[..., k]  # (n_active, c, nc, c)
         driven[:, :, k] = np.einsum("pahb,pbm->pahm", slope, phi[k].reshape(n_active, c, m)).reshape(n, nc, m)
         flexible = static[np.ix_(rows, rows)].reshape(n_active, c, n)

@@ -42,7 +42,9 @@ def decrement(balance: HarmonicBalance, mode: Backbone) -> np.ndarray:
     if not problem.one_system:
         raise Refusal("a free decay needs one system for all harmonics: this model has several")
     points = [
-        problem.at(mode.contact[i].reshape(problem.rest.shape), mode.omega[i], mode.damping[i], mode.modal_amplitude[i])
+        problem.at(
+            mode.contact[i].reshape(problem.rest_x.shape), mode.omega[i], mode.damping[i], mode.modal_amplitude[i]
+        )
         for i in range(len(size))
     ]
     order = problem.basis.order
@@ -77,7 +79,7 @@ class _Marched:
         self._contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, np.zeros((1, 1)))
         self._law = compiled_law.pointer(joint.module.step)
         self._problem, self._memory = problem, balance.memory
-        self._k = problem.k.reshape(problem.rest.shape[:2])
+        self._k = problem.k.reshape(problem.rest_x.shape[:2])
         n = problem.basis.n_samples
         self._angle = 2 * np.pi * np.arange(1, n + 1) / n
 

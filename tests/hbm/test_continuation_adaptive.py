@@ -36,7 +36,7 @@ def worst(branch: Branch, reference: Branch) -> float:
 
 @pytest.mark.parametrize(("case", "share"), [("friction", 0.35), ("resonance", 0.1)])
 def test_points_lie_where_the_response_bends(case, share):
-    balance = rubbing_mass(how="located") if case == "friction" else Duffing(zeta=1e-3, cubic=0.0).balance()
+    balance = rubbing_mass(transitions="located") if case == "friction" else Duffing(zeta=1e-3, cubic=0.0).balance()
     reference = natural.follow(balance, 0.5, 2.0, natural.Options(n_points=2001))
     for tolerance in (1e-2, 1e-3):
         branch = adaptive.follow(balance, 0.5, 2.0, Options(tolerance=tolerance))
@@ -52,7 +52,7 @@ def test_points_lie_where_the_response_bends(case, share):
 
 
 def test_error_falls_with_the_tolerance_and_both_ways_agree():
-    balance = rubbing_mass(how="located")
+    balance = rubbing_mass(transitions="located")
     reference = natural.follow(balance, 0.5, 2.0, natural.Options(n_points=2001))
     errors = [worst(adaptive.follow(balance, 0.5, 2.0, Options(tolerance=t)), reference) for t in (3e-2, 3e-3, 3e-4)]
     assert errors[0] > errors[1] > errors[2]

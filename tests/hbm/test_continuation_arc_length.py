@@ -25,13 +25,15 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 
-def pressed_slab(harmonics: tuple[int, ...] = (0, 1, 2), rock: float = 2.0, how: str = "located") -> HarmonicBalance:
+def pressed_slab(
+    harmonics: tuple[int, ...] = (0, 1, 2), rock: float = 2.0, transitions: str = "located"
+) -> HarmonicBalance:
     """Four pairs that slide, rock and lift: six folds within its first resonance."""
     model = slab(2, 2, ratio=0.01)
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(4e6, 6e6), friction=0.3)
     excitation = Excitation.of({"press": 60.0}, {1: {"rock": rock, "shake": rock / 3}})
     return HarmonicBalance.of(
-        model, Joint("contact", "jenkins", parameters), HarmonicBasis(harmonics, 128, how), excitation, 8000.0
+        model, Joint("contact", "jenkins", parameters), HarmonicBasis(harmonics, 128, transitions), excitation, 8000.0
     )
 
 
@@ -61,7 +63,7 @@ def test_lifting_mass_softens_and_folds_as_in_closed_form():
     upper = -minimize_scalar(lambda a: -lifting.omega(a, -1), bounds=(0.17, 0.6), **precise).fun
     exact = [lower, upper]
     for way in ((0.5, 4.0), (4.0, 0.5)):
-        branch = arc_length.follow(lifting.balance(how="located"), *way)
+        branch = arc_length.follow(lifting.balance(transitions="located"), *way)
         assert branch.omega[-1] == way[1]
         np.testing.assert_allclose(np.sort(branch.omega[list(branch.folds)]), exact, rtol=1e-8)
         assert len(branch.omega) < 200
@@ -219,7 +221,7 @@ def test_bordered_solve_is_that_of_the_full_matrix_and_regular_at_a_fold():
 
 def test_a_first_solution_is_found_along_the_load_where_rest_fails():
     """At 2.4 rad/s the lifting mass rests on the upper curve only, behind folds in the load."""
-    balance, omega = Lifting().balance(how="located"), 2.4
+    balance, omega = Lifting().balance(transitions="located"), 2.4
     assert not newton.solve_from_rest(balance, omega).converged
     solution = arc_length.solve_along_load(balance, omega)
     assert solution.converged
@@ -305,7 +307,7 @@ def test_a_walk_that_always_lands_astray_with_steps_that_do_not_get_shorter_ends
         stepper._here = stepper.segments[index].start
         del stepper.segments[index:]
 
-    monkeypatch.setattr(CurveStepper, "arrives", lambda *given: False)
+    monkeypatch.setattr(CurveStepper, "arrives", lambda *arguments: False)
     monkeypatch.setattr(CurveStepper, "rewind", same_again)
     branch = arc_length.follow(Duffing().balance(), 0.5, 0.6)
     assert went_back

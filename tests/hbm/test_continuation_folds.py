@@ -19,9 +19,9 @@ def duffing_branch():
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_fold_against_the_load_is_where_the_discriminant_vanishes(duffing_branch, which):
+def test_fold_against_the_load_is_where_the_discriminant_vanishes(duffing_branch, number):
     duffing, branch = Duffing(), duffing_branch
-    i = branch.folds[which]
+    i = branch.folds[number]
     x = branch.contact[i].reshape(1, 1, -1)
     line = track_fold(parameter.load(duffing.balance(), 2.0), 1.0, 0.1, branch.omega[i], x)
     assert str(line.end) == "reached load factor 0.1"
@@ -47,7 +47,7 @@ def test_two_folds_meet_in_a_cusp_and_the_line_goes_round_it(duffing_branch):
 
 @pytest.mark.parametrize(("make", "start", "stop"), [("gap", 0.0, 0.3), ("stiffness", 1.0, 0.5)])
 def test_fold_of_a_lifting_mass_against_branches_traced_anew(make, start, stop):
-    balance = Lifting().balance(how="located")
+    balance = Lifting().balance(transitions="located")
     branch = arc_length.follow(balance, 0.5, 4.0)
     i = max(branch.folds, key=lambda i: branch.omega[i])
     path = getattr(parameter, make)(balance, 1.6)

@@ -39,7 +39,7 @@ def test_a_jump_that_newton_makes_by_itself_is_said():
 
 
 def test_a_lifting_mass_jumps_both_ways_at_the_folds_of_the_arc_length():
-    balance = Lifting().balance((0, 1, 2, 3), how="located")
+    balance = Lifting().balance((0, 1, 2, 3), transitions="located")
     round_them = arc_length.follow(balance, 0.9, 4.0)
     folds = np.sort(round_them.omega[list(round_them.folds)])
     for start, stop in ((0.9, 4.0), (4.0, 0.9)):

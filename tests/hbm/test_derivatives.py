@@ -146,13 +146,13 @@ def test_a_peak_that_is_a_corner_follows_first_slip():
 
 
 def test_a_fold_moves_as_folds_found_anew_and_tells_both_sides_of_a_corner():
-    balance, h = Lifting().balance((0, 1, 2, 3), how="located"), 1e-6
+    balance, h = Lifting().balance((0, 1, 2, 3), transitions="located"), 1e-6
     branch = arc_length.follow(balance, 0.9, 4.0)
     at, posed = branch.folds[0], BalanceInputs.of(balance)
     state = balance.evaluate(branch.omega[at], balance.shaped(branch.contact[at]))
 
-    def sides(above, below):
-        return tuple(replace(posed, contact=balance.contact.with_gap(balance.contact.gap + s)) for s in (above, below))
+    def sides(upper, lower):
+        return tuple(replace(posed, contact=balance.contact.with_gap(balance.contact.gap + s)) for s in (upper, lower))
 
     changes = [ParameterChange("gap", h, *sides(h, -h)), ParameterChange("twice above zero", h, *sides(2 * h, -h))]
     result = at_fold(balance, state, changes)

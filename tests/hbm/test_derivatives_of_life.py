@@ -64,8 +64,10 @@ def found_of(problem, worn, site, names, share=SHARE, numbers=None):
     built = BalanceInputs.of(problem.balance)
 
     def posed(name, factor):
-        there = problem_of(site, name, factor).balance
-        return replace(built, excitation=there.excitation) if name in LOADS else replace(built, contact=there.contact)
+        changed = problem_of(site, name, factor).balance
+        return (
+            replace(built, excitation=changed.excitation) if name in LOADS else replace(built, contact=changed.contact)
+        )
 
     changes = [ParameterChange(name, STEP, *(posed(name, 1 + side) for side in (STEP, -STEP))) for name in names]
     return tangent.of_life(problem, worn, changes, numbers or {"coefficient": ("coefficient", ["contact"])}, share)
@@ -111,19 +113,21 @@ def depth_rate(e):
     faces = (1 + np.exp(-e.depth / n["depth"])) * (1 + 1 / (1 + e.cycles / n["cycles"]))
     return n["coefficient"] * e.energy**1.1 / e.area * faces
 """
-TWO = (Duty(AT, 0.6), Duty(AtFrequency("tip", 300.0, EXACT), 0.4, 1.3))
-BESIDE = (Duty(AtPeakRatio(PEAK, 0.97)),)
+TWO_DUTIES = (Duty(AT, 0.6), Duty(AtFrequency("tip", 300.0, EXACT), 0.4, 1.3))
+NEAR_PEAK = (Duty(AtPeakRatio(PEAK, 0.97)),)
 
 
 @pytest.mark.parametrize(
     ("law", "mission", "names"),
     [
         ("own", (Duty(AT),), ("friction", "depth", "cycles")),
-        ("energy", TWO, ("shake", "gap")),
-        pytest.param("archard", TWO, ("friction", "coefficient"), marks=pytest.mark.slow),
+        ("energy", TWO_DUTIES, ("shake", "gap")),
+        pytest.param("archard", TWO_DUTIES, ("friction", "coefficient"), marks=pytest.mark.slow),
         pytest.param("impact", (Duty(AT),), ("friction",), marks=pytest.mark.slow),
-        pytest.param("energy", BESIDE, ("friction", "shake"), marks=pytest.mark.slow),
-        pytest.param("energy", (*TWO[:1], Duty(BESIDE[0].site, 0.4)), ("friction", "gap"), marks=pytest.mark.slow),
+        pytest.param("energy", NEAR_PEAK, ("friction", "shake"), marks=pytest.mark.slow),
+        pytest.param(
+            "energy", (*TWO_DUTIES[:1], Duty(NEAR_PEAK[0].site, 0.4)), ("friction", "gap"), marks=pytest.mark.slow
+        ),
     ],
     ids=["own", "mission", "archard", "impact", "beside", "both"],
 )
@@ -139,7 +143,7 @@ def test_other_laws_and_missions_have_the_derivatives_of_their_steps_taken_again
         return problem_of(AT, "" if base else name, factor, wear=wears, mission=mission)
 
     problem = posed()
-    if mission is TWO and law == "energy":
+    if mission is TWO_DUTIES and law == "energy":
         worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
     else:
         worn = evolve(thesis.Rule(problem, 1e-5))

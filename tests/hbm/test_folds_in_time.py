@@ -65,7 +65,7 @@ def test_of_three_solutions_the_middle_one_is_left_in_time() -> None:
     omega, three = coexisting(balance, branch, low, high, "mass", 5)
     assert low < omega < high
     assert [item.stable for item in three] == [True, False, True]
-    assert [item.is_stable for item in three] == [True, False, True]
+    assert [item.returns for item in three] == [True, False, True]
     assert three[1].growth > 0 > max(three[0].growth, three[2].growth)
 
 

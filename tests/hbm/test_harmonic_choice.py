@@ -23,11 +23,11 @@ def pairs() -> tuple[HarmonicBalance, list[float]]:
 
 
 def true_error(
-    balance: HarmonicBalance, kept: tuple[int, ...], omega: list[float], x: list[np.ndarray], top: int
+    balance: HarmonicBalance, harmonics: tuple[int, ...], omega: list[float], x: list[np.ndarray], top: int
 ) -> float:
     """Change of the response when all harmonics to `top` are kept, at the worst frequency and output."""
     full = widened(balance, top)
-    narrow = full.with_harmonics(kept)
+    narrow = full.with_harmonics(harmonics)
     errors = []
     for w, start in zip(omega, x, strict=True):
         solution = newton.solve(full, w, narrow.basis.transfer(start, full.basis))

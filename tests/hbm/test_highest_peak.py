@@ -38,8 +38,8 @@ def test_points_where_a_curve_stands_or_turns_back_have_no_parabola(omega: tuple
 def test_the_higher_of_two_outputs_comes_first_and_a_low_one_not_at_all() -> None:
     omega = np.linspace(900.0, 1100.0, 41)
     heights = np.stack([resonance(omega, at, 8.0, high) for at, high in ((951.0, 1.0), (1003.0, 1.06), (1060.0, 0.5))])
-    found = highest_peak.candidates(omega, heights.T)
-    assert [(abs(omega[point] - at) < 5.0, output) for (point, output), at in zip(found, (1003, 951), strict=True)] == [
+    peaks = highest_peak.candidates(omega, heights.T)
+    assert [(abs(omega[point] - at) < 5.0, output) for (point, output), at in zip(peaks, (1003, 951), strict=True)] == [
         (True, 1),
         (True, 0),
     ]

@@ -40,9 +40,9 @@ def jenkins(n_samples: int = 8192) -> HarmonicBalance:
 
 def test_frequency_and_damping_of_a_jenkins_element_are_the_closed_form():
     slip = LIMIT / KT
-    found = backbone(jenkins(), 0.1 * slip, 100 * slip)
-    assert str(found.end).startswith("reached")
-    x = found.amplitude
+    mode = backbone(jenkins(), 0.1 * slip, 100 * slip)
+    assert str(mode.end).startswith("reached")
+    x = mode.amplitude
     slides = x > slip
     theta = np.arccos(np.where(slides, 1 - 2 * slip / x, -1.0))
     in_phase = KT / np.pi * (theta - np.sin(theta) * np.cos(theta))
@@ -50,28 +50,28 @@ def test_frequency_and_damping_of_a_jenkins_element_are_the_closed_form():
     omega = np.sqrt((STIFFNESS + in_phase) / MASS)
     viscous = 2 * RATIO * np.sqrt(MASS * STIFFNESS)
     zeta = viscous / (2 * MASS * omega) + dissipated / (2 * np.pi * MASS * omega**2 * x**2)
-    np.testing.assert_allclose(found.omega, omega, rtol=1e-6)
-    np.testing.assert_allclose(found.damping, zeta, rtol=2e-6)
-    np.testing.assert_allclose(found.response[:, 0, 1], x, rtol=1e-9)
-    np.testing.assert_allclose(found.energy, dissipated, rtol=1e-6, atol=1e-9 * dissipated.max())
-    assert found.damping.max() > 9 * RATIO
+    np.testing.assert_allclose(mode.omega, omega, rtol=1e-6)
+    np.testing.assert_allclose(mode.damping, zeta, rtol=2e-6)
+    np.testing.assert_allclose(mode.response[:, 0, 1], x, rtol=1e-9)
+    np.testing.assert_allclose(mode.energy, dissipated, rtol=1e-6, atol=1e-9 * dissipated.max())
+    assert mode.damping.max() > 9 * RATIO
 
 
 @pytest.mark.parametrize("between", [1e-3, 1e-4])
 def test_straight_lines_between_points_miss_no_more_than_asked_where_slip_begins(between):
     slip = LIMIT / KT
-    found = backbone(jenkins(), 0.1 * slip, 100 * slip, options=BackboneOptions(between=between))
-    log_x = np.linspace(*np.log(found.amplitude[[0, -1]]), 2001)
+    mode = backbone(jenkins(), 0.1 * slip, 100 * slip, options=BackboneOptions(between=between))
+    log_x = np.linspace(*np.log(mode.amplitude[[0, -1]]), 2001)
     x = np.exp(log_x)
     slides = x > slip
     theta = np.arccos(np.where(slides, 1 - 2 * slip / x, -1.0))
     omega = np.sqrt((STIFFNESS + KT / np.pi * (theta - np.sin(theta) * np.cos(theta))) / MASS)
     dissipated = 4 * LIMIT * np.maximum(x - slip, 0.0)
     zeta = RATIO * np.sqrt(STIFFNESS / MASS) / omega + dissipated / (2 * np.pi * MASS * omega**2 * x**2)
-    there = np.log(found.amplitude)
-    assert np.abs(np.interp(log_x, there, found.omega) / omega - 1).max() < 1.5 * between
-    assert np.abs(np.interp(log_x, there, found.damping) - zeta).max() < 1.5 * between
-    assert len(found.omega) < 120 * np.sqrt(1e-3 / between)
+    exact = np.log(mode.amplitude)
+    assert np.abs(np.interp(log_x, exact, mode.omega) / omega - 1).max() < 1.5 * between
+    assert np.abs(np.interp(log_x, exact, mode.damping) - zeta).max() < 1.5 * between
+    assert len(mode.omega) < 120 * np.sqrt(1e-3 / between)
 
 
 def duffing(harmonics: tuple[int, ...], ratio: float) -> HarmonicBalance:
@@ -83,24 +83,24 @@ def duffing(harmonics: tuple[int, ...], ratio: float) -> HarmonicBalance:
 
 
 def test_backbone_of_a_duffing_oscillator_with_one_harmonic_is_the_closed_form():
-    found = backbone(duffing((1,), RATIO), 1e-5, 1e-1)
-    assert str(found.end).startswith("reached")
-    omega = np.sqrt((STIFFNESS + KT + 0.75 * 2e9 * found.amplitude**2) / MASS)
-    np.testing.assert_allclose(found.omega, omega, rtol=1e-8)
-    np.testing.assert_allclose(found.damping, RATIO * np.sqrt(STIFFNESS / MASS) / omega, rtol=1e-7)
+    mode = backbone(duffing((1,), RATIO), 1e-5, 1e-1)
+    assert str(mode.end).startswith("reached")
+    omega = np.sqrt((STIFFNESS + KT + 0.75 * 2e9 * mode.amplitude**2) / MASS)
+    np.testing.assert_allclose(mode.omega, omega, rtol=1e-8)
+    np.testing.assert_allclose(mode.damping, RATIO * np.sqrt(STIFFNESS / MASS) / omega, rtol=1e-7)
     assert omega[-1] > 10 * omega[0]
-    assert np.all(np.abs(found.energy) < 1e-9 * KT * found.amplitude**2)
+    assert np.all(np.abs(mode.energy) < 1e-9 * KT * mode.amplitude**2)
 
 
 def test_backbone_of_a_duffing_oscillator_converges_to_the_exact_period():
     errors = []
     for top in (1, 3, 5, 7, 9):
-        found = backbone(duffing(tuple(range(1, top + 1, 2)), 0.0), 1e-4, 1e-2)
-        peak = found.response[:, 0, 0::2].sum(axis=1)
+        mode = backbone(duffing(tuple(range(1, top + 1, 2)), 0.0), 1e-4, 1e-2)
+        peak = mode.response[:, 0, 0::2].sum(axis=1)
         stiff = STIFFNESS + KT + 2e9 * peak**2
         exact = np.pi * np.sqrt(stiff / MASS) / (2 * ellipk(2e9 * peak**2 / (2 * stiff)))
-        errors.append(np.abs(found.omega / exact - 1).max())
-        np.testing.assert_allclose(found.damping, 0.0, atol=1e-9)
+        errors.append(np.abs(mode.omega / exact - 1).max())
+        np.testing.assert_allclose(mode.damping, 0.0, atol=1e-9)
     assert all(b < 0.1 * a for a, b in pairwise(errors))
     assert errors[-1] < 1e-6
 
@@ -117,28 +117,28 @@ def structure(ratio: float, friction: float = 0.3) -> HarmonicBalance:
 
 def test_small_amplitude_is_the_linear_mode_and_the_backbone_goes_on():
     balance = structure(ratio=0.01)
-    found = backbone(balance, 1e-9, 3e-5, mode=1, options=BackboneOptions(n_points=25))
+    curve = backbone(balance, 1e-9, 3e-5, mode=1, options=BackboneOptions(n_points=25))
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
     stuck = system.stiffness + b.T @ (balance.contact.stiffness.ravel()[:, None] * b)
     lam, phi = sla.eigh(stuck, system.mass)
-    assert found.reference_omega == pytest.approx(np.sqrt(lam[1]), rel=1e-10)
-    assert found.omega[0] == pytest.approx(np.sqrt(lam[1]), rel=1e-4)  # light damping couples modes at second order
-    assert found.damping[0] == pytest.approx(phi[:, 1] @ system.damping @ phi[:, 1] / (2 * np.sqrt(lam[1])), rel=1e-3)
-    assert str(found.end).startswith("reached")
-    assert found.omega[-1] < 0.98 * found.omega[0]
-    assert found.damping.max() > 2 * found.damping[0]
+    assert curve.reference_omega == pytest.approx(np.sqrt(lam[1]), rel=1e-10)
+    assert curve.omega[0] == pytest.approx(np.sqrt(lam[1]), rel=1e-4)  # light damping couples modes at second order
+    assert curve.damping[0] == pytest.approx(phi[:, 1] @ system.damping @ phi[:, 1] / (2 * np.sqrt(lam[1])), rel=1e-3)
+    assert str(curve.end).startswith("reached")
+    assert curve.omega[-1] < 0.98 * curve.omega[0]
+    assert curve.damping.max() > 2 * curve.damping[0]
 
 
 def test_damping_is_the_energy_lost_and_a_force_along_the_added_term_holds_the_motion():
     """Forced in phase with its own added term, the structure vibrates in the nonlinear mode: K, M, C and f_c agree."""
     balance = structure(ratio=0.0)
-    found = backbone(balance, 1e-8, 2e-5, mode=0, options=BackboneOptions(n_points=12))
+    curve = backbone(balance, 1e-8, 2e-5, mode=0, options=BackboneOptions(n_points=12))
     i = -1
-    omega, zeta = found.omega[i], found.damping[i]
+    omega, zeta = curve.omega[i], curve.damping[i]
     system, basis = balance.model.system, balance.basis
     k = balance.contact.stiffness.ravel()
     b = np.asarray(balance.model.interface.B)
-    x = found.contact[i].reshape(3, 3, -1)
+    x = curve.contact[i].reshape(3, 3, -1)
     state = balance.evaluate(omega, x)
     # rebuild q from the contact forces with the added term on the left, then apply that term as a load instead
     force = basis.to_complex(b.T @ state.g)
@@ -154,7 +154,7 @@ def test_damping_is_the_energy_lost_and_a_force_along_the_added_term_holds_the_m
         for part, unit in ((added.real, 1.0), (added.imag, 1j)):
             load_vectors[f"{h} {unit}"] = part
             loads[(h, f"{h} {unit}")] = unit
-    assert motion_energy == pytest.approx(found.energy[i], rel=1e-6)
+    assert motion_energy == pytest.approx(curve.energy[i], rel=1e-6)
     forced_model = ReducedModel(
         type(system)(system.mass, system.stiffness, None, load_vectors, system.outputs), balance.model.interface
     )

@@ -35,8 +35,8 @@ class StuckOscillator:
     def __init__(self, ratio: float):
         mass, stiffness = np.eye(2), np.array([[3.0, -1.0], [-1.0, 4.0]])
         stuck = stiffness + np.diag([2.0, 0.0])
-        damping, load, seen = modal_damping(mass, stuck, ratio), np.array([1.0, 0.3]), np.array([0.2, 1.0])
-        system = SecondOrderSystem(mass, stiffness, damping, {"force": load}, {"mass": seen})
+        damping, load, row = modal_damping(mass, stuck, ratio), np.array([1.0, 0.3]), np.array([0.2, 1.0])
+        system = SecondOrderSystem(mass, stiffness, damping, {"force": load}, {"mass": row})
         law = ContactParameters.of(("t1",), [[2.0]], friction=1e12, normal_load=3.0)
         self.balance = HarmonicBalance.of(
             ReducedModel(system, interface(np.eye(2)[:1], ("t1",))),
@@ -48,7 +48,7 @@ class StuckOscillator:
 
         def height(omega: float) -> float:
             dynamic = stuck - omega**2 * mass + 1j * omega * damping
-            return float(abs(seen @ np.linalg.solve(dynamic, 0.5 * load)))
+            return float(abs(row @ np.linalg.solve(dynamic, 0.5 * load)))
 
         tops = []
         for mode in np.sqrt(np.linalg.eigvalsh(stuck)):
@@ -63,26 +63,26 @@ class StuckOscillator:
 @pytest.mark.parametrize("ratio", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
 def test_a_linear_resonance_has_its_height_at_any_damping(ratio: float) -> None:
     problem = StuckOscillator(ratio)
-    found = AtPeak("mass", *RANGE).solve(problem.balance)
-    assert found.solution.converged
-    assert found.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
-    assert found.state.omega == pytest.approx(problem.peak[1], rel=0.05 * ratio + 1e-9)
+    branch = AtPeak("mass", *RANGE).solve(problem.balance)
+    assert branch.solution.converged
+    assert branch.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
+    assert branch.state.omega == pytest.approx(problem.peak[1], rel=0.05 * ratio + 1e-9)
 
 
 def test_a_scan_that_ends_on_its_way_is_begun_at_the_other_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """As where no solution is found behind a fold."""
     problem, follow = StuckOscillator(1e-2), adaptive.follow
-    below = 0.9 * problem.peak[1]
+    lower = 0.9 * problem.peak[1]
 
     def ends(balance: HarmonicBalance, start: float, stop: float, options: adaptive.Options) -> Branch:
         if start > stop:
             return follow(balance, start, stop, options)
-        return replace(follow(balance, start, below, options), end=BranchEnd.ENDED.say(" here"))
+        return replace(follow(balance, start, lower, options), end=BranchEnd.ENDED.say(" here"))
 
     monkeypatch.setattr(adaptive, "follow", ends)
-    found = AtPeak("mass", *RANGE).solve(problem.balance)
-    assert found.solution.converged
-    assert found.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
+    point = AtPeak("mass", *RANGE).solve(problem.balance)
+    assert point.solution.converged
+    assert point.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
 
 
 @pytest.mark.parametrize("ratio", [5e-3, 1e-5])
@@ -102,9 +102,9 @@ def test_a_peak_beside_solves_that_fail_is_found_or_told(failing, monkeypatch: p
     problem, solve, solves = StuckOscillator(1e-2), newton.solve, count(1)
     branch = natural.follow(problem.balance, *RANGE, natural.Options(n_points=10))
 
-    def some(*given: Any) -> newton.Solution:
-        found = solve(*given)
-        return replace(found, outcome=SolveEnd.NO_DESCENT.say()) if next(solves) in failing else found
+    def some(*arguments: Any) -> newton.Solution:
+        result = solve(*arguments)
+        return replace(result, outcome=SolveEnd.NO_DESCENT.say()) if next(solves) in failing else result
 
     monkeypatch.setattr(newton, "solve", some)
     solved = with_peaks(problem.balance, branch, AtPeak("mass", *RANGE))
@@ -122,16 +122,16 @@ def test_a_search_that_ends_lower_than_its_point_is_told(monkeypatch: pytest.Mon
     problem, within = StuckOscillator(1e-2), AtPeak.solve_between
     branch = natural.follow(problem.balance, *RANGE, natural.Options(n_points=30))
 
-    for share, found in ((1e-6, True), (0.1, False)):
+    for share, result in ((1e-6, True), (0.1, False)):
 
-        def lower(site: AtPeak, balance: HarmonicBalance, omega: float, *rest: Any, share: float = share) -> Any:
+        def lower(site: AtPeak, balance: HarmonicBalance, omega: float, *arguments: Any, share: float = share) -> Any:
             height = branch.amplitude("mass")[np.abs(branch.omega - omega).argmin()]
-            return replace(within(site, balance, omega, *rest), amplitude=(1 - share) * height)
+            return replace(within(site, balance, omega, *arguments), amplitude=(1 - share) * height)
 
         monkeypatch.setattr(AtPeak, "solve_between", lower)
         solved = with_peaks(problem.balance, branch, AtPeak("mass", *RANGE))
-        assert (solved.peak("mass") is not None) is found
-        assert (solved.no_peak("mass") == "") is found
+        assert (solved.peak("mass") is not None) is result
+        assert (solved.no_peak("mass") == "") is result
         np.testing.assert_array_equal(solved.omega, branch.omega)
 
 

@@ -18,11 +18,11 @@ from tribodyn.reduction.wave_model import as_wave
 EXACT = newton.NewtonOptions(tolerance=1e-12)
 
 
-def solved(one, wheel, omega, order):
+def solved(balance, wheel, omega, order):
     """The states of a wave and of the whole wheel that it is."""
-    result = newton.solve_from_rest(one, omega, EXACT)
+    result = newton.solve_from_rest(balance, omega, EXACT)
     assert result.converged
-    x = np.concatenate(tiny.spread(one, result.state.x, order))
+    x = np.concatenate(tiny.spread(balance, result.state.x, order))
     everywhere = newton.solve(wheel, omega, x, EXACT)
     assert everywhere.converged
     assert np.abs(everywhere.state.x - x).max() < 1e-8 * np.abs(x).max()

@@ -63,11 +63,11 @@ class Lifting:
         self.zeta, self.force, self.press, self.kn = zeta, force, press, kn
 
     def balance(
-        self, harmonics: tuple[int, ...] = (0, 1), n_samples: int = 64, how: str = "sampled"
+        self, harmonics: tuple[int, ...] = (0, 1), n_samples: int = 64, transitions: str = "sampled"
     ) -> HarmonicBalance:
         parameters = ContactParameters.of(("n",), [[self.kn]])
         excitation = Excitation.of({"normal": self.press}, {1: {"force": self.force}})
-        basis = HarmonicBasis(harmonics, n_samples, how)
+        basis = HarmonicBasis(harmonics, n_samples, transitions)
         return HarmonicBalance.of(
             oscillator(1.0, 1.0, self.zeta, "n"), Joint("contact", "unilateral", parameters), basis, excitation, 10.0
         )
@@ -93,11 +93,13 @@ class Lifting:
         return float(np.sqrt(p + side * np.sqrt(root)))
 
 
-def rubbing_mass(harmonics: tuple[int, ...] = (0, 1), n_samples: int = 128, how: str = "sampled") -> HarmonicBalance:
+def rubbing_mass(
+    harmonics: tuple[int, ...] = (0, 1), n_samples: int = 128, transitions: str = "sampled"
+) -> HarmonicBalance:
     """A pressed mass on a Jenkins element that sticks far from its resonance and slips in it."""
     parameters = ContactParameters.of(("t1", "n"), [[3.0, 5.0]], friction=0.5)
     excitation = Excitation.of({"normal": 1.0}, {1: {"force": 0.3}})
-    basis = HarmonicBasis(harmonics, n_samples, how)
+    basis = HarmonicBasis(harmonics, n_samples, transitions)
     return HarmonicBalance.of(
         oscillator(1.0, 1.0, 0.01), Joint("contact", "jenkins", parameters), basis, excitation, 5.0
     )

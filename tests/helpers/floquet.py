@@ -7,6 +7,6 @@ import numpy as np
 from tribodyn.hbm.stability.exponents import Stability
 
 
-def multipliers(found: Stability) -> np.ndarray:
+def multipliers(stability: Stability) -> np.ndarray:
     """(n,) complex factors exp(lambda T) by which perturbations change over one period."""
-    return np.exp(found.exponents * 2 * np.pi / found.omega)
+    return np.exp(stability.exponents * 2 * np.pi / stability.omega)

@@ -60,9 +60,9 @@ def test_a_contact_force_or_an_energy_off_by_a_thousandth_is_seen(transitions: s
     balance = body.balance(replace(body.ordinary, transitions=transitions, **changes))
     state = solve_and_judge(balance, body.ordinary.omega)[1].state
 
-    def told(found: State) -> set[str]:
+    def told(verdict: State) -> set[str]:
         return {
-            march_check.name for march_check in march_checks(balance, found) if march_check.off > march_check.allowed
+            march_check.name for march_check in march_checks(balance, verdict) if march_check.off > march_check.allowed
         }
 
     assert not told(state)

@@ -26,8 +26,8 @@ TINY = (
 def test_every_run_ends_as_a_run_may(tmp_path: Path) -> None:
     attempts = fuzz.fuzz("beam", TINY, values=150, runs=3, seed=1, folder=tmp_path, command=cli.main)
     assert [item for item in attempts if not item.good] == []
-    again = fuzz.cases("beam", TINY, 150, seed=1)
-    assert {(item.key, item.value) for item in attempts} == set(again)
+    repeated = fuzz.cases("beam", TINY, 150, seed=1)
+    assert {(item.key, item.value) for item in attempts} == set(repeated)
     of = fuzz.counts(attempts)["beam"]
     assert (of["values"], of["runs"], sum(of["ends"].values())) == (150, 3, 3)
     assert of[fuzz.REFUSED] + of["scenes"] <= 150
@@ -67,7 +67,7 @@ def test_every_key_is_tried() -> None:
 )
 def test_a_wrong_end_is_seen(does: str, end: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fuzz_runs, "LATE", 1.0)
-    monkeypatch.setattr(fuzz, "cases", lambda *given: [("scene.title", '"abc"')])  # what reading refuses is not run
+    monkeypatch.setattr(fuzz, "cases", lambda *inputs: [("scene.title", '"abc"')])  # what reading refuses is not run
 
     def instead(words: list[str]) -> None:
         if 'scene.title="abc"' not in words:

@@ -13,7 +13,7 @@ from proof.scoreboard import Judged, Row
 
 SEED = 2
 SCENES = (12, 7)  # a beam and a plate that take a second each
-KEPT = Path(__file__).parents[2] / "docs" / "accuracy" / "scoreboard_rows.jsonl"
+COUNTED = Path(__file__).parents[2] / "docs" / "accuracy" / "scoreboard_rows.jsonl"
 
 
 @pytest.fixture(scope="module")
@@ -98,10 +98,10 @@ def test_a_violated_error_is_reported(tmp_path: Path) -> None:
 
 def test_the_page_says_what_the_kept_rows_say(tmp_path: Path) -> None:
     """The rows of the campaign are kept beside its page, whose counts, ratios and figure come from them."""
-    (tmp_path / scoreboard.ROWS).write_text(KEPT.read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / scoreboard.ROWS).write_text(COUNTED.read_text(encoding="utf-8"), encoding="utf-8")
     saved = scoreboard.rows_in(tmp_path)
     assert len({row.seed for row in saved}) == 1
-    page = KEPT.with_name("scoreboard.md").read_text(encoding="utf-8")
+    page = COUNTED.with_name("scoreboard.md").read_text(encoding="utf-8")
     for line in scoreboard_table.summary(saved).splitlines():
         assert line.rstrip() in page, line
     assert scoreboard.run(0, saved[0].seed, tmp_path, 1.0, lambda sentence: None) == saved  # nothing is run again

@@ -34,7 +34,7 @@ class AdaptiveRules:
         follows from the fourth derivative and may vanish; next to a kink that formula does not hold
     jump_error : error estimate in the shortest step, over the tolerance, beyond which the response has jumped: a step
         that is shorter than the first by thousands of times cannot be that wrong on one and the same curve
-    taken : steps ahead within which a point that was solved before, or the stop, is taken for the next one
+    snap_steps : steps ahead within which a point that was solved before, or the stop, is taken for the next one
     crawled : points in the shortest step that miss the tolerance: a response with so many of them is rough however
         close they lie, as where pairs come to rest anew at every point, and the shortest step is doubled
     rejected_error : error estimate, over the tolerance, that takes a step back; one solve is worth a factor of two
@@ -42,7 +42,7 @@ class AdaptiveRules:
 
     least_error_share: float = 0.3
     jump_error: float = 1e3
-    taken: float = 1.2
+    snap_steps: float = 1.2
     crawled: int = 50
     rejected_error: float = 2.0
 
@@ -136,10 +136,10 @@ class _Sweep:
 
     def advance(self) -> Outcome[BranchEnd] | None:
         """One point more; why the branch ends, or None."""
-        builder, most = self.builder, self._options.max_points
+        builder, limit = self.builder, self._options.max_points
         trouble = "" if self._first.converged else str(self._first.outcome)
         if not trouble and builder.value[-1] != self._stop:
-            trouble = f"{most} points were allowed" if len(builder.value) >= most else self._step_on()
+            trouble = f"{limit} points were allowed" if len(builder.value) >= limit else self._step_on()
         if trouble:
             return BranchEnd.ENDED.say(f" {self._path.say(builder.value[-1])}: {trouble}")
         if builder.value[-1] == self._stop:
@@ -156,18 +156,18 @@ class _Sweep:
 
     def _step_on(self) -> str:
         """One point more; a sentence where that fails."""
-        here = self.builder.value[-1]
+        origin = self.builder.value[-1]
         while True:
-            value, solution = self._solve(here)
+            value, solution = self._solve(origin)
             if not solution.converged:
                 if self._step <= self._options.min_step:
-                    return "" if self._options.jumps and self._jump(here) else str(solution.outcome)
+                    return "" if self._options.jumps and self._jump(origin) else str(solution.outcome)
                 self._step = max(0.25 * self._step, self._options.min_step)
                 continue
             response = self._outputs(value, solution)
             error = self._error(value, response)
-            step = abs((value - here) / self._span)
-            if error > self._options.rules.rejected_error and step > self._options.rules.taken * self._shortest:
+            step = abs((value - origin) / self._span)
+            if error > self._options.rules.rejected_error and step > self._options.rules.snap_steps * self._shortest:
                 self._ahead.append((value, solution))
                 self._step = max(step * self._factor(error), self._shortest)
                 continue
@@ -182,18 +182,18 @@ class _Sweep:
                 self._step = float(np.clip(step * self._factor(error), self._shortest, self._options.max_step))
             return ""
 
-    def _jump(self, here: float) -> bool:
+    def _jump(self, origin: float) -> bool:
         """Continue behind a fold, small or large, where no solution follows on the one here; whether there is one."""
         step = self._options.min_step
         while step < self._options.max_step:
             step *= 10
-            value = here + min(step, (self._stop - here) / self._span) * self._span
+            value = origin + min(step, (self._stop - origin) / self._span) * self._span
             place = self._path.place(value)
             solution = newton.solve(*place, self.builder.x[-1], self._options.newton)
             if not solution.converged and self._options.load_paths:
                 solution = solve_along_load(*place, self._options.newton)
             if solution.converged:
-                self._ahead = [a for a in self._ahead if abs(a[0] - here) > abs(value - here)]
+                self._ahead = [a for a in self._ahead if abs(a[0] - origin) > abs(value - origin)]
                 self._accept(value, solution, self._outputs(value, solution), jumped=True)
                 return True
         return False
@@ -201,27 +201,27 @@ class _Sweep:
     def _factor(self, error: float) -> float:
         return float(np.clip(0.9 * max(error, 1e-12) ** (-1 / (EXTRAPOLATION_DEGREE + 1)), 0.2, 2.0))
 
-    def _solve(self, here: float) -> tuple[float, Solution]:
+    def _solve(self, origin: float) -> tuple[float, Solution]:
         """The next point: the stop or one solved ahead where it is near, else one solved anew."""
-        value = here + self._step * self._span
-        if self._ahead and abs(self._ahead[-1][0] - here) <= self._options.rules.taken * abs(value - here):
+        value = origin + self._step * self._span
+        if self._ahead and abs(self._ahead[-1][0] - origin) <= self._options.rules.snap_steps * abs(value - origin):
             return self._ahead.pop()
-        if abs(self._stop - here) <= self._options.rules.taken * abs(value - here):
+        if abs(self._stop - origin) <= self._options.rules.snap_steps * abs(value - origin):
             value = self._stop
-        known = max(self._clean, len(self.builder.value) - EXTRAPOLATION_DEGREE - 1)
-        guess = extrapolate(np.array(self.builder.value[known:]), self.builder.x[known:], value)
+        first = max(self._clean, len(self.builder.value) - EXTRAPOLATION_DEGREE - 1)
+        guess = extrapolate(np.array(self.builder.value[first:]), self.builder.x[first:], value)
         return value, newton.solve(*self._path.place(value), guess, self._options.newton)
 
     def _error(self, value: float, response: np.ndarray) -> float:
         """Estimated error of interpolation in the step to a value, relative to the tolerance."""
         first = max(self._clean, len(self.builder.value) - EXTRAPOLATION_DEGREE - 1)
-        known = np.array(self.builder.value[first:])
-        if len(known) < EXTRAPOLATION_DEGREE:  # too few points to tell: the first steps are short anyway
+        parameters = np.array(self.builder.value[first:])
+        if len(parameters) < EXTRAPOLATION_DEGREE:  # too few points to tell: the first steps are short anyway
             return 1.0
-        missed = self._size(response - extrapolate(known, self._response[first:], value))
-        window = np.append(known[1:], value)  # of the polynomial that interpolates here, at worst
-        between = np.linspace(known[-1], value, 9)[1:-1]
-        share = np.abs(np.prod(between[:, None] - window, axis=1)).max() / np.abs(np.prod(value - known))
+        missed = self._size(response - extrapolate(parameters, self._response[first:], value))
+        window = np.append(parameters[1:], value)  # of the polynomial that interpolates here, at worst
+        between = np.linspace(parameters[-1], value, 9)[1:-1]
+        share = np.abs(np.prod(between[:, None] - window, axis=1)).max() / np.abs(np.prod(value - parameters))
         share = max(share, self._options.rules.least_error_share)
         scale = np.maximum(self._largest, self._size(response))
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -156,16 +156,20 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
     """
     options = options or NewtonOptions()
     if (simpler := balance.simpler()) is not None:
-        near = solve_along_load(simpler, omega, options)
-        beside = newton.solve(balance, omega, near.state.x, options)
-        reached = beside if near.converged and beside.converged else solve_along_stiffness(balance, omega, options)
+        simple_solution = solve_along_load(simpler, omega, options)
+        solution = newton.solve(balance, omega, simple_solution.state.x, options)
+        reached = (
+            solution
+            if simple_solution.converged and solution.converged
+            else solve_along_stiffness(balance, omega, options)
+        )
         if reached:
             return reached
     first = newton.solve_from_rest(balance, omega, options)
     if first.outcome.kind is SolveEnd.NO_REST and (
-        rest := solve_along_friction(balance.with_load(0.0), omega, options)
+        rest_state := solve_along_friction(balance.with_load(0.0), omega, options)
     ):
-        first = newton.solve_from_rest(balance, omega, options, rest)
+        first = newton.solve_from_rest(balance, omega, options, rest_state)
     if first.converged or first.outcome.kind is SolveEnd.NOT_HELD:
         return first
     full, loads = balance.load_factor, balance.excitation
@@ -179,8 +183,8 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
         last = newton.solve(balance, omega, half_later * ramp.contact[-1].reshape(first.state.x.shape), options)
         if last.converged:
             return last
-    found = solve_along_friction(balance, omega, options) or solve_along_stiffness(balance, omega, options)
-    return found or first
+    alternative = solve_along_friction(balance, omega, options) or solve_along_stiffness(balance, omega, options)
+    return alternative or first
 
 
 class _Walk:
@@ -221,19 +225,19 @@ class _Walk:
 
     def _step_on(self) -> Outcome[BranchEnd] | None:
         builder, path = self.builder, self._path
-        here = path.say(builder.value[-1])
+        place = path.say(builder.value[-1])
         if builder.points[0].outcome != CONVERGED:
-            return BranchEnd.ENDED.say(f" {here}: {builder.points[0].outcome}")
+            return BranchEnd.ENDED.say(f" {place}: {builder.points[0].outcome}")
         if len(builder.value) >= self._options.max_points:
-            return BranchEnd.ENDED.say(f" {here}: {self._options.max_points} points were allowed")
-        if self._stays():
-            why = f"{self._options.patience} points brought it hardly further than {path.say(self._milestone)}"
-            return BranchEnd.ENDED.say(f" {here}: {why}")
+            return BranchEnd.ENDED.say(f" {place}: {self._options.max_points} points were allowed")
+        if self._is_stuck():
+            reason = f"{self._options.patience} points brought it hardly further than {path.say(self._milestone)}"
+            return BranchEnd.ENDED.say(f" {place}: {reason}")
         parts = self._stepper.advance()
         if not parts:
             if self._jump():
                 return None
-            return BranchEnd.ENDED.say(f" {here}: {self._stepper.trouble}")
+            return BranchEnd.ENDED.say(f" {place}: {self._stepper.trouble}")
         self._first = self._first or parts[0].start.bare()
         for part in parts:
             bound = next((b for b in self._bounds if part.crosses(b)), None)
@@ -246,18 +250,18 @@ class _Walk:
         self._rows.append(len(builder.value))
         return self._came_back(parts)
 
-    def _stays(self) -> bool:
+    def _is_stuck(self) -> bool:
         """Whether the points that the patience allows brought the walk hardly further."""
-        here, count = self.builder.value[-1], len(self.builder.value)
-        if abs(here - self._start) > abs(self._milestone - self._start) + self._options.rules.headway * self._reach:
-            self._milestone, self._since = here, count
+        current, count = self.builder.value[-1], len(self.builder.value)
+        if abs(current - self._start) > abs(self._milestone - self._start) + self._options.rules.headway * self._reach:
+            self._milestone, self._since = current, count
         return self._options.patience is not None and count >= self._since + self._options.patience
 
     def _jump(self) -> bool:
         """Step over a gap in the curve, its parameter moving on as before; whether there is a solution behind."""
-        here, span, sense = self.builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
+        origin, span, sense = self.builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
         for share in self._options.rules.gap_steps if len(self._jumps) < self._options.rules.max_gaps else ():
-            value = here + sense * share * span
+            value = origin + sense * share * span
             if sense == 0 or not self._bounds[0] < value < self._bounds[1]:
                 break
             solution = newton.solve(*self._path.place(value), self.builder.x[-1], self._options.newton)
@@ -290,30 +294,30 @@ class _Walk:
 
     def _came_back(self, parts: list[Segment]) -> Outcome[BranchEnd] | None:
         """Whether the curve is closed, or lost itself in infinity or in its own past."""
-        builder, here, newton_options = self.builder, self._path.say(self.builder.value[-1]), self._options.newton
+        builder, place, newton_options = self.builder, self._path.say(self.builder.value[-1]), self._options.newton
         growth = self._options.max_growth
         if np.linalg.norm(builder.x[-1]) > growth * self._size > 0:
-            why = f"the response grows without bound, {growth:.0e} times that of the first point"
-            return BranchEnd.ENDED.say(f" {here}: {why}")
+            reason = f"the response grows without bound, {growth:.0e} times that of the first point"
+            return BranchEnd.ENDED.say(f" {place}: {reason}")
         assert self._first is not None
-        old = self._stepper.segments
-        if len(old) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):
+        history = self._stepper.segments
+        if len(history) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):
             return BranchEnd.CLOSED.say(f": came back to its first point after {len(builder.value)} points")
-        return self._lost(parts, here)
+        return self._lost(parts, place)
 
-    def _lost(self, parts: list[Segment], here: str) -> Outcome[BranchEnd] | None:
+    def _lost(self, parts: list[Segment], place: str) -> Outcome[BranchEnd] | None:
         """Whether the walk is back on its own way: then it went wrong there, is rewound and continues in shorter steps.
 
         Against its sense it turned where it should not; in its sense it left the curve for a closed one beside it.
         """
-        old, newton_options = self._stepper.segments, self._options.newton
-        for index in range(1, len(old) - 2):
-            near = [p for p in parts if p.near(old[index])]
+        history, newton_options = self._stepper.segments, self._options.newton
+        for index in range(1, len(history) - 2):
+            candidates = [p for p in parts if p.meets(history[index])]
             for sense in (-1.0, 1.0):
-                if not any(p.passes(self._path, old[index].start, sense, newton_options) for p in near):
+                if not any(p.passes(self._path, history[index].start, sense, newton_options) for p in candidates):
                     continue
                 if self._rewinds == self._options.rules.max_rewinds:
-                    return BranchEnd.ENDED.say(f" {here}: the curve came back onto itself")
+                    return BranchEnd.ENDED.say(f" {place}: the curve came back onto itself")
                 self._rewinds += 1
                 index = index if sense < 0 else max(index - 2, 0)
                 self._rewind(index)

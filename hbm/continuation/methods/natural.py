@@ -35,14 +35,14 @@ class NaturalRules:
     max_corner_points : the same where a contact law has a simpler one to begin with, as its curves have corners
     abrupt : miss of the extrapolation, in the longer of the last two steps of x, from which on a step is solved
         backwards: over a jump it does not lead back
-    same : distance, in steps of x, within which it has led back
+    same_point : distance, in steps of x, within which it has led back
     """
 
     least_spacing: float = 0.5
     max_fold_points: int = 200
     max_corner_points: int = 5
     abrupt: float = 0.5
-    same: float = 1e-2
+    same_point: float = 1e-2
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class _Sweep:
         self._path, self._stop, self._options = path, stop, options
         self._solution = arc_length.first_on(path, start, options.newton)
         rising = np.linspace(min(start, stop), max(start, stop), options.n_points)
-        self._wanted = (rising if start <= stop else rising[::-1])[1:]  # the same values either way
+        self._targets = (rising if start <= stop else rising[::-1])[1:]  # the same values either way
         self.builder = BranchBuilder(path)
         self.builder.add(start, self._solution)
         self.done = 0
@@ -108,7 +108,7 @@ class _Sweep:
         path, builder, options = self._path, self.builder, self._options
         solution = self._solution
         if solution.converged:
-            value = self._wanted[self.done]
+            value = self._targets[self.done]
             solution = self._step(value, options.refinements)
             if not solution.converged:
                 solution = _by_arc_length(path, builder, solution, value, self._stop, options)
@@ -116,7 +116,7 @@ class _Sweep:
             self.done += 1
         if not solution.converged:
             return BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {solution.outcome}")
-        if self.done == len(self._wanted):
+        if self.done == len(self._targets):
             end = BranchEnd.JUMPED if self.notes else BranchEnd.REACHED
             return end.say(f" {path.say(self._stop)}{self.notes}")
         return None
@@ -141,7 +141,7 @@ class _Sweep:
         It does where that is near the tangent at its end, else where it is solved from there
         """
         builder, rules, path, x = self.builder, self._options.rules, self._path, state.x
-        here, before, last = builder.value[-1], builder.x[-1], len(builder.value) - 1
+        origin, before, last = builder.value[-1], builder.x[-1], len(builder.value) - 1
         first = max(builder.folds[-1] + 1 if builder.folds else 0, last - EXTRAPOLATION_DEGREE)
         step = np.linalg.norm(x - before)
         if last - first < 1:
@@ -150,26 +150,26 @@ class _Sweep:
         far = rules.abrupt * max(step, np.linalg.norm(before - builder.x[-2]))  # where it turns, steps are short
         if np.linalg.norm(miss) <= far:
             return True
-        slope, _, _ = path.place(value)[0].linearise(state).solve(-path.slope(value, state), rules.same)
-        if np.linalg.norm(x - before - (value - here) * slope.reshape(x.shape)) <= far:
+        slope, _, _ = path.place(value)[0].linearise(state).solve(-path.slope(value, state), rules.same_point)
+        if np.linalg.norm(x - before - (value - origin) * slope.reshape(x.shape)) <= far:
             return True
-        back = newton.solve(*path.place(here), x, self._options.newton)
-        return back.converged and bool(np.linalg.norm(back.state.x - before) <= rules.same * step)
+        back = newton.solve(*path.place(origin), x, self._options.newton)
+        return back.converged and bool(np.linalg.norm(back.state.x - before) <= rules.same_point * step)
 
 
 def _by_arc_length(
     path: Parameter, builder: BranchBuilder, failed: Solution, value: float, stop: float, options: Options
 ) -> Solution:
     """Replace the failed last point by the fold that made it fail, if any, and the solution behind it, at `value`."""
-    here, origin, shape, rules = builder.value[-2], builder.value[0], failed.state.x.shape, options.rules
+    previous_value, origin, shape, rules = builder.value[-2], builder.value[0], failed.state.x.shape, options.rules
     way = arc_length.Options(
-        width=arc_length.Options.width * abs((stop - origin) / (value - here)),
+        width=arc_length.Options.width * abs((stop - origin) / (value - previous_value)),
         bounds=(min(origin, value), max(origin, value)),
         guess=builder.x[-2],
         max_points=rules.max_fold_points if path.place(value)[0].simpler() is None else rules.max_corner_points,
         newton=options.newton,
     )
-    curve = arc_length.follow(path, here, value, way)
+    curve = arc_length.follow(path, previous_value, value, way)
     arrived = curve.parameter[-1] == value and curve.converged[-1]
     if not (arrived or curve.folds):
         return failed
@@ -182,8 +182,8 @@ def _by_arc_length(
     else:
         solution = arc_length.solve_along_load(*path.place(value), options.newton)
         if not solution.converged:
-            why = SolveEnd.AT_FOLD.say(f" {path.say(fold)}; arc_length goes round it")
-            solution = replace(solution, outcome=why)
+            reason = SolveEnd.AT_FOLD.say(f" {path.say(fold)}; arc_length goes round it")
+            solution = replace(solution, outcome=reason)
     builder.add(value, solution)
     return solution
 
@@ -194,19 +194,19 @@ def predict(builder: BranchBuilder, value: float, least_spacing: float = Natural
     Points closer together than half of the step, as halved steps leave them, would blow up their differences; those
     before a fold lie on another leg of the curve.
     """
-    apart = least_spacing * abs(value - builder.value[-1])
+    spacing = least_spacing * abs(value - builder.value[-1])
     chosen = [len(builder.value) - 1]
     for i in reversed(range(builder.folds[-1] + 1 if builder.folds else 0, chosen[0])):
         if len(chosen) > EXTRAPOLATION_DEGREE:
             break
-        if abs(builder.value[i] - builder.value[chosen[-1]]) >= apart:
+        if abs(builder.value[i] - builder.value[chosen[-1]]) >= spacing:
             chosen.append(i)
-    known = chosen[::-1]
-    return extrapolate(np.array([builder.value[i] for i in known]), [builder.x[i] for i in known], value)
+    rows = chosen[::-1]
+    return extrapolate(np.array([builder.value[i] for i in rows]), [builder.x[i] for i in rows], value)
 
 
-def extrapolate(known: np.ndarray, values: Sequence[np.ndarray] | np.ndarray, at: float) -> np.ndarray:
+def extrapolate(abscissas: np.ndarray, values: Sequence[np.ndarray] | np.ndarray, at: float) -> np.ndarray:
     """Lagrange polynomial through values known at points (n,), taken at another point."""
-    places = known.tolist()
-    apart = [[(at - b) / (a - b) for b in places if b != a] for a in places]
-    return np.sum([math.prod(w) * value for w, value in zip(apart, values, strict=True)], axis=0)
+    places = abscissas.tolist()
+    ratios = [[(at - b) / (a - b) for b in places if b != a] for a in places]
+    return np.sum([math.prod(w) * value for w, value in zip(ratios, values, strict=True)], axis=0)

@@ -27,7 +27,7 @@ STEP = 0.04  # beyond it the ends of the laps stand back [m]
 START = {"friction": 0.09, "damping": 1.6e-3, "ends": 35e-6, "sides": 200e-6, "modulus": 190e9, "bolts": 12249.0}
 FACTOR = {"friction": 5.0, "damping": 2.0, "ends": 3.0, "sides": 5.0, "modulus": 1.06, "bolts": 2.0}  # bounds
 DIFFERENCE = dict.fromkeys(START, 0.05) | {"sides": 0.1, "modulus": 0.004}  # steps of the logarithms
-WANTED = np.array([[0.003], [0.15]])  # of frequency and damping
+ACCURACY = np.array([[0.003], [0.15]])  # of frequency and damping
 
 
 def opening(points: np.ndarray, ends: float, sides: float) -> np.ndarray:
@@ -83,7 +83,7 @@ def main(path: Path, names: list[str]) -> None:
     def residual(unknowns: np.ndarray) -> np.ndarray:
         if np.array_equal(unknowns, last[0]):
             return last[1]
-        result = (beam.off(values(unknowns))["force"] / WANTED).ravel()
+        result = (beam.off(values(unknowns))["force"] / ACCURACY).ravel()
         last[:] = unknowns.copy(), result
         print({n: f"{v:.4g}" for n, v in values(unknowns).items()}, f"cost {result @ result / 2:.3f}", flush=True)
         return result

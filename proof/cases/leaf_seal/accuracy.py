@@ -122,20 +122,22 @@ class Accuracy:
     def record(self) -> dict[str, object]:
         """For machines."""
         edges = {"upper": self.upper, "lower": self.lower}
-        in_time = {name: {"hz": one.in_time / (2 * np.pi), "m": one.amplitude} for name, one in edges.items()}
-        solutions = [asdict(one) for one in self.solutions]
-        found = {"hz": self.frequency, "harmonics": HILL, "solutions": solutions}
-        return {"rows": self.rows, "in_time": in_time, "coexisting": found, "picture": str(self.picture)}
+        in_time = {
+            name: {"hz": solution.in_time / (2 * np.pi), "m": solution.amplitude} for name, solution in edges.items()
+        }
+        solutions = [asdict(solution) for solution in self.solutions]
+        table = {"hz": self.frequency, "harmonics": HILL, "solutions": solutions}
+        return {"rows": self.rows, "in_time": in_time, "coexisting": table, "picture": str(self.picture)}
 
     def text(self) -> str:
         """For people."""
         lines = [table(self.rows, self.upper, self.lower)]
         lines.append(f"solutions at {self.frequency:.2f} Hz with harmonics 0..{HILL}, amplitude of the lower corner:")
         lines += [
-            f"  {MICRO * one.amplitude:9.2f} um  {'stable' if one.stable else 'unstable':8} by Hill "
-            f"(growth {one.growth:+7.2f} /s), after {one.periods} periods in time {MICRO * one.in_time:9.2f} um: "
-            f"{'stays' if one.is_stable else 'leaves'}"
-            for one in self.solutions
+            f"  {MICRO * s.amplitude:9.2f} um  {'stable' if s.stable else 'unstable':8} by Hill "
+            f"(growth {s.growth:+7.2f} /s), after {s.periods} periods in time {MICRO * s.in_time:9.2f} um: "
+            f"{'stays' if s.returns else 'leaves'}"
+            for s in self.solutions
         ]
         return "\n".join([*lines, str(self.picture)])
 
@@ -153,6 +155,6 @@ def compute(folder: Path) -> Accuracy:
         folds = [float(hill.branch.omega[i]) for i in resonance(hill)[:2]]
         omega, solutions = coexisting(hill.balance, hill.branch, min(folds), max(folds), LINER_NODE)
         marks = [(upper.in_time, upper.amplitude), (lower.in_time, lower.amplitude)]
-        marks += [(omega, one.in_time) for one in solutions]
+        marks += [(omega, solution.in_time) for solution in solutions]
         figure_of(responses, marks).savefig(path)
     return Accuracy(rows, upper, lower, omega / (2 * np.pi), solutions, path)

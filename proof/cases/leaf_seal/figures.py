@@ -91,16 +91,16 @@ def contact_figure(shown: Sequence[tuple[str, LeafResponse, int]]) -> Figure:
     states = [response.state(point) for _, response, point in shown]
     chatters = [response.chatter(point) for _, response, point in shown]
     pressure = [1e-3 * state.cycle.force[:, 0, 0] / patch.area for state in states]
-    speed = [1e3 * one.impact_velocity for one in chatters]
+    speed = [1e3 * contact.impact_velocity for contact in chatters]
     aspect = np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0])
     n = len(shown)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(3.1 * n + 1.8, 4 * (3.1 * aspect + 0.15) + 0.5), layout="constrained")
         grid = figure.subplots(4, n + 1, squeeze=False, width_ratios=[1.0] * n + [0.55])
-        for column, ((name, _, _), state, one) in enumerate(zip(shown, states, chatters, strict=True)):
+        for column, ((name, _, _), state, contact) in enumerate(zip(shown, states, chatters, strict=True)):
             pressed = draw_field(grid[0, column], patch, pressure[column], PRESSURE_MAP, float(np.max(pressure)))
             draw_status(grid[1, column], patch, state.cycle.status)
-            touching = draw_field(grid[2, column], patch, one.touching, "viridis", 1.0)
+            touching = draw_field(grid[2, column], patch, contact.touching, "viridis", 1.0)
             struck = draw_field(grid[3, column], patch, speed[column], "magma", float(np.max(speed)))
             grid[0, column].set_title(name, fontsize=10, fontweight="normal")
         for axes in grid[:, -1]:
@@ -126,16 +126,16 @@ def history_figure(response: LeafResponse, points: Sequence[int], names: Sequenc
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.7 * len(points) + 2.2, 5.6), layout="constrained")
         grid = figure.subplots(2, len(points), sharex=True, squeeze=False)
-        for (above, lower), point, name in zip(grid.T, points, names, strict=True):
+        for (upper, lower), point, name in zip(grid.T, points, names, strict=True):
             outputs = MICRO * branch.response[point] @ functions.T
             for output, color in zip(TITLES, (BLUE, ORANGE, GREEN), strict=True):
-                above.plot(
+                upper.plot(
                     angle / (2 * np.pi), outputs[branch.output_names.index(output)], color=color, label=TITLES[output]
                 )
             _, force = balance.history(response.state(point))
             for (label, pair), color in zip(pairs.items(), (BLUE, GREEN, RED), strict=True):
                 lower.plot(shares, np.append(force[pair, 0], force[pair, 0, 0]), color=color, label=label)
-            above.set_title(name, fontsize=10, fontweight="normal")
+            upper.set_title(name, fontsize=10, fontweight="normal")
             lower.set_xlabel("time / period")
         grid[0, 0].set_ylabel("displacement z / µm")
         grid[1, 0].set_ylabel("contact force / N")

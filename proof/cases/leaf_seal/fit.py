@@ -180,18 +180,18 @@ def _counted(ratios: np.ndarray) -> np.ndarray:
     return relative_errors(ratios)[COUNTED]
 
 
-def doubt(one: Fit, other: Fit) -> float:
+def doubt(first: Fit, second: Fit) -> float:
     """Standard error of the difference of the errors of two leaves, by leaving out one number at a time (jackknife)."""
-    squares = np.stack([fitted.errors[COUNTED] ** 2 for fitted in (one, other)])
+    squares = np.stack([fitted.errors[COUNTED] ** 2 for fitted in (first, second)])
     n = squares.shape[1]
     without = np.diff(np.sqrt((squares.sum(axis=1, keepdims=True) - squares) / (n - 1)), axis=0)
     return float(np.sqrt((n - 1) * np.mean((without - without.mean()) ** 2)))
 
 
-def chosen(own: Fit, others: Sequence[Fit]) -> Fit:
+def chosen(base: Fit, alternatives: Sequence[Fit]) -> Fit:
     """The scene's own leaf, or the best of the others where it fits better by more than two standard errors."""
-    best = min(others, key=lambda item: item.rms)
-    return best if own.rms - best.rms > 2 * doubt(own, best) else own
+    best = min(alternatives, key=lambda item: item.rms)
+    return best if base.rms - best.rms > 2 * doubt(base, best) else base
 
 
 def fit(scene: MeshScene, pin_column: int, start: Sequence[float] | None = None, max_steps: int = 20) -> Fit:
@@ -253,13 +253,13 @@ def search(tell: Callable[[str], None]) -> Fit:
     return result
 
 
-def as_text(found: Fit) -> str:
+def as_text(result: Fit) -> str:
     """For people."""
     return "\n".join(
         [
-            found.table(),
-            f"error {100 * found.rms:.2f} % r.m.s.; 1.00 is {found.unit:.4g} Hz",
-            f"contact of both patches over spring of one pin: {found.contact / found.spring:.3g}",
-            found.toml(),
+            result.table(),
+            f"error {100 * result.rms:.2f} % r.m.s.; 1.00 is {result.unit:.4g} Hz",
+            f"contact of both patches over spring of one pin: {result.contact / result.spring:.3g}",
+            result.toml(),
         ]
     )

@@ -22,7 +22,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 
-LINEAR, APART = 0.85, 1.12  # frequencies of the linear points, over those where separation begins and ends
+LINEAR, SEPARATING = 0.85, 1.12  # frequencies of the linear points, over those where separation begins and ends
 LINER_NODE = OUTPUT  # the lower corner, which moves most where the leaf chatters
 WEAR_COEFFICIENT = 2e-15  # [m3/J], that of the thesis's friction contacts put to impacts (ours)
 
@@ -64,13 +64,13 @@ class LeafResponse:
         branch = self.branch
         height = branch.amplitude(LINER_NODE)
         peak = int(np.argmax(height))
-        apart = np.flatnonzero((self.status() & SEPARATES).any(axis=1) & (self.status() & STICKS).any(axis=1))
-        low, high = branch.omega[peak] * LINEAR, branch.omega[peak] * APART
+        separating = np.flatnonzero((self.status() & SEPARATES).any(axis=1) & (self.status() & STICKS).any(axis=1))
+        low, high = branch.omega[peak] * LINEAR, branch.omega[peak] * SEPARATING
         first = last = peak
-        if len(apart):
-            first, last = int(apart[0]), int(apart[-1])
-            peak = int(apart[np.argmax(height[apart])])
-            low, high = branch.omega[first] * LINEAR, branch.omega[last] * APART
+        if len(separating):
+            first, last = int(separating[0]), int(separating[-1])
+            peak = int(separating[np.argmax(height[separating])])
+            low, high = branch.omega[first] * LINEAR, branch.omega[last] * SEPARATING
 
         def nearest(start: int, stop: int, omega: float) -> int:
             return start + int(np.argmin(np.abs(branch.omega[start : stop + 1] - omega)))

@@ -27,7 +27,7 @@ from tribodyn.workflows.scene.source import read_scene
 
 MAPS = ("inclination", "bow")  # parameters whose contact is drawn
 LINEAR_POINT = 4  # of the chosen five
-KEPT = "configurations"  # folder of the records
+RECORDS = "configurations"  # folder of the records
 
 
 def sizes(response: LeafResponse) -> str:
@@ -64,10 +64,10 @@ def study(
     records: list[Record] = []
     for case in chosen:
         scene = read_scene("leaf_seal_thesis", case.overrides).scene
-        saved = leaf_record.load(case, scene, folder / KEPT) if resume else None
+        saved = leaf_record.load(case, scene, folder / RECORDS) if resume else None
         record = saved if saved is not None and saved.complete else solve(case)
         if record is not saved:
-            leaf_record.save(record, scene, folder / KEPT)
+            leaf_record.save(record, scene, folder / RECORDS)
         drawn = case.group in MAPS or not records
         records.append(record if drawn else replace(record, response=None))  # a model is some megabytes
         write_table(records, folder / "study.csv")
@@ -133,14 +133,14 @@ def write_chatter(response: LeafResponse, points: Sequence[int], path: Path) -> 
             + ("opening_ms", "closing_ms", "impact_velocity_mm_s")
         )
         for number, point in enumerate(points, start=1):
-            found, status = response.chatter(point), response.state(point).cycle.status
+            bounces, status = response.chatter(point), response.state(point).cycle.status
             for pair, name in face.items():
-                instants = (found.opening[pair], found.closing[pair], found.approach[pair])
+                instants = (bounces.opening[pair], bounces.closing[pair], bounces.approach[pair])
                 table.writerow(
                     (number, f"{response.branch.frequency[point]:.3f}", name, pair)
                     + tuple(f"{1e3 * value:.3f}" for value in at[pair, :2])
-                    + (STATUS[int(status[pair])][0], f"{1e3 * found.contact_duration[pair]:.4f}")
-                    + (f"{found.touching[pair]:.4f}",)
+                    + (STATUS[int(status[pair])][0], f"{1e3 * bounces.contact_duration[pair]:.4f}")
+                    + (f"{bounces.touching[pair]:.4f}",)
                     + tuple(" ".join(f"{1e3 * value:.4f}" for value in values) for values in instants)
                 )
 

@@ -26,7 +26,7 @@ from tribodyn.workflows.result.result import Patch, References
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 STAGES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the volume worn when the preload is lost
-APART = 1e-4  # mating height that leaves the faces apart [m]
+CLEARANCE = 1e-4  # mating height that leaves the faces apart [m]
 STUCK_PRELOAD = 150.0  # beyond which the experiment saw no relative displacement [N]
 READINGS: tuple[tuple[int, ...], ...] = ((0, 1, 2, 3), (0, 1, 2))
 """Harmonics: 0 to 3, and "3 harmonics including the 0th"."""
@@ -131,7 +131,7 @@ def _energies(rig: Rig) -> dict[float, Cycle]:
 
 def apart(rig: Rig, references: References) -> float:
     """Largest relative difference of the response of faces held apart to that of the linear open rig."""
-    loose, subset = rig.with_mating_height(-APART), slice(None, None, len(references.omega) // 8)
+    loose, subset = rig.with_mating_height(-CLEARANCE), slice(None, None, len(references.omega) // 8)
     values = np.array([loose.cycle(float(omega / (2 * np.pi))).amplitude for omega in references.omega[subset]])
     return float(np.max(np.abs(values / references.free[subset] - 1)))
 

@@ -46,18 +46,18 @@ def draw(study: Study, folder: Path) -> list[Path]:
 
 def energy_against_force(study: Study) -> Figure:
     """Table 5.3: energy per cycle and sliding range against shaker force."""
-    figure, (remaining, right) = _axes(9.0, 3.8, 2)
+    figure, (remaining, second) = _axes(9.0, 3.8, 2)
     force = list(published.TABLE_5_3)
     for saved, style in zip(READINGS, ("o-", "s:"), strict=True):
         cycles = study.cycles[saved]
         name = f"ours, harmonics 0 to {saved[-1]}"
         remaining.plot(force, [MICRO * cycles[f].energy for f in force], style, color=BLUE, ms=4, label=name)
-        right.plot(force, [2 * MICRO * cycles[f].slip for f in force], style, color=BLUE, ms=4, label=name)
-    for axes, column in ((remaining, 0), (right, 1)):
+        second.plot(force, [2 * MICRO * cycles[f].slip for f in force], style, color=BLUE, ms=4, label=name)
+    for axes, column in ((remaining, 0), (second, 1)):
         axes.plot(force, [MICRO * row[column] for row in published.TABLE_5_3.values()], label="experiment", **MARKS)
         axes.set(yscale="log", xlabel="shaker force / N")
     remaining.set(ylabel="energy per cycle / µJ", title="Table 5.3: 290 Hz, 31 N")
-    right.set(ylabel="sliding range / µm")
+    second.set(ylabel="sliding range / µm")
     remaining.legend(fontsize=9)
     return figure
 
@@ -85,13 +85,13 @@ def contact_area_maps(study: Study) -> Figure:
 def total_wear(study: Study) -> Figure:
     """Figure 5.27: total wear when the preload is lost."""
     run = study.runs[0]
-    path, across = 1e3 * run.points.T
+    path, y = 1e3 * run.points.T
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     axes = figure.add_subplot(projection="3d")
     corners = study.patch.faces
     triangles = np.concatenate([corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)])
     height = -MICRO * run.history.depth[-1]
-    shown = axes.plot_trisurf(across, path, height, triangles=triangles, cmap=WEAR_MAP + "_r", lw=0.2)
+    shown = axes.plot_trisurf(y, path, height, triangles=triangles, cmap=WEAR_MAP + "_r", lw=0.2)
     figure.colorbar(shown, ax=axes, label="total wear / µm", shrink=0.7)
     axes.set(xlabel="sliding direction / mm", ylabel="along the beam / mm", yticks=[-1, 0, 1])
     axes.set_title("Figure 5.27: total wear", loc="left")

@@ -103,10 +103,10 @@ def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
     """
     if not run.lost:
         raise ValueError(f"a wear coefficient needs a run that loses its preload, but this one: {run.end}")
-    found = np.array([run.history.cycles[-1], run.spent[-1]])
+    final = np.array([run.history.cycles[-1], run.spent[-1]])
     measured = [MeasuredNumber("cycles to loss", LIFE_MEASURED), MeasuredNumber("work to loss", WORK, "J")]
     parameter = FitParameter("coefficient", coefficient / 10, 10 * coefficient, (coefficient,), "m3/J")
-    return identify([parameter], measured, lambda values: found * coefficient / values["coefficient"])
+    return identify([parameter], measured, lambda values: final * coefficient / values["coefficient"])
 
 
 def run(
@@ -116,23 +116,23 @@ def run(
 
     tell : called with a sentence on what is under way
     """
-    found = {}
+    fits = {}
     file = read_scene(scene, overrides)
     check(file)
     with threadpool_limits(1):
         if column:
             tell("section of the column: a mesh and a reduction for every section tried")
             title = "Section of the column and springs at its base to published frequencies"
-            found[title] = fit_column(scene, overrides)
+            fits[title] = fit_column(scene, overrides)
         tell("joint springs")
-        found["Joint springs to published frequencies, before: rigid joints"] = fit_joints(joints_of(file))
+        fits["Joint springs to published frequencies, before: rigid joints"] = fit_joints(joints_of(file))
         rig = Rig.of(file)
         tell("platform height and damping")
-        found["Platform height to the preload, with the springs of the scene"] = fit_height(rig)
-        found["Modal damping to the energies of table 5.3, with the springs of the scene"] = fit_damping(rig)
+        fits["Platform height to the preload, with the springs of the scene"] = fit_height(rig)
+        fits["Modal damping to the energies of table 5.3, with the springs of the scene"] = fit_damping(rig)
         if wear:
-            found["Wear coefficient to the published life and work; not used"] = _coefficient(rig, file, tell)
-    return found
+            fits["Wear coefficient to the published life and work; not used"] = _coefficient(rig, file, tell)
+    return fits
 
 
 def _coefficient(rig: Rig, file: SceneFile, tell: Callable[[str], None]) -> Identification:
@@ -141,11 +141,11 @@ def _coefficient(rig: Rig, file: SceneFile, tell: Callable[[str], None]) -> Iden
     return fit_coefficient(wear_down(rig, 0.0, tell), wear.numbers["coefficient"])
 
 
-def as_text(found: Mapping[str, Identification]) -> str:
+def as_text(fits: Mapping[str, Identification]) -> str:
     """All reports."""
-    return "\n\n".join(f"{title}\n{identification.report()}" for title, identification in found.items())
+    return "\n\n".join(f"{title}\n{identification.report()}" for title, identification in fits.items())
 
 
-def as_records(found: Mapping[str, Identification]) -> dict[str, object]:
+def as_records(fits: Mapping[str, Identification]) -> dict[str, object]:
     """All reports for machines."""
-    return {title: identification.record() for title, identification in found.items()}
+    return {title: identification.record() for title, identification in fits.items()}

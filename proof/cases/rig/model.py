@@ -90,13 +90,13 @@ class Rig:
         """The rig with another modal damping ratio."""
         return self.with_keys(f"damping.modal={ratio!r}")
 
-    def with_harmonics(self, kept: tuple[int, ...]) -> Rig:
+    def with_harmonics(self, harmonics: tuple[int, ...]) -> Rig:
         """The rig with other harmonics."""
-        return self.with_keys(f"harmonics.kept={list(kept)}")
+        return self.with_keys(f"harmonics.kept={list(harmonics)}")
 
-    def with_mating_height(self, more: float) -> Rig:
+    def with_mating_height(self, rise: float) -> Rig:
         """The rig with its faces pushed on by another `more` [m] (thesis 5.5: 0, +3 and -3 um)."""
-        return self.with_opening(np.full_like(self.opening, -more))
+        return self.with_opening(np.full_like(self.opening, -rise))
 
     def with_opening(self, depth: np.ndarray) -> Rig:
         """The rig with its gaps opened by a wear depth (n_pair,) [m]."""
@@ -165,6 +165,6 @@ def check(file: SceneFile) -> None:
 
 def _reaction(file: SceneFile, model: Model, state: State) -> float:
     """Static force at the prescribed nodes of a scene in a solved state of its model [N]."""
-    inputs, found = next(iter(file.mesh_scene.prescribed.values())), model.balance.model.reaction
-    assert found is not None
-    return float(found.force(inputs.displacement, state.cycle.force[:, :, 0]).sum())
+    inputs, base_reaction = next(iter(file.mesh_scene.prescribed.values())), model.balance.model.reaction
+    assert base_reaction is not None
+    return float(base_reaction.force(inputs.displacement, state.cycle.force[:, :, 0]).sum())

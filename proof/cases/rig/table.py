@@ -15,7 +15,7 @@ from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS
 
 MILLION = 1e6
 UPPER_PEAK = (340.0, 450.0)  # where the peak near 400 Hz is looked for [Hz]
-SAME = 1e-6  # relative difference of numbers that are the same
+EQUAL = 1e-6  # relative difference of numbers that are the same
 
 
 @dataclass(frozen=True)
@@ -139,9 +139,9 @@ def _statics(study: Study) -> list[Trend]:
     slips = {force: _sliding_share(cycle.state.cycle.status) for force, cycle in study.cycles[READINGS[0]].items()}
     shares = ", ".join(f"{force:.0f} N {share:.0%}" for force, share in slips.items())
     return [
-        Trend("prescribed height", "the reaction at the platform is the preload", f"to {worst:.1e}", worst < SAME),
+        Trend("prescribed height", "the reaction at the platform is the preload", f"to {worst:.1e}", worst < EQUAL),
         Trend("prescribed height", "no interference, no preload", f"{none.preload:.1e} N, screws {none.reaction:.1e} N",
-              abs(none.preload) + abs(none.reaction) < SAME),
+              abs(none.preload) + abs(none.reaction) < EQUAL),
         Trend("prescribed height", "without contact the response is the open one",
               f"to {study.apart:.1e} (linear reference of {len(study.references.omega)} points)", study.apart < 1e-3),
         Trend("stuck", f"no relative displacement over {STUCK_PRELOAD:.0f} N of preload",
@@ -239,31 +239,31 @@ def _responses(stages: Sequence[Stage], study: Study) -> list[Trend]:
     ]  # fmt: skip
 
 
-def as_text(found: Table) -> str:
+def as_text(table: Table) -> str:
     """Markdown."""
     lines = ["| | published | ours | difference | |", "|---|---|---|---|---|"]
     lines += [
         f"| {n.topic}: {n.name}{'' if n.unit == '-' else ', ' + n.unit} | {n.published:.4g} | {n.ours:.4g} "
         f"| {100 * n.difference:+.3g} % | {n.note} |"
-        for n in found.numbers
+        for n in table.numbers
     ]
     lines += ["", "| | published | ours | agrees |", "|---|---|---|---|"]
-    lines += [f"| {t.topic} | {t.published} | {t.ours} | {'yes' if t.agrees else 'no'} |" for t in found.trends]
+    lines += [f"| {t.topic} | {t.published} | {t.ours} | {'yes' if t.agrees else 'no'} |" for t in table.trends]
     lines += ["", "| 10^6 cycles | preload at rest, N | energy, uJ | in time, uJ | amplitude | time integration |"]
     lines += ["|---|---|---|---|---|---|"]
-    for c in found.checks:
+    for c in table.checks:
         energy = "-" if c.energy_in_time is None else f"{1e6 * c.energy_in_time:.0f}"
         amplitude = "-" if c.amplitude_difference is None else f"{100 * c.amplitude_difference:+.2g} %"
         lines.append(
             f"| {c.cycles / MILLION:.3g} | {c.preload_at_rest:.1f} | {1e6 * c.energy:.0f} | {energy} | {amplitude} "
             f"| {c.outcome} |"
         )
-    lines += ["", f"{found.seconds:.0f} s of processor time, one thread"]
+    lines += ["", f"{table.seconds:.0f} s of processor time, one thread"]
     return "\n".join(lines) + "\n"
 
 
-def as_records(found: Table) -> dict[str, object]:
+def as_records(table: Table) -> dict[str, object]:
     """For machines."""
-    numbers = [{**asdict(n), "difference": n.difference} for n in found.numbers]
-    return {"numbers": numbers, "trends": [asdict(t) for t in found.trends],
-            "checks": [asdict(c) for c in found.checks], "seconds": found.seconds}  # fmt: skip
+    numbers = [{**asdict(n), "difference": n.difference} for n in table.numbers]
+    return {"numbers": numbers, "trends": [asdict(t) for t in table.trends],
+            "checks": [asdict(c) for c in table.checks], "seconds": table.seconds}  # fmt: skip

@@ -90,12 +90,14 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     name = f"mating height {shift * 1e6:+.3g} um"
     if history.ended.failed:
         raise NoSolution(f"{name}, wear step {len(history.cycles)}: {history.end}")
-    rest = history.preload_at_rest
-    assert rest is not None
-    tell(f"{name}: {len(rest)} steps, {history.cycles[-1]:.3g} cycles, preload {rest[-1]:.3g} N at rest; {history.end}")
+    preload = history.preload_at_rest
+    assert preload is not None
+    tell(
+        f"{name}: {len(preload)} steps, {history.cycles[-1]:.3g} cycles, preload {preload[-1]:.3g} N at rest; {history.end}"
+    )
     interface = balance.model.interface
     in_plane = (interface.points - interface.points.mean(axis=0))[:, :2]
-    return RigWear(shift, history, rest, interface.area, in_plane, str(history.end), time.process_time() - clock)
+    return RigWear(shift, history, preload, interface.area, in_plane, str(history.end), time.process_time() - clock)
 
 
 def loop(balance: HarmonicBalance, history: WearHistory, row: int) -> tuple[np.ndarray, np.ndarray]:

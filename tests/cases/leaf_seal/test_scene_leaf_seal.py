@@ -16,7 +16,7 @@ from proof.cases.leaf_seal import (
 )
 from proof.cases.leaf_seal.cases import Case, cases, liner
 from proof.cases.leaf_seal.response import LINER_NODE, respond
-from proof.cases.leaf_seal.study import KEPT
+from proof.cases.leaf_seal.study import RECORDS
 from tests.helpers.reduced import reduce_part
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
@@ -326,7 +326,7 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
         is None
     )
     assert (
-        leaf_record.load(small[0], scene_file.read("leaf_seal_thesis", small[2].overrides).scene, tmp_path / KEPT)
+        leaf_record.load(small[0], scene_file.read("leaf_seal_thesis", small[2].overrides).scene, tmp_path / RECORDS)
         is None
     )
     paths = leaf_study.draw(records, tmp_path)

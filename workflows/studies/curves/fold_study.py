@@ -34,8 +34,8 @@ class FoldStudy(StudyResult):
         return [
             {
                 "balance_hz": fold.omega / (2 * np.pi),
-                "time_hz": fold.in_time / (2 * np.pi) if fold.found else None,
-                "difference": fold.omega / fold.in_time - 1 if fold.found else None,
+                "time_hz": fold.in_time / (2 * np.pi) if fold.is_located else None,
+                "difference": fold.omega / fold.in_time - 1 if fold.is_located else None,
                 "resolution": fold.resolution,
                 "amplitude_m": fold.amplitude,
                 "outcome": str(fold.outcome),
@@ -49,7 +49,7 @@ class FoldStudy(StudyResult):
         for fold in self.folds:
             hertz, in_time = fold.omega / (2 * np.pi), fold.in_time / (2 * np.pi)
             fold_in_time = f": {fold.outcome}"
-            if fold.found:
+            if fold.is_located:
                 fold_in_time = f", in time {in_time:.6g} Hz (known to {100 * fold.resolution:.2g} %): the balance is "
                 fold_in_time += f"{100 * (hertz / in_time - 1):+.3g} % off"
             texts.append(f"balance {hertz:.6g} Hz{fold_in_time}")
