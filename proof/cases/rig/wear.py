@@ -92,9 +92,8 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
         raise NoSolution(f"{name}, wear step {len(history.cycles)}: {history.end}")
     preload = history.preload_at_rest
     assert preload is not None
-    tell(
-        f"{name}: {len(preload)} steps, {history.cycles[-1]:.3g} cycles, preload {preload[-1]:.3g} N at rest; {history.end}"
-    )
+    span = f"{len(preload)} steps, {history.cycles[-1]:.3g} cycles"
+    tell(f"{name}: {span}, preload {preload[-1]:.3g} N at rest; {history.end}")
     interface = balance.model.interface
     in_plane = (interface.points - interface.points.mean(axis=0))[:, :2]
     return RigWear(shift, history, preload, interface.area, in_plane, str(history.end), time.process_time() - clock)
