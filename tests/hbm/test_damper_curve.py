@@ -29,9 +29,9 @@ def peak(limit: float, harmonics: tuple[int, ...] = (1,)) -> float:
     basis = HarmonicBasis(harmonics, 64, "located")
     load = Excitation.of({}, {1: {"wave": FORCE}})
     balance = HarmonicBalance.of(model, Joint("damper", "jenkins_constant", numbers), basis, load, 2.0)
-    found = AtPeak("tip", 0.9, 1.4).solve(balance)
-    assert found.solution.converged
-    return float(found.amplitude)
+    peak_point = AtPeak("tip", 0.9, 1.4).solve(balance)
+    assert peak_point.solution.converged
+    return float(peak_point.amplitude)
 
 
 def chain_peak(limit: float, waves: int, blades: int = 6) -> tuple[float, float]:
@@ -47,10 +47,10 @@ def chain_peak(limit: float, waves: int, blades: int = 6) -> tuple[float, float]
     basis = HarmonicBasis((1,), 64, "located")
     load = Excitation.of({}, {1: {"cos": FORCE, "sin": -1j * FORCE}})
     balance = HarmonicBalance.of(model, Joint("shroud", "jenkins_constant", numbers), basis, load, 3.0)
-    found = AtPeak("tip 0", 0.9, 1.9).solve(balance)
-    assert found.solution.converged
-    heights = np.linalg.norm(found.response, axis=1)
-    return float(found.amplitude), float(np.ptp(heights) / heights.max())
+    peak_point = AtPeak("tip 0", 0.9, 1.9).solve(balance)
+    assert peak_point.solution.converged
+    heights = np.linalg.norm(peak_point.response, axis=1)
+    return float(peak_point.amplitude), float(np.ptp(heights) / heights.max())
 
 
 def closed_form(limit: float, damper: float = DAMPER) -> float:

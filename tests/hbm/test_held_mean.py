@@ -41,9 +41,9 @@ def held(
 
 
 def solved(balance: HarmonicBalance) -> State:
-    found = newton.solve_from_rest(balance, OMEGA)
-    assert found.converged
-    return found.state
+    solution = newton.solve_from_rest(balance, OMEGA)
+    assert solution.converged
+    return solution.state
 
 
 @pytest.mark.parametrize(("height", "force"), [(4e-5, 1.5), (HEIGHT, 30.0)])
@@ -52,18 +52,18 @@ def test_motion_in_time_is_that_of_many_harmonics(height: float, force: float) -
     balance = held(force, height=height)
     state = solved(balance)
     assert np.bitwise_or.reduce(state.cycle.status) == STICKS | SLIPS | SEPARATES
-    found = verify(balance, state, Options(512, tolerance=1e-8))
-    assert found.motion.periodic
-    assert found.largest < 1e-3
-    assert np.abs(found.motion.hold_error).max() < 1e-7 * height  # of the displacement as it was marched
+    comparison = verify(balance, state, Options(512, tolerance=1e-8))
+    assert comparison.motion.periodic
+    assert comparison.largest < 1e-3
+    assert np.abs(comparison.motion.hold_error).max() < 1e-7 * height  # of the displacement as it was marched
     stepper = TimeStepper(balance, OMEGA, Options(512))
     assert stepper.hold is not None
     assert isinstance(balance.model, PrescribedModel)
     reaction = balance.model.reaction
-    in_time = reaction.force(height, found.motion.force.mean(axis=2))  # another formula than that of the hold
+    in_time = reaction.force(height, comparison.motion.force.mean(axis=2))  # another formula than that of the hold
     np.testing.assert_allclose(in_time, reaction.force(height, state.cycle.force[:, :, 0]), rtol=2e-3)
-    own = reaction.support * height  # of the springs that act about the height
-    np.testing.assert_allclose(stepper.hold.in_balance(state) - own, in_time, rtol=2e-3)
+    finer = reaction.support * height  # of the springs that act about the height
+    np.testing.assert_allclose(stepper.hold.in_balance(state) - finer, in_time, rtol=2e-3)
 
 
 def test_a_force_that_is_known_makes_the_same_motion() -> None:
@@ -82,11 +82,11 @@ def test_a_force_that_is_known_makes_the_same_motion() -> None:
         replace(free, system=replace(free.system, loads=loads)), joints, basis,
         Excitation.of({"push": 1.0}, {1: {"shaker": 12.0}}), 2 * OMEGA,
     )  # fmt: skip
-    found = time_integration.integrate(pushed, OMEGA, solved(pushed), options)
+    motion = time_integration.integrate(pushed, OMEGA, solved(pushed), options)
     assert len(exact.hold_error) == len(PLATFORM)
-    assert len(found.hold_error) == 0
-    np.testing.assert_allclose(found.outputs, exact.outputs, atol=1e-6 * np.abs(exact.outputs).max())
-    assert found.energy.sum() == pytest.approx(exact.energy.sum(), rel=1e-6)
+    assert len(motion.hold_error) == 0
+    np.testing.assert_allclose(motion.outputs, exact.outputs, atol=1e-6 * np.abs(exact.outputs).max())
+    assert motion.energy.sum() == pytest.approx(exact.energy.sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -99,10 +99,10 @@ def test_a_plain_march_comes_to_the_mean_of_a_stuck_and_of_a_loose_contact(
     balance = held(3.0, 3, friction=friction, gap=gap)
     lower = held(3.0, 3, 0.5 * HEIGHT, friction, gap)
     options = Options(64, tolerance=1e-7, accelerate=False, max_periods=400)
-    found = time_integration.integrate(balance, OMEGA, lower.evaluate(OMEGA, solved(lower).x), options)
-    assert found.periodic
-    assert (found.status == status).all()
-    assert np.abs(found.hold_error).max() < 1e-6 * HEIGHT
+    motion = time_integration.integrate(balance, OMEGA, lower.evaluate(OMEGA, solved(lower).x), options)
+    assert motion.periodic
+    assert (motion.status == status).all()
+    assert np.abs(motion.hold_error).max() < 1e-6 * HEIGHT
 
 
 def test_the_mean_of_a_motion_that_never_repeats_itself_is_held() -> None:
@@ -110,11 +110,11 @@ def test_the_mean_of_a_motion_that_never_repeats_itself_is_held() -> None:
     state = solved(balance)
     follower = Follower(MeanOptions(128))
     follower.start(balance, state)
-    found = follower.mean(balance, OMEGA, lambda motion: motion.hold_error)
-    assert found.is_stationary
-    assert found.spread > 0.02
-    assert 0 < np.abs(found.seen).max() < 1e-3 * 4e-5
-    assert found.energy.sum() == pytest.approx(balance.energy(state).sum(), rel=0.02)
+    means = follower.mean(balance, OMEGA, lambda motion: motion.hold_error)
+    assert means.is_stationary
+    assert means.spread > 0.02
+    assert 0 < np.abs(means.observed).max() < 1e-3 * 4e-5
+    assert means.energy.sum() == pytest.approx(balance.energy(state).sum(), rel=0.02)
 
 
 def test_multipliers_while_the_force_stays_are_those_by_hill() -> None:
@@ -132,9 +132,11 @@ def test_what_drives_a_motion_away_in_time_is_seen(monkeypatch: pytest.MonkeyPat
     for force, height, stable in ((1.5, 4e-5, True), (30.0, HEIGHT, False)):
         balance = held(force, 9, height)
         state, options = solved(balance), Options(STEPS, tolerance=1e-9)
-        whole = np.exp(floquet.floquet_exponents(balance, state, options).real.max() * 2 * np.pi / OMEGA)
-        assert (whole < 1) == stable
-        assert floquet.largest_multiplier(balance, state, options) == pytest.approx(whole, rel=0.2 if stable else 0.02)
+        complete = np.exp(floquet.floquet_exponents(balance, state, options).real.max() * 2 * np.pi / OMEGA)
+        assert (complete < 1) == stable
+        assert floquet.largest_multiplier(balance, state, options) == pytest.approx(
+            complete, rel=0.2 if stable else 0.02
+        )
 
 
 def test_a_push_decides_where_sliders_just_reach_their_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,9 +144,9 @@ def test_a_push_decides_where_sliders_just_reach_their_limit(monkeypatch: pytest
     model = prescribe(two_bodies(), PLATFORM, "height", support=4e5)
     kink = problem(model, HEIGHT, 6.0, (0.0, 1.0, -1e-5), tuple(range(8)))
     options = Options(STEPS, tolerance=1e-9)
-    whole = floquet.largest_multiplier(kink, solved(kink), options)
+    complete = floquet.largest_multiplier(kink, solved(kink), options)
     monkeypatch.setattr(floquet, "RULES", replace(floquet.RULES, dense=0))
-    assert whole < 0.9
+    assert complete < 0.9
     assert floquet.largest_multiplier(kink, solved(kink), options) > 1.1
     for balance, leaves in ((kink, False), (held(12.0, 7, 4e-5), True), (held(30.0, 7), True)):
         assert floquet.is_unstable(balance, solved(balance), options) == leaves
@@ -160,8 +162,8 @@ def test_life_in_time_is_that_of_many_harmonics() -> None:
     )
     with growth_by_few_modes():
         run = evolve(error_controlled.Rule(problem, Tolerance(0.01, 1e-4)))
-    found = evolve(error_controlled.Rule(problem, Tolerance(0.02, 1e-4), motion="time"))
-    assert found.ended is run.ended is WearEnd.PRELOAD_LOST
-    assert found.in_time.all()
-    assert found.is_stationary.all()
-    assert cycles_to_preload(found, 0.5) == pytest.approx(cycles_to_preload(run, 0.5), rel=0.02)
+    worn = evolve(error_controlled.Rule(problem, Tolerance(0.02, 1e-4), motion="time"))
+    assert worn.ended is run.ended is WearEnd.PRELOAD_LOST
+    assert worn.in_time.all()
+    assert worn.is_stationary.all()
+    assert cycles_to_preload(worn, 0.5) == pytest.approx(cycles_to_preload(run, 0.5), rel=0.02)

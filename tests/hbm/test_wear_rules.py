@@ -162,8 +162,8 @@ def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> N
 
     class Lost(AtFrequency):
         def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
-            found = self.solve(balance)
-            return replace(found, solution=replace(found.solution, outcome="no way from here"))
+            point = self.solve(balance)
+            return replace(point, solution=replace(point.solution, outcome="no way from here"))
 
     lost = replace(problem, mission=(Duty(Lost("tip", 420.0)),))
     before = assess(lost, np.zeros(N_PAIR), 0.0, None)
@@ -243,13 +243,13 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
 
     class Blind(AtFrequency):
         def solve(self, balance: HarmonicBalance) -> OperatingPoint:
-            found, deepest = super().solve(balance), (balance.contact.gap - gap).max()
+            point, deepest = super().solve(balance), (balance.contact.gap - gap).max()
             if end < deepest < end + 5e-6:
                 missed.append(deepest)
-                return replace(found, solution=replace(found.solution, outcome="nothing here"))
+                return replace(point, solution=replace(point.solution, outcome="nothing here"))
             if deepest > end:
                 over.append(deepest)
-            return found
+            return point
 
         def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
             ended = not over and (balance.contact.gap - gap).max() > end
@@ -357,11 +357,11 @@ def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearPro
     highest = site.solve(problem.balance)
     lower = AtPeak("tip", 500.0, 545.0).solve(problem.balance)
     assert lower.amplitude < highest.amplitude / 2
-    found = site.dominant_peak(problem.balance, lower)
-    assert found.point is not None
-    assert found.solves > found.point.solves > 0  # the sweep's, too
-    assert found.point.state.omega == pytest.approx(highest.state.omega, rel=1e-4)
-    assert found.nearness == pytest.approx(highest.amplitude / (site.dominance * lower.amplitude), rel=1e-6)
+    dominant = site.dominant_peak(problem.balance, lower)
+    assert dominant.point is not None
+    assert dominant.solves > dominant.point.solves > 0  # the sweep's, too
+    assert dominant.point.state.omega == pytest.approx(highest.state.omega, rel=1e-4)
+    assert dominant.nearness == pytest.approx(highest.amplitude / (site.dominance * lower.amplitude), rel=1e-6)
     none = site.dominant_peak(problem.balance, highest)
     assert none.point is None
     assert lower.amplitude / (1.01 * site.dominance * highest.amplitude) < none.nearness < 0.5
@@ -389,8 +389,8 @@ def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypat
     assert lower.state.omega == pytest.approx(peak.omega, rel=1e-4)
     solve = newton.solve
 
-    def ends(balance: HarmonicBalance, omega: float, *rest: object) -> newton.Solution:
-        found = solve(balance, omega, *rest)
+    def ends(balance: HarmonicBalance, omega: float, *options: object) -> newton.Solution:
+        found = solve(balance, omega, *options)
         return found if omega < 0.97 * peak.omega else replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1"))
 
     monkeypatch.setattr(newton, "solve", ends)
@@ -406,13 +406,13 @@ def test_no_lower_peak_is_taken_for_one_that_is_not_refined(
     site = AtPeak("tip", 250.0, 1200.0)
     highest, solve = site.solve(problem.balance), newton.solve
 
-    def ends(balance: HarmonicBalance, omega: float, x: np.ndarray, *rest: object) -> newton.Solution:
-        found = solve(balance, omega, x, *rest)
+    def ends(balance: HarmonicBalance, omega: float, x: np.ndarray, *options: object) -> newton.Solution:
+        found = solve(balance, omega, x, *options)
         nearby = abs(omega / highest.state.omega - 1) < 0.004
         return replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1")) if nearby else found
 
     branch = site._scan(problem.balance)
-    monkeypatch.setattr(AtPeak, "_scan", lambda *given: branch)
+    monkeypatch.setattr(AtPeak, "_scan", lambda *options: branch)
     monkeypatch.setattr(newton, "solve", ends)
     found = site.solve(problem.balance)
     assert not found.solution.converged

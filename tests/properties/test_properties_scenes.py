@@ -45,10 +45,10 @@ def entries(table: dict[str, Any], before: str = "") -> list[tuple[str, Any]]:
     return rows
 
 
-def measures(found: list[tuple[str, Any]]) -> list[tuple[str, str]]:
+def measures(values: list[tuple[str, Any]]) -> list[tuple[str, str]]:
     """Keys that hold a number, with its unit as it stands after the number."""
-    numbers = [(key, re.fullmatch(r"[-+.\deE]+( [^ ]+)", value)) for key, value in found if isinstance(value, str)]
-    bare = [(key, "") for key, value in found if isinstance(value, int | float) and not isinstance(value, bool)]
+    numbers = [(key, re.fullmatch(r"[-+.\deE]+( [^ ]+)", value)) for key, value in values if isinstance(value, str)]
+    bare = [(key, "") for key, value in values if isinstance(value, int | float) and not isinstance(value, bool)]
     return [(key, match[1]) for key, match in numbers if match] + bare
 
 

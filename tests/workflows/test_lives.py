@@ -42,8 +42,8 @@ def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
         monkeypatch.setattr(td.studies.LifeDistribution, "plot", lambda self: Figure())
 
 
-def study(vary: dict[str, Any] = VARY, runs: int = 32, seed: int = 3, **more: Any) -> dict[str, Any]:
-    return {"study": {"scene": "beam", "design": "sobol", "runs": runs, "seed": seed}, "vary": vary, **more}
+def study(vary: dict[str, Any] = VARY, runs: int = 32, seed: int = 3, **overrides: Any) -> dict[str, Any]:
+    return {"study": {"scene": "beam", "design": "sobol", "runs": runs, "seed": seed}, "vary": vary, **overrides}
 
 
 def space(tables: dict[str, Any]) -> ParameterSpace:
@@ -316,8 +316,8 @@ def test_runs_with_derivatives_say_as_much_as_three_times_as_many() -> None:
         back = lambda c: of.values(stats.norm.cdf(c))  # noqa: E731
         step = 1e-6 * np.eye(4)
         by = np.stack([(log_life(back(points + s)) - log_life(back(points - s))) / 2e-6 for s in step], axis=1)
-        found = Surrogate.fitted(points, log_life(back(points)), by if slopes else None)
-        return float(np.std(found.mean(of.coordinates(large)) - log_life(large)))
+        lives = Surrogate.fitted(points, log_life(back(points)), by if slopes else None)
+        return float(np.std(lives.mean(of.coordinates(large)) - log_life(large)))
 
     assert error(16, True) < error(48, False)
 

@@ -43,11 +43,11 @@ SHARES, CONFIDENCE, RUNS, SETS = (0.1, 0.5, 0.9), 0.9, 64, 20
 @pytest.fixture(scope="module")
 def population(tmp_path_factory: pytest.TempPathFactory) -> tuple[np.ndarray, np.ndarray]:
     """Coordinates and logarithms of the lives of five hundred runs."""
-    found = td.studies.grid(LIVES, tmp_path_factory.mktemp("population")).columns
-    values = np.asarray(found["life"], float)
+    lives = td.studies.grid(LIVES, tmp_path_factory.mktemp("population")).columns
+    values = np.asarray(lives["life"], float)
     has = np.isfinite(values)
     space = ParameterSpace.of(study_file.parse(LIVES, "population.toml", Path()))
-    return space.coordinates(space.points_of(found))[has], np.log(values[has])
+    return space.coordinates(space.points_of(lives))[has], np.log(values[has])
 
 
 def sampled(points: np.ndarray, surrogate: Surrogate) -> Sample:
