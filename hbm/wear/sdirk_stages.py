@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from tribodyn.declarations import Role, name_of
 from tribodyn.hbm import newton
-from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.operating_point import FrequencyCorrection, OperatingPoint
 from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.wear import harmonic_fallback, law as wear_law
 from tribodyn.hbm.wear.history import WearRow
@@ -97,7 +98,7 @@ def _stage(
     omega: np.ndarray,
     searches: Sequence[FrequencySearch],
 ) -> WearState:
-    """Solve depth = base + stretch rate(depth) with every duty at its site; the wear per work of `near` is tried."""
+    """Solve depth = base + stretch rate(depth) with every duty at its site, from the wear per work of `neighbour`."""
     duties = problem.mission
     unworn = [problem.in_duty(duty) for duty in duties]
     gain = depth_per_work(problem, neighbour)
@@ -115,14 +116,7 @@ def _stage(
             continue
         worn_at = solution.state
         depth = worn_at.depth
-        points, corrections = [], []
-        for w, duty, part in zip(omega, duties, balance.parts(solution.state.x), strict=True):
-            worn = problem.in_duty(duty, depth)
-            state = worn.evaluate(float(w), part)
-            reached = newton.Solution(state, solution.outcome, solution.steps, solution.products, solution.history)
-            points.append(OperatingPoint.of(worn, reached, duty.site.output, 0))
-            if solution.converged:
-                corrections.append(duty.site.correction(worn, state))
+        points, corrections = _duty_points(problem, depth, omega, balance.parts(solution.state.x), solution)
         solves += sum(c.solves for c in corrections)
         stage = worn_state(problem, depth, cycles, points, solves)
         if not solution.converged:
@@ -140,6 +134,25 @@ def _stage(
         previous = omega, solution.state.x
         x = solution.state.x + balance.follow(worn_at, after - omega)
         omega, gain = after, turned
+
+
+def _duty_points(
+    problem: WearProblem,
+    depth: np.ndarray,
+    omega: np.ndarray,
+    parts: Sequence[np.ndarray],
+    solution: newton.Solved[Any],
+) -> tuple[list[OperatingPoint], list[FrequencyCorrection]]:
+    """The points of all duties of a stage, and the corrections of their frequencies where it converged."""
+    points, corrections = [], []
+    for w, duty, part in zip(omega, problem.mission, parts, strict=True):
+        worn = problem.in_duty(duty, depth)
+        state = worn.evaluate(float(w), part)
+        solved = newton.Solution(state, solution.outcome, solution.steps, solution.products, solution.history)
+        points.append(OperatingPoint.of(worn, solved, duty.site.output, 0))
+        if solution.converged:
+            corrections.append(duty.site.correction(worn, state))
+    return points, corrections
 
 
 def depth_per_work(problem: WearProblem, state: WearState) -> np.ndarray:

@@ -23,32 +23,28 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation.operating_condition import AtPeakRatio
 from tribodyn.hbm.continuation.operating_point import AtFrequency
-from tribodyn.hbm.derivatives.cycle_derivatives import peak_moves
 from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives
-from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
-from tribodyn.hbm.derivatives.parameter_effects import ParameterEffects
+from tribodyn.hbm.derivatives.parameter_change import ParameterChange
 from tribodyn.hbm.linearisation import Linearisation
 from tribodyn.hbm.newton import RULES as NEWTON
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.harmonic_fallback import top_harmonic
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, StepScheme, WearHistory, WearRow, cycles_to_preload
-from tribodyn.hbm.wear.implicit_stage import WearingBalance, work_slope
+from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
-from tribodyn.hbm.wear.sdirk_stages import GAMMA, FrequencySearch, depth_per_work, initial_guess, solve_first_stage
+from tribodyn.hbm.wear.sdirk_stages import GAMMA, FrequencySearch, initial_guess, solve_first_stage
 from tribodyn.hbm.wear.step_memory import StepMemory
-from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
+from tribodyn.hbm.wear.wear_problem import WearProblem
 from tribodyn.hbm.wear.wear_rows import state_of
 from tribodyn.hbm.wear.wear_state import WearState, assess, wear_of
+from tribodyn.hbm.wear.worn_cycle import WornCycle
 
 
 @single
@@ -65,16 +61,8 @@ def of_life(
     share : of the first preload, where the life ends. The gaps of a joint open together: each pair has the same part
     Raises  NoDerivative where there is no life, or no derivative along it
     """
-    life = cycles_to_preload(worn, share)
-    if life is None:
-        raise NoDerivative(f"the contact has no life: {worn.end}")
-    preload = worn.preload if worn.preload_at_rest is None else worn.preload_at_rest
-    end = int(np.flatnonzero(preload < share * preload[0])[0])
-    end -= int(preload[end] <= 0)  # all apart: the row before is the last that tells of the parameters
-    if end == 0:
-        raise NoDerivative("the first step of wear parts the contact")
-    rows = worn.rows()[: end + 1]
-    _check(problem, rows, worn.scheme)
+    life, end = _life_and_last_row(worn, share)
+    _check(problem, rows := worn.rows()[: end + 1], worn.scheme)
     changes = tuple(changes)  # all at once: each state asks for all of them
     joints, by_law = problem.balance.contact.joints, _by_numbers(problem, numbers)
     last, n = len(changes) + len(by_law), len(changes) + len(by_law) + 1 + len(joints)
@@ -85,7 +73,7 @@ def of_life(
     opens = np.zeros((len(area), n))
     for i, joint in enumerate(joints, last + 1):
         opens[joint.rows, i] = 1.0
-    tangent, depth = _Tangent(problem, changes, by_law, opens, worn.scheme), np.zeros_like(opens)
+    tangent, depth = Tangent(problem, changes, by_law, opens, worn.scheme), np.zeros_like(opens)
     after = first = state_of(problem, rows[0])
     for i, row in enumerate(rows[:-1]):
         before, after = after, state_of(problem, rows[i + 1])
@@ -112,6 +100,19 @@ def of_life(
     )  # fmt: skip
 
 
+def _life_and_last_row(worn: WearHistory, share: float) -> tuple[float, int]:
+    """Life [cycles] until a share of the first preload is left, and the last row that depends on the parameters."""
+    life = cycles_to_preload(worn, share)
+    if life is None:
+        raise NoDerivative(f"the contact has no life: {worn.end}")
+    preload = worn.preload if worn.preload_at_rest is None else worn.preload_at_rest
+    end = int(np.flatnonzero(preload < share * preload[0])[0])
+    end -= int(preload[end] <= 0)  # without any force the row does not depend on them: take the one before
+    if end == 0:
+        raise NoDerivative("the first step of wear parts the contact")
+    return life, end
+
+
 def _check(problem: WearProblem, rows: Sequence[WearRow], scheme: str) -> None:
     """Raise NoDerivative where there is none along the rows of a run."""
     basis = problem.balance.basis
@@ -134,7 +135,7 @@ def _check(problem: WearProblem, rows: Sequence[WearRow], scheme: str) -> None:
 
 
 @dataclass(frozen=True)
-class _Tangent:
+class Tangent:
     """The columns of a tangent, the changes first.
 
     by_law : the problem a step above and a step below each number of a wear law, and the step; one column follows, of
@@ -184,7 +185,9 @@ class _Tangent:
         Returns those of depth [m], depth per cycle, both (n_pair, n), and preload of the joints that wear (n,)
         """
         problem, n, n_change = self.problem, base.shape[1], len(self.changes)
-        cycles = [_Cycle(self, duty, at.state, state) for duty, at in zip(problem.mission, state.points, strict=True)]
+        cycles = [
+            WornCycle(self, duty, at.state, state) for duty, at in zip(problem.mission, state.points, strict=True)
+        ]
         force, x, rate_by_x, *rates = zip(*(cycle.slopes(n) for cycle in cycles), strict=True)
         force, x, rate_by_x = (np.concatenate(part, axis=1) for part in (force, x, rate_by_x))
         rate, by_gap, by_depth = (np.sum(part, axis=0) for part in rates)
@@ -224,122 +227,6 @@ class _Tangent:
         return depth, rate, force_change[problem.pairs, normal].sum(axis=0)
 
 
-@dataclass(frozen=True)
-class _Cycle:
-    """The cycle of one duty at a state of the wear, and the slopes of its forces and of the depth that it wears."""
-
-    tangent: _Tangent
-    duty: Duty
-    solved: State
-    state: WearState
-
-    @cached_property
-    def balance(self) -> HarmonicBalance:
-        """Worn."""
-        return self.tangent.problem.in_duty(self.duty, self.state.depth)
-
-    @cached_property
-    def changes(self) -> list[ParameterChange]:
-        """Of the worn contact."""
-        return [_worn(change, self.tangent.problem.balance, self.balance) for change in self.tangent.changes]
-
-    def slopes(self, n: int) -> tuple[np.ndarray, ...]:
-        """Changes of force and x (n_pair, n_component * n_coeff, n) at the same x and forces by n columns, d rate / d x
-        (n_pair, n_component * n_coeff), d rate (n_pair, n), and d rate (n_pair,) by gap and by depth."""
-        effects, problem = ParameterEffects(self.balance, self.solved), self.tangent.problem
-        upper, lower = effects.of_gap()
-        one_sided, by_work = (
-            [(2 * (upper - lower), upper + lower)],
-            {w.law for w in problem.wearing.values()} == {"energy"},
-        )
-        if by_work:  # in closed form by x and gap, which is faster; at a corner both are of the same side
-            solved, basis, contact = self.solved, self.balance.basis, self.balance.contact
-            gain = self.duty.share * depth_per_work(problem, self.state)
-            rate_by_x = gain[:, None] * work_slope(self.balance, solved.x, solved.cycle)
-            assert solved.cycle.jacobian is not None
-            column = -solved.cycle.jacobian[:, :, contact.components.index("n") * basis.n_coeff]
-            work = basis.work_per_cycle(column.reshape(solved.x.shape), solved.x)[:, contact.tangential]
-            by_gap = by_depth = gain * work.sum(axis=1)
-        else:
-            by_gap, by_depth = self._by_depth(0.0), self._by_depth(1.0)
-            one_sided.append((self._by_depth(0.0, RULES.law_step) - by_gap, by_gap))
-            rate_by_x = self._by_x()
-        if any(np.abs(differ).max() > RULES.corner * np.abs(size).max() for differ, size in one_sided):
-            self.tangent.corners.append(self.state.cycles)
-        force, x, rate = (np.zeros((*shape, n)) for shape in (rate_by_x.shape, rate_by_x.shape, (len(rate_by_x),)))
-        for i, change in enumerate(self.changes):
-            effect = np.mean(effects.of_change(change), axis=0)
-            force[..., i], x[..., i] = effect[: 2 * rate_by_x.size].reshape(2, *rate_by_x.shape)
-            rate[:, i] = self._by(change)
-        for i, (up, down, step) in enumerate(self.tangent.by_law, len(self.changes)):
-            rate[:, i] = (self._rate(problem=up) - self._rate(problem=down)) / (2 * step)
-        later = RULES.law_step * self.state.cycles  # steps that are longer begin later, too
-        aged = (self._rate(later=later) - self._rate(later=-later)) / (2 * RULES.law_step)
-        rate[:, len(self.changes) + len(self.tangent.by_law)] = aged
-        return force, x, rate_by_x, rate, by_gap, by_depth
-
-    def _rate(
-        self,
-        balance: HarmonicBalance | None = None,
-        x: np.ndarray | None = None,
-        problem: WearProblem | None = None,
-        deeper: np.ndarray | float = 0.0,
-        later: float = 0.0,
-    ) -> np.ndarray:
-        """(n_pair,) share of the duty in the depth per cycle [m], with something changed."""
-        changed, x = balance or self.balance, self.solved.x if x is None else x
-        state = replace(self.solved, x=x, cycle=changed.contact.cycle(x, changed.basis, changed.memory, jacobian=False))
-        depth, cycles = self.state.depth + deeper, self.state.cycles + later
-        return self.duty.share * wear_of(problem or self.tangent.problem, changed, state, depth, cycles)[0]
-
-    def _by(self, change: ParameterChange) -> np.ndarray:
-        """(n_pair,) d rate by a parameter, at the same x."""
-        base, sides, problem = self.balance, (change.above, change.below), self.tangent.problem
-        slope = np.zeros(len(self.solved.x))
-        if any(
-            inputs.contact is not base.contact or inputs.memory is not base.memory or inputs.model is not base.model
-            for inputs in sides
-        ):
-            up, down = (
-                self._rate(
-                    replace(base, contact=inputs.contact, memory=inputs.memory),
-                    problem=replace(
-                        problem, area=problem.area + inputs.model.interface.area - base.model.interface.area
-                    ),
-                )
-                for inputs in sides
-            )
-            slope = (up - down) / (2 * change.step)
-        return slope if change.contact_part is None else slope + self._by(change.contact_part)
-
-    def _by_depth(self, worn: float, reach: float = RULES.gap_step) -> np.ndarray:
-        """(n_pair,) d rate by the gap at the same x, which a depth opens that a law may ask for (worn = 1)."""
-        base, gap, step = self.balance, self.balance.contact.gap, reach * self._size
-        up, down = (self._rate(base.with_gap(gap + s), deeper=worn * s) for s in (step, -step))
-        return (up - down) / (2 * step)
-
-    def _by_x(self) -> np.ndarray:
-        """(n_pair, n_component * n_coeff) d rate of each pair by its own x, one coefficient of all pairs at a time."""
-        x, step = self.solved.x, RULES.gap_step * self._size
-        moves = (step[:, None, None] * unit for unit in np.eye(x[0].size).reshape(-1, *x[0].shape))
-        return np.stack([(self._rate(x=x + d) - self._rate(x=x - d)) / (2 * step) for d in moves], axis=1)
-
-    @property
-    def _size(self) -> np.ndarray:
-        """(n_pair,) largest displacement [m]."""
-        return np.asarray(np.abs(self.solved.x).max(axis=(1, 2), initial=1e-12))
-
-    def moves(self) -> np.ndarray:
-        """(n_change + n_pair,) d omega of a place that moves with a peak, see `peak_moves`."""
-        site, balance, state, ratio = self.duty.site, self.balance, self.solved, 1.0
-        if isinstance(site, AtPeakRatio):
-            ratio, state = site.ratio, site.peak_near(balance, state.omega, state.x).state
-        try:
-            return ratio * peak_moves(balance, state, site.output, self.changes, site.newton)
-        except NoDerivative as reason:
-            raise NoDerivative(f"at {self.state.cycles:.4g} cycles {reason}") from None
-
-
 def _by_numbers(
     problem: WearProblem, numbers: Mapping[str, tuple[str, Sequence[str]]]
 ) -> tuple[tuple[WearProblem, WearProblem, float], ...]:
@@ -360,25 +247,6 @@ def _by_numbers(
         up, down = (replace(problem, wear={**problem.wearing, **changed}) for changed in laws)
         pairs.append((up, down, step))
     return tuple(pairs)
-
-
-def _worn(change: ParameterChange, unworn: HarmonicBalance, balance: HarmonicBalance) -> ParameterChange:
-    """A change of a worn contact."""
-    opened = balance.contact.gap - unworn.contact.gap
-
-    def there(posed: BalanceInputs) -> BalanceInputs:
-        is_unworn = posed.contact is unworn.contact
-        return replace(
-            posed,
-            contact=balance.contact if is_unworn else posed.contact.with_gap(posed.contact.gap + opened),
-            balance=None,
-        )
-
-    twice = None if change.double_step is None else tuple(there(inputs) for inputs in change.double_step)
-    touching = None if change.contact_part is None else _worn(change.contact_part, unworn, balance)
-    return replace(
-        change, above=there(change.above), below=there(change.below), double_step=twice, contact_part=touching
-    )
 
 
 def _solved(linear: Linearisation, right: Sequence[np.ndarray]) -> np.ndarray:

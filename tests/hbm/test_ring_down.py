@@ -36,7 +36,7 @@ def test_a_linear_decay_gives_its_frequency_and_damping():
         from_decay(t[:1100], np.cos(omega * t[:1100]), omega)
     lopsided = np.exp(-zeta * omega * t) * (np.cos(omega * t) + 0.2 * np.cos(2 * omega * t))
     np.testing.assert_allclose(from_decay(t, lopsided, omega).omega, omega, rtol=1e-3)
-    with pytest.raises(IntegrationFailed, match="other modes that ring"):
+    with pytest.raises(IntegrationFailed, match="are other modes"):
         from_decay(t, np.cos(omega * t) + 0.3 * np.cos(4.3 * omega * t), omega)
 
 
