@@ -16,7 +16,8 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.linear.compliance import ContactCompliance
-from tribodyn.hbm.linear.mistuned_compliance import MistunedCompliance, NominalWheel
+from tribodyn.hbm.linear.mistuned_compliance import MistunedCompliance
+from tribodyn.hbm.linear.nominal_wheel import NominalWheel
 from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.sector_reduction import ReducedSector

@@ -20,7 +20,7 @@ from tribodyn.fem.modes import StaticDivergence, modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.reduction.model import ReducedModel, Reduction
+from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.refusal import Refusal
 
 
@@ -41,7 +41,7 @@ def craig_bampton(
     solver : see fem.factor
     attached : loads whose static response with the masters held joins the modes, so that statics under them are exact
     Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
-        its origin is a `Reduction`
+        its origin is a `ReductionBasis`
     Raises  Refusal where n_modes and cutoff are both or neither given, too many modes are asked, or a body can move
         rigidly with its masters held
     """
@@ -79,7 +79,7 @@ def craig_bampton(
         {name: basis.T @ row for name, row in system.outputs.items()},
         turning,
     )
-    origin = Reduction(basis, m, len(omega), factor.name, omitted / (2 * np.pi))
+    origin = ReductionBasis(basis, m, len(omega), factor.name, omitted / (2 * np.pi))
     model = ReducedModel(reduced, replace(interface, B=np.asarray(interface.B @ basis)), origin)
     try:
         frequency, _ = linear_modes(model, None, min(LIMITS.reported_modes, reduced.n_dof))

@@ -30,7 +30,7 @@ ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -38,11 +38,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
-from tribodyn.fem.modes import modes
+from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components
 from tribodyn.fem.system import SecondOrderSystem, dense
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_files
 from tribodyn.reduction.abaqus_matrix import Labels
+from tribodyn.reduction.foreign_contact import component_number, frames_of_normals, interface_of_rows, sign_factors
+from tribodyn.reduction.matrix_facts import MatrixFacts, matrix_facts, symmetric
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
 
@@ -54,31 +55,6 @@ Dof = int | Sequence[int | str]
 
 Terms = Dof | Mapping[Any, float] | np.ndarray
 """A load or output: one DOF, DOF -> factor, or the vector (n,) itself."""
-
-
-@dataclass(frozen=True)
-class MatrixFacts:
-    """What matrices by themselves say about their structure.
-
-    frequency : (n,) [Hz] of its lowest modes, those of rigid bodies first, which are n_rigid
-    mass : [kg] moved along each of x, y, z along which it is free; empty where it is held or the rows have no labels
-    remarks : doubts, one sentence each
-    """
-
-    frequency: np.ndarray
-    n_rigid: int
-    mass: tuple[float, ...]
-    remarks: tuple[str, ...]
-
-    def lines(self) -> list[str]:
-        """Sentences, the doubts as warnings."""
-        elastic = ", ".join(f"{f:.5g}" for f in self.frequency[self.n_rigid :][:6])
-        support = f"{self.n_rigid} rigid-body modes" if self.n_rigid else "no rigid-body mode: it is held"
-        free = f", mass {' / '.join(f'{m:.5g}' for m in self.mass)} kg along its free directions" if self.mass else ""
-        return [
-            f"matrices: {support}{free}; first elastic modes {elastic} Hz",
-            *(f"warning: {r}" for r in self.remarks),
-        ]
 
 
 @dataclass(frozen=True)
@@ -111,7 +87,7 @@ class ForeignMatrices:
             raise Refusal(f"{dof!r} is no DOF: give a number from 0 or a pair (node, component)")
         if self.labels is None:
             raise Refusal(f"DOF {tuple(dof)} names a node but the files have no labels: give mapping= or numbers")
-        label = (int(dof[0]), _component(dof[1]))
+        label = (int(dof[0]), component_number(dof[1]))
         if label not in self._rows:
             raise Refusal(f"node {label[0]} has no free component {label[1]} in these matrices")
         return self._rows[label]
@@ -121,32 +97,8 @@ class ForeignMatrices:
         return {label: row for row, label in enumerate(self.labels or ())}
 
     def facts(self) -> MatrixFacts:
-        """What the matrices by themselves say about their structure, without damping, loads and contacts.
-
-        Raises  ValueError where they have no modes, as where the mass matrix is not positive definite
-        """
-        K, M = self.stiffness, self.mass
-        frequency = modes(K, M, min(12, self.n_dof))[0] / (2 * np.pi)
-        n_rigid = int((frequency < 1e-3 * frequency[-1]).sum())
-        mass: list[float] = []
-        for axis in (1, 2, 3):
-            translation = np.array([label[1] == axis for label in self.labels or ()], float)
-            if translation.any() and abs(K @ translation).max() <= 1e-6 * abs(K).max():
-                mass.append(float(translation @ (M @ translation)))
-        remarks = []
-        if n_rigid not in (0, 6):
-            remarks.append(
-                f"{n_rigid} rigid-body modes: a structure has none where it is held, and six where it is free"
-            )
-        if mass and max(mass) > 1.01 * min(mass):
-            each = ", ".join(f"{m:.4g}" for m in mass)
-            remarks.append(f"its mass is not the same in all directions ({each} kg): rows are missing or turned")
-        elastic = frequency[n_rigid] if n_rigid < len(frequency) else 0.0
-        if not 1e-2 < elastic < 1e6:
-            remarks.append(f"its first elastic mode is at {elastic:.3g} Hz: check that both matrices are in one system")
-        if mass and not 1e-4 < mass[0] < 1e5:
-            remarks.append(f"its mass is {mass[0]:.3g} kg, as in tonnes or grams: give scale, 1e3 for N, mm, t and s")
-        return MatrixFacts(frequency, n_rigid, tuple(mass), tuple(remarks))
+        """What the matrices state about their structure; raises Refusal where they have no modes."""
+        return matrix_facts(self.stiffness, self.mass, self.labels)
 
     def system(self, loads: Mapping[str, Terms], outputs: Mapping[str, Terms]) -> SecondOrderSystem:
         """The matrices with named unit loads and observed displacements, sparse: what Craig-Bampton takes."""
@@ -192,11 +144,11 @@ class ForeignMatrices:
             raise Refusal(f"body1 has {n_pair} contact nodes but body2 has {len(second)}: they meet in pairs")
         if normal is None:
             frames = np.tile(np.eye(3), (n_pair, 1, 1))
-            weights = np.tile(np.diag(_signs(signs, len(modelled))), (n_pair, 1, 1))
+            weights = np.tile(np.diag(sign_factors(signs, len(modelled))), (n_pair, 1, 1))
         else:
             if signs is not None:
                 raise Refusal("signs and normal are both given: the normal already gives what closes the gap")
-            frames = _frames(normal, t1, n_pair)
+            frames = frames_of_normals(normal, t1, n_pair)
             weights = frames[:, [COMPONENTS.index(name) for name in modelled]]
         rows = np.repeat(np.arange(n_pair * len(modelled)), width)
         shape = (n_pair * len(modelled), self.n_dof)
@@ -206,7 +158,7 @@ class ForeignMatrices:
             return sp.coo_matrix((weights.ravel(), (rows, columns.ravel())), shape=shape).tocsr()
 
         motion = one_body(first) if second is None else one_body(first) - one_body(second)
-        return _interface(motion, modelled, frames, area, gap, points)
+        return interface_of_rows(motion, modelled, frames, area, gap, points)
 
     def contact_rows(
         self,
@@ -233,7 +185,7 @@ class ForeignMatrices:
         if not np.isfinite(motion.data).all():
             raise Refusal("contact rows have entries that are not finite")
         frames = np.tile(np.eye(3), (motion.shape[0] // len(modelled), 1, 1))
-        return _interface(motion, modelled, frames, area, gap, points)
+        return interface_of_rows(motion, modelled, frames, area, gap, points)
 
     def _vector(self, terms: Terms, name: str) -> np.ndarray:
         if isinstance(terms, np.ndarray):
@@ -331,7 +283,7 @@ def _checked(matrices: dict[str, sp.csr_matrix], rows: Labels | None, floats: bo
     floats : whether a stiffness of zero is meant, as of a mass that only its contacts hold
     """
     checked = {
-        part: _symmetric(matrix, f"{part} matrix", zero=floats and part == "stiffness")
+        part: symmetric(matrix, f"{part} matrix", zero=floats and part == "stiffness")
         for part, matrix in matrices.items()
         if part != "damping" or abs(matrix).max() > 0 or matrix.shape[0] != matrix.shape[1]
     }
@@ -348,16 +300,9 @@ def _checked(matrices: dict[str, sp.csr_matrix], rows: Labels | None, floats: bo
 
 def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> ReducedModel:
     """The matrices as they are, dense, for hbm; meant for systems already reduced elsewhere (some thousand DOFs)."""
-    return ReducedModel(
-        system=SecondOrderSystem(
-            mass=dense(system.mass),
-            stiffness=dense(system.stiffness),
-            damping=None if system.damping is None else dense(system.damping),
-            loads=dict(system.loads),
-            outputs=dict(system.outputs),
-        ),
-        interface=ContactInterface(**{**vars(interface), "B": dense(interface.B)}),
-    )
+    damping = None if system.damping is None else dense(system.damping)
+    small = replace(system, mass=dense(system.mass), stiffness=dense(system.stiffness), damping=damping)
+    return ReducedModel(small, replace(interface, B=dense(interface.B)))
 
 
 def _without_constrained(matrices: ForeignMatrices, penalty: float = 1e30) -> ForeignMatrices:
@@ -380,90 +325,4 @@ def _without_constrained(matrices: ForeignMatrices, penalty: float = 1e30) -> Fo
             *matrices.notes,
             f"{constrained.sum()} constrained DOFs (stiffness {penalty:g} N/m or more) were left out",
         ),
-    )
-
-
-def _symmetric(matrix: sp.csr_matrix, name: str, rounding: float = 1e-8, zero: bool = False) -> sp.csr_matrix:
-    """The matrix, made exactly symmetric, or a ValueError that shows the worst entry.
-
-    rounding : largest asymmetry, over the largest entry, that is rounding of the file
-    """
-    if matrix.shape[0] != matrix.shape[1]:
-        raise Refusal(f"the {name} is {matrix.shape[0]} x {matrix.shape[1]}: it must be square")
-    largest = abs(matrix).max()
-    if largest == 0 and not zero:
-        raise Refusal(f"the {name} is zero: is it the right variable?")
-    difference = abs(matrix - matrix.T).tocoo()
-    if difference.nnz and difference.data.max() > rounding * largest:
-        if not (sp.tril(matrix, -1).nnz and sp.triu(matrix, 1).nnz):
-            raise Refusal(f"the {name} holds one triangle only: mirror it before saving, A + tril(A, -1).T")
-        worst = int(difference.data.argmax())
-        row, column = int(difference.row[worst]), int(difference.col[worst])
-        raise Refusal(
-            f"the {name} is not symmetric: entry ({row}, {column}) is {matrix[row, column]:g} "
-            f"but ({column}, {row}) is {matrix[column, row]:g}"
-        )
-    return ((matrix + matrix.T) / 2).tocsr()
-
-
-def _interface(
-    motion: sp.csr_matrix,
-    components: tuple[str, ...],
-    frames: np.ndarray,
-    area: float | np.ndarray,
-    gap: float | np.ndarray,
-    points: np.ndarray | None,
-) -> ContactInterface:
-    """The interface of rows (n_pair * n_component, n_dof); raises ValueError for an empty row and for bad areas."""
-    n_pair = len(frames)
-    motion.eliminate_zeros()
-    if (np.diff(motion.indptr) == 0).any():
-        pair = int(np.flatnonzero(np.diff(motion.indptr) == 0)[0]) // len(components)
-        raise Refusal(f"contact pair {pair} has the same DOF on both bodies, or a row of zeros: it can never move")
-    areas = np.broadcast_to(np.asarray(area, float) / (n_pair if np.ndim(area) == 0 else 1), n_pair).copy()
-    if not (areas > 0).all():
-        raise Refusal("a contact area is not positive: give the area of the patch, or one per pair, in m2")
-    return ContactInterface(
-        components=components,
-        points=np.zeros((n_pair, 3)) if points is None else np.asarray(points, float).reshape(n_pair, 3),
-        frames=frames,
-        area=areas,
-        gap=np.broadcast_to(np.asarray(gap, float), n_pair).copy(),
-        B=motion,
-        faces=np.zeros((0, 4), int),
-    )
-
-
-def _component(component: int | str) -> int:
-    """Component 1..6 from a number, from UX .. ROTZ, or from x, y, z."""
-    if isinstance(component, str):
-        name = component.upper()
-        name = "U" + name if name in ("X", "Y", "Z") else name
-        if name in harwell_boeing.COMPONENT_NAMES:
-            return harwell_boeing.COMPONENT_NAMES.index(name) + 1
-    elif 0 <= component <= 6:
-        return int(component)
-    raise Refusal(
-        f"component {component!r} is unknown: give 1 to 6, x, y, z or UX, UY, UZ, ROTX, ROTY, ROTZ (0: a scalar point)"
-    )
-
-
-def _signs(signs: Sequence[float] | None, n_component: int) -> np.ndarray:
-    chosen = np.ones(n_component) if signs is None else np.asarray(signs, float)
-    if chosen.shape != (n_component,) or not (np.abs(chosen) == 1).all():
-        raise Refusal(f"signs is {signs}: give +1 or -1 for each of the {n_component} components")
-    return chosen
-
-
-def _frames(normal: Sequence[float] | np.ndarray, t1: Sequence[float] | None, n_pair: int) -> np.ndarray:
-    """(n_pair, 3, 3) rows t1, t2, n; without a t1 it follows the axis that is least along the normal."""
-    direction = np.broadcast_to(np.asarray(normal, float), (n_pair, 3))
-    length = np.linalg.norm(direction, axis=1, keepdims=True)
-    if not (length > 0).all():
-        raise Refusal("a contact normal is zero: give a direction from body 1 into body 2")
-    n = direction / length
-    if t1 is not None:
-        return contact_frames(n, t1)
-    return np.concatenate(
-        [contact_frames(reference[None], np.eye(3)[np.abs(reference).argmin()].tolist()) for reference in n]
     )

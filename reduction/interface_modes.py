@@ -17,7 +17,7 @@ import scipy.linalg as sla
 
 from tribodyn.fem.modes import modes
 from tribodyn.reduction.limits import LIMITS
-from tribodyn.reduction.model import ReducedModel, Reduction
+from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.refusal import Refusal
 
 
@@ -63,7 +63,7 @@ def interface_modes(
     basis[np.arange(n_m, n), np.arange(len(a) + n_contact, basis.shape[1])] = 1.0
     omitted = float(omega[n_modes]) / (2 * np.pi) if n_modes < len(b) else np.inf
     reduced = model.projected(basis)
-    assert isinstance(reduced.origin, Reduction)
+    assert isinstance(reduced.origin, ReductionBasis)
     origin = replace(
         reduced.origin, master_dofs=masters[a], n_interface_modes=n_modes, interface_omitted_frequency=omitted
     )

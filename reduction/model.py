@@ -51,7 +51,7 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Reduction(Origin):
+class ReductionBasis(Origin):
     """Coordinates that a reduction chose.
 
     basis : (n_full, n), q_full = basis @ q; master_dofs : (n_masters,) see `masters`

@@ -23,7 +23,7 @@ from tribodyn.fem.constraints import partition
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.reduction.model import ReducedModel, Reduction, SystemChange
+from tribodyn.reduction.model import ReducedModel, ReductionBasis, SystemChange
 from tribodyn.refusal import Refusal
 
 
@@ -152,7 +152,7 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     """
     if len(rows) == 0:
         return model
-    if not isinstance(model.origin, Reduction) or not model.has_one_system:
+    if not isinstance(model.origin, ReductionBasis) or not model.has_one_system:
         raise Refusal("motions can be held only in a model that was reduced from one mesh for all harmonics")
     constraint = rows @ model.origin.basis
     N = null_space(constraint / np.linalg.norm(constraint, axis=1, keepdims=True))

@@ -38,7 +38,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import fixed_interface_modes
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
-from tribodyn.reduction.model import ReducedModel, Reduction
+from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.refusal import Refusal
 
 
@@ -213,7 +213,7 @@ def residual_flexibility(
         {name: V.T @ row for name, row in system.outputs.items()},
         None if system.gyroscopic is None else V.T @ (system.gyroscopic @ V),
     )
-    origin = Reduction(V, np.zeros(0, int), len(squares), factor.name, omitted / (2 * np.pi))
+    origin = ReductionBasis(V, np.zeros(0, int), len(squares), factor.name, omitted / (2 * np.pi))
     residual = ResidualFlexibility(k, K, B, V, squares, M, solver)
     residual.__dict__["factor"] = factor
     model = FlexibleModel(reduced, replace(interface, B=at_contact), origin, residual=residual)

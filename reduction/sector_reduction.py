@@ -23,7 +23,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.model import ReducedModel, Reduction
+from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.refusal import Refusal
 
 
@@ -34,7 +34,7 @@ class ReducedSector:
     """
 
     sector: Sector
-    origin: Reduction
+    origin: ReductionBasis
     accuracy: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -53,11 +53,11 @@ def reduce_sector(
     both_faces = replace(sector.interface, B=vstack([sector.interface.B, sector.left_map], format="csr"))
     seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
     model = craig_bampton(sector.system, both_faces, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
-    assert isinstance(model.origin, Reduction)
+    assert isinstance(model.origin, ReductionBasis)
     return in_coordinates(sector, model.system, model.origin)
 
 
-def in_coordinates(sector: Sector, system: SecondOrderSystem, origin: Reduction) -> ReducedSector:
+def in_coordinates(sector: Sector, system: SecondOrderSystem, origin: ReductionBasis) -> ReducedSector:
     """A full sector as the system it is in the coordinates of a reduction, its masters first."""
     small = replace(
         sector,

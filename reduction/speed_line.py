@@ -19,7 +19,7 @@ from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.model import Damping, ReducedModel, Reduction
+from tribodyn.reduction.model import Damping, ReducedModel, ReductionBasis
 from tribodyn.reduction.sector_reduction import ReducedSector, in_coordinates, reduce_sector, stuck_ritz
 from tribodyn.reduction.wave_model import IndexSystem, WaveIndices, WaveModel, wave_model
 
@@ -41,7 +41,7 @@ def reduce_alike(
     columns += [(basis[:, :m] - bases[0][:, :m]) / np.sqrt(energy[:m]) for basis in bases[1:]]
     internal = independent(np.concatenate(columns, axis=1), sectors[0].system.stiffness)
     basis = np.concatenate([bases[0][:, :m], internal], axis=1)
-    origin: Reduction = replace(first.origin, basis=basis, n_modes=internal.shape[1])
+    origin: ReductionBasis = replace(first.origin, basis=basis, n_modes=internal.shape[1])
     return in_coordinates(sectors[0], sectors[0].system.projected(basis), origin)
 
 

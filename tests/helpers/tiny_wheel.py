@@ -15,7 +15,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import on_wheel
 from tribodyn.reduction.linear_damping import modal_damping
-from tribodyn.reduction.model import Reduction
+from tribodyn.reduction.model import ReductionBasis
 from tribodyn.reduction.sector_reduction import ReducedSector
 from tribodyn.reduction.wave_model import travelling_wave, wheel_model
 
@@ -42,7 +42,7 @@ def sector(components: tuple[str, ...], turning: float = 0.0, n_sectors: int = N
     )  # fmt: skip
     turn = rotation((1, 0, 0), 2 * np.pi / n_sectors)
     full = Sector(system, interface, remaining, NONE, NONE, turn, n_sectors, {"contact": slice(0, 1)})
-    return ReducedSector(full, Reduction(np.eye(4), np.zeros(0, int), 0, "", np.inf))
+    return ReducedSector(full, ReductionBasis(np.eye(4), np.zeros(0, int), 0, "", np.inf))
 
 
 def wave_and_wheel(

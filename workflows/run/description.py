@@ -16,7 +16,7 @@ from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.threads import usable
-from tribodyn.reduction.model import Reduction
+from tribodyn.reduction.model import ReductionBasis
 from tribodyn.version import package_version
 from tribodyn.workflows.result.model_facts import Around, ModelFacts, Stage
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
@@ -61,7 +61,7 @@ def described(
         worst = min(mesh_reader.quality(piece.mesh).scaled_jacobian for piece in pieces(part.mesh))
         facts = replace(facts, elements=int(part.mesh.nelements), nodes=len(part.points), scaled_jacobian=worst)
     origin = reduced.origin
-    if isinstance(origin, Reduction):
+    if isinstance(origin, ReductionBasis):
         facts = replace(
             facts,
             retained_modes=origin.n_modes,

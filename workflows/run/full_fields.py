@@ -16,7 +16,7 @@ from tribodyn.workflows.scene.schema import Scene
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedState:
     """A solved state of the contact: what it shares with a WearRow.
 
     omega : [rad/s]; depth : (n_pair,) worn off [m]; displacement, force : (n_contact, n_coeff) [m], [N]
@@ -30,7 +30,7 @@ class Solved:
     load_factor: float
 
 
-States = Sequence[Solved | WearRow]
+States = Sequence[SolvedState | WearRow]
 
 
 def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Part | None) -> Result:
@@ -42,7 +42,7 @@ def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Par
     numbers = result.shown_rows()
     if not len(numbers) or balance.contact.n_pair == 0:  # loops and states of a contact that is not there
         return result
-    states: list[Solved | WearRow]
+    states: list[SolvedState | WearRow]
     if result.wear is not None:
         rows = result.wear.rows()
         states = [rows[i] for i in numbers]
@@ -58,11 +58,11 @@ def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Par
     return result
 
 
-def _of_point(balance: HarmonicBalance, omega: float, x: np.ndarray) -> Solved:
+def _of_point(balance: HarmonicBalance, omega: float, x: np.ndarray) -> SolvedState:
     """The state of a point of the response of the unworn contact."""
     n_pair = balance.contact.n_pair
     state = balance.evaluate(float(omega), x.reshape(n_pair, -1, balance.basis.n_coeff), jacobian=False)
-    return Solved(float(omega), np.zeros(n_pair), x, state.cycle.force.reshape(x.shape), balance.load_factor)
+    return SolvedState(float(omega), np.zeros(n_pair), x, state.cycle.force.reshape(x.shape), balance.load_factor)
 
 
 def displacement_fields(balance: HarmonicBalance, part: Part, states: States, numbers: np.ndarray) -> Fields:
@@ -70,7 +70,7 @@ def displacement_fields(balance: HarmonicBalance, part: Part, states: States, nu
 
     balance : the unworn problem under the load that the states come from; numbers : (n_field,) rows or points
     """
-    loaded = [balance.with_load(s.load_factor) if isinstance(s, Solved) else balance for s in states]
+    loaded = [balance.with_load(s.load_factor) if isinstance(s, SolvedState) else balance for s in states]
     fields = [
         part.field(full_displacement(b, s.displacement, s.force, s.omega)) for b, s in zip(loaded, states, strict=True)
     ]

@@ -33,7 +33,7 @@ def lines(matrices: ForeignMatrices) -> list[str]:
     """Sentences on matrices: what was changed on reading, their rigid-body modes, mass and first modes, doubts."""
     try:
         return [*matrices.notes, *matrices.facts().lines()]
-    except ValueError as problem:  # such as massless DOFs, which a balance can do with
+    except Refusal as problem:  # such as massless DOFs, which a balance can do with
         return [*matrices.notes, f"matrices: their modes are not known, {problem}"]
 
 

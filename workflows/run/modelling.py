@@ -14,21 +14,16 @@ import numpy as np
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import NoMeanRotation
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.load_vectors import BodyForce, Centrifugal, Load, Moment, NodalForce, Pressure, Sum
 from tribodyn.fem.part import Part, unbalanced_load
-from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at
-from tribodyn.hbm import rest
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.continuation.harmonic_choice import ChoiceOptions, HarmonicChoice
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import SingularStuckSystem, UnbalancedLoad
 from tribodyn.reduction.limits import LIMITS
-from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.linear_damping import modal_damping, rayleigh, rayleigh_of_ratios
-from tribodyn.reduction.model import ReducedModel, Reduction
+from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.reduction.prescribed import hold
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import (
@@ -42,6 +37,9 @@ from tribodyn.workflows.run import (
     settings,
 )
 from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
+from tribodyn.workflows.run.damping_matrices import damping_matrix
+from tribodyn.workflows.run.ground_motion import ground_motion
+from tribodyn.workflows.run.preloaded_state import preloaded
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.sanity_checks import check_size
 from tribodyn.workflows.scene.load_tables import StaticLoad
@@ -90,7 +88,7 @@ def build(file: SceneFile, progress: Progress, chosen: tuple[int, ...] = ()) -> 
         try:
             model = make_model(scene, part, reduced, chosen)
         except UnbalancedLoad as unbalanced:
-            if part is None or reduced.is_wave or not isinstance(reduced.origin, Reduction):
+            if part is None or reduced.is_wave or not isinstance(reduced.origin, ReductionBasis):
                 raise
             force = joints.excite(scene, None).force(0, part.system.loads, len(part.free)).real
             raise Refusal(unbalanced_load(force, part, reduced.origin.basis @ unbalanced.shapes)) from None
@@ -239,20 +237,6 @@ def damped(scene: Scene, reduced: Kind) -> Kind:
     return reduced
 
 
-def damping_matrix(scene: Scene, springs: np.ndarray, system: SecondOrderSystem, B: np.ndarray) -> np.ndarray | None:
-    """Damping matrix (n, n) [N s/m] of a system with its contact map and springs, None where the scene has none."""
-    damping = scene.damping
-    if damping.state == "stuck":
-        system = replace(system, stiffness=stuck_stiffness(system.stiffness, B, springs))
-    if damping.modal is not None:
-        return modal_damping(system, damping.modal)
-    if damping.ratios is not None and damping.modes is not None:
-        return rayleigh(system, *rayleigh_of_ratios(system, damping.modes, damping.ratios))
-    if damping.mass is not None or damping.stiffness is not None:
-        return rayleigh(system, damping.mass or 0.0, damping.stiffness or 0.0)
-    return None
-
-
 @dataclass(frozen=True)
 class Problem:
     """What the balance of a scene is made of, whatever harmonics it keeps.
@@ -330,48 +314,3 @@ def _at_speeds(scene: MeshScene, part: Part, harmonics: tuple[int, ...]) -> dict
         at_speed = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"speed": speed}), "wear": None})
         balances[speed] = make_model(at_speed, part, damped(at_speed, plain_model(at_speed, part)), harmonics).balance
     return balances
-
-
-def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> HarmonicBalance:
-    """The balance resting in its preload, to which it has come without friction.
-
-    Joints whose springs follow from their own numbers have those of this state, and so has the damping of its modes.
-    """
-    x = rest.displacement(balance, settings.newton_options(scene))
-    resting = replace(balance, memory=rest.memory(balance, x), at_rest=x)
-    tangent_springs = rest.tangents(resting, x)
-    if not tangent_springs:
-        return resting
-    tangent = [
-        replace(j, parameters=replace(j.parameters, stiffness=tangent_springs.get(j.name, j.parameters.stiffness)))
-        for j in resting.contact.joints
-    ]
-    b, springs = balance, np.array(balance.contact.stiffness)
-    for joint in tangent:
-        springs[np.ix_(joint.rows, b.contact.columns(joint))] = joint.parameters.stiffness
-    if scene.damping.given and scene.damping.state == "stuck":
-        undamped = replace(reduced, system=replace(reduced.system, damping=None))
-        reduced = undamped.with_damping(partial(damping_matrix, scene, springs))
-    preloaded_balance = HarmonicBalance.of(reduced, tangent, b.basis, b.excitation, b.omega_max, resting.memory)
-    return replace(preloaded_balance, at_rest=x)
-
-
-def ground_motion(scene: MeshScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
-    """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
-
-    Raises  ValueError where a face has no contact or a harmonic is not kept
-    """
-    if not scene.motion:
-        return None
-    i = part.interface
-    amplitudes = np.zeros((i.n_pair, len(i.components), len(basis.harmonics)), complex)
-    for face, motion in scene.motion.items():
-        if face not in part.pairs:
-            raise Refusal(f'motion.{face}: "{face}" is no contact face, the contact has {", ".join(part.pairs)}')
-        rows = i.frames[part.pairs[face]][:, [COMPONENTS.index(c) for c in i.components]]
-        for h, value in ((0, motion.static), (1, motion.harmonic * np.exp(1j * motion.phase))):
-            if value != 0 and h not in basis.harmonics:
-                raise Refusal(f"motion.{face} moves in harmonic {h}: keep it in harmonics.kept")
-            if h in basis.harmonics:
-                amplitudes[part.pairs[face], :, basis.harmonics.index(h)] = value * (rows @ np.array(motion.direction))
-    return basis.to_real(amplitudes).reshape(-1, basis.n_coeff)

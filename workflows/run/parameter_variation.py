@@ -19,7 +19,7 @@ from tribodyn.hbm.contact.joint import JointSet
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.reduction.limits import LIMITS
-from tribodyn.reduction.model import ReducedModel, Reduction
+from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
 from tribodyn.workflows.run import joints, matrix_model, modelling, part_reduction, scene_assembly
@@ -188,7 +188,7 @@ class ParameterVariation:
             return None
         plain = plain if wave is None else wave.model
         origin = plain.origin
-        if not isinstance(origin, Reduction) or origin.n_interface_modes or plain.leaves_flexibility_out:
+        if not isinstance(origin, ReductionBasis) or origin.n_interface_modes or plain.leaves_flexibility_out:
             return None
         (system, _, back), shapes = self._here, origin.basis
         if back is not None:

@@ -15,7 +15,7 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.interface_modes import interface_modes
-from tribodyn.reduction.model import ReducedModel, Reduction
+from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.residual_flexibility import residual_flexibility
@@ -90,7 +90,7 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
         reduced = interface_modes(reduced, options.interface_modes, keep.astype(int), separate=extra)
     if back is None:
         return reduced
-    assert isinstance(reduced.origin, Reduction)
+    assert isinstance(reduced.origin, ReductionBasis)
     return replace(reduced, origin=replace(reduced.origin, basis=back @ reduced.origin.basis))
 
 

@@ -83,7 +83,7 @@ def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
     try:
         attached = distributed(scene, full) if speed else ()
         return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff, attached)
-    except ValueError as trouble:
+    except Refusal as trouble:
         if not speed:
             raise
         raise Refusal(f"at wheel.speed = {60 * speed:.6g} rpm {trouble}, or let it turn slower") from None
@@ -117,7 +117,7 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
             if len(turning) == 2:
                 settings = (scene.reduction.modes, scene.reduction.cutoff, distributed(scene, turning[0]))
                 ends = reduce_alike(turning, *settings)
-        except ValueError as trouble:
+        except Refusal as trouble:
             raise Refusal(f"at {60 * speed:.6g} rpm of the operating line {trouble}") from None
         if len(turning) == 2:
             springs = joints.contact_stiffness(scene, ends.model)
