@@ -151,6 +151,6 @@ def test_stuck_ritz_shapes_keep_statics_exact_and_the_contact_near(reduced, monk
 
 
 def test_shared_nodes_of_contact_and_seam_are_one_sentence(reduced):
-    broken = replace(reduced.sector, left=np.asarray(reduced.sector.interface.B))
+    broken = replace(reduced.sector, left_map=np.asarray(reduced.sector.interface.B))
     with pytest.raises(ValueError, match="the right contact face of a cyclic part must be of master nodes"):
         waves.relative_map(broken, 1)
