@@ -112,7 +112,7 @@ class ContactFaces:
         try:
             first, second = (find_group(faces, name, "face") for name in (self.face, self.opposite))
             return self._facing(mesh, first, second)
-        except ValueError as trouble:
+        except Refusal as trouble:
             raise type(trouble)(f"contact of '{self.face}' and '{self.opposite}': {trouble}") from None
 
     def _facing(self, mesh: Any, first: np.ndarray, second: np.ndarray) -> tuple[ContactInterface, csr_matrix]:

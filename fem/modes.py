@@ -11,7 +11,7 @@ from scipy.sparse import block_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
-from tribodyn.fem.factor import Factor, factorise
+from tribodyn.fem.factor import Factor, SingularStiffness, factorise
 from tribodyn.fem.system import dense
 from tribodyn.refusal import Refusal
 
@@ -127,11 +127,11 @@ def _factorise_shifted(K: Any, M: Any, sigma: float | None) -> tuple[Factor, flo
         return _factorise(K - sigma * M if sigma else K, definite=sigma <= 0), sigma
     try:
         return _factorise(K), 0.0
-    except ValueError:
+    except SingularStiffness:
         sigma = -1e-9 * stiffest(K, M)
     try:
         return _factorise(K - sigma * M), sigma
-    except ValueError:
+    except SingularStiffness:
         _factorise(K, definite=False)  # singular is another matter
         raise StaticDivergence(f"{UNSTABLE}, omega^2 is negative: {CURE}") from None
 

@@ -1,4 +1,4 @@
-"""The surface that two faces of different meshes share: where it lies on both, and integrals over it.
+"""Gauss points of the surface that two faces of different meshes share, and dual functions on it.
 
 Facets of the second face are carried along the normal of a facet of the first one, cut with it, and Gauss points are
 laid on the triangles of each cut. A flat facet is cut in its plane, which is exact for straight edges; a curved one in

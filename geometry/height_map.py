@@ -1,7 +1,5 @@
-"""Measured height maps: is it plausible, mend it, level it, part waviness from roughness; two maps face to face.
+"""Measured height maps: level, mirror and sample them at contact nodes; the gap between two of them.
 
-`prepare` runs the steps in order: refuse what cannot be a machined face, take spikes out, close holes, level, filter.
-Each step that changes measured points reports it in a sentence.
 Coordinates are those of the contact patch seen along the normal of body 1. A face of body 2 is measured looking at it,
 so it must be mirrored once before it faces body 1.
 """

@@ -1,4 +1,8 @@
-"""Measured height maps checked, repaired and split into waviness and roughness."""
+"""Check and repair measured height maps, and split them into waviness and roughness.
+
+`prepare` runs the steps in order: refuse what cannot be a machined face, take spikes out, close holes, level, filter.
+Each step that changes measured points reports it in a sentence.
+"""
 
 from __future__ import annotations
 

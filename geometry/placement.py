@@ -1,4 +1,4 @@
-"""A mesh moved, turned and scaled; one volume taken out of a mesh; whether a body lies in another one."""
+"""Move, turn and scale a mesh; extract one volume of a mesh; measure the overlap of two bodies."""
 
 from __future__ import annotations
 

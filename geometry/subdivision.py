@@ -1,4 +1,4 @@
-"""A mesh with every element cut into eight, its shape and its groups kept.
+"""Cut every element of a mesh into eight; the shape and the groups stay the same.
 
 A piece lies in its parent as a piece of the parent's own reference cell, so that curved elements keep their shape: the
 refined mesh bounds the same body to rounding.

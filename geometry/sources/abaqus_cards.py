@@ -47,7 +47,7 @@ def read(path: Path) -> RawMesh:
 
 @dataclass
 class _Cards(MaterialCards):
-    """Cards taken one after the other; what they name is turned into groups of the mesh."""
+    """Reads cards one after the other; the sets that they name become groups of the mesh."""
 
     ties: list[deck.DeckTie] = field(default_factory=list)
     contacts: list[deck.DeckTie] = field(default_factory=list)
@@ -227,7 +227,7 @@ class _Cards(MaterialCards):
     def _contact_pair(self, card: Card) -> None:
         for line in card.data:
             self.unused.append(f"contact pair {' on '.join(line)}, which the scene gives as [contacts.NAME]")
-            with suppress(ValueError):  # of faces of what is no solid
+            with suppress(Refusal):  # of faces of what is no solid
                 slave, master = (self._place(name, card, face=True) for name in line)
                 friction = self.frictions.get(card.option("INTERACTION").upper())
                 self.contacts.append(deck.DeckTie(" on ".join(line), slave, master, friction=friction))
@@ -247,7 +247,7 @@ class _Cards(MaterialCards):
         if card.option("TYPE").upper() == "TEMPERATURE":
             self.skipped.ignored["*INITIAL CONDITIONS, TEMPERATURE"] += 1
             for line in (line for line in card.data if len(line) > 1):
-                with suppress(ValueError):  # of nodes that the deck has not: no table is taken at a temperature then
+                with suppress(Refusal):  # of nodes that the deck has not: no table is taken at a temperature then
                     self.warm[self._rows(line[0], card)] = card.number(line[1])
         else:
             self._refused(card, card.option("TYPE").upper())

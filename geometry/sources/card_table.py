@@ -47,7 +47,7 @@ class CardTable:
 
 @dataclass
 class SkippedCards:
-    """Cards of a file that were met and not carried over. mark : what stands before a card's name in sentences"""
+    """Cards of a file that are not read. mark : prefix of a card's name in sentences"""
 
     table: CardTable
     mark: str = ""

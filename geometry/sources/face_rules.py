@@ -1,6 +1,6 @@
-"""Faces of a body picked by rule: within a box, nearest to a point, by their normal, by their numbers in a CAD file.
+"""Select faces of a body by rule: within a box, nearest to a point, by their normal, by their numbers in a CAD file.
 
-Only facets of the boundary are picked.
+Only facets of the boundary are selected.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def add_faces(
             raise Refusal(f"faces.{name} has the name of a group of the mesh: give it another")
         try:
             boundaries[name] = select_facets(mesh, rule)
-        except ValueError as trouble:
+        except Refusal as trouble:
             raise Refusal(f"faces.{name}: {trouble}") from None
         sets[name] = np.unique(mesh.dofs.get_facet_dofs(boundaries[name]).flatten())
     return (mesh.with_boundaries(boundaries), sets) if rules else (mesh, sets)

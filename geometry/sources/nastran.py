@@ -62,7 +62,7 @@ def read(path: Path) -> RawMesh:
 
 @dataclass
 class _Bulk(ReferenceCards):
-    """Cards of a file taken one after the other.
+    """Reads the cards of a file one after the other.
 
     chosen : kind of set -> numbers that the case control selects, None where there is no case control
     grids, systems, springs, scales : cards that others refer to, by their number; weight : PARAM WTMASS

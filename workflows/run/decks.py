@@ -63,7 +63,7 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
         raise Refusal(f"decks.{name}.unit: expected one of {', '.join(foreign_file.UNITS)}")
     try:
         return _DeckConversion(name, table, materials, source(path, UNITS[table.unit])).convert()
-    except ValueError as trouble:
+    except Refusal as trouble:
         clause = str(trouble)
         raise Refusal(clause if clause.startswith("decks.") else f"decks.{name}: {clause}") from None
 
@@ -93,7 +93,7 @@ def with_elements(mesh: Any, node_sets: dict[str, np.ndarray], table: Table, bod
 
 
 class _DeckConversion:
-    """One deck on its way into a structure."""
+    """Converts one deck into parts of a structure."""
 
     def __init__(self, name: str, table: Table, materials: Mapping[str, AnyMaterial], source: foreign_file.Source):
         if table.elements != "linear_reduced" and "equations" in table.use:
@@ -110,7 +110,7 @@ class _DeckConversion:
         self.carried: set[str] = set()  # points that a coupling ties to a face
 
     def convert(self) -> CarriedDeck:
-        """All of it."""
+        """Convert all that the table uses; note the rest."""
         use = self.table.use
         for kind in EVERYTHING:
             entries = getattr(self.deck, kind)
@@ -123,18 +123,16 @@ class _DeckConversion:
         self.content.clamps += [Clamp(group, axes) for group, axes in self.table.fixed_axes.items()]
         ignored = [f"{self.source.refused[name]}, by ignore" for name in self.table.ignore]
         unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes, *ignored)]
-        self.content.notes = [
-            f"decks.{self.name}: {sentence}" for sentence in (*notes_of(self.source, self.table), *unused)
-        ]
+        notes = (*notes_of(self.source, self.table), *unused)
+        self.content.notes = [f"decks.{self.name}: {sentence}" for sentence in notes]
         return self.content
 
     def _refuse(self) -> None:
         """Raise Refusal where the deck has what is not carried over, unless the scene ignores it."""
         refused, ignore = self.source.refused, self.table.ignore
         if unknown := [name for name in ignore if name not in refused]:
-            raise Refusal(
-                f"ignore: '{unknown[0]}' is not refused, {', '.join(refused) or 'nothing'} is: correct the name"
-            )
+            listed = ", ".join(refused) or "nothing"
+            raise Refusal(f"ignore: '{unknown[0]}' is not refused, {listed} is: correct the name")
         if remaining := [name for name in refused if name not in ignore]:
             listed = ", ".join(refused[name] for name in remaining)
             names = ", ".join(f'"{name}"' for name in remaining)
@@ -142,8 +140,6 @@ class _DeckConversion:
                 f"the deck has {listed}, not carried over though stiffness, mass, support or load may change: give it "
                 f"in the scene, and leave it out by decks.{self.name}.ignore = [{names}]"
             )
-
-    # bodies
 
     def _body(self, name: str) -> Body:
         solid = self.source.bodies[name]
