@@ -84,7 +84,7 @@ def test_a_wheel_shows_the_derivatives_of_its_peak(scene: Path, tmp_path: Path) 
     rows = found.record()["derivatives"]["elasticities"]
     size = [abs(row["amplitude"]) for row in rows.values()]
     assert size == sorted(size, reverse=True)
-    assert sum(row["frequency"] for row in rows.values()) == pytest.approx(0.263, abs=0.002)
+    assert sum(row["peak_frequency"] for row in rows.values()) == pytest.approx(0.263, abs=0.002)
     assert (
         f"to first order a scatter of 0.1 % of all factors scatters the amplitude by {np.linalg.norm(size) / 10:.3g} %"
         in str(found)

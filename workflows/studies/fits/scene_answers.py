@@ -138,19 +138,19 @@ class SceneAnswers:
             self._points[where, load] = point
         return self._points[where, load]
 
-    def _wear(self, quantity: WearQuantity, left: float) -> float:
+    def _wear(self, quantity: WearQuantity, life_share: float) -> float:
         """A quantity of the wear, at the end of the life."""
         if self.file.scene.wear is None:
             raise SceneError(f"{quantity.label} is measured, but the scene has no [wear]")
-        if left not in self._runs:
-            self._runs[left] = wear_run.worn_out(self.file, self.model, left)
-        run, contact = self._runs[left], self.model.balance.contact
-        life = cycles_to_preload(run, left)
+        if life_share not in self._runs:
+            self._runs[life_share] = wear_run.worn_out(self.file, self.model, life_share)
+        run, contact = self._runs[life_share], self.model.balance.contact
+        life = cycles_to_preload(run, life_share)
         if life is None:
-            raise SolveFailed(f"the preload did not fall to {left:.3g} of its start: {run.end}")
+            raise SolveFailed(f"the preload did not fall to {life_share:.3g} of its start: {run.end}")
         worn = WornContact(
             run, self.model.reduced.interface.area, contact.gap, contact.components, self.model.balance.basis,
-            {joint.name: slice(int(joint.rows[0]), int(joint.rows[-1]) + 1) for joint in contact.joints}, left,
+            {joint.name: slice(int(joint.rows[0]), int(joint.rows[-1]) + 1) for joint in contact.joints}, life_share,
         )  # fmt: skip
         if not quantity.grows:
             return float(quantity.value(worn) or 0.0)

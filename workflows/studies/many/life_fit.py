@@ -48,7 +48,7 @@ class LifeFit:
     """A surrogate of a number, over a space.
 
     drawn : (n,) whether a run was drawn from the distribution, not added where it says most about a quantile
-    asked : the share that runs were added for; None where none were
+    share_sought : the share that runs were added for; None where none were
     logarithmic : of its logarithm; open : runs of which only a lower bound is known, bound : the lowest of them
     failed : share of runs without
     scaled : keys whose common factor a life is in proportion to the reciprocal of, one set after the other
@@ -58,7 +58,7 @@ class LifeFit:
     space: ParameterSpace
     surrogate: Surrogate
     drawn: np.ndarray
-    asked: float | None
+    share_sought: float | None
     logarithmic: bool
     bound: float
     open: int
@@ -78,7 +78,7 @@ class LifeFit:
         at : the share among runs that have the number; draws : of the quantile, by the surrogate
         """
         low, high = np.quantile(draws, [0.5 - confidence / 2, 0.5 + confidence / 2])
-        if share == self.asked:
+        if share == self.share_sought:
             return float(low), float(high)
         of = self.surrogate
         values, predictions = (

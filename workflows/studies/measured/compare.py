@@ -229,16 +229,16 @@ def compare(
     base_runs = files[""]
     try:
         measured = prepared(measured, base_runs.scene, resonance)
-        found = {}
+        runs_by_change = {}
         for change, file in files.items():
             with limited(file.scene.solver.threads):
                 model = modelling.build(file, report)
                 measured.check_position(file.scene, model.part)
-                found[change] = compare_runs(file, model, measured, report)
+                runs_by_change[change] = compare_runs(file, model, measured, report)
     except Refusal as trouble:
         raise Refusal(f"{measured.source}: {trouble}") from None
-    first = found.pop("")
-    return MeasurementComparison(base_runs.name, measured, first, found)
+    first = runs_by_change.pop("")
+    return MeasurementComparison(base_runs.name, measured, first, runs_by_change)
 
 
 def changed(scene: Source, overrides: Overrides, changes: Sequence[str]) -> dict[str, SceneFile]:
