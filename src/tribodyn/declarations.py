@@ -9,7 +9,7 @@ A file declares them in one class, each with its unit, its limits and, where the
         hardening: float = number("N/m", default=0.0, low=0.0)
 
 No other file knows their names. They are read from the text of the file, which is not run: a scene is checked without
-running its files. A part or a continuation may leave units out; see `workflows.scene.own` for what a value may then be.
+running its files. A part or a continuation may leave units out; see `workflows.scene.user_files`.
 """
 
 from __future__ import annotations
@@ -184,8 +184,8 @@ def complete(numbers: tuple[Number, ...], values: Mapping[str, Any], owner: str)
     names = [number.name for number in numbers]
     for name in values:
         if name not in names:
-            known = f"its numbers are {', '.join(names)}" if names else "it has none"
-            raise Refusal(f"{owner} has no number {name}: {known}")
+            explanation = f"its numbers are {', '.join(names)}" if names else "it has none"
+            raise Refusal(f"{owner} has no number {name}: {explanation}")
     result = {}
     for number in numbers:
         if number.name not in values and number.required:

@@ -26,9 +26,9 @@ from tribodyn.workflows.run.part_reduction import components, contacts, without_
 from tribodyn.workflows.run.sanity_checks import check_opening
 from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
-from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, Scene
+from tribodyn.workflows.scene.user_files import is_user_file
 from tribodyn.workflows.scene.wear import Wear
 
 
@@ -113,7 +113,7 @@ def plan(file: SceneFile) -> Plan:
         built = file.mesh_scene
         tables = built.bodies.values() if built.geometry is None else [built.geometry]
         for part in (table.part for table in tables):
-            if part is not None and is_file(part):
+            if part is not None and is_user_file(part):
                 raise Refusal(f'part = "{part}" is a file of your own, which a plan does not run: run the scene')
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
@@ -224,7 +224,7 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
 
 def _step_cost(wear: Wear) -> StepCost | None:
     """What its rule states of its cost; a file beside the scene, which a plan does not run, states nothing."""
-    return None if is_file(wear.rule) else cast("StepCost | None", wear_rule.load(wear.rule_name).Rule.COST)
+    return None if is_user_file(wear.rule) else cast("StepCost | None", wear_rule.load(wear.rule_name).Rule.COST)
 
 
 def _time(seconds: float) -> str:

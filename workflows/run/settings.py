@@ -17,8 +17,8 @@ from tribodyn.hbm.wear import law as wear_law, wear_rule
 from tribodyn.hbm.wear.wear_problem import Duty
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import references
-from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.user_files import is_user_file
 from tribodyn.workflows.scene.wear import Place
 
 OUTPUT = "response"
@@ -30,13 +30,13 @@ def check_names(scene: Scene, own_files: bool = True) -> None:
     own_files : run files beside the scene for it, which a plan must not do
     """
     for contact in scene.joints.values():
-        if own_files or not is_file(contact.law):
+        if own_files or not is_user_file(contact.law):
             contact_law.require_components(contact.law_name, contact.components)
-    if own_files or not is_file(scene.response.method):
+    if own_files or not is_user_file(scene.response.method):
         response_options(scene)
-    if scene.wear is not None and (own_files or not is_file(scene.wear.law)):
+    if scene.wear is not None and (own_files or not is_user_file(scene.wear.law)):
         wear_law.load(scene.wear.law_name)
-    if scene.wear is not None and (own_files or not is_file(scene.wear.rule)):
+    if scene.wear is not None and (own_files or not is_user_file(scene.wear.rule)):
         wear_rule.load(scene.wear.rule_name)
 
 

@@ -13,12 +13,12 @@ from tribodyn import declarations
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table, quantity
-from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
 from tribodyn.workflows.scene.stages import CONTACT, PART, SMOOTH, SceneStage
+from tribodyn.workflows.scene.user_files import LawTable, folder_of, is_user_file, user_file
 
 
 def rows_of(path: Path) -> list[list[float]]:
-    """The rows of a file of comma-separated numbers; raises ValueError where it is none."""
+    """The rows of a file of comma-separated numbers."""
     try:
         rows: list[list[float]] = np.loadtxt(path, delimiter=",", ndmin=2).tolist()
     except ValueError as error:
@@ -69,7 +69,7 @@ class ByTemperature(Table, stage=CONTACT):
         return {name: tuple(values) for name, values in (self.model_extra or {}).items()}
 
     def at(self, temperature: float) -> dict[str, float]:
-        """The numbers at a change of temperature [K]; raises ValueError beyond the ends."""
+        """The numbers at a change of temperature [K]; refuses one beyond the ends."""
         low, high = self.temperature[0], self.temperature[-1]
         if not low <= temperature <= high:
             raise Refusal(
@@ -102,7 +102,7 @@ class ContactTable(LawTable):
     @classmethod
     def _read_the_table(cls, table: Any, info: ValidationInfo) -> Any:
         folder = folder_of(info)
-        return rows_of(beside(folder, table, f"{cls.TABLE}.table")) if isinstance(table, str) and folder else table
+        return rows_of(user_file(folder, table, f"{cls.TABLE}.table")) if isinstance(table, str) and folder else table
 
     @model_validator(mode="after")
     def _table_that_the_law_takes(self, info: ValidationInfo) -> Self:
@@ -116,27 +116,27 @@ class ContactTable(LawTable):
     @property
     def law_file(self) -> Path:
         """File of the law."""
-        return Path(self.law_name) if self._own is not None else contact_law.file_of(self.law)
+        return Path(self.law_name) if self._user_file is not None else contact_law.file_of(self.law)
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> ContactTable:
-        along, across = any(c != "n" for c in self.components), "n" in self.components
-        given = self.stiffness_is_given
-        for name, need in (
-            ("tangential_stiffness", along and not given),
-            ("normal_stiffness", across and not given),
+        has_tangential, has_normal = any(c != "n" for c in self.components), "n" in self.components
+        is_derived = self.has_derived_stiffness
+        for name, is_needed in (
+            ("tangential_stiffness", has_tangential and not is_derived),
+            ("normal_stiffness", has_normal and not is_derived),
         ):
-            if need != (getattr(self, name) is not None):
-                verb = "is missing" if need else "has no meaning"
-                what = f"for the components {', '.join(self.components)}"
-                what = "where it follows from a punch or the law" if given and not need else what
-                raise Refusal(f"contact.{name} {verb} {what}")
+            if is_needed != (getattr(self, name) is not None):
+                verb = "is missing" if is_needed else "has no meaning"
+                reason = f"for the components {', '.join(self.components)}"
+                reason = "where it follows from a punch or the law" if is_derived and not is_needed else reason
+                raise Refusal(f"contact.{name} {verb} {reason}")
         return self
 
     @property
-    def stiffness_is_given(self) -> bool:
-        """Whether the stiffness follows from something else than its two numbers."""
-        if is_file(self.law) and self._own is None:  # of a result: it was checked when the scene was read
+    def has_derived_stiffness(self) -> bool:
+        """Whether the stiffness follows from the numbers of the law, not from the two of this table."""
+        if is_user_file(self.law) and self._user_file is None:  # of a result: it was checked when the scene was read
             return self.tangential_stiffness is None and self.normal_stiffness is None
         return bool(declarations.constant(self.law_file, "STIFFNESS_FROM_NUMBERS"))
 
@@ -193,23 +193,23 @@ class FaceContact(ContactTable, stage=PART):
     def _map_is_there(self, info: ValidationInfo) -> Self:
         folder = folder_of(info)
         if folder is not None and self.gap_map is not None:
-            beside(folder, self.gap_map, f"{self.TABLE}.gap_map")
+            user_file(folder, self.gap_map, f"{self.TABLE}.gap_map")
         return self
 
     def opening(self, folder: Path) -> np.ndarray | None:
-        """Rows x, y, z, opening (k, 4) [m] of its map in `folder`, None without one; raises ValueError without rows."""
+        """Rows x, y, z, opening (k, 4) [m] of its gap map in `folder`, None without a map."""
         if self.gap_map is None:
             return None
-        rows = np.array(rows_of(beside(folder, self.gap_map, f"{self.TABLE}.gap_map")))
+        rows = np.array(rows_of(user_file(folder, self.gap_map, f"{self.TABLE}.gap_map")))
         rows = rows[np.isfinite(rows).all(axis=1)]
         if rows.shape[1:] != (4,) or len(rows) < 4:
             raise Refusal(f"{self.TABLE}.gap_map: expected four rows or more of x, y, z, opening in '{self.gap_map}'")
         return rows
 
     @property
-    def stiffness_is_given(self) -> bool:
-        """Whether it follows from a punch, or from the numbers of the law."""
-        return self.punch is not None or super().stiffness_is_given
+    def has_derived_stiffness(self) -> bool:
+        """Whether the stiffness follows from a punch, or from the numbers of the law."""
+        return self.punch is not None or super().has_derived_stiffness
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -218,7 +218,7 @@ class FaceContact(ContactTable, stage=PART):
 
     @property
     def meets_next(self) -> bool:
-        """Whether it is, in a wheel, a contact of neighbouring sectors."""
+        """Whether it is a contact of neighbouring sectors of a wheel."""
         if self.sector is not None or self.opposite is None:
             return self.sector == "next"
         first, second = (name.rpartition(".")[0].split(".")[0] for name in (self.groups[0], self.opposite))

@@ -15,46 +15,48 @@ from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ByTemperature, Change, ContactTable, Surfaces
 from tribodyn.workflows.scene.fields import Table, unknown_key
-from tribodyn.workflows.scene.own import in_si, is_file
+from tribodyn.workflows.scene.user_files import in_si, is_user_file
 
 if TYPE_CHECKING:  # most scenes name no faces and start sooner without
     from tribodyn.geometry.height_map import HeightMap
 
 
-class _OfContact(Table):
+class _TemperatureKeys(Table):
     temperature: Change | None = None
     by_temperature: ByTemperature
 
 
-class _Heat(Table):
+class _HeatedLoad(Table):
     temperature: Change
 
 
-def with_numbers_when_hot(key: str, contact: Mapping[str, Any], static: Any, folder: Path | None) -> dict[str, Any]:
+def with_numbers_by_temperature(
+    key: str, contact: Mapping[str, Any], static: Any, folder: Path | None
+) -> dict[str, Any]:
     """The table of a contact as it stands in the file, with the numbers of its temperature.
 
     key : of the contact; static : the table of the static loads
     folder : of the scene, None for the scene of a result, whose numbers are in SI units
     Raises  Refusal where its temperature is not known or a number is given twice
     """
-    own = {name: contact[name] for name in ("temperature", "by_temperature") if name in contact}
-    if folder is not None and isinstance(own["by_temperature"], Mapping):
-        own["by_temperature"] = _in_si(f"{key}.by_temperature", own["by_temperature"], contact, folder)
+    table = {name: contact[name] for name in ("temperature", "by_temperature") if name in contact}
+    if folder is not None and isinstance(table["by_temperature"], Mapping):
+        table["by_temperature"] = _in_si(f"{key}.by_temperature", table["by_temperature"], contact, folder)
     try:
-        read = _OfContact.model_validate(own)
+        read = _TemperatureKeys.model_validate(table)
     except ValidationError as error:  # before the numbers that it should have given are missed
         first = error.errors()[0]
         where = ".".join(str(part) for part in (key, *first["loc"]))
         raise Refusal(f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
     try:
-        found = read.by_temperature.at(_warmed(contact, static) if read.temperature is None else read.temperature)
-    except ValueError as error:
+        values = read.by_temperature.at(_mean_change(contact, static) if read.temperature is None else read.temperature)
+    except Refusal as error:
         raise Refusal(f"{key}: {error}") from None
     # a scene that was written out has the numbers beside the table
-    twice = [name for name, value in found.items() if contact.get(name, value) not in (None, value)]
-    if twice:
-        raise Refusal(f"{key}.{twice[0]}: by_temperature gives it too: leave one of them out")
-    return {**contact, **own, **found}
+    repeated = [name for name, value in values.items() if contact.get(name, value) not in (None, value)]
+    if repeated:
+        raise Refusal(f"{key}.{repeated[0]}: by_temperature gives it too: leave one of them out")
+    return {**contact, **table, **values}
 
 
 def _in_si(key: str, table: Mapping[str, Any], contact: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -75,23 +77,23 @@ def _in_si(key: str, table: Mapping[str, Any], contact: Mapping[str, Any], folde
     return result
 
 
-def _warmed(contact: Mapping[str, Any], static: Any) -> float:
-    """Mean over its two bodies of what the static loads heat them by [K]."""
-    faces = [contact.get(one) for one in ("first", "second", "group", "opposite")]
+def _mean_change(contact: Mapping[str, Any], static: Any) -> float:
+    """Mean change of temperature of its two bodies by the static loads [K]."""
+    faces = [contact.get(name) for name in ("first", "second", "group", "opposite")]
     bodies = {str(face).partition(".")[0] for face in faces if isinstance(face, str) and face != "ground"}
-    warmed = dict.fromkeys(bodies, 0.0)
+    changes = dict.fromkeys(bodies, 0.0)
     for load in static.values() if isinstance(static, Mapping) else ():
         if not isinstance(load, Mapping) or not {"temperature", "field"} & set(load):
             continue
         if "field" in load:
             raise Refusal("a field of temperatures heats its bodies: give the contact's own temperature")
         try:
-            change = _Heat.model_validate({"temperature": load["temperature"]}).temperature
+            change = _HeatedLoad.model_validate({"temperature": load["temperature"]}).temperature
         except ValidationError:  # reported where the load is read
             continue
         for body in bodies & set(load.get("bodies", bodies)):
-            warmed[body] += change
-    return sum(warmed.values()) / len(warmed)
+            changes[body] += change
+    return sum(changes.values()) / len(changes)
 
 
 def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:
@@ -100,10 +102,10 @@ def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:
     from tribodyn.geometry.height_map import mirrored, synthetic_pair
 
     if surfaces.synthetic is not None:
-        made = surfaces.synthetic
-        pair = synthetic_pair(made.seed, made.size, ridge=made.ridge, waviness=made.waviness, roughness=made.roughness)
+        s = surfaces.synthetic
+        pair = synthetic_pair(s.seed, s.size, ridge=s.ridge, waviness=s.waviness, roughness=s.roughness)
         return list(pair)
-    read = [
+    maps = [
         height_map_files.read(
             folder / name,
             spacing=surfaces.spacing,
@@ -113,28 +115,28 @@ def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:
         for name in (surfaces.first, surfaces.second)
         if name is not None
     ]
-    return [*read[:1], *(mirrored(face, surfaces.mirror) if surfaces.mirror else face for face in read[1:])]
+    return [*maps[:1], *(mirrored(face, surfaces.mirror) if surfaces.mirror else face for face in maps[1:])]
 
 
-def takes_asperities(contact: Any) -> bool:
-    """Whether the table of a contact, as it stands in the file, leaves the law's own table to the measured faces."""
+def needs_asperities(contact: Any) -> bool:
+    """Whether a contact, as it stands in the file, has its table of asperities from the measured faces."""
     name = contact.get("law") if isinstance(contact, Mapping) else None
-    if not isinstance(name, str) or is_file(name) or "table" in contact:
+    if not isinstance(name, str) or is_user_file(name) or "table" in contact:
         return False
     try:
         return declarations.constant(contact_law.file_of(name), "TABLE") is not None
-    except ValueError:  # no such law, which is reported where the contact is read
+    except Refusal:  # no such law: reported where the contact is read
         return False
 
 
 def with_asperities(contact: Mapping[str, Any], surfaces: Surfaces, folder: Path) -> dict[str, Any]:
     """A contact as it stands in the file with the table and, where it has none, the radius of the measured faces.
 
-    Raises  ValueError where the faces have no asperities to count
+    Raises  Refusal where the faces have no asperities to count
     """
     try:
         radius, table = _asperities(surfaces, folder)
-    except (ValueError, OSError) as error:
+    except (Refusal, OSError) as error:
         raise Refusal(f"surfaces: no asperities for the law '{contact['law']}': {error}") from None
     name = declarations.name_of(Role.ASPERITY_RADIUS, contact_law.declared(contact["law"]))
     return {**({} if name is None else {name: radius}), **contact, "table": table}
@@ -144,7 +146,7 @@ def with_asperities(contact: Mapping[str, Any], surfaces: Surfaces, folder: Path
 def _asperities(surfaces: Surfaces, folder: Path) -> tuple[float, list[list[float]]]:
     from tribodyn.geometry.asperities import identify
 
-    given = faces(surfaces, folder)
-    second = given[1] if len(given) > 1 else None
-    found = identify(given[0], second, surfaces.cutoff, surfaces.shortest)
-    return found.radius, found.table().tolist()
+    maps = faces(surfaces, folder)
+    second = maps[1] if len(maps) > 1 else None
+    result = identify(maps[0], second, surfaces.cutoff, surfaces.shortest)
+    return result.radius, result.table().tolist()

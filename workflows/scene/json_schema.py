@@ -18,10 +18,10 @@ from tribodyn.geometry import parts
 from tribodyn.hbm import continuation
 from tribodyn.workflows.scene.fields import IN_UNIT
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
-from tribodyn.workflows.scene.own import LawTable
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.solution_tables import PartResponse
 from tribodyn.workflows.scene.structure_tables import NamedContact
+from tribodyn.workflows.scene.user_files import LawTable
 
 OWN_FILE = r"\.py$"
 

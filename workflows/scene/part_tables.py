@@ -24,8 +24,8 @@ from tribodyn.workflows.scene.fields import (
     quantity,
     refuse_slips,
 )
-from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
 from tribodyn.workflows.scene.stages import PART, SMOOTH
+from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers, optional_user_file, user_file
 
 
 class Meshed(Table, stage=PART):
@@ -50,7 +50,7 @@ class Meshed(Table, stage=PART):
     parameters: dict[str, int | float] = Field(default_factory=dict)
     """Parameters of the part, gathered from the other keys of the table."""
 
-    _own: Path | None = PrivateAttr(None)
+    _user_file: Path | None = PrivateAttr(None)
 
     @model_validator(mode="before")
     @classmethod
@@ -69,7 +69,7 @@ class Meshed(Table, stage=PART):
 
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:
-        self._own = own_file(folder_of(info), self.part, f"{self.KEY}part")
+        self._user_file = optional_user_file(folder_of(info), self.part, f"{self.KEY}part")
         return self
 
     @property
@@ -80,7 +80,7 @@ class Meshed(Table, stage=PART):
     @property
     def part_name(self) -> str | None:
         """The part for geometry.parts: its name, or the path of the file beside the scene."""
-        return self.part if self._own is None else str(self._own)
+        return self.part if self._user_file is None else str(self._user_file)
 
 
 class Geometry(Meshed, stage=PART):
@@ -102,10 +102,10 @@ def part_parameters(
     Raises  ValueError: no such part, unknown key, or a value that the part refuses
     """
     general = [name for name in kind.model_fields if name != "parameters"]
-    if is_file(part):
+    if is_user_file(part):
         if folder is None:
             raise Refusal(f'{kind.KEY}part: "{part}" is a file beside a scene, and this scene has no folder')
-        return numbers(kind.KEY, read(beside(folder, part, f"{kind.KEY}part")), given, general)
+        return numbers(kind.KEY, read(user_file(folder, part, f"{kind.KEY}part")), given, general)
     values = numbers(kind.KEY, read(parts.file_of(part)), given, general)
     return asdict(parts.load(part).Parameters(**values))
 

@@ -19,13 +19,12 @@ from pydantic import (
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
-from tribodyn.workflows.scene.contact_numbers import takes_asperities, with_asperities, with_numbers_when_hot
+from tribodyn.workflows.scene.contact_numbers import needs_asperities, with_asperities, with_numbers_by_temperature
 from tribodyn.workflows.scene.fields import (
     Table,
     unknown_key,
 )
 from tribodyn.workflows.scene.load_tables import HarmonicLoad, Loads, Motion, Prescribed, SpringTable, StaticLoad
-from tribodyn.workflows.scene.own import folder_of
 from tribodyn.workflows.scene.part_tables import Geometry, SolidMaterial
 from tribodyn.workflows.scene.solution_tables import (
     Damping,
@@ -51,6 +50,7 @@ from tribodyn.workflows.scene.structure_tables import (
     PointMassTable,
     TieTable,
 )
+from tribodyn.workflows.scene.user_files import folder_of
 from tribodyn.workflows.scene.wear import Wear
 from tribodyn.workflows.scene.wheel_tables import FlowTable, Mistuning, WheelTable, operating_line
 
@@ -188,11 +188,11 @@ class MeshScene(Scene):
         prefix = "contacts." if several is contacts else ""
         static = loads.get("static") if isinstance(loads, dict) else None
         found = {
-            name: with_numbers_when_hot(prefix + name, contact, static, folder)
+            name: with_numbers_by_temperature(prefix + name, contact, static, folder)
             for name, contact in contacts.items()
             if isinstance(contact, dict) and contact.get("by_temperature") is not None
         }
-        lacking = [name for name, contact in contacts.items() if takes_asperities(contact)]
+        lacking = [name for name, contact in contacts.items() if needs_asperities(contact)]
         if lacking and folder is not None and isinstance(data.get("surfaces"), dict):
             try:
                 surfaces = Surfaces.model_validate(data["surfaces"])

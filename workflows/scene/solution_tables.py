@@ -29,9 +29,9 @@ from tribodyn.workflows.scene.fields import (
     Table,
     quantity,
 )
-from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
 from tribodyn.workflows.scene.stages import DRAW, PART, REDUCTION, RESUMABLE, SMOOTH, SOLVE, STUDY
 from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers, optional_user_file, user_file
 
 HIGHEST = 15  # harmonic that kept = "auto" may keep, where the scene does not name one
 
@@ -100,7 +100,7 @@ class Response(Table, stage=SOLVE):
     options: dict[str, int | float] = Field(default_factory=dict)
     """Numbers that the continuation method declares as its own."""
 
-    _own: Path | None = PrivateAttr(None)
+    _user_file: Path | None = PrivateAttr(None)
 
     @model_validator(mode="before")
     @classmethod
@@ -108,18 +108,18 @@ class Response(Table, stage=SOLVE):
         if not isinstance(table, dict) or not isinstance(table.get("options", {}), dict):
             return table
         method, folder = table.get("method", cls.model_fields["method"].default), folder_of(info)
-        if not isinstance(method, str) or (is_file(method) and folder is None):
+        if not isinstance(method, str) or (is_user_file(method) and folder is None):
             return table  # no name of a method, or a file that was checked when the scene was read
-        if is_file(method):
+        if is_user_file(method):
             assert folder is not None
-            declared = read(beside(folder, method, "response.method"), "Options")
+            declared = read(user_file(folder, method, "response.method"), "Options")
         else:
             declared = continuation.declared(method)
         return table | {"options": numbers("response.options.", declared, table.get("options", {}), ())}
 
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:
-        self._own = own_file(folder_of(info), self.method, "response.method")
+        self._user_file = optional_user_file(folder_of(info), self.method, "response.method")
         return self
 
     @model_validator(mode="after")
@@ -140,7 +140,7 @@ class Response(Table, stage=SOLVE):
     @property
     def method_name(self) -> str:
         """The continuation for hbm: its name, or the path of the file beside the scene."""
-        return self.method if self._own is None else str(self._own)
+        return self.method if self._user_file is None else str(self._user_file)
 
     @model_validator(mode="after")
     def _range(self) -> Response:

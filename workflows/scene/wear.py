@@ -12,9 +12,16 @@ from tribodyn.declarations import Role, read
 from tribodyn.hbm.wear import law as wear_law, wear_rule
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Frequency, Number, Table
-from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file, numbers, own_file
 from tribodyn.workflows.scene.stages import DRAW, RESUMABLE, WEAR, SceneStage
 from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.scene.user_files import (
+    LawTable,
+    folder_of,
+    is_user_file,
+    numbers,
+    optional_user_file,
+    user_file,
+)
 
 
 class WearStep(Table, stage=WEAR):
@@ -213,10 +220,10 @@ class Wear(JointWearTable, stage=WEAR):
         rule = table.get("rule", cls.model_fields["rule"].default) if isinstance(table, dict) else None
         if folder is None or not isinstance(rule, str):
             return table
-        if not is_file(rule) and rule not in wear_rule.names():
+        if not is_user_file(rule) and rule not in wear_rule.names():
             known = ", ".join(repr(name) for name in wear_rule.names())
             raise Refusal(f"wear.rule: expected {known} or a file my_rule.py, got {rule!r}")
-        path = beside(folder, rule, "wear.rule") if is_file(rule) else wear_rule.file_of(rule)
+        path = user_file(folder, rule, "wear.rule") if is_user_file(rule) else wear_rule.file_of(rule)
         if table.get("step") is None and any(number.name == "step" for number in read(path)):
             raise Refusal(f'expected step, such as "5 %" of delta_max, for rule = "{rule}"')
         declared = [number for number in read(path) if number.name not in cls.model_fields]
@@ -227,7 +234,7 @@ class Wear(JointWearTable, stage=WEAR):
 
     @model_validator(mode="after")
     def _find_rule_file(self, info: ValidationInfo) -> Self:
-        self._rule_file = own_file(folder_of(info), self.rule, "wear.rule")
+        self._rule_file = optional_user_file(folder_of(info), self.rule, "wear.rule")
         return self
 
     @model_validator(mode="after")

@@ -14,8 +14,8 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.fields import Number, Table
-from tribodyn.workflows.scene.own import folder_of
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.user_files import folder_of
 from tribodyn.workflows.studies.fits.identification import MeasuredNumber
 from tribodyn.workflows.studies.measured.computed_runs import compare_runs
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run, prepared

@@ -1,7 +1,7 @@
-"""Files beside a scene, and the numbers that laws, parts and continuations declare as their own.
+"""Python files of a user beside his scene, and the numbers that laws, parts and continuations declare.
 
-A part, a contact law, a wear law and a continuation may each be a .py file in the scene's folder. Reading, planning and
-showing a scene read the text of such a file and never run it; running the scene does.
+A part, a contact law, a wear law, a wear rule and a continuation may each be a .py file in the folder of the scene.
+Reading, planning and showing a scene read the text of such a file and never run it; running the scene does.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import Table, unknown_key
 from tribodyn.workflows.scene.units import to_si
 
-ANY_UNIT = ("m", "rad", "")  # what a number without a declared unit may be given in
+ANY_UNIT = ("m", "rad", "")  # units that a number without a declared unit may have
 
 
-def is_file(name: str) -> bool:
-    """Whether a name is that of a file of one's own."""
+def is_user_file(name: str) -> bool:
+    """Whether a name is that of a user's file."""
     return name.endswith(".py")
 
 
-def beside(folder: Path, name: str, key: str) -> Path:
-    """The file of one's own that a scene names; raises ValueError where it is not in the scene's own folder.
+def user_file(folder: Path, name: str, key: str) -> Path:
+    """The user's file that a scene names; refuses one that is not in the folder of the scene.
 
     folder : of the scene; key : of the scene, such as "contact.law", for the sentence
     """
@@ -41,23 +41,23 @@ def beside(folder: Path, name: str, key: str) -> Path:
 
 
 def numbers(
-    table: str, declared: Iterable[Number], given: Mapping[str, Any], others: Iterable[str]
+    table: str, declared: Iterable[Number], values: Mapping[str, Any], general: Iterable[str]
 ) -> dict[str, int | float]:
-    """The own numbers of a law, a part or a continuation out of a table of a scene, in SI units.
+    """The numbers of a law, a part or a continuation from a table of a scene, in SI units.
 
     table : its key with a dot, such as "contact."; given : what the table has besides `others`, its general keys
-    Raises  ValueError: one is unknown, missing, not in its unit or out of its limits; lists those that there are
+    Raises  Refusal: one is unknown, missing, not in its unit or out of its limits; lists those that there are
     """
-    known = {number.name: number for number in declared}
-    found: dict[str, int | float] = {}
-    for name, value in given.items():
-        if name not in known:
-            raise Refusal(unknown_key(f"{table}{name}", [*others, *known]))
-        found[name] = in_si(f"{table}{name}", known[name], value)
-    for name, number in known.items():
-        if number.required and name not in found:
-            raise Refusal(f"{table}{name} is missing: its numbers here are {', '.join(known)}")
-    return found
+    by_name = {number.name: number for number in declared}
+    result: dict[str, int | float] = {}
+    for name, value in values.items():
+        if name not in by_name:
+            raise Refusal(unknown_key(f"{table}{name}", [*general, *by_name]))
+        result[name] = in_si(f"{table}{name}", by_name[name], value)
+    for name, number in by_name.items():
+        if number.required and name not in result:
+            raise Refusal(f"{table}{name} is missing: its numbers here are {', '.join(by_name)}")
+    return result
 
 
 def in_si(key: str, number: Number, value: Any) -> int | float:
@@ -71,33 +71,33 @@ def in_si(key: str, number: Number, value: Any) -> int | float:
 
 
 def _converted(key: str, number: Number, value: Any) -> float:
-    """A number in the unit that it declares; one without takes a length, an angle or a pure number."""
+    """A value in the declared unit; without one, a length, an angle or a dimensionless number."""
     if number.unit is not None:
         try:
             return to_si(value, number.unit)
-        except ValueError as error:
+        except Refusal as error:
             raise Refusal(f"{key}: {error}") from None
     for unit in ANY_UNIT:
         try:
             return to_si(value, unit)
-        except ValueError:
+        except Refusal:
             continue
     raise Refusal(f"{key}: expected a length, an angle or a number, got {value!r}")
 
 
 def folder_of(info: ValidationInfo) -> Path | None:
-    """The folder of the scene that is being read; None where the scene of a result is, which was checked before."""
+    """The folder of the scene that is read; None for the scene of a result, which was checked before."""
     folder: Path | None = (info.context or {}).get("folder")
     return folder
 
 
-def own_file(folder: Path | None, name: str | None, key: str) -> Path | None:
-    """The file beside a scene that a key names; None where it names none, or the scene was checked before."""
-    return None if folder is None or name is None or not is_file(name) else beside(folder, name, key)
+def optional_user_file(folder: Path | None, name: str | None, key: str) -> Path | None:
+    """The user's file that a key names; None where it names none, or the scene is that of a result."""
+    return None if folder is None or name is None or not is_user_file(name) else user_file(folder, name, key)
 
 
 class LawTable(Table):
-    """A table that names a law; the law's own numbers are further keys of it."""
+    """A table that names a law; the numbers of the law are further keys of it."""
 
     model_config = ConfigDict(extra="allow")
     TABLE: ClassVar[str]
@@ -106,7 +106,7 @@ class LawTable(Table):
     """Module that finds the file of a law of the package by `file_of(name)`."""
 
     law: str
-    _own: Path | None = PrivateAttr(None)
+    _user_file: Path | None = PrivateAttr(None)
 
     @model_validator(mode="before")
     @classmethod
@@ -115,34 +115,34 @@ class LawTable(Table):
         if folder is None or not isinstance(table, dict):
             return table
         general = {name: value for name, value in table.items() if name in fields}
-        given = {name: value for name, value in table.items() if name not in fields}
+        values = {name: value for name, value in table.items() if name not in fields}
         if not isinstance(general.get("law", ""), str):
             return general  # refused by the field itself
-        return general | numbers(f"{cls.TABLE}.", cls.declared_numbers(general, folder), given, fields)
+        return general | numbers(f"{cls.TABLE}.", cls.declared_numbers(general, folder), values, fields)
 
     @classmethod
     def declared_numbers(cls, table: Mapping[str, Any], folder: Path) -> tuple[Number, ...]:
         """The numbers that the law of a table, as it stands in the scene's file, declares."""
         law = table.get("law", cls.model_fields["law"].default)
-        return read(beside(folder, law, f"{cls.TABLE}.law") if is_file(law) else cls.LAWS.file_of(law))
+        return read(user_file(folder, law, f"{cls.TABLE}.law") if is_user_file(law) else cls.LAWS.file_of(law))
 
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:
-        self._own = own_file(folder_of(info), self.law, f"{self.TABLE}.law")
+        self._user_file = optional_user_file(folder_of(info), self.law, f"{self.TABLE}.law")
         return self
 
     @property
     def law_name(self) -> str:
-        """Name of the law for hbm: that of the package, or the path of the file beside the scene."""
-        return self.law if self._own is None else str(self._own)
+        """Name of the law for hbm: that of a shipped law, or the path of the user's file."""
+        return self.law if self._user_file is None else str(self._user_file)
 
     def number(self, role: Role) -> float | None:
         """The law's number with a role, None where it has none, or is a user's file that is not beside this result."""
-        if is_file(self.law) and self._own is None:
+        if is_user_file(self.law) and self._user_file is None:
             return None
         return self.numbers.get(name_of(role, read(self.LAWS.file_of(self.law_name))) or "")
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The law's own numbers, in the units that it declares."""
+        """The numbers of the law, in the units that it declares."""
         return dict(self.model_extra or {})
