@@ -100,7 +100,7 @@ def _is_value(table: type[BaseModel]) -> bool:
 
 def _is_key(name: str, field: Any, path: tuple[str, ...]) -> bool:
     table = _inner(field.annotation)
-    return (table is None or _is_value(table)) and (path, name) != (("geometry",), "parameters")
+    return (table is None or _is_value(table)) and name != "parameters"  # gathers keys that a part or a rule declares
 
 
 def _inner(annotation: Any) -> type[BaseModel] | None:

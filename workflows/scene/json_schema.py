@@ -79,6 +79,7 @@ class _Generator(GenerateJsonSchema):
         if issubclass(kind, LawTable):
             files = {name: read(kind.LAWS.file_of(name)) for name in kind.LAWS.KIND.names()}
             _with_own(made, "law", files)
+            keys.pop("parameters", None)  # of a wear rule, whose numbers are keys of the table
         elif "parameters" in keys:
             del keys["parameters"]
             _with_own(made, "part", {name: read(parts.file_of(name)) for name in parts.names()})
