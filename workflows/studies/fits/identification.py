@@ -23,7 +23,7 @@ Prediction = Callable[[Mapping[str, float]], np.ndarray]
 
 @dataclass(frozen=True)
 class FitParameter:
-    """A number that is looked for. low, high : bounds; starts : one or several; unit : of all of them, for the report.
+    """A number that is fitted. low, high : bounds; starts : one or several; unit : of all of them, for the report.
 
     ratio : the unknown is its logarithm, for positive numbers known to their order only; else it counts in `high - low`
     """
@@ -66,7 +66,7 @@ class MeasuredNumber:
 
 @dataclass(frozen=True)
 class Identification:
-    """What a fit found.
+    """Result of a fit.
 
     origin, values : (n_parameter,) before and after; before, after : (n_measured,) predictions there
     sensitivity : (n_measured, n_parameter) d ln(predicted) / d ln(parameter), or / d parameter in widths of its bounds

@@ -123,7 +123,7 @@ def posterior(
 
 
 class SceneFit:
-    """A scene whose numbers are looked for."""
+    """A scene whose numbers are fitted: its trials and their derivatives."""
 
     def __init__(self, file: SceneFile, task: FitTables, progress: Progress):
         doubled = set(task.measured) & set(task.predict)
@@ -150,7 +150,7 @@ class SceneFit:
     def trial(
         self, values: Mapping[str, float], targets: Mapping[str, Target | CurveTarget], nearby: bool = False
     ) -> np.ndarray:
-        """What the scene says with values; nearby : its cycles are found from those of the trial before."""
+        """Answers of the scene with values; nearby : start its cycles from those of the previous trial."""
         self._count += 1
         trial = self.file.changed(*self.changes(values))
         self._last = SceneAnswers(trial, modelling.build(trial, Progress()), self._last if nearby else None)

@@ -39,7 +39,7 @@ GAIN = 1e-3  # of an aim, of its logarithm where it is positive and of its range
 
 @dataclass(frozen=True, repr=False)
 class Optimum(StudyResult):
-    """What an optimisation came to.
+    """Result of an optimisation.
 
     table : of all runs; front : rows of the table that no other allowed one beats in all aims, by the first aim
     best : row of the one nearest to the best of every aim, each between its ends on the front; the best of one aim
@@ -120,7 +120,7 @@ def optimise(
     resume: bool = False,
     progress: Report = None,
 ) -> Optimum:
-    """Look for the best designs: least amplitude and longest life, or other aims, over ranges of any keys.
+    """Search for the best designs: least amplitude and longest life, or other aims, over ranges of any keys.
 
     study : the .toml file of a study that draws from ranges, or its tables; its table [optimise] has what is wanted
     folder : folder of optimum.json, optimum.png and the study's tables; results/NAME by default

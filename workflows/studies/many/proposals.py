@@ -1,4 +1,4 @@
-"""Where the next run of an optimisation promises most: surrogates of aims and limits, expected improvement."""
+"""Propose the next run of an optimisation: surrogates of aims and limits, expected improvement."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SAME_POINT = 1e-3  # of the unit cube, within which a proposal is a run that is 
 
 @dataclass(frozen=True)
 class EvaluatedRuns:
-    """What runs have told.
+    """Aims and limits of the runs so far.
 
     share : (n, k) places of the runs in the unit cube
     aims : (n, m) values to be made small; excess : (n, q) by which limits are passed, below 0 where they are kept.

@@ -1,4 +1,4 @@
-"""One run of a study, in whatever process it is done, and the row that it leaves."""
+"""One run of a study, in any process, and its row in the table."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class StudyRun:
 
 @dataclass(frozen=True)
 class RunRow:
-    """What a run leaves.
+    """Row of one run in the table of a study.
 
     key : of the task; sentence : how it ended; numbers : by column, SI units, what there is none of is left out
     status : complete, failed in a solve, refused as a scene, stopped by a defect, or lost with its process

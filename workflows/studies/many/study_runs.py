@@ -1,4 +1,4 @@
-"""A study from its file to its table: what is done already is not done again, and what is finished is on disk."""
+"""Run a study: read its file, solve the runs that its folder lacks, write its table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rows of a study as they are finished, each on disk before the next is told of, and its table: a row a run."""
+"""The table of a study, one row a run, and the journal that writes each finished row to disk."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ JOURNAL = "rows.jsonl"
 
 @dataclass(frozen=True, repr=False)
 class StudyTable(StudyResult):
-    """What came out of a study.
+    """Table of a study.
 
     columns : name -> (n_run,) of numbers in SI units, nan where there is none, or of texts; run, status and sentence,
         then the keys that vary, then what was computed

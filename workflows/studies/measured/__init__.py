@@ -1,1 +1,1 @@
-"""Beside a measurement: what was measured is read, and stands beside what a scene computes."""
+"""Measurements: read them and compare them with what a scene computes."""

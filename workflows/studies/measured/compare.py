@@ -1,4 +1,4 @@
-"""A measurement beside a scene: both overlaid, with the scatter of the one and the band of the other's inputs."""
+"""Compare a measurement with a scene: both overlaid, with the scatter of the measurement and a band of inputs."""
 
 from __future__ import annotations
 

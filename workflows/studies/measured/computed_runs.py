@@ -1,4 +1,4 @@
-"""What a scene computes at the points of a measurement."""
+"""Compute the response of a scene at the points of a measurement."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def solve(task: PatternRun) -> RunRow:
 
 @dataclass(frozen=True, repr=False)
 class Patterns(StudyResult):
-    """What the patterns of a scene came to.
+    """Result of all patterns of a scene.
 
     rows : by number, of all that were asked for; n_sectors : of the wheel; folder : of table and picture
     """
