@@ -18,7 +18,7 @@ def duffing_branch():
     return arc_length.follow(Duffing().balance(), 0.5, 5.0)
 
 
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("number", [0, 1])
 def test_fold_against_the_load_is_where_the_discriminant_vanishes(duffing_branch, number):
     duffing, branch = Duffing(), duffing_branch
     i = branch.folds[number]
