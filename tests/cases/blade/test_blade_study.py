@@ -56,10 +56,10 @@ def test_study_writes_its_tables_and_pictures(tmp_path):
 
 
 def test_diagram_of_blades_alone_and_stuck(blade):
-    found = blade_study.diagram(blade)
-    assert found["free"].shape == (21, blade_study.FAMILIES)
-    assert np.ptp(found["free"][:, 0]) < 1e-6 * found["free"].max()  # a rigid disk: free blades are alone
-    assert (found["stuck"][:, 0] > found["free"][:, 0]).all()
+    diagram_rows = blade_study.diagram(blade)
+    assert diagram_rows["free"].shape == (21, blade_study.FAMILIES)
+    assert np.ptp(diagram_rows["free"][:, 0]) < 1e-6 * diagram_rows["free"].max()  # a rigid disk: free blades are alone
+    assert (diagram_rows["stuck"][:, 0] > diagram_rows["free"][:, 0]).all()
     errors = blade_study.reduction_error(blade)
     assert all(error.shape == (6, blade_study.FAMILIES) for error in errors.values())
 

@@ -109,11 +109,11 @@ def test_frequencies_of_the_joint_model_are_those_of_the_rig(rig, joints):
 
 def test_the_scene_has_the_fitted_joints(joints):
     """What the scene states is what the fit finds, here on a coarser contact grid."""
-    found = rig_fit.fit_joints(joints)
-    np.testing.assert_allclose(found.after, joints.frequencies({}), rtol=1e-2)
-    assert found.rms < 0.02
-    assert np.sqrt(np.mean(np.log(found.before / found.after) ** 2)) > 0.3  # rigid joints are far off
-    assert found.verdict(2) == "at its upper bound"
+    fitted_joints = rig_fit.fit_joints(joints)
+    np.testing.assert_allclose(fitted_joints.after, joints.frequencies({}), rtol=1e-2)
+    assert fitted_joints.rms < 0.02
+    assert np.sqrt(np.mean(np.log(fitted_joints.before / fitted_joints.after) ** 2)) > 0.3  # rigid joints are far off
+    assert fitted_joints.verdict(2) == "at its upper bound"
 
 
 def test_known_springs_are_found_again(joints):
@@ -138,10 +138,10 @@ def test_modes_are_told_apart_by_their_motion():
 
 
 def test_the_height_is_found_from_the_preload(rig):
-    found = rig_fit.fit_height(rig.with_height(10e-6))
-    height = found.named()["platform"]
+    solved_height = rig_fit.fit_height(rig.with_height(10e-6))
+    height = solved_height.named()["platform"]
     assert rig.with_height(height).at_rest().preload == pytest.approx(published.PRELOAD, rel=1e-6)
-    assert found.before[0] < 0.9 * published.PRELOAD
+    assert solved_height.before[0] < 0.9 * published.PRELOAD
 
 
 def test_life_and_work_tell_the_coefficient(rig):

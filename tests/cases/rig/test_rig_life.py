@@ -15,7 +15,7 @@ COARSE = (
     "wear.tolerance=30 %", "wear.lost_below=30 %",
 )  # fmt: skip
 HALF_AS_FAST = "wear.coefficient=2.75e3 um3/J"
-FEW = "wear.max_steps=2"
+FEWER_MODES = "wear.max_steps=2"
 
 
 def words(*changes: str) -> list[str]:
@@ -30,7 +30,7 @@ def words(*changes: str) -> list[str]:
 def test_life_and_work_go_with_the_inverse_of_the_coefficient(capsys: pytest.CaptureFixture[str]) -> None:
     """The wear law is linear: nothing else may differ, the platform's height included."""
     too_soft = "material.young=1 GPa; wear.max_steps=1"
-    cli.app([*words(HALF_AS_FAST, FEW, too_soft), "--json"], result_action="return_value")
+    cli.app([*words(HALF_AS_FAST, FEWER_MODES, too_soft), "--json"], result_action="return_value")
     scene, half, small, soft = json.loads(capsys.readouterr().out)
     assert scene["outcome"] == half["outcome"] == "lost"
     assert half["cycles"] == pytest.approx(2 * scene["cycles"], rel=1e-6)
