@@ -96,7 +96,7 @@ class HarmonicBalance:
         memory : zeros by default: the contact is closed without shear, and a pair that never slips keeps the shear that
             the loads put on it
         previous : a balance whose cached linear side is reused if it matches but for the amplitudes of the loads
-        Raises  ValueError where joints, loads or frequency do not fit the model
+        Raises  Refusal where joints, loads or frequency do not fit the model
         """
         if not 0 < omega_max < np.inf:
             raise Refusal(f"the highest frequency is {omega_max} rad/s: give a finite one above zero")
@@ -163,7 +163,7 @@ class HarmonicBalance:
         return replace(self, basis=replace(self.basis, n_samples=n_samples, transitions=transitions))
 
     def with_harmonics(self, harmonics: tuple[int, ...]) -> HarmonicBalance:
-        """The same problem with fewer of its harmonics; raises ValueError for unknown ones and ones a load needs."""
+        """The same problem with fewer of its harmonics; raises Refusal for unknown ones and ones a load needs."""
         lacking = [h for h in harmonics if h not in self.basis.harmonics]
         if lacking:
             raise Refusal(f"harmonics {lacking} are not among those of the balance, {self.basis.harmonics}")

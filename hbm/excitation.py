@@ -33,7 +33,7 @@ class Excitation:
         return cls(loads)
 
     def check(self, basis: HarmonicBasis, names: Mapping[str, object]) -> None:
-        """Raise ValueError where a load is unknown or no finite number, or its harmonic is not kept."""
+        """Raise Refusal where a load is unknown or no finite number, or its harmonic is not kept."""
         if self.base is not None and not np.all(np.isfinite(self.base)):
             raise Refusal("the prescribed motion of body 2 must be finite")
         for (h, name), value in self.loads.items():

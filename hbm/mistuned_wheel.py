@@ -100,7 +100,7 @@ class MistunedWheel:
     def balance(self, deviation: np.ndarray, change: Change | None = None) -> HarmonicBalance:
         """The wheel with relative deviations (N,) of stiffness, and contacts that are the sector's or changed ones.
 
-        Raises  ValueError for deviations that cannot be
+        Raises  Refusal for deviations that cannot be
         """
         sector_balance = self.wave
         # to a balance it is what a ContactCompliance is; what needs matrices of a harmonic is refused by the model

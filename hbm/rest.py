@@ -24,7 +24,7 @@ EXACT = 1e-11  # relative residual of the state at rest
 def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None = None) -> np.ndarray:
     """Static displacement x (n_pair, n_component) [m] under the static loads alone, friction off.
 
-    Raises  ValueError where the contact does not settle
+    Raises  Refusal where the contact does not settle
     """
     if not balance.basis.has_static:
         raise Refusal("a preload without friction needs harmonic 0: keep it in harmonics.kept")

@@ -32,7 +32,7 @@ def looks_like(lines: list[str]) -> bool:
 def read(path: Path) -> tuple[sp.csr_matrix, Labels | None]:
     """Read a matrix and the labels of its rows (None in the layout without labels).
 
-    A single triangle is mirrored. Raises ValueError where lines are not numbers or indices not whole.
+    A single triangle is mirrored. raises Refusal where lines are not numbers or indices not whole.
     """
     text = path.read_text(encoding="ascii", errors="replace").replace(",", " ")
     rows = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("*")]

@@ -110,7 +110,7 @@ def fixed_interface_modes(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Modes with the masters held: omega (k,) [rad/s], phi (n_slave, k), and the first omega left out (inf for none).
 
-    Raises  ValueError where not exactly one of n_modes, cutoff is given, more modes are asked than there are, or the
+    Raises  Refusal where not exactly one of n_modes, cutoff is given, more modes are asked than there are, or the
         cutoff is beyond what the mesh resolves, more modes than half of the slaves, or has too many modes. How
         many there will be is foretold as for a bar in bending, whose number of modes rises as the root of frequency;
         elsewhere it rises faster, and they are counted where there would be too many if it rose as that of a plate, as

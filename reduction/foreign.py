@@ -210,7 +210,7 @@ def from_arrays(mass: Any, stiffness: Any, damping: Any = None, labels: Labels |
 
     mass, stiffness, damping : (n, n) symmetric [kg], [N/m], [N s/m]; damping None or zero where there is none, and a
         stiffness of zero for what its contacts alone hold
-    Raises  ValueError: not square, not symmetric, not finite, sizes that differ
+    Raises  Refusal: not square, not symmetric, not finite, sizes that differ
     """
     inputs = {"mass": mass, "stiffness": stiffness, "damping": damping}
     matrices = {part: matrix_files.real(value, f"{part} matrix") for part, value in inputs.items() if value is not None}
@@ -235,7 +235,7 @@ def read_matrices(
     mapping : ANSYS .mapping file that labels the rows
     names : other variable names, such as {"mass": "Mred"}
     scale : factor on all matrices to reach SI; 1e3 for N-mm-t-s (rotations then count in units of 1000 rad)
-    Raises  ValueError: not square, not symmetric, sizes that differ, a missing file or variable
+    Raises  Refusal: not square, not symmetric, sizes that differ, a missing file or variable
     """
     unknown = sorted(set(names or {}) - set(NAMES))
     if unknown:

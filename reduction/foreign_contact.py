@@ -20,7 +20,7 @@ def interface_of_rows(
     gap: float | np.ndarray,
     points: np.ndarray | None,
 ) -> ContactInterface:
-    """The interface of rows (n_pair * n_component, n_dof); raises ValueError for an empty row and for bad areas."""
+    """The interface of rows (n_pair * n_component, n_dof); raises Refusal for an empty row and for bad areas."""
     n_pair = len(frames)
     motion.eliminate_zeros()
     if (np.diff(motion.indptr) == 0).any():

@@ -26,7 +26,7 @@ def looks_like(lines: list[str]) -> bool:
 def read(path: Path) -> sp.csr_matrix:
     """Read an assembled real matrix; symmetric storage (RSA) is mirrored.
 
-    Raises  ValueError: complex, pattern or unassembled matrices, a truncated file
+    Raises  Refusal: complex, pattern or unassembled matrices, a truncated file
     Source  Duff, Grimes and Lewis, Users' guide for the Harwell-Boeing sparse matrix collection, 1992
     """
     lines = path.read_text(encoding="ascii", errors="replace").splitlines()
@@ -75,7 +75,7 @@ def read_mapping(path: Path) -> tuple[tuple[int, int], ...]:
     """(node, component 1..6) of each equation, from the .mapping file that HBMAT writes on request.
 
     A list of one's own in its form, equation, node and component (UX or 1), is taken too.
-    Raises  ValueError: no such file, no mapping file
+    Raises  Refusal: no such file, no mapping file
     """
     if not path.is_file():
         raise Refusal(f"there is no mapping file {path}: check the name and the folder")

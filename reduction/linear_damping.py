@@ -17,7 +17,7 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
 
     C = M Phi diag(2 zeta omega) Phi^H M over all modes of the dense system without contact
     Returns C (n, n) [N s/m]
-    Raises  ValueError for a ratio below 0
+    Raises  Refusal for a ratio below 0
     """
     if not ratio >= 0:
         raise Refusal(f"damping: ratio = {ratio}: give a part of critical damping of 0 or more, such as 0.01")
@@ -45,7 +45,7 @@ def modal_damping_towards(system: SecondOrderSystem, ratio: float) -> Callable[[
 def rayleigh(system: SecondOrderSystem, alpha: float, beta: float) -> np.ndarray:
     """C = alpha M + beta K (n, n) [N s/m]; alpha [1/s], beta [s].
 
-    Raises  ValueError for a negative coefficient
+    Raises  Refusal for a negative coefficient
     """
     if not (alpha >= 0 and beta >= 0):
         raise Refusal(f"damping: alpha = {alpha} and beta = {beta} must not be negative")
@@ -57,7 +57,7 @@ def rayleigh_of_ratios(
 ) -> tuple[float, float]:
     """alpha [1/s] and beta [s] that give two modes of a system their damping ratios, zeta = alpha / 2 w + beta w / 2.
 
-    Raises  ValueError where there are no such modes, one does not vibrate, or a coefficient would be negative
+    Raises  Refusal where there are no such modes, one does not vibrate, or a coefficient would be negative
     """
     if max(modes) >= len(system.mass):
         raise Refusal(f"damping.modes: there is no mode {max(modes)}, the system has {len(system.mass)}")

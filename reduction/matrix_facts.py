@@ -67,7 +67,7 @@ def matrix_facts(stiffness: sp.csr_matrix, mass_matrix: sp.csr_matrix, labels: L
 
 
 def symmetric(matrix: sp.csr_matrix, name: str, rounding: float = 1e-8, zero: bool = False) -> sp.csr_matrix:
-    """The matrix, made exactly symmetric, or a ValueError that shows the worst entry.
+    """The matrix, made exactly symmetric, or a Refusal that shows the worst entry.
 
     rounding : largest asymmetry, over the largest entry, that is rounding of the file
     """

@@ -48,7 +48,7 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
     path : .npz (numpy or scipy.sparse), .mat (also version 7.3), Nastran .op4 or DMIG, Matrix Market, Harwell-Boeing,
         Abaqus text
     variable : its name in a container
-    Raises  ValueError: no such file or variable, an unknown format, complex or non-finite entries
+    Raises  Refusal: no such file or variable, an unknown format, complex or non-finite entries
     """
     suffixes = variables(path)
     labels = None
@@ -71,7 +71,7 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
 
 
 def read_array(path: Path, variable: str) -> np.ndarray:
-    """A named array of real numbers, such as a list of DOFs, out of a container; raises ValueError."""
+    """A named array of real numbers, such as a list of DOFs, out of a container; raises Refusal."""
     suffixes = variables(path)
     if variable not in suffixes:
         raise Refusal(f"{path.name} has no variable '{variable}': it holds {', '.join(suffixes) or 'one matrix alone'}")
@@ -146,7 +146,7 @@ def _from_text(path: Path) -> tuple[Any, Labels | None]:
 def _from_matrix_market(path: Path) -> Any:
     """A Matrix Market file by scipy's reader, which takes 1.0D3 for 1.0: no such number, no other count than announced.
 
-    Raises  ValueError: complex or pattern matrices, a file that is not what it announces
+    Raises  Refusal: complex or pattern matrices, a file that is not what it announces
     Source  Boisvert, Pozo and Remington, The Matrix Market exchange formats, NISTIR 5935, 1996
     """
     try:

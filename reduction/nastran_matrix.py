@@ -28,7 +28,7 @@ Matrix = tuple[str, tuple[int, int], int, Iterator[Column]]
 def read_op4(path: Path) -> dict[str, sp.csr_matrix]:
     """All matrices of an OUTPUT4 file by name, real or complex, in the order of the file.
 
-    Raises  ValueError for a file that is not one, or ends early
+    Raises  Refusal for a file that is not one, or ends early
     Source  MSC Nastran, DMAP Programmer's Guide, module OUTPUT4, remarks on the formats of its files
     """
     data = path.read_bytes()
@@ -147,7 +147,7 @@ def _string(first: int, row: int | None = None) -> tuple[int, int]:
 def write_op4(path: Path, matrices: Mapping[str, np.ndarray]) -> None:
     """Write dense matrices (m, n), real or complex, as a binary OUTPUT4 file in double precision, bit for bit.
 
-    Raises  ValueError for a name that Nastran does not take
+    Raises  Refusal for a name that Nastran does not take
     """
     with path.open("wb") as file:
 
@@ -179,7 +179,7 @@ def holds_dmig(path: Path) -> bool:
 def read_dmig(path: Path) -> dict[str, Callable[[], tuple[sp.csr_matrix, Labels]]]:
     """The matrices of DMIG entries by name, each with what reads it: matrix and (grid, component) of its rows.
 
-    Raises  ValueError: an entry that contradicts itself; what reads one also for rectangular and complex matrices
+    Raises  Refusal: an entry that contradicts itself; what reads one also for rectangular and complex matrices
     Source  MSC Nastran, Quick Reference Guide, bulk data entry DMIG
     """
     heads: dict[str, list[str]] = {}

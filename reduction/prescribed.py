@@ -148,7 +148,7 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     rows : (k, n_full), such as `Part.held_rows`; none leaves the model as it is
     Returns the model in coordinates p, q = N p with N an orthonormal basis of what is allowed; they are no longer the
         displacements of single DOFs, but the contact map, loads, outputs and the way back know that
-    Raises  ValueError for a model without a full field, or one whose harmonics see different systems
+    Raises  Refusal for a model without a full field, or one whose harmonics see different systems
     """
     if len(rows) == 0:
         return model

@@ -26,7 +26,7 @@ def relative(
     system : sparse, n DOFs; interface : all three components, B over the same DOFs
     Returns the system and interface in the new coordinates, and T (n, n) with q = T q_new; feed the reduced basis
         through T to get back to the full field
-    Raises  ValueError where a component is missing, or where a body-1 DOF is held or shared by two pairs
+    Raises  Refusal where a component is missing, or where a body-1 DOF is held or shared by two pairs
     """
     if interface.components != COMPONENTS:
         raise Refusal(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
@@ -50,7 +50,7 @@ def relative(
 def body_1_dofs(interface: ContactInterface) -> np.ndarray:
     """DOFs (n_pair, 3) of the body-1 nodes along x, y, z: the columns of B that hold the frames themselves.
 
-    Raises  ValueError where one is not among the DOFs of the system
+    Raises  Refusal where one is not among the DOFs of the system
     """
     interface = interface.nodes or interface
     n_pair = interface.n_pair

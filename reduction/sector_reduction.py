@@ -119,7 +119,7 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     x : (n_c,) relative displacement of neighbours; y : accessories, then the rest. With S the seam map, a = exp(i phi),
     B_r, B_l the halves of the contact behind S and N a basis of what moves no right face,
     q = S (B_r^H (x + a B_l N y) + N y), so that B_r z - a B_l z = x whatever y is
-    Raises  ValueError where a right contact face is not made of masters, or shares nodes with a left one or a seam
+    Raises  Refusal where a right contact face is not made of masters, or shares nodes with a left one or a seam
     """
     S = seam_map(sector, index)
     right, left_rows = sector.interface.B @ S, sector.left_map @ S

@@ -146,15 +146,15 @@ def test_every_node_moves_as_on_the_dense_wheel(reduced):
     flat = current.cycle.force.reshape(current.flat.shape)
     K = np.asarray(reduced.sector.system.stiffness)
     made_of = nominal_modes.with_ports(reduced, K, nominal_modes.orthonormal(K, np.eye(len(K)), 1e-13))
-    found = wheel.full_displacement(made_of, ours, current.flat, flat, current.omega)
+    result = wheel.full_displacement(made_of, ours, current.flat, flat, current.omega)
     state = refined.state
     q = recovery.coordinates(dense, state.flat, state.cycle.force.reshape(state.flat.shape), state.omega)
     maps = sector_maps(reduced.sector)
     basis = reduced.origin.basis
     expected = np.stack([BASIS.to_real(np.stack([basis @ (P @ amplitude) for amplitude in q], axis=-1)) for P in maps])
-    assert found.shape == expected.shape
+    assert result.shape == expected.shape
     for part in (slice(0, 1), slice(1, None)):
-        assert apart(found[..., part], expected[..., part]) < 1e-6
+        assert apart(result[..., part], expected[..., part]) < 1e-6
 
 
 def test_sectors_alike_are_the_wave(reduced):

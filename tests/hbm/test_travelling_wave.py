@@ -33,7 +33,7 @@ def solved(balance, frequency):
 
 
 @pytest.mark.parametrize(
-    ("disk_radius", "engine_order", "frequency", "seen"),
+    ("disk_radius", "engine_order", "frequency", "observed"),
     [
         (0.0, 3, 310.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),
         (0.0, 2, 250.0, {STICKS | SLIPS}),  # harmonic 2 is index 4, real; harmonic 3 is index -2
@@ -42,12 +42,12 @@ def solved(balance, frequency):
         (0.02, 0, 250.0, None),  # everything in phase: every harmonic sees one real system
     ],
 )
-def test_one_sector_is_the_whole_wheel(sectors, disk_radius, engine_order, frequency, seen):
+def test_one_sector_is_the_whole_wheel(sectors, disk_radius, engine_order, frequency, observed):
     """Item 2 of the issue: to 1e-6, in every sector, displacement, force and output."""
     item, wheel = small.wave_and_wheel(sectors[disk_radius], engine_order)
     mine, theirs = solved(item, frequency), solved(wheel, frequency)
-    if seen is not None:
-        assert set(mine.cycle.status) >= seen
+    if observed is not None:
+        assert set(mine.cycle.status) >= observed
     output, outputs = item.outputs(mine), wheel.outputs(theirs)
     names = list(wheel.compliance.output_names)
     for n in range(small.N):

@@ -88,11 +88,11 @@ def turning(tmp_path_factory):
     return reduce_sector(replace(sector, system=replace(sector.system, gyroscopic=gyroscopic)), n_modes=10)
 
 
-def tips(one, wheel, outputs, everywhere, order):
+def tips(sector, wheel, outputs, everywhere, order):
     """What the wave says of the tip of every sector, and what the whole wheel does."""
     names = list(wheel.compliance.output_names)
-    tip = outputs[list(one.compliance.output_names).index("tip")]
-    expected = np.array([waves.at_sector(one.basis, tip, order, small.N, n) for n in range(small.N)])
+    tip = outputs[list(sector.compliance.output_names).index("tip")]
+    expected = np.array([waves.at_sector(sector.basis, tip, order, small.N, n) for n in range(small.N)])
     return expected, everywhere[[names.index(f"tip@{n}") for n in range(small.N)]]
 
 

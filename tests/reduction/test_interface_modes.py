@@ -46,9 +46,9 @@ def test_all_modes_lose_nothing(full: ReducedModel, n_keep: int) -> None:
         ours, theirs = (linear_modes(model, stiffness, 20)[0] for model in (reduced, full))
         assert ours == pytest.approx(theirs, rel=1e-7)
     load = np.linalg.solve(full.system.stiffness, full.system.loads["point"])
-    moved = np.linalg.solve(reduced.system.stiffness, reduced.system.loads["point"])
-    assert reduced.interface.B @ moved == pytest.approx(full.interface.B @ load, rel=1e-7, abs=1e-16)
-    assert reduced.reconstruct(moved) == pytest.approx(full.reconstruct(load), rel=1e-6, abs=1e-16)
+    displacement = np.linalg.solve(reduced.system.stiffness, reduced.system.loads["point"])
+    assert reduced.interface.B @ displacement == pytest.approx(full.interface.B @ load, rel=1e-7, abs=1e-16)
+    assert reduced.reconstruct(displacement) == pytest.approx(full.reconstruct(load), rel=1e-6, abs=1e-16)
 
 
 def test_frequencies_converge_from_above(full: ReducedModel) -> None:
@@ -69,8 +69,8 @@ def test_a_force_on_kept_dofs_moves_them_as_before(full: ReducedModel) -> None:
     reduced = interface_modes(full, 4, full.origin.masters[places])
     for mine, theirs in enumerate(places):
         exact = np.linalg.solve(full.system.stiffness, np.eye(full.system.n_dof)[theirs])[places]
-        found = np.linalg.solve(reduced.system.stiffness, np.eye(reduced.system.n_dof)[mine])[:2]
-        assert found == pytest.approx(exact, rel=1e-7)
+        result = np.linalg.solve(reduced.system.stiffness, np.eye(reduced.system.n_dof)[mine])[:2]
+        assert result == pytest.approx(exact, rel=1e-7)
 
 
 def test_kept_dofs_are_displacements(full: ReducedModel) -> None:
@@ -88,32 +88,32 @@ def test_a_displacement_can_be_prescribed_after_the_interface_is_reduced() -> No
     """Harmonic 0 and harmonic 1 of a contact on springs, and the reaction at the height: as without the reduction."""
     part = make(nx=4)
     loose = np.flatnonzero(np.asarray(abs(part.interface.B).sum(axis=0)).ravel() == 0)
-    held = loose[[5, 50, 51]]
-    full = craig_bampton(part.system, part.interface, 8, None, held)
-    n_contact = len(full.origin.masters) - len(held)
+    prescribed_dofs = loose[[5, 50, 51]]
+    full = craig_bampton(part.system, part.interface, 8, None, prescribed_dofs)
+    n_contact = len(full.origin.masters) - len(prescribed_dofs)
     springs = np.ravel(part.interface.stiffness(470e6, 583e6))
 
     def answers(model: ReducedModel) -> tuple[np.ndarray, ...]:
-        places = np.searchsorted(model.origin.masters, held)
-        made = prescribe(model, places, "height")
-        reaction = made.reaction
-        moved = []
+        places = np.searchsorted(model.origin.masters, prescribed_dofs)
+        prescribed = prescribe(model, places, "height")
+        reaction = prescribed.reaction
+        displacements = []
         for h, load in ((0, "height"), (1, "point")):
-            system, B = made.at_harmonic(h)
+            system, B = prescribed.at_harmonic(h)
             K = system.stiffness + B.T @ (springs[:, None] * B) - h * (2 * np.pi * 300) ** 2 * system.mass
-            moved.append(B @ np.linalg.solve(K, system.loads[load]))
-        force = (springs * moved[0]).reshape(part.interface.n_pair, -1)
-        return *moved, reaction.force(1.0, force)
+            displacements.append(B @ np.linalg.solve(K, system.loads[load]))
+        force = (springs * displacements[0]).reshape(part.interface.n_pair, -1)
+        return *displacements, reaction.force(1.0, force)
 
     exact = answers(full)
     for n, within in ((6, 0.05), (n_contact // 2, 0.02), (n_contact, 1e-6)):
-        reduced = interface_modes(full, n, held, separate=held)
-        assert not np.asarray(reduced.interface.B)[:, : len(held)].any()
+        reduced = interface_modes(full, n, prescribed_dofs, separate=prescribed_dofs)
+        assert not np.asarray(reduced.interface.B)[:, : len(prescribed_dofs)].any()
         for ours, theirs in zip(answers(reduced), exact, strict=True):
             assert np.linalg.norm(ours - theirs) < within * np.linalg.norm(theirs)
     assert reduced.system.n_dof == full.system.n_dof  # with all modes the static shapes are nothing new
     with pytest.raises(ValueError, match="acts on contact nodes"):
-        prescribe(interface_modes(full, 6, held), np.arange(3), "height")
+        prescribe(interface_modes(full, 6, prescribed_dofs), np.arange(3), "height")
 
 
 def test_what_cannot_be_is_refused(full: ReducedModel) -> None:
@@ -144,13 +144,13 @@ def test_a_scene_reduces_its_interface(tmp_path: Path) -> None:
     n_contact = 27
     errors = {}
     for n in (3, 12, n_contact):
-        reduced, found = peak(tmp_path, f"reduction.interface_modes={n}")
+        reduced, result = peak(tmp_path, f"reduction.interface_modes={n}")
         assert reduced.system.n_dof == full.system.n_dof - n_contact + n
-        errors[n] = np.abs(found / reference - 1).max()
+        errors[n] = np.abs(result / reference - 1).max()
     assert errors[n_contact] < 1e-4 < errors[3]
     assert errors[12] < 0.02
-    scc, found = peak(tmp_path, "reduction.interface_modes=20", "reduction.interface_keep=[]")
+    scc, result = peak(tmp_path, "reduction.interface_modes=20", "reduction.interface_keep=[]")
     assert scc.system.n_dof == 20 + 8
-    assert np.abs(found / reference - 1).max() < 0.05
+    assert np.abs(result / reference - 1).max() < 0.05
     with pytest.raises(ValueError, match="shakers"):
         peak(tmp_path, "reduction.interface_modes=3", 'reduction.interface_keep=["shakers"]')

@@ -84,8 +84,8 @@ def test_contact_forces_are_those_of_the_full_model(beam, harder: float, modes: 
     target = theirs.state.cycle.force
     limit = FORCES if harder == 1.0 else 10 * reduced_balance.compliance.error
     assert np.abs(ours.state.cycle.force - target).max() < limit * np.abs(target).max()
-    found, expected = reduced_balance.outputs(ours.state), full_balance.outputs(theirs.state)
-    assert np.abs(found - expected).max() < limit * np.abs(expected).max()
+    forces, expected = reduced_balance.outputs(ours.state), full_balance.outputs(theirs.state)
+    assert np.abs(forces - expected).max() < limit * np.abs(expected).max()
     slope = [b.frequency_slope(s.state) for b, s in ((reduced_balance, ours), (full_balance, theirs))]
     for mine, other in zip(*slope, strict=True):
         assert np.abs(mine - other).max() < 100 * limit * np.abs(other).max()
@@ -101,20 +101,25 @@ def test_statics_are_exact_and_what_is_left_out_is_told(beam) -> None:
     """K_s^-1 between contacts, from a dense solve; the share left out is the largest eigenvalue of what the rest is."""
     _, part, springs = beam
     model = residual_flexibility(part.system, part.interface, springs, 8, clusters=3)
-    rest, B = model.residual, part.interface.B.toarray()
-    assert rest is not None
+    flexibility, B = model.residual, part.interface.B.toarray()
+    assert flexibility is not None
     K_s = part.system.stiffness.toarray() + B.T @ (springs.ravel()[:, None] * B)
     exact = B @ np.linalg.solve(K_s, B.T)
-    result = rest.apply(np.eye(len(B))) + rest.at_contact @ (rest.at_contact.T / rest.squares[:, None])
+    result = flexibility.apply(np.eye(len(B))) + flexibility.at_contact @ (
+        flexibility.at_contact.T / flexibility.squares[:, None]
+    )
     assert np.abs(result - exact).max() < 1e-10 * np.abs(exact).max()
     root = np.sqrt(springs.ravel())
-    remaining = exact - rest.at_contact @ (rest.at_contact.T / rest.squares[:, None])
-    assert rest.left_out == pytest.approx(np.linalg.eigvalsh(root[:, None] * remaining * root)[-1], rel=1e-3)
+    remaining = exact - flexibility.at_contact @ (flexibility.at_contact.T / flexibility.squares[:, None])
+    assert flexibility.left_out == pytest.approx(np.linalg.eigvalsh(root[:, None] * remaining * root)[-1], rel=1e-3)
     # loads and outputs have no rest at all
     force = np.stack([*part.system.loads.values(), *part.system.outputs.values()], axis=1)
     modal = np.stack([*model.system.loads.values(), *model.system.outputs.values()], axis=1)
     shifted = np.linalg.solve(K_s, force)
-    assert np.abs(rest.shapes @ (modal / rest.squares[:, None]) - shifted).max() < 1e-8 * np.abs(shifted).max()
+    assert (
+        np.abs(flexibility.shapes @ (modal / flexibility.squares[:, None]) - shifted).max()
+        < 1e-8 * np.abs(shifted).max()
+    )
 
 
 def test_the_error_is_that_of_the_mass_left_out(beam) -> None:
@@ -122,35 +127,39 @@ def test_the_error_is_that_of_the_mass_left_out(beam) -> None:
     omega = 2 * np.pi * 3000.0
     for modes, clusters in ((6, 1), (20, 4)):
         model = residual_flexibility(part.system, part.interface, springs, modes, clusters=clusters)
-        rest, B = model.residual, part.interface.B.toarray()
-        assert rest is not None
+        flexibility, B = model.residual, part.interface.B.toarray()
+        assert flexibility is not None
         K_s = part.system.stiffness.toarray() + B.T @ (springs.ravel()[:, None] * B)
         exact = B @ np.linalg.solve(K_s - omega**2 * part.system.mass.toarray(), B.T)
-        modal = rest.at_contact @ (rest.at_contact.T / (rest.squares - omega**2)[:, None])
+        modal = flexibility.at_contact @ (flexibility.at_contact.T / (flexibility.squares - omega**2)[:, None])
         root = np.sqrt(springs.ravel())
         force = root[:, None] * np.random.default_rng(1).normal(size=(75, 8))
-        off = (exact - modal - rest.apply(np.eye(len(B)))) @ force
+        off = (exact - modal - flexibility.apply(np.eye(len(B)))) @ force
         size = np.linalg.norm(off) / np.linalg.norm(exact @ force)
-        assert 0.2 * size < rest.error(omega) < 20 * size
+        assert 0.2 * size < flexibility.error(omega) < 20 * size
 
 
 def test_what_a_solve_does_not_ask_for_is_below_its_tolerance(beam, monkeypatch: pytest.MonkeyPatch) -> None:
     """A solve ends on a bound of the residual flexibility; its state has the residual wanted with all of it, too."""
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
-    rest, requested = balance.model.residual, []
-    assert rest is not None
-    assert rest.left_out <= NEARLY_ALL
+    flexibility, requested = balance.model.residual, []
+    assert flexibility is not None
+    assert flexibility.left_out <= NEARLY_ALL
     force = np.random.default_rng(0).normal(size=(75, 4)) * np.sqrt(springs.ravel())[:, None]
-    shifted, x = rest.apply(force), np.random.default_rng(1).normal(size=(75, 4))
+    shifted, x = flexibility.apply(force), np.random.default_rng(1).normal(size=(75, 4))
     root = np.sqrt(springs.ravel())[:, None]
     share = np.linalg.norm(root * shifted) / np.linalg.norm(root * x)
-    assert 0.1 * rest.at_most(rest.lacking(force), x) < share < rest.at_most(rest.lacking(force), x)
+    assert (
+        0.1 * flexibility.at_most(flexibility.lacking(force), x)
+        < share
+        < flexibility.at_most(flexibility.lacking(force), x)
+    )
     one_row = np.eye(75)[:, :1]
-    loose = replace(rest, stiffness=springs.ravel() * (1 - one_row[:, 0]))
+    loose = replace(flexibility, stiffness=springs.ravel() * (1 - one_row[:, 0]))
     assert loose.at_most(loose.lacking(one_row), x[:, :1]) == np.inf
-    plain = type(rest).apply
-    monkeypatch.setattr(type(rest), "apply", lambda self, f: (requested.append(1), plain(self, f))[1])
+    plain = type(flexibility).apply
+    monkeypatch.setattr(type(flexibility), "apply", lambda self, f: (requested.append(1), plain(self, f))[1])
     start = newton.solve_from_rest(balance, OMEGA, NewtonOptions(tolerance=1e-8)).state.x
     bounded, path = 0, parameter.of(balance).make(OMEGA)
     for omega in OMEGA * np.linspace(1.0, 1.005, 6):
@@ -170,46 +179,46 @@ def test_what_was_asked_for_is_known_of_all_that_adds_up_to_it(beam, monkeypatch
     """Columns share one R, whichever harmonic they belong to; of another force the nearest sum is known."""
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
-    rest, rng = balance.model.residual, np.random.default_rng(0)
-    assert rest is not None
-    left_out = rest.left_out
+    flexibility, rng = balance.model.residual, np.random.default_rng(0)
+    assert flexibility is not None
+    left_out = flexibility.left_out
     solved: list[int] = []
-    plain = type(rest).apply
-    monkeypatch.setattr(type(rest), "apply", lambda self, f: (solved.append(f.shape[1]), plain(self, f))[1])
+    plain = type(flexibility).apply
+    monkeypatch.setattr(type(flexibility), "apply", lambda self, f: (solved.append(f.shape[1]), plain(self, f))[1])
     root = np.sqrt(springs.ravel())[:, None]
     first, other = (root * rng.normal(size=(75, n)) for n in (5, 3))
     requested: list[np.ndarray] = []
-    lacking, still = rest.lacking(first, requested), rest.recalled(first, requested)
+    lacking, still = flexibility.lacking(first, requested), flexibility.recalled(first, requested)
     assert np.array_equal(lacking, first / root)
     assert not still.any()
-    rest.ask(first, requested, 0.0)
-    shifted, exact = rest.recalled(first, requested), plain(rest, first)
+    flexibility.ask(first, requested, 0.0)
+    shifted, exact = flexibility.recalled(first, requested), plain(flexibility, first)
     assert np.abs(shifted - exact).max() < 1e-12 * np.abs(exact).max()
     for force in (first @ rng.normal(size=(5, 2)), other):
-        lacking, shifted = rest.lacking(force, requested), rest.recalled(force, requested)
+        lacking, shifted = flexibility.lacking(force, requested), flexibility.recalled(force, requested)
         nearby = force - root * lacking
-        exact = plain(rest, nearby)
+        exact = plain(flexibility, nearby)
         assert np.abs(shifted - exact).max() < 1e-12 * np.abs(exact).max()
         assert np.abs((first / root).T @ lacking).max() < 1e-10 * np.abs(force / root).max()
     assert np.abs(lacking).max() > 0.1 * np.abs(force / root).max()
     # of forces nearly known only the direction that matters is solved for, and the bound tells what is left
     small = first + root * (1e-4 * rng.normal(size=(75, 1)) @ rng.normal(size=(1, 5)) + 1e-8 * rng.normal(size=(75, 5)))
     solved.clear()
-    rest.ask(small, requested, 1e-6)
-    lacking, shifted = rest.lacking(small, requested), rest.recalled(small, requested)
+    flexibility.ask(small, requested, 1e-6)
+    lacking, shifted = flexibility.lacking(small, requested), flexibility.recalled(small, requested)
     assert solved == [1]
     assert 1e-8 < np.linalg.norm(lacking) < 1e-6
-    off = root * (shifted - plain(rest, small))
+    off = root * (shifted - plain(flexibility, small))
     assert np.linalg.norm(off) < left_out * np.linalg.norm(lacking)
-    rest.ask(small, requested, 1e-6)
+    flexibility.ask(small, requested, 1e-6)
     assert solved == [1]
     for size in np.logspace(-2, -8, 12):  # however near the forces are, columns stay orthonormal and the first go
         latest = first + size * root * rng.normal(size=(75, 5))
-        rest.ask(latest, requested, 0.0)
+        flexibility.ask(latest, requested, 0.0)
         basis, shifted = requested[0]
         assert np.abs(basis.T @ basis - np.eye(basis.shape[1])).max() < 1e-12
-        assert np.abs(rest.lacking(latest, requested)).max() < 1e-12 * np.abs(latest / root).max()
-        exact = plain(rest, root * basis)
+        assert np.abs(flexibility.lacking(latest, requested)).max() < 1e-12 * np.abs(latest / root).max()
+        exact = plain(flexibility, root * basis)
         assert np.abs(shifted - exact).max() < 1e-11 * np.abs(exact).max()
     assert basis.shape == (75, 5 * LIMITS.recalled)
 
@@ -218,11 +227,11 @@ def test_directions_know_what_is_recalled(beam) -> None:
     """The Jacobian of a balance with what is known of the residual flexibility, against differences."""
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
-    rest, requested = balance.model.residual, list[np.ndarray]()
-    assert rest is not None
+    flexibility, requested = balance.model.residual, list[np.ndarray]()
+    assert flexibility is not None
     state = newton.solve_from_rest(balance, OMEGA).state
-    rest.ask(state.g, requested, 0.0)
-    nearby = replace(balance, remainder=lambda g: rest.recalled(g, requested))
+    flexibility.ask(state.g, requested, 0.0)
+    nearby = replace(balance, remainder=lambda g: flexibility.recalled(g, requested))
     path = np.random.default_rng(0).normal(size=state.x.shape) * np.abs(state.x).max()
     high, low = (nearby.evaluate(OMEGA, state.x + h * path) for h in (1e-6, -1e-6))
     expected = (high.residual - low.residual) / 2e-6
@@ -267,11 +276,11 @@ def test_clusters_share_out_all_pairs(beam) -> None:
 
 def test_a_copy_in_another_process_makes_its_own_factor(beam) -> None:
     _, part, springs = beam
-    rest = residual_flexibility(part.system, part.interface, springs, 4, clusters=2).residual
+    flexibility = residual_flexibility(part.system, part.interface, springs, 4, clusters=2).residual
     force = np.random.default_rng(0).normal(size=(75, 2))
-    record = pickle.loads(pickle.dumps(rest))
-    assert rest is not None
-    assert np.allclose(record.apply(force), rest.apply(force), rtol=1e-10, atol=0)
+    record = pickle.loads(pickle.dumps(flexibility))
+    assert flexibility is not None
+    assert np.allclose(record.apply(force), flexibility.apply(force), rtol=1e-10, atol=0)
 
 
 def test_a_scene_with_thousands_of_pairs_does_without_masters(beam) -> None:

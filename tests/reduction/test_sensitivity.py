@@ -64,9 +64,13 @@ def test_the_reduced_model_follows_as_one_that_is_reduced_anew(key: str) -> None
     assert np.abs(fixed - repeated).max() > 1e-3 * np.abs(repeated).max()  # shapes that stay would not do
 
 
-def _less(new: SecondOrderSystem, old: SecondOrderSystem) -> SecondOrderSystem:
-    loads, outputs = ({n: v - getattr(old, k)[n] for n, v in getattr(new, k).items()} for k in ("loads", "outputs"))
-    return SecondOrderSystem(new.mass - old.mass, new.stiffness - old.stiffness, None, loads, outputs)
+def _less(minuend: SecondOrderSystem, subtrahend: SecondOrderSystem) -> SecondOrderSystem:
+    loads, outputs = (
+        {n: v - getattr(subtrahend, k)[n] for n, v in getattr(minuend, k).items()} for k in ("loads", "outputs")
+    )
+    return SecondOrderSystem(
+        minuend.mass - subtrahend.mass, minuend.stiffness - subtrahend.stiffness, None, loads, outputs
+    )
 
 
 def _projected(system: SecondOrderSystem, model):

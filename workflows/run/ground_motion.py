@@ -14,7 +14,7 @@ from tribodyn.workflows.scene.schema import MeshScene
 def ground_motion(scene: MeshScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
     """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
 
-    Raises  ValueError where a face has no contact or a harmonic is not kept
+    Raises  Refusal where a face has no contact or a harmonic is not kept
     """
     if not scene.motion:
         return None

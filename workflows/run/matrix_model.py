@@ -23,7 +23,7 @@ Take = Callable[[Variable], np.ndarray]
 
 
 def read(files: MatrixFiles, folder: Path) -> ForeignMatrices:
-    """The matrices of a scene; names of files begin in `folder`. Raises ValueError for files that cannot be used."""
+    """The matrices of a scene; names of files begin in `folder`. raises Refusal for files that cannot be used."""
     named = {key: folder / name for key in ("mass", "stiffness", "damping", "mapping") if (name := getattr(files, key))}
     path = None if files.file is None else folder / files.file
     return read_matrices(path, **named, names=files.names, scale=files.scale)
@@ -40,7 +40,7 @@ def lines(matrices: ForeignMatrices) -> list[str]:
 def make(scene: MatrixScene, folder: Path) -> ReducedModel:
     """The model of a scene, with the damping of its files.
 
-    Raises  ValueError: files, variables or DOFs that cannot be used
+    Raises  Refusal: files, variables or DOFs that cannot be used
     """
     matrices, contact, response = read(scene.model, folder), scene.contact, scene.response
 

@@ -32,7 +32,7 @@ def peak() -> float:
 
 
 def check(n_dof: int, solver: str, columns: int = 0) -> None:
-    """Raise ValueError where a model of so many DOFs, its modes and shapes (n_dof, columns) do not fit this machine."""
+    """Raise Refusal where a model of so many DOFs, its modes and shapes (n_dof, columns) do not fit this machine."""
     try:
         machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, OSError, ValueError):  # as on Windows

@@ -229,7 +229,7 @@ def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
 
 
 def damped(scene: Scene, reduced: Kind) -> Kind:
-    """The model with the scene's damping; raises ValueError where its files hold another one."""
+    """The model with the scene's damping; raises Refusal where its files hold another one."""
     if reduced.system.damping is None:
         return reduced.with_damping(partial(damping_matrix, scene, joints.contact_stiffness(scene, reduced)))
     if scene.damping.given:
@@ -264,7 +264,7 @@ class Problem:
         return cls(scene, part, reduced, joints_of_scene, bolts)
 
     def balance(self, harmonics: tuple[int, ...], previous: HarmonicBalance | None = None) -> HarmonicBalance:
-        """The balance of some harmonics, see `of`; raises ValueError where harmonic 0 is needed and left out."""
+        """The balance of some harmonics, see `of`; raises Refusal where harmonic 0 is needed and left out."""
         scene, options, gap = self.scene, self.scene.harmonics, self.reduced.interface.gap
         auto = options.transitions == "auto"
         basis = HarmonicBasis(

@@ -42,7 +42,7 @@ SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its 
 def sector(scene: MeshScene, part: Part) -> Sector:
     """The full sector of the scene's wheel, vibrating about its equilibrium where it spins.
 
-    Raises  ValueError where its faces do not match those of its neighbours, or where the disk is left cut open
+    Raises  Refusal where its faces do not match those of its neighbours, or where the disk is left cut open
     """
     wheel = scene.wheel
     assert wheel is not None
@@ -63,7 +63,7 @@ def sector(scene: MeshScene, part: Part) -> Sector:
 
 
 def check_sectors(scene: MeshScene) -> None:
-    """Raise ValueError where a part of the scene is made for another number of sectors than its wheel has."""
+    """Raise Refusal where a part of the scene is made for another number of sectors than its wheel has."""
     if scene.wheel is None:
         return
     tables = [table.parameters for table in (*scene.bodies.values(), scene.geometry) if table is not None]
@@ -76,7 +76,7 @@ def check_sectors(scene: MeshScene) -> None:
 def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
     """A full sector on its contact, seam and load nodes and a few modes: what serves every engine order.
 
-    Raises  ValueError where it cannot stand, by itself or at its speed
+    Raises  Refusal where it cannot stand, by itself or at its speed
     """
     assert scene.wheel is not None
     speed = scene.wheel.speed
@@ -102,7 +102,7 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
 
     The sector is reduced at speeds that halve the intervals of their squares until the frequencies which the others
     foretell at the newest one are right to `LIMITS.speed_spacing_error`, at most seven of them
-    Raises  ValueError where it cannot stand at one of them
+    Raises  Refusal where it cannot stand at one of them
     """
     wheel = scene.wheel
     assert wheel is not None
@@ -147,7 +147,7 @@ def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
 
     The stress is that of the static loads with the contact as it settles under it: closed, slipped or open, pair by
     pair
-    Raises  ValueError where the contact does not settle or a body can move rigidly, StaticDivergence where the sector
+    Raises  Refusal where the contact does not settle or a body can move rigidly, StaticDivergence where the sector
         has no equilibrium, turns far in it, or is unstable in it with its contacts stuck
     """
     wheel = scene.wheel
@@ -233,7 +233,7 @@ def static_loads(scene: MeshScene) -> dict[str, float]:
 def temperature(scene: MeshScene, part: Part) -> np.ndarray | None:
     """Change of temperature (n_node,) [K] by the static loads of the scene; None where none heats.
 
-    Raises  ValueError for a field from a file
+    Raises  Refusal for a field from a file
     """
     change = None
     for name, load in scene.loads.static.items():
