@@ -27,9 +27,23 @@ if TYPE_CHECKING:
     from tribodyn.hbm.continuation.free_vibration import ModePoint
 
 __all__ = [
-    "CurveQuantity", "CycleQuantity", "EndOfLife", "ErrorKind", "ModeQuantity", "MotionInTime", "Slopes",
-    "SolvedCurve", "SolvedCycle", "StatedQuantity", "WearQuantity", "WornContact", "every", "known", "load",
-    "names_with_error", "with_error",
+    "CurveQuantity",
+    "CycleQuantity",
+    "EndOfLife",
+    "ErrorKind",
+    "ModeQuantity",
+    "MotionInTime",
+    "Slopes",
+    "SolvedCurve",
+    "SolvedCycle",
+    "StatedQuantity",
+    "WearQuantity",
+    "WornContact",
+    "load",
+    "names_with_error",
+    "quantities_of",
+    "quantity_named",
+    "with_error",
 ]  # fmt: skip
 FILES = PluginKind("quantity", "tribodyn.hbm.quantities", ())
 
@@ -141,14 +155,14 @@ def use(file: Path) -> None:
     """Add a quantity of one's own, a file beside a scene, to those that runs state."""
     _files.append(Path(file))
     load.cache_clear()
-    _every.cache_clear()
+    _all.cache_clear()
 
 
 def forget(file: Path) -> None:
     """Take a quantity of one's own out again."""
     _files.remove(Path(file))
     load.cache_clear()
-    _every.cache_clear()
+    _all.cache_clear()
 
 
 @cache
@@ -167,19 +181,19 @@ def load(name: str) -> StatedQuantity:
 
 
 @cache
-def _every() -> tuple[StatedQuantity, ...]:
+def _all() -> tuple[StatedQuantity, ...]:
     names = [*FILES.names(), *(file.stem for file in _files)]
     return tuple(sorted(map(load, names), key=lambda q: (q.rank, q.name)))
 
 
-def every(kind: type[Kinds]) -> tuple[Kinds, ...]:
+def quantities_of(kind: type[Kinds]) -> tuple[Kinds, ...]:
     """All quantities of a kind, by rank."""
-    return tuple(q for q in _every() if isinstance(q, kind))
+    return tuple(q for q in _all() if isinstance(q, kind))
 
 
 def with_error(kind: type[Kinds]) -> tuple[Kinds, ...]:
     """The quantities of a kind whose errors are stated."""
-    return tuple(q for q in every(kind) if q.error is not ErrorKind.NONE)
+    return tuple(q for q in quantities_of(kind) if q.error is not ErrorKind.NONE)
 
 
 def names_with_error() -> tuple[str, ...]:
@@ -187,6 +201,6 @@ def names_with_error() -> tuple[str, ...]:
     return tuple(q.name for kind in (CycleQuantity, WearQuantity) for q in with_error(kind))
 
 
-def known(name: str) -> StatedQuantity:
+def quantity_named(name: str) -> StatedQuantity:
     """The quantity of this name; one of a result whose file is not there any more has its name and no unit."""
-    return next((q for q in _every() if q.name == name), StatedQuantity(name, "", lambda _: None, name=name))
+    return next((q for q in _all() if q.name == name), StatedQuantity(name, "", lambda _: None, name=name))

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from proof.scoreboard import ROUNDING, Judged, Row
-from tribodyn.hbm.quantity import known, names_with_error
+from tribodyn.hbm.quantity import names_with_error, quantity_named
 from tribodyn.workflows.pictures.theme import BLUE, RED, STYLE
 
 COLUMNS = ("scene", "family", "pairs", "harmonics", "quantity", "value", "stated error", "true error", "dominated by")
@@ -56,12 +56,12 @@ def summary(rows: Sequence[Row]) -> str:
             sum(not statement.stated for statement in of),
             sum(statement.stated and statement.error is None for statement in of),
         ]
-        name = "all" if quantity is None else known(quantity).label
+        name = "all" if quantity is None else quantity_named(quantity).label
         lines.append(f"{name:15} {counts[0]:8d} {counts[1]:8d} {median:>19} {unsaid[0]:10d} {unsaid[1]:9d}")
     bounds = [statement for row in rows for statement in row.bound if statement.counted]
     lines.append(f"--accuracy: {len(bounds)} bounds, {sum(statement.violated for statement in bounds)} violated")
     for row, statement in _violated(rows):
-        name = known(statement.quantity).label
+        name = quantity_named(statement.quantity).label
         lines.append(
             f"violated: {row.family} {row.number}, {name}: stated {statement.error:.2g}, true {statement.true:.2g}"
         )

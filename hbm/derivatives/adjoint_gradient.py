@@ -23,7 +23,7 @@ from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.parameter_change import ParameterChange
 from tribodyn.hbm.derivatives.parameter_effects import ParameterEffects
 from tribodyn.hbm.krylov import gmres
-from tribodyn.hbm.quantity import CycleQuantity, SolvedCycle, every
+from tribodyn.hbm.quantity import CycleQuantity, SolvedCycle, quantities_of
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def cycle_numbers(
     cycle, zero = SolvedCycle.of(balance, state, output, wear), CycleNumber.zero(balance, state)
     joints = [joint.name for joint in balance.contact.joints] if len(balance.contact.joints) > 1 else []
     numbers = []
-    for quantity in every(CycleQuantity):
+    for quantity in quantities_of(CycleQuantity):
         for joint in ("", *joints) if quantity.by_joint else ("",):
             part = cycle.of_joint(joint) if joint else cycle
             value = quantity.value(part) if quantity.slopes else None

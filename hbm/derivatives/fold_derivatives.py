@@ -20,7 +20,7 @@ from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives, PointSlopes, derivatives_at, point_slopes
 from tribodyn.hbm.derivatives.parameter_change import ParameterChange
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.quantity import FoldQuantity, every
+from tribodyn.hbm.quantity import FoldQuantity, quantities_of
 from tribodyn.hbm.threads import single
 
 
@@ -35,7 +35,7 @@ def at_fold(
     state = _exact_fold(balance, state, options)
     gradient = Gradient(balance, state, (CycleNumber.zero(balance, state),), at_fold=True)
     parameters, (point,) = point_slopes([gradient], changes)
-    quantities = [(q, q.slope) for q in every(FoldQuantity) if q.slope is not None]
+    quantities = [(q, q.slope) for q in quantities_of(FoldQuantity) if q.slope is not None]
     slopes = np.array([[slope(state.omega)] for _, slope in quantities]) / -point.by_frequency[0]
     fold_slopes = PointSlopes(
         np.array([q.value(state.omega) for q, _ in quantities]), np.zeros(len(quantities)),

@@ -15,7 +15,7 @@ from tribodyn.hbm.derivatives.derivative_table import Derivatives
 from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.quantity import ModeQuantity, every
+from tribodyn.hbm.quantity import ModeQuantity, quantities_of
 from tribodyn.hbm.threads import single
 
 
@@ -53,7 +53,7 @@ def at_mode(
         difference = ((8 * (up - down) - (far[0] - far[1])) / 12 if far else (up - down) / 2) / change.step
         return difference if change.contact_part is None else difference + slope(change.contact_part)
 
-    quantities = [(q, q.tangent) for q in every(ModeQuantity) if q.tangent is not None]
+    quantities = [(q, q.tangent) for q in quantities_of(ModeQuantity) if q.tangent is not None]
     names, columns = list[str](), []
     for change in changes:
         right = replace(point, residual=slope(change))

@@ -40,7 +40,7 @@ def test_a_quantity_declares_title_and_unit(name: str) -> None:
     assert loaded.unit in UNITS
 
 
-@pytest.mark.parametrize("name", [q.name for q in quantity.every(CycleQuantity) if q.slopes is not None])
+@pytest.mark.parametrize("name", [q.name for q in quantity.quantities_of(CycleQuantity) if q.slopes is not None])
 def test_adjoint_slopes_are_those_of_the_value(name: str, balance: HarmonicBalance, cycle: SolvedCycle) -> None:
     """A random small step of displacement, force and response at once."""
     declared = quantity.load(name)

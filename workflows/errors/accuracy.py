@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from tribodyn.hbm.quantity import WearQuantity, known, load, names_with_error, with_error
+from tribodyn.hbm.quantity import WearQuantity, load, names_with_error, quantity_named, with_error
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.errors import refine
 from tribodyn.workflows.errors.refinement_limits import DEFAULT
@@ -65,8 +65,8 @@ class ErrorBound:
     @property
     def sentence(self) -> str:
         """Errors, the settings that gave them, and what is not satisfied."""
-        good = [f"{known(q).label} {self.errors[q]:.2g}" for q, reason in self.reasons.items() if not reason]
-        bad = [f"{known(q).label} ({reason})" for q, reason in self.reasons.items() if reason]
+        good = [f"{quantity_named(q).label} {self.errors[q]:.2g}" for q, reason in self.reasons.items() if not reason]
+        bad = [f"{quantity_named(q).label} ({reason})" for q, reason in self.reasons.items() if reason]
         settings = f"with {', '.join(self.overrides)}" if self.overrides else "with the scene as it is"
         text = f"error bound {self.request.error:g} {settings}, after {self.rounds} runs"
         text += f"; satisfied: {', '.join(good)}" if good else ""
@@ -79,7 +79,7 @@ def parsed(text: str) -> AccuracyRequest:
     number, _, names = " ".join(text.lower().split()).rstrip(".").partition(" of ")
     try:
         error = to_si(PER_CENT.sub("%", number), "")
-    except ValueError as wrong:
+    except Refusal as wrong:
         raise Refusal(f'--accuracy "{text}": {wrong}') from None
     if not 0 < error < 1:
         raise Refusal(f'--accuracy "{text}": give an error above 0 and below 100 %, such as "1 %"')

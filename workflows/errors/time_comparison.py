@@ -8,7 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, MotionInTime, SolvedCycle, WearQuantity, every, with_error
+from tribodyn.hbm.quantity import (
+    CycleQuantity,
+    ErrorKind,
+    MotionInTime,
+    SolvedCycle,
+    WearQuantity,
+    quantities_of,
+    with_error,
+)
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
 from tribodyn.hbm.time.stepper import Options as TimeOptions
@@ -136,7 +144,7 @@ def compare(state: OperatingState) -> MotionDifference:
     energy = means.energy.reshape(sectors, -1).mean(axis=0)
     motion = MotionInTime(means, sectors, energy, float(means.observed[0]) / sectors)
     cycle, differences = SolvedCycle.of(balance, solved, settings.OUTPUT), {}
-    for quantity in every(CycleQuantity):
+    for quantity in quantities_of(CycleQuantity):
         value = quantity.value(cycle)
         if quantity.in_time is not None and value is not None:
             in_time, least = quantity.in_time(motion)

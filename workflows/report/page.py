@@ -70,7 +70,7 @@ def part_alone(result: Result) -> str:
         return ""
     try:
         return _html(result.provenance["scene_name"], _viewer(0), {"charts": {}, "solids": [data]})
-    except ValueError:
+    except Refusal:
         return ""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tribodyn.hbm.quantity import CurveQuantity, StatedQuantity, WearQuantity, known
+from tribodyn.hbm.quantity import CurveQuantity, StatedQuantity, WearQuantity, quantity_named
 from tribodyn.workflows.result.answers import (
     FIRST,
     LAST,
@@ -142,7 +142,7 @@ def _error_lines(statements: Mapping[str, Statement]) -> list[str]:
     """A table of values, errors and what dominates these; the reasons of what is not known once, below it."""
     lines, reasons = [], dict[str, list[str]]()
     for name, statement in statements.items():
-        quantity = known(name)
+        quantity = quantity_named(name)
         if statement.value is None or statement.error == 0.0:  # given by the scene
             continue
         if statement.stated:

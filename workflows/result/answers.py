@@ -22,7 +22,7 @@ from tribodyn.hbm.quantity import (
     StatedQuantity,
     WearQuantity,
     WornContact,
-    every,
+    quantities_of,
 )
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.workflows.result.verdict import Statement
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 FIRST, LAST, PEAK, STABLE, RUN = "first", "last", "peak", "stable", ""
 """Moments: before wear (at the peak of a response that does not wear), at the end of wear; at the peak of the response
 where wear is taken at another frequency; at its highest stable point; of the whole run."""
-SAME = 0.01  # relative difference of a value and of that of its statement, which is solved again
+VALUE_TOLERANCE = 0.01  # relative difference of a value and of that of its statement, which is solved again
 EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 
 
@@ -136,17 +136,18 @@ def histories_of(result: Result) -> dict[StatedQuantity, np.ndarray]:
     rows = range(len(wear.cycles))
     cycles = [_cycle_at(result, wear, row) for row in rows]
     tables: dict[StatedQuantity, list[float | None]] = {
-        quantity: [quantity.value(cycle) for cycle in cycles] for quantity in every(CycleQuantity)
+        quantity: [quantity.value(cycle) for cycle in cycles] for quantity in quantities_of(CycleQuantity)
     }
     worn = [contact for row in rows if (contact := worn_contact(result, row)) is not None]
-    tables |= {quantity: [quantity.value(c) for c in worn] for quantity in every(WearQuantity) if quantity.grows}
+    growing = [quantity for quantity in quantities_of(WearQuantity) if quantity.grows]
+    tables |= {quantity: [quantity.value(contact) for contact in worn] for quantity in growing}
     return {quantity: np.array(values, float) for quantity, values in tables.items() if None not in values}
 
 
 def _of_cycles(result: Result) -> Iterator[Answer]:
     cycles = cycles_of(result)
     statements = _statements(result)
-    for quantity in every(CycleQuantity):
+    for quantity in quantities_of(CycleQuantity):
         values = {moment: quantity.value(cycle) for moment, (cycle, _) in cycles.items()}
         if all(value is None for value in values.values()):
             yield Answer(quantity, "", FIRST, None)
@@ -163,7 +164,7 @@ def _of_cycles(result: Result) -> Iterator[Answer]:
 
 def _of_wear(result: Result) -> Iterator[Answer]:
     worn, statements = worn_contact(result), _statements(result)
-    for quantity in every(WearQuantity):
+    for quantity in quantities_of(WearQuantity):
         for joint in ("", *(_joints(result) if quantity.by_joint and worn is not None else ())):
             contact = worn.of_joint(joint) if worn is not None and joint else worn
             value = None if contact is None else quantity.value(contact)
@@ -173,7 +174,7 @@ def _of_wear(result: Result) -> Iterator[Answer]:
 
 def _of_curve(result: Result) -> Iterator[Answer]:
     spread = None if result.bounds is None else result.bounds.spread
-    for quantity in every(CurveQuantity):
+    for quantity in quantities_of(CurveQuantity):
         value = None if result.response is None else quantity.value(SolvedCurve(result.response, spread))
         yield Answer(quantity, "", RUN, value)
 
@@ -188,7 +189,8 @@ def _statements(result: Result) -> Mapping[str, Statement]:
 
 def _is_value_of(statement: Statement | None, value: float) -> bool:
     """Whether a statement is about a value; it is not where the row is of a motion in time, not of the balance."""
-    return statement is not None and statement.value is not None and isclose(statement.value, value, rel_tol=SAME)
+    expected = None if statement is None else statement.value
+    return expected is not None and isclose(expected, value, rel_tol=VALUE_TOLERANCE)
 
 
 def _basis(result: Result) -> HarmonicBasis:

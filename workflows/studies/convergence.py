@@ -21,7 +21,7 @@ from matplotlib.ticker import NullFormatter, NullLocator
 from matplotlib.tri import Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-from tribodyn.hbm.quantity import known, names_with_error
+from tribodyn.hbm.quantity import names_with_error, quantity_named
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors.ladder_table import (
     SOLVED,
@@ -164,7 +164,7 @@ def _line(setting: str, pairs: str, seconds: str, memory: str, cells: Sequence[s
 
 
 def _name(quantity: str) -> str:
-    return known(quantity).label
+    return quantity_named(quantity).label
 
 
 def _cell(ladder: LadderTable, row: LadderRow, quantity: str) -> str:

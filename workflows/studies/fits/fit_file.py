@@ -74,7 +74,8 @@ class Target(Table):
 
     @model_validator(mode="after")
     def _only_what_it_needs(self) -> Self:
-        names = [q.name for kind in (quantity.CycleQuantity, quantity.WearQuantity) for q in quantity.every(kind)]
+        kinds = (quantity.CycleQuantity, quantity.WearQuantity)
+        names = [q.name for kind in kinds for q in quantity.quantities_of(kind)]
         if self.of not in (*LINEAR_MODES, *names):
             raise Refusal(f"of: expected one of {', '.join((*LINEAR_MODES, *names))}")
         of_cycle = isinstance(self.quantity, quantity.CycleQuantity)

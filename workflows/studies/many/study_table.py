@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
-from tribodyn.hbm.quantity import StatedQuantity, every, names_with_error
+from tribodyn.hbm.quantity import StatedQuantity, names_with_error, quantities_of
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.store import replacing, set_aside
 from tribodyn.workflows.studies.many import study_pictures
@@ -168,7 +168,7 @@ def table(
 
 def _ordered(names: Mapping[str, None]) -> list[str]:
     """Names of numbers in an order that does not depend on which run came first."""
-    first = [column for q in every(StatedQuantity) for column in (f"{q.name}_first", f"{q.name}_last", q.name)]
+    first = [column for q in quantities_of(StatedQuantity) for column in (f"{q.name}_first", f"{q.name}_last", q.name)]
     first.append("peak_at_end")
     return [name for name in first if name in names] + sorted(name for name in names if name not in first)
 
