@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy import stats
 
-from tribodyn.hbm.quantity import StatedQuantity, every, names_with_error
+from tribodyn.hbm.quantity import StatedQuantity, names_with_error, quantities_of
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED, STYLE
@@ -70,7 +70,7 @@ def _label(optimum: Optimum, at: int) -> str:
 
 def _axis_label(column: str) -> str:
     """A column that is a quantity by its label and unit, another one by its name."""
-    quantity = next((q for q in every(StatedQuantity) if column in (q.name, f"{q.name}_first")), None)
+    quantity = next((q for q in quantities_of(StatedQuantity) if column in (q.name, f"{q.name}_first")), None)
     return column if quantity is None else f"{quantity.label} / {quantity.unit}"
 
 
