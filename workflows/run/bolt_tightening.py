@@ -36,7 +36,7 @@ def rods(scene: MeshScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> di
 
     Raises  ValueError for unknown faces, an orthotropic shank, or a bolt that crosses nothing
     """
-    found = {}
+    rods_by_name = {}
     for name, table in scene.bolts.items():
         rod = Bolt(name, table.first, table.second)
         stiffness = 0.0
@@ -47,8 +47,8 @@ def rods(scene: MeshScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> di
                 if not isinstance(solid, Material):
                     raise Refusal(f"bolts.{name}: its material is orthotropic; give an isotropic one or stiffness")
                 stiffness = solid.E * np.pi * table.diameter**2 / 4 / rod.length(mesh, node_sets)
-        found[name] = Bolt(name, table.first, table.second, stiffness)
-    return found
+        rods_by_name[name] = Bolt(name, table.first, table.second, stiffness)
+    return rods_by_name
 
 
 @dataclass(frozen=True)

@@ -96,8 +96,8 @@ def earlier(path: Path, file: SceneFile) -> Result | None:
     if key:
         raise Refusal(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
     before = store.file_digests(result)
-    for name, found in digests(file.scene.model_dump(mode="json"), file.folder).items():
-        if before.get(name, found) != found:
+    for name, content_digest in digests(file.scene.model_dump(mode="json"), file.folder).items():
+        if before.get(name, content_digest) != content_digest:
             raise Refusal(f"{path} was computed with another content of {name}: run the scene without --resume")
     return result
 

@@ -33,7 +33,7 @@ def surface_gap(file: SceneFile, interface: ContactInterface) -> tuple[np.ndarra
             f'surfaces.mating_height is {surfaces.mating_height:g} m, more than the face is long: give its unit, "3 um"'
         )
 
-    def made() -> tuple[np.ndarray, tuple[str, ...]]:
+    def prepared_heights() -> tuple[np.ndarray, tuple[str, ...]]:
         repairs: list[str] = []
         heights = np.zeros((2, len(nodes)))
         for i, face in enumerate(faces(surfaces, file.folder)):
@@ -42,7 +42,7 @@ def surface_gap(file: SceneFile, interface: ContactInterface) -> tuple[np.ndarra
             repairs += prepared.repairs
         return heights, tuple(repairs)
 
-    heights, repairs = model_cache.cached_heights(file, nodes, made)
+    heights, repairs = model_cache.cached_heights(file, nodes, prepared_heights)
     return facing_gap(heights[0], heights[1], surfaces.mating_height), repairs
 
 
@@ -54,12 +54,12 @@ def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> n
     """
     tangents = interface.frames[pairs].mean(axis=0)[:2]
     points = interface.points[pairs] if interface.nodes is None else interface.nodes.points
-    at, wanted = rows[:, :3] @ tangents.T, points @ tangents.T
-    found = scipy.interpolate.LinearNDInterpolator(at, rows[:, 3])(wanted)
-    outside = ~np.isfinite(found)
-    found[outside] = scipy.interpolate.NearestNDInterpolator(at, rows[:, 3])(wanted[outside])
-    found = found if interface.nodes is None else interface.mean[pairs] @ found
-    return np.asarray(found - found.min())
+    at, targets = rows[:, :3] @ tangents.T, points @ tangents.T
+    opening = scipy.interpolate.LinearNDInterpolator(at, rows[:, 3])(targets)
+    outside = ~np.isfinite(opening)
+    opening[outside] = scipy.interpolate.NearestNDInterpolator(at, rows[:, 3])(targets[outside])
+    opening = opening if interface.nodes is None else interface.mean[pairs] @ opening
+    return np.asarray(opening - opening.min())
 
 
 def patch_coordinates(interface: ContactInterface, axes: tuple[str, str]) -> np.ndarray:
@@ -68,8 +68,10 @@ def patch_coordinates(interface: ContactInterface, axes: tuple[str, str]) -> np.
     Raises  ValueError where the patch is not flat
     """
     frame = interface.frames.mean(axis=0)
-    along = np.stack([(-1.0 if name.startswith("-") else 1.0) * frame[COMPONENTS.index(name[-2:])] for name in axes])
-    nodes = interface.points @ along.T
+    directions = np.stack(
+        [(-1.0 if name.startswith("-") else 1.0) * frame[COMPONENTS.index(name[-2:])] for name in axes]
+    )
+    nodes = interface.points @ directions.T
     size = float(np.ptp(nodes, axis=0).max())
     if np.ptp(interface.points @ frame[2]) > FLAT * size or np.ptp(interface.frames, axis=0).max() > FLAT:
         raise Refusal("surfaces: the contact is not flat, so that a height map cannot be laid on it; leave them out")

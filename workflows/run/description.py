@@ -72,7 +72,7 @@ def described(
     if isinstance(file.scene, MeshScene) and file.scene.contacts:
         pairs = {name: slice(0, i.n_pair) for name in file.scene.contacts}  # a single joint has them all
         pairs |= {joint.name: joint.pairs for joint in balance.contact.joints if isinstance(joint.pairs, slice)}
-        pairs |= {name: own for name, own in reduced.joints.items() if name in pairs}
+        pairs |= {name: scene_text for name, scene_text in reduced.joints.items() if name in pairs}
         facts = replace(facts, joints=pairs)
     if file.scene.wear is not None:
         depth = delta_max(file.scene, free, i.area)  # none where nothing holds the part without its contact
@@ -104,12 +104,12 @@ def provenance(file: SceneFile) -> dict[str, str]:
 
 def part_mesh(part: Part) -> PartMesh | None:
     """The mesh of a part in the node order of VTK; None where its bodies are of different elements."""
-    found = []
+    fields = []
     for piece in pieces(part.mesh):
         cells = piece.mesh.dofs.element_dofs.T
         reference, kind = VTK_KIND[cells.shape[1]]
         to_vtk = permutation(piece.mesh.elem.doflocs, REFERENCE_POINTS[reference][: cells.shape[1]])
-        found.append((kind, piece.node + cells[:, to_vtk]))
-    if len({kind for kind, _ in found}) > 1:
+        fields.append((kind, piece.node + cells[:, to_vtk]))
+    if len({kind for kind, _ in fields}) > 1:
         return None
-    return PartMesh(found[0][0], part.points, np.concatenate([cells for _, cells in found]))
+    return PartMesh(fields[0][0], part.points, np.concatenate([cells for _, cells in fields]))

@@ -29,14 +29,14 @@ def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
         contact = scene.joints[name]
         module = contact_law.load(contact.law_name)
         if getattr(module, "STIFFNESS_FROM_NUMBERS", False):
-            seen = [interface.components.index(c) for c in contact.components]
-            own = parameters_of(contact, interface, pairs, np.ones((len(interface.area[pairs]), len(seen))))
-            k[pairs, seen] = module.springs(contact_law.complete(contact.law_name, own))
+            columns = [interface.components.index(c) for c in contact.components]
+            parameters = parameters_of(contact, interface, pairs, np.ones((len(interface.area[pairs]), len(columns))))
+            k[pairs, columns] = module.springs(contact_law.complete(contact.law_name, parameters))
             continue
         tangential, normal = joint_stiffness(scene, contact)
         total = {"t1": tangential, "t2": tangential, "n": normal}
-        along = [total[c] if c in contact.components else 0.0 for c in interface.components]
-        k[pairs] = np.outer(interface.area[pairs] / interface.area[pairs].sum(), along)
+        stiffnesses = [total[c] if c in contact.components else 0.0 for c in interface.components]
+        k[pairs] = np.outer(interface.area[pairs] / interface.area[pairs].sum(), stiffnesses)
     return k
 
 
@@ -83,17 +83,17 @@ def elastic(scene: Scene, face: str) -> tuple[float, float]:
 def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
     """Every joint with its law and that law's parameters."""
     springs, interface = contact_stiffness(scene, reduced), reduced.interface
-    found = []
+    made_joints = []
     for name, pairs in joint_pairs(scene, reduced).items():
         contact = scene.joints[name]
-        seen = [interface.components.index(c) for c in contact.components]
-        parameters = parameters_of(contact, interface, pairs, springs[pairs][:, seen])
-        found.append(Joint(name, contact.law_name, parameters, pairs))
-    if not found:  # a structure that touches nothing: a joint of no pairs
+        columns = [interface.components.index(c) for c in contact.components]
+        parameters = parameters_of(contact, interface, pairs, springs[pairs][:, columns])
+        made_joints.append(Joint(name, contact.law_name, parameters, pairs))
+    if not made_joints:  # a structure that touches nothing: a joint of no pairs
         zeros: dict[str, Any] = {number.name: 0.0 for number in contact_law.declared("jenkins")}
         nothing = contact_law.ContactParameters.of(interface.components, springs, gap=interface.gap, **zeros)
-        found.append(Joint("none", "jenkins", nothing))
-    return found
+        made_joints.append(Joint("none", "jenkins", nothing))
+    return made_joints
 
 
 def parameters_of(
@@ -117,7 +117,7 @@ def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     if isinstance(scene, MeshScene):
-        loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
+        loads |= {(0, name): table.displacement for name, table in scene.prescribed.items()}
         loads |= {(0, decks.load_name(name)): 1.0 for name in scene.decks}
         if scene.wheel is not None and scene.wheel.speed:
             loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2

@@ -1,8 +1,8 @@
-"""Parts, reductions and heights of faces on disk under a hash of what they are made of: no other run makes them again.
+"""Cache of parts, reduced models and heights of faces on disk, under a hash of all that they are made of.
 
-An entry is a pickle behind its own digest; one that is damaged is made anew. It is written under another name and
-renamed when it is whole, and a run waits for one that makes what it wants. Those unused for longest go where all
-together exceed `ROOM`.
+An entry is a pickle behind its own digest; a damaged one is built again. It is written under another name and renamed
+when it is complete; a run waits for another one that builds the same entry. The entries unused for longest are removed
+where all together exceed `ROOM`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _last: ContextVar[dict[str, Any] | None] = ContextVar("tribodyn_last", default=N
 
 @contextmanager
 def memory_cache() -> Iterator[None]:
-    """Within it the last part, reduction and balance stay in memory too, for scenes that differ little."""
+    """Keep the last part, reduced model and balance in memory too, for a study of scenes that differ little."""
     before = _last.set({})
     try:
         yield
@@ -57,32 +57,32 @@ def memory_cache() -> Iterator[None]:
 
 
 def cached_balance(make: Callable[[HarmonicBalance | None], HarmonicBalance]) -> HarmonicBalance:
-    """A problem made beside the last one, whose linear side it may have, where that stays in memory."""
+    """Build a balance. Reuse the cached compliance of the previous one if it matches."""
     last = _last.get()
     if last is None:
         return make(None)
-    last["balance"] = made = make(last.get("balance"))
-    return made
+    last["balance"] = balance = make(last.get("balance"))
+    return balance
 
 
 def cached_part(file: SceneFile, make: Callable[[], Part]) -> Part:
-    """The part of a scene, without the gap of measured faces: as it is kept, else made and kept."""
+    """The part of a scene, without the gap of measured faces: read from the cache, else built and cached."""
     scene = file.mesh_scene
-    return _kept(file, "part", (values_through(scene, PART), _kinds_of_loads(scene)), make)
+    return _cached(file, "part", (values_through(scene, PART), _kinds_of_loads(scene)), make)
 
 
-def cached_reduction(file: SceneFile, whole: Part, make: Callable[[], ReducedModel]) -> ReducedModel:
-    """The reduction of a part, not damped, with nothing prescribed: as it is kept, else made and kept.
+def cached_reduction(file: SceneFile, part: Part, make: Callable[[], ReducedModel]) -> ReducedModel:
+    """The reduced model of a part, undamped, with nothing prescribed: read from the cache, else built and cached.
 
     It does not depend on the gaps, which are those of the part.
     """
-    scene, interface, springs = file.mesh_scene, whole.interface, b""
+    scene, interface, springs = file.mesh_scene, part.interface, b""
     speeds = scene.operating_range if scene.wheel and scene.wheel.along_speed else ()
-    if scene.wheel or part_reduction.without_masters(scene, interface.B.shape[0], len(whole.held_rows) > 0):
-        springs = joints.contact_stiffness(scene, joints.unreduced(whole)).tobytes()
+    if scene.wheel or part_reduction.without_masters(scene, interface.B.shape[0], len(part.held_rows) > 0):
+        springs = joints.contact_stiffness(scene, joints.unreduced(part)).tobytes()
     values = values_through(scene, scene.reduced_through)
-    found = _kept(file, "reduction", (values, _kinds_of_loads(scene), springs, speeds), make)
-    return replace(found, interface=replace(found.interface, gap=interface.gap))
+    model = _cached(file, "reduction", (values, _kinds_of_loads(scene), springs, speeds), make)
+    return replace(model, interface=replace(model.interface, gap=interface.gap))
 
 
 def _kinds_of_loads(scene: MeshScene) -> list[str]:
@@ -91,23 +91,23 @@ def _kinds_of_loads(scene: MeshScene) -> list[str]:
 
 
 def cached_heights(file: SceneFile, nodes: np.ndarray, make: Callable[[], T]) -> T:
-    """Heights of measured faces at contact nodes, whatever the mating height: as they are kept, else made and kept."""
+    """Heights of measured faces at contact nodes, before the mating height, from the cache or built."""
     surfaces = file.mesh_scene.model_dump(include={"surfaces"}, exclude={"surfaces": {"mating_height"}})
-    return _kept(file, "heights", (surfaces, nodes.tobytes()), make)
+    return _cached(file, "heights", (surfaces, nodes.tobytes()), make)
 
 
 def cache_folder() -> Path | None:
-    """Where entries lie, None where nothing is kept."""
-    given = os.environ.get(FOLDER)
-    if given is not None:
-        return None if given in ("", "off") else Path(given)
+    """The folder of the entries; None where the cache is off."""
+    setting = os.environ.get(FOLDER)
+    if setting is not None:
+        return None if setting in ("", "off") else Path(setting)
     try:
         return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tribodyn"
     except RuntimeError:  # a user without a home
         return None
 
 
-def _key(file: SceneFile, early: dict[str, Any], *more: object) -> str:
+def _key(file: SceneFile, early: dict[str, Any], *others_of_key: object) -> str:
     """Hash of the tables, of the files that they name, of the program and of its packages; empty where it is not known.
 
     What a file of Python code reads, or one that includes others, is not known; the program's own code is in CODE.
@@ -116,8 +116,8 @@ def _key(file: SceneFile, early: dict[str, Any], *more: object) -> str:
     if not file.is_shipped and any(_reads_others(path, path.stat().st_mtime_ns) for path in named.values()):
         return ""
     versions = (platform.python_version(), platform.machine(), *map(package_version, PACKAGES))
-    own = (early, digests(early, file.folder), usable(file.scene.solver.threads), CODE, versions, more)
-    return hashlib.sha256(repr(own).encode()).hexdigest()
+    content = (early, digests(early, file.folder), usable(file.scene.solver.threads), CODE, versions, others_of_key)
+    return hashlib.sha256(repr(content).encode()).hexdigest()
 
 
 @cache
@@ -125,20 +125,20 @@ def _reads_others(path: Path, changed: int) -> bool:
     return path.suffix == ".py" or INCLUDES.search(path.read_bytes()) is not None
 
 
-def _kept(file: SceneFile, what: str, own: tuple[Any, ...], make: Callable[[], T]) -> T:
+def _cached(file: SceneFile, kind: str, ingredients: tuple[Any, ...], make: Callable[[], T]) -> T:
     """own : what it is made of, its tables first."""
     room, last = cache_folder(), _last.get()
-    if last is not None and what in last and last[what][0] == own:
-        found: T = last[what][1]
-        return found
+    if last is not None and kind in last and last[kind][0] == ingredients:
+        model: T = last[kind][1]
+        return model
     with limited(file.scene.solver.threads):  # who makes it: another count rounds differently
-        found = make() if room is None else _kept_in(room, _key(file, *own), make)
+        model = make() if room is None else _cached_on_disk(room, _key(file, *ingredients), make)
     if last is not None:
-        last[what] = own, found
-    return found
+        last[kind] = ingredients, model
+    return model
 
 
-def _kept_in(room: Path, key: str, make: Callable[[], T]) -> T:
+def _cached_on_disk(room: Path, key: str, make: Callable[[], T]) -> T:
     if not key:
         return make()
     path, lock = room / f"{key}.pickle", FileLock(room / f"{key[:2]}.lock")
@@ -148,11 +148,11 @@ def _kept_in(room: Path, key: str, make: Callable[[], T]) -> T:
     except (OSError, NotImplementedError):  # or a disk that cannot lock
         return make()
     try:
-        found: T | None = _read(path)
-        if found is None:
-            found = make()
-            _write(path, found)
-        return found
+        model: T | None = _read(path)
+        if model is None:
+            model = make()
+            _write(path, model)
+        return model
     finally:
         lock.release()
 
@@ -172,13 +172,13 @@ def _read(path: Path) -> Any:
         return None
 
 
-def _write(path: Path, what: object) -> None:
+def _write(path: Path, model: object) -> None:
     """Keep an entry, and let the longest unused go; nothing where it is too large or the disk is full."""
     fresh = path.with_suffix(".new")
     try:
         with fresh.open("wb+") as stream:
             start = stream.write(bytes(hashlib.sha256().digest_size))
-            pickle.dump(what, stream, pickle.HIGHEST_PROTOCOL)
+            pickle.dump(model, stream, pickle.HIGHEST_PROTOCOL)
             if stream.tell() > ROOM / 4:
                 raise OSError(errno.EFBIG, "too large to be kept")
             stream.seek(start)

@@ -1,4 +1,4 @@
-"""A scene whose numbers are varied: what a step of each of them makes of its problem, without solving it again."""
+"""Variation of the numbers of a scene: the inputs of its balance for other values, without solving it again."""
 
 from __future__ import annotations
 
@@ -64,14 +64,14 @@ def moves_nodes(number: SceneValue) -> bool:
 
 
 class ParameterVariation:
-    """A scene with its model, and what a step of each of its numbers makes of it."""
+    """A scene with its model, and the inputs of its balance for another value of one of its numbers."""
 
     def __init__(self, file: SceneFile, progress: Progress, step: float = STEP):
         self.file, self.scene, self.step = file, file.scene, step
         part = plain = None
         if isinstance(self.scene, MeshScene):
             with progress.stage("mesh, mass and stiffness, reduction"):
-                part, plain = self._made(file)
+                part, plain = self._part_and_model(file)
             self._damped = modelling.damped(self.scene, plain)
             reduced = part_reduction.with_prescribed(self.scene, part, self._damped)
         else:
@@ -80,33 +80,33 @@ class ParameterVariation:
             reduced = self._damped = modelling.damped(self.scene, plain)
         self.part, self.plain = part, plain
         self.model = modelling.make_model(self.scene, part, reduced)
-        self.own = BalanceInputs.of(self.model.balance)
+        self.base = BalanceInputs.of(self.model.balance)
         self.numbers = smooth_numbers(self.scene)
-        self._ways: dict[str, SecondOrderSystem] = {}  # key -> what the reduced model moves by where it doubles
-        self._beside: dict[str, tuple[Part, Part]] = {}  # key -> the part with its nodes moved to both sides
+        self._directions: dict[str, SecondOrderSystem] = {}  # key -> what the reduced model moves by where it doubles
+        self._moved_parts: dict[str, tuple[Part, Part]] = {}  # key -> the part with its nodes moved to both sides
 
     @staticmethod
-    def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
+    def _part_and_model(file: SceneFile) -> tuple[Part, ReducedModel]:
         part, _ = modelling.with_surfaces(file, modelling.part_of(file, Progress()))
         return part, modelling.plain_of(file, part)
 
     def change(self, key: str, value: float) -> ParameterChange:
         """The problems a step above and below a value of a key."""
-        number, anew = self.numbers[key], self._settles or self.anew(key)
-        linear = self._scales(key) or self.follows(key)
-        step = (REBUILT if anew or linear else self.step) * abs(value)
+        number, needs_reduction = self.numbers[key], self._has_preload_steps or self.is_reduced_again(key)
+        linear = self._scales(key) or self.is_linear(key)
+        step = (REBUILT if needs_reduction or linear else self.step) * abs(value)
         if moves_nodes(number):
             self.nodes_moved(key)  # or refused
-            step = (4 if anew else 1) * NODES * abs(value) if anew or self._sector else step
-        far: tuple[BalanceInputs, ...] | None = () if anew or linear else None
-        if self._settles or (anew and number.stage <= REDUCTION):
-            far = self.posed(key, value + 2 * step), self.posed(key, value - 2 * step)
+            step = (4 if needs_reduction else 1) * NODES * abs(value) if needs_reduction or self._sector else step
+        far: tuple[BalanceInputs, ...] | None = () if needs_reduction or linear else None
+        if self._has_preload_steps or (needs_reduction and number.stage <= REDUCTION):
+            far = self.inputs(key, value + 2 * step), self.inputs(key, value - 2 * step)
         touching = None
-        if (anew or linear) and not self._settles and _touches(number):
+        if (needs_reduction or linear) and not self._has_preload_steps and _is_seen_by_contact(number):
             small = self.step * abs(value)
-            up, down = (replace(self.own, contact=self._contact(key, value + side)) for side in (small, -small))
+            up, down = (replace(self.base, contact=self._contact(key, value + side)) for side in (small, -small))
             touching = ParameterChange(key, small, up, down)
-        return ParameterChange(key, step, self.posed(key, value + step), self.posed(key, value - step), far, touching)
+        return ParameterChange(key, step, self.inputs(key, value + step), self.inputs(key, value - step), far, touching)
 
     def _changed(self, key: str, value: float) -> SceneFile:
         """The scene with another value of a key; read again only where other numbers follow from it."""
@@ -120,63 +120,70 @@ class ParameterVariation:
         plain = self.plain
         if moves_nodes(self.numbers[key]):
             plain = replace(plain, interface=self._interface(plain.interface, key, value))
-        return JointSet.of(self.own.model, joints.make_joints(self._changed(key, value).scene, plain))
+        return JointSet.of(self.base.model, joints.make_joints(self._changed(key, value).scene, plain))
 
-    def posed(self, key: str, value: float) -> BalanceInputs:
+    def inputs(self, key: str, value: float) -> BalanceInputs:
         """The problem with another value of a key; nothing is solved but what the preload comes to rest in."""
         file = self._changed(key, value)
         scene, part, plain, number = file.scene, self.part, self.plain, self.numbers[key]
         if self._scales(key):
             plain = _scaled(plain, number.name, value / number.value)
-        elif self.follows(key):
-            plain = self._followed(key, value)
+        elif self.is_linear(key):
+            plain = self._changed_model(key, value)
             if part is not None and moves_nodes(number):
                 part = replace(part, interface=self._interface(part.interface, key, value))
-        elif self.anew(key):
-            part, plain = self._made(file)
-        reduced = self.own.model
+        elif self.is_reduced_again(key):
+            part, plain = self._part_and_model(file)
+        reduced = self.base.model
         if plain is not self.plain or self._damps(scene, plain):
-            more, like = value / number.value, self._damped
+            ratio, reference = value / number.value, self._damped
             if self._scales(key) and scene.damping.modal is not None and scene.damping.state != "stuck":
-                more, like = more**0.5, _scaled(like, number.name, more)  # as all frequencies go
-            if key == "damping.modal" or like is not self._damped:  # the same modes
-                reduced = like.with_damping(lambda system, _: more * np.asarray(system.damping))
+                ratio, reference = ratio**0.5, _scaled(reference, number.name, ratio)  # as all frequencies go
+            if key == "damping.modal" or reference is not self._damped:  # the same modes
+                reduced = reference.with_damping(lambda system, _: ratio * np.asarray(system.damping))
             else:
                 reduced = modelling.damped(scene, plain)
             if isinstance(scene, MeshScene) and part is not None:
                 reduced = part_reduction.with_prescribed(scene, part, reduced)
-        if self._settles:
+        if self._has_preload_steps:
             problem = modelling.Problem.of(scene, part, reduced)
             balance = problem.balance(self.model.balance.basis.harmonics)
             return replace(BalanceInputs.of(balance), balance=balance)
         base = None
         if isinstance(scene, MeshScene) and part is not None:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
-        contact = self._contact(key, value) if _touches(number) and plain is self.plain else self.own.contact
-        loads = self.own.excitation if number.stage is CONTACT else joints.excite(scene, base)
-        return BalanceInputs(reduced, contact, loads, self.own.memory, same_coordinates=self.follows(key))
+        contact = (
+            self._contact(key, value) if _is_seen_by_contact(number) and plain is self.plain else self.base.contact
+        )
+        loads = self.base.excitation if number.stage is CONTACT else joints.excite(scene, base)
+        return BalanceInputs(reduced, contact, loads, self.base.memory, same_coordinates=self.is_linear(key))
 
     @property
-    def _settles(self) -> bool:
+    def _has_preload_steps(self) -> bool:
         """Whether the contact comes to its preload in steps of their own, by bolts or without friction."""
         return self.scene.preload.frictionless or bool(getattr(self.scene, "bolts", None))
 
     @property
-    def _spins(self) -> bool:
+    def _is_spinning(self) -> bool:
         wheel = getattr(self.scene, "wheel", None)
         return wheel is not None and wheel.speed > 0
 
-    def anew(self, key: str) -> bool:
-        """Whether the model is reduced anew: the stress of a part that spins is that of its contact at rest."""
+    def is_reduced_again(self, key: str) -> bool:
+        """Whether the model must be reduced again; the stress of a spinning part is that of its contact at rest."""
         number, scene = self.numbers.get(key), self.scene
-        if number is None or isinstance(number.table, (Vibrates, BoltTable)) or self._scales(key) or self.follows(key):
+        if (
+            number is None
+            or isinstance(number.table, (Vibrates, BoltTable))
+            or self._scales(key)
+            or self.is_linear(key)
+        ):
             return False
         return number.stage <= (scene.reduced_through if isinstance(scene, MeshScene) else REDUCTION)
 
-    def follows(self, key: str) -> bool:
-        """Whether the reduced matrices follow the full ones, which are linear in it."""
+    def is_linear(self, key: str) -> bool:
+        """Whether the full matrices are linear in a number, so that the reduced ones follow by projection."""
         number = self.numbers[key]
-        if moves_nodes(number) and self._settles:  # bolts are as long as their part is thick
+        if moves_nodes(number) and self._has_preload_steps:  # bolts are as long as their part is thick
             return False
         return number.stage <= REDUCTION and not self._scales(key) and self._sensitivity is not None
 
@@ -184,13 +191,13 @@ class ParameterVariation:
     def _sensitivity(self) -> Sensitivity | None:
         """None where the model is no plain reduction by Craig and Bampton of a part that stands still."""
         part, plain, wave = self.part, self.plain, self._sector
-        if part is None or len(part.held_rows) or self._spins or (plain.is_wave and wave is None):
+        if part is None or len(part.held_rows) or self._is_spinning or (plain.is_wave and wave is None):
             return None
         plain = plain if wave is None else wave.model
         origin = plain.origin
         if not isinstance(origin, ReductionBasis) or origin.n_interface_modes or plain.leaves_flexibility_out:
             return None
-        (system, _, back), shapes = self._here, origin.basis
+        (system, _, back), shapes = self._base_coordinates, origin.basis
         if back is not None:
             shapes = shapes.copy()
             shapes[body_1_dofs(part.interface).ravel()] = part.interface.B @ origin.basis
@@ -208,7 +215,7 @@ class ParameterVariation:
         return wave.reduced if has_all else None
 
     @cached_property
-    def _here(self) -> tuple[SecondOrderSystem, ContactInterface, csr_matrix | None]:
+    def _base_coordinates(self) -> tuple[SecondOrderSystem, ContactInterface, csr_matrix | None]:
         """`_coordinates` of the own part."""
         return self._coordinates(cast(Part, self.part))
 
@@ -218,59 +225,68 @@ class ParameterVariation:
             return relative(part.system, part.interface)
         return part.system, part.interface, None
 
-    def _followed(self, key: str, value: float) -> ReducedModel:
+    def _changed_model(self, key: str, value: float) -> ReducedModel:
         """The reduced model with another value of a key that it follows."""
         number, following, scene = self.numbers[key], self._sensitivity, self.file.mesh_scene
         share = value / number.value - 1
         assert following is not None
         if key == "material.young" and _loaded_alike(scene):  # all stiffness but that of the springs
             springs = [spring for spring, number in self.numbers.items() if isinstance(number.table, SpringTable)]
-            moved = following.model_at([(self._way(spring), -share) for spring in springs], share)
+            changed_model = following.model_at([(self._direction(spring), -share) for spring in springs], share)
         else:
-            moved = following.model_at([(self._way(key), share)])
+            changed_model = following.model_at([(self._direction(key), share)])
         wave, turned = self._sector, list[Any]()
         if moves_nodes(number):
-            there = self.nodes_moved(key)[int(share < 0)]
-            rows = [(self._coordinates(there)[1].B, self._here[1].B)]
+            moved_parts = self.nodes_moved(key)[int(share < 0)]
+            rows = [(self._coordinates(moved_parts)[1].B, self._base_coordinates[1].B)]
             if wave is not None:
                 from tribodyn.workflows.run import sector
 
-                rows.append(tuple(sector.sector(scene, one).left_map for one in (there, cast(Part, self.part))))
-            turned = [abs(share) / NODES * ((new - old) @ following.shapes) for new, old in rows]
-            moved = replace(moved, interface=self._interface(moved.interface, key, value, turned[0]))
+                rows.append(
+                    tuple(
+                        sector.sector(scene, moved_part).left_map for moved_part in (moved_parts, cast(Part, self.part))
+                    )
+                )
+            turned = [
+                abs(share) / NODES * ((rows_after - rows_before) @ following.shapes) for rows_after, rows_before in rows
+            ]
+            changed_model = replace(
+                changed_model, interface=self._interface(changed_model.interface, key, value, turned[0])
+            )
         if wave is None:
-            return moved
+            return changed_model
         left = wave.sector.left_map + (turned[1] if turned else 0.0)
         small = replace(
-            wave, sector=replace(wave.sector, system=moved.system, interface=moved.interface, left_map=left)
+            wave,
+            sector=replace(wave.sector, system=changed_model.system, interface=changed_model.interface, left_map=left),
         )
         from tribodyn.reduction.wave_model import WaveIndices, as_wave, wave_model
 
         return wave_model(small, as_wave(self.plain).engine_order, WaveIndices(small))
 
-    def _way(self, key: str) -> SecondOrderSystem:
+    def _direction(self, key: str) -> SecondOrderSystem:
         """What the reduced model moves by where a key is doubled."""
-        if key not in self._ways:
+        if key not in self._directions:
             assert self._sensitivity is not None
             if moves_nodes(self.numbers[key]):
-                up, down = (self._coordinates(one)[0] for one in self.nodes_moved(key))
+                up, down = (self._coordinates(moved_part)[0] for moved_part in self.nodes_moved(key))
                 change = _between(up, down, 1 / (2 * NODES))
             else:
                 change = self._doubled(key)
-                change = change if self._here[2] is None else change.projected(self._here[2])
-            self._ways[key] = self._sensitivity.towards(change)
-        return self._ways[key]
+                change = change if self._base_coordinates[2] is None else change.projected(self._base_coordinates[2])
+            self._directions[key] = self._sensitivity.towards(change)
+        return self._directions[key]
 
     def _reach(self, key: str) -> float:
         """Share of a length or angle within which its mesh has to stay the same one that moves."""
-        return NODES if self.follows(key) else 8 * NODES
+        return NODES if self.is_linear(key) else 8 * NODES
 
     def nodes_moved(self, key: str) -> tuple[Part, Part]:
         """The part with its nodes moved to a length or angle above and below.
 
         Raises  NoDerivative where the mesh or what meets at the contact is another one there, or none
         """
-        if key not in self._beside:
+        if key not in self._moved_parts:
             assert self.part is not None
             value, reach = self.numbers[key].value, self._reach(key)
             try:
@@ -279,8 +295,8 @@ class ParameterVariation:
                 raise NoDerivative(f"beside {key} = {value:g}: {reason}") from None
             if not _smooth(up, self.part, down):
                 raise NoDerivative(f"beside {key} = {value:g} its mesh or what meets at the contact is another one")
-            self._beside[key] = up, down
-        return self._beside[key]
+            self._moved_parts[key] = up, down
+        return self._moved_parts[key]
 
     @staticmethod
     def _part(file: SceneFile) -> Part:
@@ -293,10 +309,10 @@ class ParameterVariation:
     def _interface(self, own: ContactInterface, key: str, value: float, turned: Any = 0.0) -> ContactInterface:
         """An interface with its places, frames, areas and gaps moved to another length or angle, its rows `turned`."""
         share = (value / self.numbers[key].value - 1) / (2 * self._reach(key))
-        up, down = (one.interface for one in self.nodes_moved(key))
+        up, down = (part.interface for part in self.nodes_moved(key))
         names = ("points", "frames", "area", "gap")
-        moved = {n: getattr(own, n) + share * (getattr(up, n) - getattr(down, n)) for n in names}
-        return replace(own, **moved, B=own.B + turned)
+        values = {n: getattr(own, n) + share * (getattr(up, n) - getattr(down, n)) for n in names}
+        return replace(own, **values, B=own.B + turned)
 
     def _doubled(self, key: str) -> SecondOrderSystem:
         """What the full system moves by where a key is doubled; springs need no assembly."""
@@ -313,7 +329,7 @@ class ParameterVariation:
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""
         scene = self.scene
-        if key not in ("material.young", "material.density") or not isinstance(scene, MeshScene) or self._spins:
+        if key not in ("material.young", "material.density") or not isinstance(scene, MeshScene) or self._is_spinning:
             return False
         return _loaded_alike(scene) and not (scene.springs and key == "material.young")
 
@@ -321,42 +337,44 @@ class ParameterVariation:
         """Whether the damping of a scene is another one."""
         if scene.damping != self.scene.damping:
             return True
-        own, springs = (joints.contact_stiffness(one, plain) for one in (self.scene, scene))
-        return scene.damping.given and scene.damping.state == "stuck" and not np.array_equal(own, springs)
+        springs_before, springs = (joints.contact_stiffness(scene_, plain) for scene_ in (self.scene, scene))
+        return scene.damping.given and scene.damping.state == "stuck" and not np.array_equal(springs_before, springs)
 
 
 def _with(table: Any, path: Sequence[str], value: float) -> Any:
     """A table of a scene with another value at the end of a path of keys."""
-    name, *rest = path
+    name, *inner_path = path
     inside = isinstance(table, dict)
-    new = _with(table[name] if inside else getattr(table, name), rest, value) if rest else value
-    return {**table, name: new} if inside else table.model_copy(update={name: new})
+    changed = _with(table[name] if inside else getattr(table, name), inner_path, value) if inner_path else value
+    return {**table, name: changed} if inside else table.model_copy(update={name: changed})
 
 
-def _between(new: SecondOrderSystem, old: SecondOrderSystem, factor: float = 1.0) -> SecondOrderSystem:
+def _between(upper: SecondOrderSystem, lower: SecondOrderSystem, factor: float = 1.0) -> SecondOrderSystem:
     """The difference of two systems times a factor."""
     moves = {
-        kind: {name: factor * (v - getattr(old, kind)[name]) for name, v in getattr(new, kind).items()}
+        kind: {name: factor * (v - getattr(lower, kind)[name]) for name, v in getattr(upper, kind).items()}
         for kind in ("loads", "outputs")
     }
-    return SecondOrderSystem(factor * (new.mass - old.mass), factor * (new.stiffness - old.stiffness), None, **moves)
+    return SecondOrderSystem(
+        factor * (upper.mass - lower.mass), factor * (upper.stiffness - lower.stiffness), None, **moves
+    )
 
 
-def _smooth(up: Part, own: Part, down: Part) -> bool:
+def _smooth(up: Part, base: Part, down: Part) -> bool:
     """Whether two parts to both sides of one have its mesh and its pairs, and all of it moves evenly."""
-    if any(one.points.shape != own.points.shape or not np.array_equal(one.free, own.free) for one in (up, down)):
+    if any(part.points.shape != base.points.shape or not np.array_equal(part.free, base.free) for part in (up, down)):
         return False
-    names, parts = ("area", "gap", "frames", "B"), (up, own, down)
-    shapes = ((one.points, *(getattr(one.interface, name) for name in names)) for one in parts)
-    for above, here, below in zip(*shapes, strict=True):
-        if not above.shape == here.shape == below.shape:
+    names, parts = ("area", "gap", "frames", "B"), (up, base, down)
+    shapes = ((part.points, *(getattr(part.interface, name) for name in names)) for part in parts)
+    for above, middle, lower in zip(*shapes, strict=True):
+        if not above.shape == middle.shape == lower.shape:
             return False
-        if abs(above + below - 2 * here).max() > 0.1 * abs(above - below).max() + 1e-12 * abs(here).max():
+        if abs(above + lower - 2 * middle).max() > 0.1 * abs(above - lower).max() + 1e-12 * abs(middle).max():
             return False
     return True
 
 
-def _touches(number: SceneValue) -> bool:
+def _is_seen_by_contact(number: SceneValue) -> bool:
     """Whether the law of a contact may depend on a number."""
     if number.name == "density":
         return False

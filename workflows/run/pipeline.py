@@ -69,10 +69,10 @@ def run(
                     start, stop = (2 * np.pi * f for f in scene.response.references or scene.response.range)
                     linear = references.linear_references(model.balance, settings.OUTPUT, start, stop)
             result = keep(replace(result, response=frf, references=linear, stage=Stage.RESPONSE))
-        found = result.response
-        check_branch(found)
-        if scene.wears and found is not None and (peak := found.peak(settings.OUTPUT)) is not None:
-            at, height = found.omega[peak] / (2 * np.pi), float(found.amplitude(settings.OUTPUT)[peak])
+        branch = result.response
+        check_branch(branch)
+        if scene.wears and branch is not None and (peak := branch.peak(settings.OUTPUT)) is not None:
+            at, height = branch.omega[peak] / (2 * np.pi), float(branch.amplitude(settings.OUTPUT)[peak])
             progress.say(f"response: peak {measured(at, 'Hz', 4)}, {measured(height, 'm')}, unworn")
         result = keep(judged(scene, model.balance, result, progress))
         if scene.wears:
@@ -83,11 +83,11 @@ def run(
         if scene.wear is not None and scene.wear.responses and result.wear_steps:
             with progress.track("responses of the worn contact") as advance:
 
-                def again(worn: HarmonicBalance) -> Branch:
+                def follow_worn(worn: HarmonicBalance) -> Branch:
                     return response_curve.follow_response(scene, worn, folds=False)
 
                 count = scene.wear.responses
-                curves = response_curve.worn_responses(result, model.balance, count, again, advance)
+                curves = response_curve.worn_responses(result, model.balance, count, follow_worn, advance)
                 result = keep(replace(result, worn=curves))
         if judge is not None and scene.verdict.enabled and scene.response.control == "force":
             result = judge(file, model, result, progress)

@@ -80,7 +80,7 @@ class Plan:
         """The plan as pairs of a name and a readable value."""
         steps = "as many as it takes" if self.wear_steps is None else f"about {self.wear_steps}"
         response, wear = (_time(count * self.solve_seconds) for count in (self.response_solves, self.wear_solves))
-        whole = _time(self.reduction_seconds + (self.response_solves + self.wear_solves) * self.solve_seconds)
+        text_of_plan = _time(self.reduction_seconds + (self.response_solves + self.wear_solves) * self.solve_seconds)
         return [
             ("mesh", f"{self.elements} elements, {self.nodes} nodes" if self.elements else "none: matrices"),
             ("full model", f"{self.full_dofs} DOFs"),
@@ -92,7 +92,7 @@ class Plan:
             ("response", f"{self.response_solves} solves, about {response}"),
             ("wear", f"{steps} steps, about {wear}" if self.wear_solves else "none"),
             ("errors", "measured on a finer model after the run" if self.verdict else "not measured"),
-            ("whole run", f"about {whole} on one core, to a factor of three, without errors"),
+            ("whole run", f"about {text_of_plan} on one core, to a factor of three, without errors"),
             *(("warning", remark) for remark in self.remarks),
         ]
 
@@ -101,7 +101,7 @@ def plan(file: SceneFile) -> Plan:
     """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
     scene = file.scene
     check_names(scene, own_files=False)
-    elements = nodes = held = 0
+    elements = nodes = groups = 0
     sparse = False
     remarks: list[str] = []
     if isinstance(scene, MatrixScene):
@@ -123,15 +123,15 @@ def plan(file: SceneFile) -> Plan:
         free = free_dofs(3 * nodes, joined.clamps, node_sets)
         full = len(free)
         pairs, masters = _contact(built, mesh, node_sets, free)
-        held = int(built.geometry is not None and built.geometry.no_turning is not None)
+        groups = int(built.geometry is not None and built.geometry.no_turning is not None)
         modes, cutoff = built.reduction.modes, built.reduction.cutoff
-        sparse = without_masters(built, pairs * len(components(scene)), held > 0)
+        sparse = without_masters(built, pairs * len(components(scene)), groups > 0)
         if sparse:
             masters = LIMITS.clusters * len(components(scene)) + 5
     basis = HarmonicBasis(scene.harmonics.kept or COSTS.harmonics, scene.harmonics.samples)
     n_component = len(components(scene))
     contact = pairs * n_component
-    model = masters + (modes if modes is not None else 50) - held
+    model = masters + (modes if modes is not None else 50) - groups
     memory = (
         200e6  # the program itself
         + memory_use.FACTOR * full
@@ -177,11 +177,11 @@ def _openings(
         one.build(mesh, node_sets)
         if isinstance(one, Tie):
             pairs.append(one)
-    found = []
+    remarks = []
     for pair in pairs:
         first, _, shared = pair.meeting(mesh)
-        found += check_opening(pair.label, shared.gap, first.length)
-    return found
+        remarks += check_opening(pair.label, shared.gap, first.length)
+    return remarks
 
 
 def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
@@ -202,7 +202,10 @@ def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free
             masters.append(body_1_dofs(interface).ravel())
         else:
             masters += [np.unique(half.indices) for half in (interface.B, *second)]
-    masters += [find_group(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
+    masters += [
+        find_group(node_sets, names_of_laws.group) * 3 + "xyz".index(names_of_laws.axis)
+        for names_of_laws in scene.prescribed.values()
+    ]
     touched = [(find_group(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= LIMITS.point_load]
     return pairs, len(np.intersect1d(np.concatenate([*masters, []]).astype(int), free))
@@ -212,10 +215,10 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
     """Wear steps and balance solves to expect."""
     if scene.wear is None or scene.wear.max_steps == 0:
         return 0, 0
-    most, cost = scene.wear.max_steps, _step_cost(scene.wear)
+    step_limit, cost = scene.wear.max_steps, _step_cost(scene.wear)
     share = scene.wear.accuracy_share
-    likely = most if share is None or cost is None else round(cost.steps * (share / cost.accuracy) ** cost.power)
-    steps = min(most, likely)
+    likely = step_limit if share is None or cost is None else round(cost.steps * (share / cost.accuracy) ** cost.power)
+    steps = min(step_limit, likely)
     solves = 0
     for place in (duty.at for duty in scene.wear.duties):
         solves += steps if place.peak is None else steps * (cost.at_peak if cost else 1) + scene.response.points

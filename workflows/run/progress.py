@@ -46,15 +46,15 @@ class Progress:
             yield self._lines(name, start) if self._log else lambda *_: None
         elif self._console.is_terminal:
             columns = (TextColumn("{task.description}"), BarColumn(12), TaskProgressColumn())
-            left, before = TextColumn("{task.fields[left]}{task.fields[note]}"), compiled()
-            with Bar(*columns, left, console=self._console, transient=True) as bar:
+            remaining, before = TextColumn("{task.fields[left]}{task.fields[note]}"), compiled()
+            with Bar(*columns, remaining, console=self._console, transient=True) as bar:
                 task = bar.add_task(name, total=1.0, left="", note="")
                 log = self._lines(name, start, on_console=False) if self._log else None
 
                 def advance(share: float, note: str, *_: object) -> None:
-                    left = time_left(share, start, compiled() - before)
-                    gap = "; " if left and note else ""
-                    bar.update(task, completed=min(share, 1.0), left=left, note=gap + note)
+                    remaining = time_left(share, start, compiled() - before)
+                    gap = "; " if remaining and note else ""
+                    bar.update(task, completed=min(share, 1.0), left=remaining, note=gap + note)
                     if log is not None:
                         log(share, note)
 
@@ -73,8 +73,8 @@ class Progress:
             if now - last >= wait and share > 0:
                 last = now
                 wait *= 1 if self._details else 2
-                left = time_left(share, start, compiling)
-                line = f"{name}: {min(share, 1.0):.0%}{', ' if left else ''}{left}; {note}".rstrip("; ")
+                remaining = time_left(share, start, compiling)
+                line = f"{name}: {min(share, 1.0):.0%}{', ' if remaining else ''}{remaining}; {note}".rstrip("; ")
                 (self.say if on_console else self._write)(line)
 
         return advance
@@ -105,9 +105,9 @@ def time_left(share: float, start: float, compiling: float) -> str:
     start : of the work, as of time.perf_counter; compiling : seconds spent on it since then
     """
     steady = max(time.perf_counter() - start - compiling, 0.0)
-    left = f"{steady * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""
-    apart = f"(compiled for {compiling:.0f} s, once)" if compiling >= 1 else ""
-    return " ".join(filter(None, [left, apart]))
+    remaining = f"{steady * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""
+    compilation = f"(compiled for {compiling:.0f} s, once)" if compiling >= 1 else ""
+    return " ".join(filter(None, [remaining, compilation]))
 
 
 Callback = Callable[[str, float | None], None]

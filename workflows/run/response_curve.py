@@ -34,44 +34,50 @@ def follow_response(
     """
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
-    asked = scene.response
-    if asked.control == "phase":
-        assert isinstance(asked.amplitude, tuple)
-        way = BackboneOptions(asked.points, newton=settings.newton_options(scene))
-        return control.phase_resonance(balance, settings.OUTPUT, low, high, *asked.amplitude, way)
-    ends = (low, high) if asked.sweep == "up" else (high, low)
+    request = scene.response
+    if request.control == "phase":
+        assert isinstance(request.amplitude, tuple)
+        way = BackboneOptions(request.points, newton=settings.newton_options(scene))
+        return control.phase_resonance(balance, settings.OUTPUT, low, high, *request.amplitude, way)
+    ends = (low, high) if request.sweep == "up" else (high, low)
 
     seen: list[tuple[float, float]] = []
     at = balance.compliance.output_names.index(settings.OUTPUT)
 
-    def told(done: int, wanted: int, point: BranchPoint) -> None:
+    def report(done: int, total: int, point: BranchPoint) -> None:
         assert advance is not None
         seen.append((point.omega, float(amplitude(point.response[at]))))
         hertz, height = measured(point.omega / (2 * np.pi), "Hz", 4), measured(seen[-1][1], "m")
-        advance(done / wanted, f"{sparkline(*np.array(seen).T)} {hertz}, {height}", seen[-1])
+        advance(done / total, f"{sparkline(*np.array(seen).T)} {hertz}, {height}", seen[-1])
 
     def along(problem: HarmonicBalance) -> Branch:
-        found: Branch = method.follow(problem, *ends, options, told if advance else lambda *_: None)
-        return found
+        branch_of_method: Branch = method.follow(problem, *ends, options, report if advance else lambda *_: None)
+        return branch_of_method
 
-    if asked.control == "amplitude":
-        assert isinstance(asked.amplitude, float)
-        held = control.constant_response(balance, settings.OUTPUT, asked.amplitude)
-        return control.driven(held, along(held))
+    if request.control == "amplitude":
+        assert isinstance(request.amplitude, float)
+        controlled = control.constant_response(balance, settings.OUTPUT, request.amplitude)
+        return control.driven(controlled, along(controlled))
     branch = along(balance)
-    named = "method" in asked.model_fields_set and asked.method_name != "adaptive"
-    as_swept = named or "sweep" in asked.model_fields_set
+    named = "method" in request.model_fields_set and request.method_name != "adaptive"
+    as_swept = named or "sweep" in request.model_fields_set
     if folds and branch.ended is BranchEnd.JUMPED and not as_swept:
         rules = arc_length.ArcLengthRules(max_gaps=0)  # a curve with gaps does not lead from fold to fold
         round_folds = arc_length.Options(rules=rules, newton=settings.newton_options(scene))
-        whole = arc_length.follow(balance, *ends, round_folds)
-        if whole.arrived:
-            branch = replace(whole, end=whole.end.kind.say(f"{whole.end.detail} by arc length: a sweep jumps"))
+        full_curve = arc_length.follow(balance, *ends, round_folds)
+        if full_curve.arrived:
+            branch = replace(
+                full_curve, end=full_curve.end.kind.say(f"{full_curve.end.detail} by arc length: a sweep jumps")
+            )
     return curve_peaks.with_peaks(balance, branch, settings.peak_of(scene))
 
 
 def choose_harmonics(
-    balance: HarmonicBalance, peak: AtPeak, options: harmonic_choice.ChoiceOptions, most: int = 3, same: float = 1e-3
+    balance: HarmonicBalance,
+    peak: AtPeak,
+    options: harmonic_choice.ChoiceOptions,
+    n_choices: int = 3,
+    same_peak: float = 1e-3,
 ) -> HarmonicChoice:
     """Harmonics that make the response of every output right to the tolerance of the options at its resonance.
 
@@ -81,12 +87,12 @@ def choose_harmonics(
     Raises  harmonic_choice.NotSolved
     """
     before = 0.0
-    for _ in range(most):
+    for _ in range(n_choices):
         point = peak.solve(balance)
         if not point.solution.converged:
             raise harmonic_choice.NotSolved(f"harmonics cannot be chosen: no peak was found: {point.solution.outcome}")
         omega = point.state.omega
-        if abs(omega - before) <= same * omega:
+        if abs(omega - before) <= same_peak * omega:
             break
         choice = harmonic_choice.choose(balance, [omega], options)
         balance, before = choice.balance, omega
@@ -106,11 +112,13 @@ def shear_bounds(
     for i in range(n):
         if branch.converged[i]:
             x = balance.shaped(branch.contact[i])
-            found = residual_shear.response_bounds(balance, branch.omega[i], x, output, newton)
-            failed[i] = np.sum(~found.converged)
-            if found.converged.any():
-                low[:, i], high[:, i] = zip(found.amplitude_range(output), found.energy_range(), strict=True)
-            stuck[i] = found.stuck[0].mean()
+            range_at_point = residual_shear.response_bounds(balance, branch.omega[i], x, output, newton)
+            failed[i] = np.sum(~range_at_point.converged)
+            if range_at_point.converged.any():
+                low[:, i], high[:, i] = zip(
+                    range_at_point.amplitude_range(output), range_at_point.energy_range(), strict=True
+                )
+            stuck[i] = range_at_point.stuck[0].mean()
         advance((i + 1) / n, "")
     return ShearBounds(low[0], high[0], low[1], high[1], stuck, failed)
 
@@ -129,8 +137,8 @@ def worn_responses(
     assert result.wear is not None
     wear, patch = result.wear, result.patch
     volume = wear.depth @ patch.area
-    wanted = volume[-1] * np.arange(1, count + 1) / count
-    rows = np.unique([int(np.argmin(np.abs(volume - v))) for v in wanted])
+    volumes = volume[-1] * np.arange(1, count + 1) / count
+    rows = np.unique([int(np.argmin(np.abs(volume - v))) for v in volumes])
     branches = []
     for i, row in enumerate(rows):
         worn = balance.with_gap(balance.contact.gap + wear.depth[row])

@@ -48,8 +48,8 @@ class Usual:
     line_error: float = 1e-4
 
 
-USUAL = Usual()
-APART = 0.005  # of the length of a face: an opening or overlap from which on a pair is remarked
+TYPICAL = Usual()
+LARGEST_OPENING = 0.005  # of the length of a face: an opening or overlap from which on a pair is remarked
 
 
 def lines(file: SceneFile, model: Model) -> Iterator[str]:
@@ -63,10 +63,10 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
     names = [body.name for body in part.mesh.bodies]
     material = part_reduction.material(scene, part.mesh)
     found, plain, counts = [], {}, []
-    for name, (piece, own) in zip(names, materials_of(part.mesh, material), strict=True):
-        found.append(facts(piece.mesh, densities(piece.mesh, own)))
-        if isinstance(own, Material):
-            plain[name or file.name] = own
+    for name, (piece, scene_text) in zip(names, materials_of(part.mesh, material), strict=True):
+        found.append(facts(piece.mesh, densities(piece.mesh, scene_text)))
+        if isinstance(scene_text, Material):
+            plain[name or file.name] = scene_text
         kind = "hexahedra" if piece.mesh.t.shape[0] == 8 else "tetrahedra"
         counts.append(f"{name}: {piece.mesh.nelements} {kind}" if name else f"{piece.mesh.nelements} {kind}")
     size = np.max([one.high for one in found], axis=0) - np.min([one.low for one in found], axis=0)
@@ -121,18 +121,18 @@ def _mm(point: np.ndarray, between: str = ", ") -> str:
 def check_opening(pair: str, gap: np.ndarray, length: float) -> list[str]:
     """Remarks on the opening (n,) [m], negative in an overlap, of two faces; length : of the first one [m]."""
     return [
-        f"the faces of {pair} lie up to {1e3 * far:.3g} mm {how}: correct their places"
-        for far, how in ((float(gap.max()), "apart"), (-float(gap.min()), "inside each other"))
-        if far > APART * length
+        f"the faces of {pair} lie up to {1e3 * far:.3g} mm {position}: correct their places"
+        for far, position in ((float(gap.max()), "apart"), (-float(gap.min()), "inside each other"))
+        if far > LARGEST_OPENING * length
     ]
 
 
 def check_size(size: np.ndarray, cure: str) -> list[str]:
     """A remark on a size (3,) [m] that is not usual; cure : what to do about it."""
     longest = float(size.max())
-    if longest > USUAL.size[1]:
+    if longest > TYPICAL.size[1]:
         return [f"it is {longest:.4g} m long, as a mesh in millimetres read in metres would be: {cure}"]
-    if longest < USUAL.size[0]:
+    if longest < TYPICAL.size[0]:
         return [
             f"it is {1e6 * longest:.4g} um long, as a mesh in metres read in millimetres would be: correct its unit"
         ]
@@ -142,17 +142,17 @@ def check_size(size: np.ndarray, cure: str) -> list[str]:
 def check_materials(materials: Mapping[str, Material]) -> list[str]:
     """Remarks on materials, body -> material, whose numbers are not usual."""
     remarks = []
-    for name, one in materials.items():
-        if not USUAL.density[0] <= one.rho <= USUAL.density[1]:
-            unit = "g/cm3" if 0.1 < one.rho < USUAL.density[0] else "another unit"
+    for name, material in materials.items():
+        if not TYPICAL.density[0] <= material.rho <= TYPICAL.density[1]:
+            unit = "g/cm3" if 0.1 < material.rho < TYPICAL.density[0] else "another unit"
             remarks.append(
-                f"the density of {name} is {one.rho:.4g} kg/m3, as a value in {unit} without its unit would be: "
+                f"the density of {name} is {material.rho:.4g} kg/m3, as a value in {unit} without its unit would be: "
                 'write it with its unit, such as "7.86 g/cm3"'
             )
-        if not USUAL.young[0] <= one.E <= USUAL.young[1]:
-            unit = "GPa" if one.E < 2e3 else "MPa" if USUAL.young[0] > one.E else "another unit"
+        if not TYPICAL.young[0] <= material.E <= TYPICAL.young[1]:
+            unit = "GPa" if material.E < 2e3 else "MPa" if TYPICAL.young[0] > material.E else "another unit"
             remarks.append(
-                f"Young's modulus of {name} is {one.E:.4g} Pa, as a value in {unit} without its unit would be: "
+                f"Young's modulus of {name} is {material.E:.4g} Pa, as a value in {unit} without its unit would be: "
                 'write it with its unit, such as "210 GPa"'
             )
     return remarks
@@ -161,7 +161,7 @@ def check_materials(materials: Mapping[str, Material]) -> list[str]:
 def check_speed(scene: MeshScene, line_error: float | None) -> list[str]:
     """Remarks on a speed that does not excite the frequencies of the response, and on stress between speeds."""
     wheel, (low, high) = scene.wheel, scene.response.range
-    if line_error is not None and line_error > USUAL.line_error:
+    if line_error is not None and line_error > TYPICAL.line_error:
         return [
             f"the stress of the wheel changes abruptly along its speeds: frequencies between those at which it was "
             f"computed are right to {line_error:.1e} only; shorten the range"
@@ -183,7 +183,7 @@ def _free(system: SecondOrderSystem) -> bool:
     if not isinstance(system.stiffness, np.ndarray):
         return False
     squares = eigh(system.stiffness, system.mass, eigvals_only=True, subset_by_index=(0, min(12, len(system.mass) - 1)))
-    return bool(abs(squares[0]) < USUAL.rigid * squares[-1])
+    return bool(abs(squares[0]) < TYPICAL.rigid * squares[-1])
 
 
 def check_deflection(
@@ -195,7 +195,7 @@ def check_deflection(
     modal damping of the scene. A structure that contact alone holds is not checked.
     system : full or reduced, without contact; largest : of its coordinates -> largest displacement [m]; size : [m]
     """
-    moved: dict[str, tuple[float, str]] = {}
+    displacement: dict[str, tuple[float, str]] = {}
     try:
         solve = _solver(system.stiffness)
     except (ValueError, LinAlgError):  # nothing holds it but the contact
@@ -204,20 +204,20 @@ def check_deflection(
         return []
     for name, load in {**scene.loads.static, **scene.loads.harmonic}.items():
         if name in system.loads:
-            moved[name] = (largest(solve(system.loads[name] * load.amplitude)), "at rest")
+            displacement[name] = (largest(solve(system.loads[name] * load.amplitude)), "at rest")
     ratio = scene.damping.modal
     if ratio and scene.response.frequency:
-        omega, phi = modes(system.stiffness, system.mass, min(USUAL.modes, system.mass.shape[0]))
+        omega, phi = modes(system.stiffness, system.mass, min(TYPICAL.modes, system.mass.shape[0]))
         low, high = (2 * np.pi * f for f in scene.response.frequency)
         for name, load in scene.loads.harmonic.items():
             force = system.loads[name] * load.amplitude if name in system.loads else 0.0 * phi[:, 0]
             for i in np.flatnonzero((omega * load.harmonic >= low) & (omega <= high * load.harmonic) & (omega > 0)):
                 swing = largest(phi[:, i] * (phi[:, i] @ force) / (2 * ratio * omega[i] ** 2))
-                moved[name] = max(
-                    moved.get(name, (0.0, "")), (swing, f"at its resonance of {omega[i] / (2 * np.pi):.4g} Hz")
+                displacement[name] = max(
+                    displacement.get(name, (0.0, "")), (swing, f"at its resonance of {omega[i] / (2 * np.pi):.4g} Hz")
                 )
-    name, (most, where) = max(moved.items(), key=lambda item: item[1][0], default=("", (0.0, "")))
-    if most <= USUAL.bent * size:
+    name, (most, where) = max(displacement.items(), key=lambda item: item[1][0], default=("", (0.0, "")))
+    if most <= TYPICAL.bent * size:
         return []
     return [
         f"load {name} alone moves the part by {1e3 * most:.3g} mm on {1e3 * size:.3g} mm {where} while the "

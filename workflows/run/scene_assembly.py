@@ -29,11 +29,11 @@ from tribodyn.workflows.scene.part_tables import Meshed, SolidMaterial
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.structure_tables import AXES
 
-Noted = tuple[Any, dict[str, np.ndarray], tuple[str, ...]]
+MeshWithNotes = tuple[Any, dict[str, np.ndarray], tuple[str, ...]]
 """A mesh, its node sets, and sentences on what was done to its file and is not used of it."""
 
 
-def _read(table: Meshed, folder: Path, path: Path, sizes: cad.Sizes | None = None) -> Noted:
+def _read(table: Meshed, folder: Path, path: Path, sizes: cad.Sizes | None = None) -> MeshWithNotes:
     """The mesh that a table gives: of a file in `folder`, or of a part, which is kept at `path`."""
     if table.mesh is not None:
         return mesh_reader.read_with_notes(folder / table.mesh, sizes)
@@ -57,31 +57,31 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
         bodies = []
         for name, table in scene.bodies.items():
             try:
-                mesh, node_sets, notes = _placed(table, folder, scratch / f"mesh_{name}.msh")
-                own = tuple(f"bodies.{name}: {note}" for note in notes)
-                bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), own))
+                mesh, node_sets, notes = _placed_mesh(table, folder, scratch / f"mesh_{name}.msh")
+                remarks = tuple(f"bodies.{name}: {note}" for note in notes)
+                bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), remarks))
             except ValueError as trouble:
                 raise Refusal(f"bodies.{name}: {trouble}") from None
-        _apart(bodies)
+        _refuse_overlap(bodies)
     brought = carried_decks(scene, folder)
     bodies += [body for deck in brought.values() for body in deck.bodies]
     points = {name: list(place) for deck in brought.values() for name, place in deck.points.items()}
-    whole = Assembly(bodies)
+    structure = Assembly(bodies)
     for name, coupling in scene.couplings.items():
         if name in points:
             raise Refusal(f"couplings.{name} has the name of a point of a deck: give it another")
-        points[name] = _middle(whole, coupling)
-    return Assembly(bodies, points) if points else whole
+        points[name] = _middle(structure, coupling)
+    return Assembly(bodies, points) if points else structure
 
 
-def _apart(bodies: Sequence[Body]) -> None:
+def _refuse_overlap(bodies: Sequence[Body]) -> None:
     """Raise ValueError where a body of a scene lies in another one."""
-    for one, other in permutations(bodies, 2):
-        found = overlap(one.mesh, other.mesh)
-        if found is not None:
-            share, (x, y, z) = found
+    for body, other in permutations(bodies, 2):
+        overlap_at = overlap(body.mesh, other.mesh)
+        if overlap_at is not None:
+            share, (x, y, z) = overlap_at
             raise Refusal(
-                f"bodies.{one.name} overlaps bodies.{other.name}: {share:.0%} of its elements lie in it, about "
+                f"bodies.{body.name} overlaps bodies.{other.name}: {share:.0%} of its elements lie in it, about "
                 f"({x:.4g}, {y:.4g}, {z:.4g}) m: move one of them, or correct its unit"
             )
 
@@ -92,7 +92,7 @@ def carried_decks(scene: MeshScene, folder: Path) -> dict[str, decks.CarriedDeck
     return {name: decks.structure(name, table, materials, folder) for name, table in scene.decks.items()}
 
 
-def _placed(table: structure_tables.BodyTable, folder: Path, path: Path) -> Noted:
+def _placed_mesh(table: structure_tables.BodyTable, folder: Path, path: Path) -> MeshWithNotes:
     mesh, node_sets, notes = _read(table, folder, path, _sizes(table))
     if table.volume is not None:
         mesh, node_sets = placement.extract_volume(mesh, node_sets, table.volume)
@@ -100,8 +100,8 @@ def _placed(table: structure_tables.BodyTable, folder: Path, path: Path) -> Note
     mesh, node_sets = face_rules.add_faces(mesh, node_sets, {name: face.rule for name, face in table.faces.items()})
     mesh, node_sets = subdivision.subdivide(mesh, node_sets, table.halved)
     turn, shift = np.eye(3), np.zeros(3)
-    for one in table.turns:
-        R, point = rotation(one.axis, one.angle), np.array(one.point)
+    for turn_table in table.turns:
+        R, point = rotation(turn_table.axis, turn_table.angle), np.array(turn_table.point)
         turn, shift = R @ turn, R @ (shift - point) + point
     return placement.place(mesh, 1.0, turn, shift + np.array(table.translation)), node_sets, notes
 
@@ -141,14 +141,14 @@ def make_material(table: SolidMaterial) -> AnyMaterial:
     return Material(table.young, table.poisson, table.density, table.expansion, reduced)
 
 
-def _middle(whole: Assembly, table: structure_tables.CouplingTable) -> list[float]:
+def _middle(structure: Assembly, table: structure_tables.CouplingTable) -> list[float]:
     if table.point is not None:
         return list(table.point)
-    if table.face in whole.boundaries:
-        face = surface(whole, whole.boundaries[table.face], vertices_only=True)
+    if table.face in structure.boundaries:
+        face = surface(structure, structure.boundaries[table.face], vertices_only=True)
         middle = face.area @ face.points / face.area.sum()
     else:
-        middle = whole.doflocs.T[find_group(whole.node_sets, table.face)].mean(axis=0)
+        middle = structure.doflocs.T[find_group(structure.node_sets, table.face)].mean(axis=0)
     return [float(c) for c in middle]
 
 
@@ -165,20 +165,20 @@ class Connections:
 
 def connections(scene: MeshScene, folder: Path) -> Connections:
     """What holds and joins the bodies of a scene, whose files are in `folder`; raises Refusal as `carried_decks`."""
-    found = Connections(springs=[make_spring(table) for table in scene.springs.values()])
-    held: dict[str, Meshed] = {} if scene.geometry is None else {"": scene.geometry}
-    held |= {f"{name}.": body for name, body in scene.bodies.items()}
-    _of_structure(scene, found)
+    result = Connections(springs=[make_spring(table) for table in scene.springs.values()])
+    meshed: dict[str, Meshed] = {} if scene.geometry is None else {"": scene.geometry}
+    meshed |= {f"{name}.": body for name, body in scene.bodies.items()}
+    _of_structure(scene, result)
     for name, deck in carried_decks(scene, folder).items():
-        found.clamps += deck.clamps
-        found.constraints += deck.constraints
-        found.springs += deck.springs
-        found.masses += deck.masses
-        found.loads[decks.load_name(name)] = deck.load
-    for before, table in held.items():
-        found.clamps += [Clamp(f"{before}{group}") for group in table.fixed]
-        found.clamps += [Clamp(f"{before}{group}", axes) for group, axes in table.fixed_axes.items()]
-    return found
+        result.clamps += deck.clamps
+        result.constraints += deck.constraints
+        result.springs += deck.springs
+        result.masses += deck.masses
+        result.loads[decks.load_name(name)] = deck.load
+    for before, table in meshed.items():
+        result.clamps += [Clamp(f"{before}{group}") for group in table.fixed]
+        result.clamps += [Clamp(f"{before}{group}", axes) for group, axes in table.fixed_axes.items()]
+    return result
 
 
 def make_spring(table: SpringTable) -> Spring:
@@ -186,18 +186,18 @@ def make_spring(table: SpringTable) -> Spring:
     return Spring(table.group, table.direction, table.stiffness, table.opposite)
 
 
-def _of_structure(scene: MeshScene, found: Connections) -> None:
+def _of_structure(scene: MeshScene, result: Connections) -> None:
     """Ties, couplings with what of their points is held, links and lumped masses."""
-    found.constraints += [Tie(f"ties.{name}", t.first, t.second, t.reach) for name, t in scene.ties.items()]
+    result.constraints += [Tie(f"ties.{name}", t.first, t.second, t.reach) for name, t in scene.ties.items()]
     coupled: dict[str, RigidCoupling | DistributedCoupling] = {}
     for name, table in scene.couplings.items():
         kind = RigidCoupling if table.kind == "rigid" else DistributedCoupling
         coupled[name] = kind(name, table.face)
         for point, axes in ((name, AXES[:3]), (f"{name}.turn", AXES[3:])):
-            held = "".join(axis[-1] for axis in axes if axis in table.fixed)
-            found.clamps += [Clamp(point, held)] if held else []
-    found.constraints += coupled.values()
+            axes_held = "".join(axis[-1] for axis in axes if axis in table.fixed)
+            result.clamps += [Clamp(point, axes_held)] if axes_held else []
+    result.constraints += coupled.values()
     for name, link in scene.links.items():
         free = [AXES.index(axis) for axis in link.free]
-        found.constraints.append(Link(f"links.{name}", coupled[link.first], coupled[link.second], free))
-    found.masses += [Mass(table.at, table.mass, table.inertia) for table in scene.masses.values()]
+        result.constraints.append(Link(f"links.{name}", coupled[link.first], coupled[link.second], free))
+    result.masses += [Mass(table.at, table.mass, table.inertia) for table in scene.masses.values()]

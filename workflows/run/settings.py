@@ -44,8 +44,8 @@ def response_options(scene: Scene) -> Any:
     """Options of the scene's continuation method; raises ValueError where the method refuses them."""
     kind = continuation.load(scene.response.method_name).Options
     general = {"n_points": scene.response.points, "newton": newton_options(scene)}
-    known = {option.name for option in fields(kind)}
-    return kind(**{name: value for name, value in general.items() if name in known} | scene.response.options)
+    names = {option.name for option in fields(kind)}
+    return kind(**{name: value for name, value in general.items() if name in names} | scene.response.options)
 
 
 def response_range(scene: Scene) -> tuple[float, float]:

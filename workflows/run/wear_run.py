@@ -61,7 +61,7 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
     problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
     found = result.response
     if found is not None and (peak := found.peak(settings.OUTPUT)) is not None:
-        problem = _begun(problem, (float(found.omega[peak]), model.balance.shaped(found.contact[peak])))
+        problem = _start(problem, (float(found.omega[peak]), model.balance.shaped(found.contact[peak])))
     scale = settings.depth_scale(scene, patch.free_deflection, patch.area)
     rule = rule_of(scene, problem, scale)
     try:
@@ -76,7 +76,7 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
     return result
 
 
-def _begun(problem: WearProblem, start: tuple[float, np.ndarray] | None) -> WearProblem:
+def _start(problem: WearProblem, start: tuple[float, np.ndarray] | None) -> WearProblem:
     """A problem whose duties at the peak begin at one that is known, see `Duty.start`."""
 
     there = [duty.load == 1 and duty.balance is None and isinstance(duty.site, AtPeak) for duty in problem.mission]
@@ -93,7 +93,7 @@ def worn_out(
     """
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
-    problem = _begun(wear_problem(file.scene, file.folder, balance, left, wanted.end_at == "at_rest"), start)
+    problem = _start(wear_problem(file.scene, file.folder, balance, left, wanted.end_at == "at_rest"), start)
     scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)
     return evolve(rule_of(file.scene, problem, scale, with_growth=False), wanted.max_steps)
 

@@ -50,7 +50,7 @@ class Table(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known(cls, table: Any) -> Any:
+    def _only_known_keys(cls, table: Any) -> Any:
         """Runs after those of a table itself, which may take other keys."""
         if isinstance(table, dict) and cls.model_config.get("extra") == "forbid":
             for key in table:
@@ -67,11 +67,11 @@ def holds_tables(annotation: Any) -> bool:
 
 
 class UnknownKey(Refusal):
-    """A key that a table does not have; known : those that it has."""
+    """A key that a table does not have; names : those that it has."""
 
-    def __init__(self, key: str, known: list[str]):
-        super().__init__(unknown_key(key, known))
-        self.key, self.known = key, known
+    def __init__(self, key: str, names: list[str]):
+        super().__init__(unknown_key(key, names))
+        self.key, self.names = key, names
 
 
 @dataclass(frozen=True)
@@ -116,16 +116,16 @@ def parsed_direction(value: object) -> tuple[float, float, float]:
 Direction = Annotated[tuple[float, float, float], BeforeValidator(parsed_direction)]
 
 
-def unknown_key(key: str, known: list[str]) -> str:
+def unknown_key(key: str, all_names: list[str]) -> str:
     """Clause about a key that does not exist, with the one that was probably meant and all that exist."""
-    names = [name for name in known if name != PARAMETERS]
+    names = [name for name in all_names if name != PARAMETERS]
     close = difflib.get_close_matches(key.rpartition(".")[2], names, n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
     return f"unknown key {key}{hint}, known here: {', '.join(names)}"
 
 
-def refuse_slips(given: Iterable[str], needed: list[str], known: list[str]) -> None:
+def refuse_slips(keys: Iterable[str], needed: list[str], names: list[str]) -> None:
     """Raise ValueError where one of the given keys is a slip of the pen for one that is needed."""
-    for key in given:
-        if key not in known and difflib.get_close_matches(key, needed, n=1):
-            raise Refusal(unknown_key(key, [*needed, *(name for name in known if name not in needed)]))
+    for key in keys:
+        if key not in names and difflib.get_close_matches(key, needed, n=1):
+            raise Refusal(unknown_key(key, [*needed, *(name for name in names if name not in needed)]))

@@ -15,11 +15,11 @@ LENGTH = 16  # hexadecimal digits of a digest that are kept
 
 def files_named(table: Any, folder: Path) -> dict[str, Path]:
     """Files that texts in nested tables and lists name, such as a mesh, a height map or a law of one's own."""
-    found = {}
+    paths = {}
     for value in _texts(table):
         if len(value) < 256 and "\n" not in value and "\0" not in value and (folder / value).is_file():
-            found[value] = folder / value
-    return dict(sorted(found.items()))
+            paths[value] = folder / value
+    return dict(sorted(paths.items()))
 
 
 def digests(table: Any, folder: Path) -> dict[str, str]:

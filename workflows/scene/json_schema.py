@@ -36,7 +36,7 @@ def json_schema() -> dict[str, Any]:
 @cache
 def meanings(kind: type[BaseModel]) -> dict[str, str]:
     """The text below every key of a table, from the source of its class and of those that it inherits from."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for table in reversed(kind.__mro__):
         module = sys.modules[table.__module__]
         if not module.__name__.startswith("tribodyn"):
@@ -46,8 +46,8 @@ def meanings(kind: type[BaseModel]) -> dict[str, str]:
         body = next((w.body for w in written if isinstance(w, ast.ClassDef) and w.name == name), [])
         for key, text in pairwise(body):
             if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name) and isinstance(text, ast.Expr):
-                found[key.target.id] = inspect.cleandoc(str(ast.literal_eval(text.value)))
-    return found
+                texts[key.target.id] = inspect.cleandoc(str(ast.literal_eval(text.value)))
+    return texts
 
 
 class _Generator(GenerateJsonSchema):
@@ -64,47 +64,50 @@ class _Generator(GenerateJsonSchema):
         return {"anyOf": [inner, {"type": "string"}], "description": f"[{unit or 'ratio'}]"}
 
     def model_schema(self, schema: Any) -> dict[str, Any]:
-        kind, made = schema["cls"], super().model_schema(schema)
-        keys = made.setdefault("properties", {})
+        kind, schema_of_table = schema["cls"], super().model_schema(schema)
+        keys = schema_of_table.setdefault("properties", {})
         for name, text in meanings(kind).items():
             if name in keys:
                 unit = keys[name].get("description", "")
                 keys[name] = {**keys[name], "description": f"{' '.join(text.split())} {unit}".strip()}
         if issubclass(kind, PartResponse):  # that of the first harmonic load
-            made["required"] = ["frequency"]
+            schema_of_table["required"] = ["frequency"]
         if issubclass(kind, NamedContact):
             for name, other in (("first", "group"), ("second", "opposite")):
                 keys[name] = {"type": "string", "description": keys[other]["description"]}
-            made["required"] = [name for name in made["required"] if name != "group"]
+            schema_of_table["required"] = [name for name in schema_of_table["required"] if name != "group"]
         if issubclass(kind, LawTable):
             files = {name: read(kind.LAWS.file_of(name)) for name in kind.LAWS.KIND.names()}
-            _with_own(made, "law", files)
+            _with_own(schema_of_table, "law", files)
             keys.pop("parameters", None)  # of a wear rule, whose numbers are keys of the table
         elif "parameters" in keys:
             del keys["parameters"]
-            _with_own(made, "part", {name: read(parts.file_of(name)) for name in parts.names()})
+            _with_own(schema_of_table, "part", {name: read(parts.file_of(name)) for name in parts.names()})
         elif "options" in keys:
-            own = {name: continuation.declared(name) for name in continuation.KIND.names()}
-            _with_own(keys["options"], "method", own)
+            numbers_of_methods = {name: continuation.declared(name) for name in continuation.KIND.names()}
+            _with_own(keys["options"], "method", numbers_of_methods)
             keys["options"]["type"] = "object"
-        return made
+        return schema_of_table
 
 
-def _with_own(made: dict[str, Any], owner: str, files: Mapping[str, Iterable[Number]]) -> None:
+def _with_own(schema: dict[str, Any], owner: str, files: Mapping[str, Iterable[Number]]) -> None:
     """Add the numbers that files declare to the keys of a table; a file beside the scene may have others."""
-    keys = made.setdefault("properties", {})
+    keys = schema.setdefault("properties", {})
     if owner in keys:
         keys[owner]["examples"] = list(files)
     for name, numbers in files.items():
         for number in numbers:
-            had = keys.get(number.name, {}).get("description")
+            description = keys.get(number.name, {}).get("description")
             text = f"{owner} {name}: {number.meaning} [{number.unit or 'ratio'}]"
-            keys[number.name] = {"type": ["number", "string"], "description": f"{had}; {text}" if had else text}
-    known = sorted(keys)
+            keys[number.name] = {
+                "type": ["number", "string"],
+                "description": f"{description}; {text}" if description else text,
+            }
+    names = sorted(keys)
     if owner in keys:
-        made["additionalProperties"] = True
-        made["if"] = {"properties": {owner: {"type": "string", "pattern": OWN_FILE}}, "required": [owner]}
-        made["else"] = {"propertyNames": {"enum": known}}
+        schema["additionalProperties"] = True
+        schema["if"] = {"properties": {owner: {"type": "string", "pattern": OWN_FILE}}, "required": [owner]}
+        schema["else"] = {"propertyNames": {"enum": names}}
 
 
 def _plain(schema: Any) -> Any:

@@ -161,9 +161,9 @@ class Loads(Table, Generic[Static, Harmonic]):
 
     @model_validator(mode="after")
     def _distinct(self) -> Loads[Static, Harmonic]:
-        both = sorted(set(self.static) & set(self.harmonic))
-        if both:
-            raise Refusal(f'expected one load named "{both[0]}", found it under static and under harmonic')
+        shared = sorted(set(self.static) & set(self.harmonic))
+        if shared:
+            raise Refusal(f'expected one load named "{shared[0]}", found it under static and under harmonic')
         if not self.harmonic:
             raise Refusal("expected at least one harmonic load, for example [loads.harmonic.drive]")
         return self

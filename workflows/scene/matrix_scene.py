@@ -85,7 +85,7 @@ class MatrixFiles(Table, stage=PART):
     """Factor on all matrices to reach SI."""
 
     @model_validator(mode="after")
-    def _both(self) -> MatrixFiles:
+    def _complete(self) -> MatrixFiles:
         if self.file is None and (self.mass is None or self.stiffness is None):
             raise Refusal('expected file = "part.npz", or mass and stiffness with one file each')
         return self

@@ -58,14 +58,14 @@ class Meshed(Table, stage=PART):
         """Keys that the table does not have are gathered as parameters of the part."""
         if not isinstance(table, dict) or "parameters" in table:
             return table
-        own = {key: value for key, value in table.items() if key in cls.model_fields}
+        general = {key: value for key, value in table.items() if key in cls.model_fields}
         other = {key: value for key, value in table.items() if key not in cls.model_fields}
-        if ("part" in own) == ("mesh" in own):
+        if ("part" in general) == ("mesh" in general):
             refuse_slips(other, ["part", "mesh"], list(cls.model_fields))
             raise Refusal('expected either part = "name" or mesh = "file.msh", and not both')
-        if not isinstance(own.get("part"), str):
-            return own | other  # a mesh file has no parameters: the other keys are unknown ones
-        return own | {"parameters": part_parameters(own["part"], other, folder_of(info), cls)}
+        if not isinstance(general.get("part"), str):
+            return general | other  # a mesh file has no parameters: the other keys are unknown ones
+        return general | {"parameters": part_parameters(general["part"], other, folder_of(info), cls)}
 
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:
@@ -94,7 +94,7 @@ class Geometry(Meshed, stage=PART):
 
 
 def part_parameters(
-    part: str, given: dict[str, Any], folder: Path | None = None, kind: type[Meshed] = Geometry
+    part: str, values_given: dict[str, Any], folder: Path | None = None, kind: type[Meshed] = Geometry
 ) -> dict[str, int | float]:
     """Parameters of a part in SI units: all of them, or those given to a file of one's own, which is not run here.
 
@@ -105,8 +105,8 @@ def part_parameters(
     if is_user_file(part):
         if folder is None:
             raise Refusal(f'{kind.KEY}part: "{part}" is a file beside a scene, and this scene has no folder')
-        return numbers(kind.KEY, read(user_file(folder, part, f"{kind.KEY}part")), given, general)
-    values = numbers(kind.KEY, read(parts.file_of(part)), given, general)
+        return numbers(kind.KEY, read(user_file(folder, part, f"{kind.KEY}part")), values_given, general)
+    values = numbers(kind.KEY, read(parts.file_of(part)), values_given, general)
     return asdict(parts.load(part).Parameters(**values))
 
 

@@ -102,16 +102,16 @@ def read(name: str, overrides: Sequence[str] = ()) -> SceneFile:
     return parse(_text(path, "scene"), path.name, overrides, path.resolve().parent)
 
 
-def tables(path: Path, what: str) -> dict[str, Any]:
+def tables(path: Path, kind: str) -> dict[str, Any]:
     """The tables of a TOML file of a study, fit, ...; raises SceneError for one that cannot be read."""
-    return deepcopy(_tables(_text(path, what), path.name))
+    return deepcopy(_tables(_text(path, kind), path.name))
 
 
-def _text(path: Path, what: str) -> str:
+def _text(path: Path, kind: str) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(f'the {what} file "{path}" cannot be read as text ({error})') from None
+        raise SceneError(f'the {kind} file "{path}" cannot be read as text ({error})') from None
 
 
 @lru_cache(maxsize=4)  # a study changes one scene many times
@@ -139,8 +139,8 @@ def checked(kind: type[Kind], data: dict[str, Any], label: str, folder: Path | N
         return kind.model_validate(data, context=None if folder is None else {"folder": folder})
     except ValidationError as error:
         problems = _problems(error, data)
-        more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
-        raise SceneError(f"{label}: {'; '.join(problems[:MOST_PROBLEMS])}{more}") from None
+        remainder = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
+        raise SceneError(f"{label}: {'; '.join(problems[:MOST_PROBLEMS])}{remainder}") from None
 
 
 def kind_of(data: dict[str, Any]) -> type[Scene]:
@@ -154,8 +154,10 @@ def from_json(text: str) -> Scene:
     try:
         return kind_of(data).model_validate(data)
     except ValidationError as trouble:
-        why = _problems(trouble, data)[0].partition(",")[0]
-        raise SceneError(f"the scene of this result is of another version of tribodyn ({why}): run it again") from None
+        reason = _problems(trouble, data)[0].partition(",")[0]
+        raise SceneError(
+            f"the scene of this result is of another version of tribodyn ({reason}): run it again"
+        ) from None
 
 
 def _override(data: dict[str, Any], text: str) -> None:
@@ -184,44 +186,44 @@ def _problems(error: ValidationError, data: Any) -> list[str]:
     closest_first = sorted(error.errors(), key=lambda problem: problem["type"].endswith("_type"))
     places = [(_place(problem, data), problem) for problem in closest_first]
     refused = [place for place, problem in places if problem["type"] != "missing"]
-    found: dict[tuple[Any, ...], str] = {}
+    sentences: dict[tuple[Any, ...], str] = {}
     for place, problem in places:
         inside = any(len(other) > len(place) and other[: len(place)] == place for other in refused)
         if not inside and not (problem["type"] == "missing" and place[:-1] in refused):
-            found.setdefault(place, _sentence(problem, place))
-    return list(found.values())
+            sentences.setdefault(place, _sentence(problem, place))
+    return list(sentences.values())
 
 
 def _place(problem: Any, data: Any) -> tuple[str | int, ...]:
     """Keys and list positions that lead to a problem, without the names of kinds that pydantic puts between them."""
-    kept: list[str | int] = []
+    place: list[str | int] = []
     *way, last = problem["loc"] or [""]
     for item in (*way, last):
         inside = data if isinstance(data, dict) else dict(enumerate(data)) if isinstance(data, (list, tuple)) else {}
         if item in inside:
-            kept.append(item)
+            place.append(item)
             data = inside[item]
-    return (*kept, last) if problem["type"] == "missing" else tuple(kept)
+    return (*place, last) if problem["type"] == "missing" else tuple(place)
 
 
 def _sentence(problem: Any, place: tuple[str | int, ...]) -> str:
     """One clause out of a problem that pydantic found: the key, what was expected, what was given."""
-    kind, given, context, key = problem["type"], problem["input"], problem.get("ctx", {}), _key(place)
+    kind, value, context, key = problem["type"], problem["input"], problem.get("ctx", {}), _key(place)
     if kind == "missing":
         return f"{key} is missing"
     if kind == "value_error":
         error = context["error"]
         if isinstance(error, UnknownKey):
-            return unknown_key(_key((*place, error.key)), error.known)
+            return unknown_key(_key((*place, error.key)), error.names)
         return str(error) if key in str(error) else f"{key}: {error}"
     limits = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at least")}
     limits |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}
     if kind in limits:
         bound, word = limits[kind]
-        return f"{key}: expected a value {word} {context[bound]:g}, got {given!r}"
+        return f"{key}: expected a value {word} {context[bound]:g}, got {value!r}"
     if kind == "literal_error":
-        return f"{key}: expected {context['expected']}, got {given!r}"
-    what = {
+        return f"{key}: expected {context['expected']}, got {value!r}"
+    expected = {
         "string_type": "a text in quotes",
         "int_type": "a whole number",
         "bool_type": "true or false",
@@ -231,7 +233,7 @@ def _sentence(problem: Any, place: tuple[str | int, ...]) -> str:
         "too_long": "a shorter list",
         "too_short": "a longer list",
     }.get(kind)
-    return f"{key}: {f'expected {what}' if what else problem['msg'].lower()}, got {given!r}"
+    return f"{key}: {f'expected {expected}' if expected else problem['msg'].lower()}, got {value!r}"
 
 
 def _key(location: Sequence[str | int]) -> str:

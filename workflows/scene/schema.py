@@ -183,11 +183,13 @@ class MeshScene(Scene):
         """A contact has the numbers of its temperature, and the asperities of the measured faces that its law wants."""
         if not isinstance(data, dict):
             return data
-        loads, several, folder = data.get("loads"), data.get("contacts") or None, folder_of(info)
-        contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
-        prefix = "contacts." if several is contacts else ""
+        loads, named_contacts, folder = data.get("loads"), data.get("contacts") or None, folder_of(info)
+        contacts: dict[str, Any] = (
+            named_contacts if isinstance(named_contacts, dict) else {"contact": data.get("contact")}
+        )
+        prefix = "contacts." if named_contacts is contacts else ""
         static = loads.get("static") if isinstance(loads, dict) else None
-        found = {
+        completed = {
             name: with_numbers_by_temperature(prefix + name, contact, static, folder)
             for name, contact in contacts.items()
             if isinstance(contact, dict) and contact.get("by_temperature") is not None
@@ -198,12 +200,13 @@ class MeshScene(Scene):
                 surfaces = Surfaces.model_validate(data["surfaces"])
             except ValidationError:  # reported where the table itself is read
                 return data
-            found |= {
-                name: with_asperities({**contacts[name], **found.get(name, {})}, surfaces, folder) for name in lacking
+            completed |= {
+                name: with_asperities({**contacts[name], **completed.get(name, {})}, surfaces, folder)
+                for name in lacking
             }
-        if not found:
+        if not completed:
             return data
-        return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}
+        return {**data, **({"contacts": {**contacts, **completed}} if named_contacts is contacts else completed)}
 
     @model_validator(mode="before")
     @classmethod
@@ -280,22 +283,22 @@ class MeshScene(Scene):
     def _one_prescribed(self) -> MeshScene:
         if len(self.prescribed) > 1:
             raise Refusal(f"expected one table under prescribed, got {', '.join(self.prescribed)}")
-        for name, held in self.prescribed.items():
+        for name, table in self.prescribed.items():
             if name in (*self.loads.static, *self.loads.harmonic):
                 raise Refusal(f"prescribed.{name} has the name of a load: give it another")
-            for spring in held.springs:
+            for spring in table.springs:
                 if spring not in self.springs:
-                    raise Refusal(unknown_key(f"springs.{spring}", [f"springs.{known}" for known in self.springs]))
-                if self.springs[spring].group != held.group or self.springs[spring].opposite is not None:
-                    raise Refusal(f"prescribed.{name}: springs.{spring} must hold {held.group} to the ground")
+                    raise Refusal(unknown_key(f"springs.{spring}", [f"springs.{other}" for other in self.springs]))
+                if self.springs[spring].group != table.group or self.springs[spring].opposite is not None:
+                    raise Refusal(f"prescribed.{name}: springs.{spring} must hold {table.group} to the ground")
         return self
 
     @model_validator(mode="after")
-    def _whole(self) -> MeshScene:
-        several = bool(self.bodies or self.decks)
-        if not several and (self.geometry is None) != (self.material is None):
+    def _consistent(self) -> MeshScene:
+        has_bodies = bool(self.bodies or self.decks)
+        if not has_bodies and (self.geometry is None) != (self.material is None):
             raise Refusal(f"{'geometry' if self.geometry is None else 'material'} is missing")
-        if several == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
+        if has_bodies == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
             raise Refusal("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
         if self.wear is not None and not self.joints:
             raise Refusal("contact is missing: [wear] needs [contact] or [contacts.NAME]")
@@ -312,9 +315,9 @@ class MeshScene(Scene):
         for where, material in made_of:
             if material not in self.materials:
                 raise Refusal(f"{where}: {unknown_key(f'materials.{material}', [*self.materials])}")
-        taken = [*self.loads.static, *self.loads.harmonic]
+        load_names = [*self.loads.static, *self.loads.harmonic]
         for name in self.bolts:
-            if name in taken or name == CENTRIFUGAL:
+            if name in load_names or name == CENTRIFUGAL:
                 raise Refusal(f"bolts.{name} has the name of a load: give it another")
         for name in self.couplings:
             if name in self.bodies:

@@ -124,16 +124,16 @@ class Response(Table, stage=SOLVE):
 
     @model_validator(mode="after")
     def _controls(self) -> Self:
-        given = self.amplitude if isinstance(self.amplitude, tuple) else (self.amplitude,)
-        wanted = {"force": (), "amplitude": (1,), "phase": (2,)}[self.control]
-        if (self.amplitude is None) != (not wanted) or (wanted and len(given) not in wanted):
+        amplitudes = self.amplitude if isinstance(self.amplitude, tuple) else (self.amplitude,)
+        counts = {"force": (), "amplitude": (1,), "phase": (2,)}[self.control]
+        if (self.amplitude is None) != (not counts) or (counts and len(amplitudes) not in counts):
             kind = {"force": "no amplitude", "amplitude": 'amplitude = "10 um"'}.get(
                 self.control, 'amplitude = ["1 um", "1 mm"]'
             )
             raise Refusal(f'expected {kind} with control = "{self.control}"')
-        if wanted and (not min(a or 0.0 for a in given) > 0 or len(set(given)) < len(given)):
+        if counts and (not min(a or 0.0 for a in amplitudes) > 0 or len(set(amplitudes)) < len(amplitudes)):
             raise Refusal(f"expected amplitude above 0, and two that differ, got {self.amplitude}")
-        if wanted and (self.stability or self.bounds):
+        if counts and (self.stability or self.bounds):
             raise Refusal(f'expected no stability and no bounds with control = "{self.control}"')
         return self
 
@@ -189,7 +189,7 @@ class Reduction(Table, stage=REDUCTION):
     to the contact stays (SCCe)."""
 
     @model_validator(mode="after")
-    def _whole(self) -> Reduction:
+    def _consistent(self) -> Reduction:
         if self.interface_modes is None and self.interface_keep is not None:
             raise Refusal("expected interface_keep only with interface_modes")
         if (self.modes is None) == (self.cutoff is None):

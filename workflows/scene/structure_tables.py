@@ -180,9 +180,9 @@ class NamedContact(FaceContact):
             refuse_slips(table, ["first", "second"], ["first", "second", *cls.model_fields])
             missing = "first" if "first" not in table else "second"
             raise Refusal(f'{missing} is missing: give first = "body.face", and second the same or "{GROUND}"')
-        rest = {key: value for key, value in table.items() if key not in ("first", "second")}
+        remainder = {key: value for key, value in table.items() if key not in ("first", "second")}
         other = {} if table["second"] == GROUND else {"opposite": table["second"]}
-        return {**rest, "group": table["first"], **other}
+        return {**remainder, "group": table["first"], **other}
 
 
 class TieTable(Table, stage=PART):
@@ -232,7 +232,7 @@ class LinkTable(Table, stage=PART):
     """Motions in which they stay free of each other: out of "x", "y", "z" and the turns "rx", "ry", "rz"."""
 
     @model_validator(mode="after")
-    def _known(self) -> LinkTable:
+    def _links_two_couplings(self) -> LinkTable:
         if len(set(self.free)) == len(AXES):
             raise Refusal(f"free: expected some of {', '.join(AXES)}, but not all, got {list(self.free)}")
         if self.first == self.second:

@@ -39,9 +39,9 @@ UNITS: dict[str, tuple[Fraction, Dimension, str]] = {
 }
 
 NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*$")
-BEYOND = 1e25  # in SI units: above it products of quantities overflow, and no structure has it
-BELOW = 1e-60  # and what is meant to be zero: its square, or another number over it, leaves the range of numbers
-KEPT = 4096  # texts that were converted: a study reads its scene thousands of times
+LARGEST = 1e25  # in SI units: above it products of quantities overflow, and no structure has it
+SMALLEST = 1e-60  # and what is meant to be zero: its square, or another number over it, leaves the range of numbers
+CACHE_SIZE = 4096  # texts that were converted: a study reads its scene thousands of times
 FACTOR = re.compile(r"(%|[A-Za-z]+)(?:\^?(-?\d))?$")
 
 
@@ -53,7 +53,7 @@ class Unit:
     dimension: Dimension
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def parse_unit(text: str) -> Unit:
     """Read a unit expression such as "N/um", "um3/J", "kg/m^3" or "" (dimensionless).
 
@@ -100,32 +100,32 @@ def to_si(value: object, unit: str) -> float:
     expected = f"expected {_describe(unit)}"
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise Refusal(f"{expected}, got {value!r}")
-    if not abs(value) < BEYOND:
+    if not abs(value) < LARGEST:
         raise Refusal(f"{expected}, got {value}, beyond what a structure has")
-    if 0 < abs(value) < BELOW:
-        raise Refusal(f"{expected}, got {value}: give 0, or more than {BELOW:g}")
+    if 0 < abs(value) < SMALLEST:
+        raise Refusal(f"{expected}, got {value}: give 0, or more than {SMALLEST:g}")
     return float(value)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def _text_to_si(value: str, unit: str) -> float:
-    wanted, expected = parse_unit(unit), f"expected {_describe(unit)}"
+    target_unit, expected = parse_unit(unit), f"expected {_describe(unit)}"
     match = NUMBER.match(value)
     if match is None:
         raise Refusal(f'{expected}, got "{value}"')
-    if not match[2] and wanted.dimension != (0, 0, 0, 0, 0):
+    if not match[2] and target_unit.dimension != (0, 0, 0, 0, 0):
         raise Refusal(f'{expected}, got "{value}" without a unit')
     try:
-        given = parse_unit(match[2])
+        source_unit = parse_unit(match[2])
     except ValueError as error:
         raise Refusal(f'{expected}, got "{value}" in which {error}') from None
-    if given.dimension != wanted.dimension:
-        raise Refusal(f'{expected}, got "{value}" which is {_name(given.dimension)}')
-    exact = Fraction(match[1]) * given.factor / wanted.factor
-    if not abs(exact) < BEYOND:
+    if source_unit.dimension != target_unit.dimension:
+        raise Refusal(f'{expected}, got "{value}" which is {_name(source_unit.dimension)}')
+    exact = Fraction(match[1]) * source_unit.factor / target_unit.factor
+    if not abs(exact) < LARGEST:
         raise Refusal(f'{expected}, got "{value}", beyond what a structure has')
-    if 0 < abs(exact) < BELOW:
-        raise Refusal(f'{expected}, got "{value}": give 0, or more than {BELOW:g}')
+    if 0 < abs(exact) < SMALLEST:
+        raise Refusal(f'{expected}, got "{value}": give 0, or more than {SMALLEST:g}')
     return float(exact)
 
 

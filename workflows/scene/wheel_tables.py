@@ -60,21 +60,23 @@ def operating_line(wheel: dict[str, Any], response: dict[str, Any]) -> dict[str,
             'wheel.sweep = "speed": the frequency of engine order 0 does not go with the speed; set it to "frequency"'
         )
     try:
-        both = {"speed": speed, "frequency": frequency}
-        given = {key: RANGE.validate_python(value) for key, value in both.items() if value}
-        own = FREQUENCY.validate_python(wheel["speed"]) if "speed" in wheel else None
+        ranges = {"speed": speed, "frequency": frequency}
+        parsed = {key: RANGE.validate_python(value) for key, value in ranges.items() if value}
+        wheel_speed = FREQUENCY.validate_python(wheel["speed"]) if "speed" in wheel else None
         each = abs(int(order))  # type: ignore[arg-type]
     except (ValidationError, TypeError, ValueError):
         return {}  # reported where the key itself is read
-    if not given:
+    if not parsed:
         return {}
-    speeds = np.array(given["speed"] if "speed" in given else given["frequency"]) / (1 if "speed" in given else each)
-    if len(given) == 2 and not np.allclose(given["frequency"], each * speeds, rtol=1e-9):
+    speeds = np.array(parsed["speed"] if "speed" in parsed else parsed["frequency"]) / (
+        1 if "speed" in parsed else each
+    )
+    if len(parsed) == 2 and not np.allclose(parsed["frequency"], each * speeds, rtol=1e-9):
         raise Refusal("response.speed and response.frequency are both given: leave one of them out")
     middle = float(speeds.mean())
-    if own and not np.isclose(own, middle, rtol=1e-9):
+    if wheel_speed and not np.isclose(wheel_speed, middle, rtol=1e-9):
         raise Refusal('wheel.speed is given, but with wheel.sweep = "speed" it follows from the response: leave it out')
-    hertz = given.get("frequency") or [float(each * s) for s in speeds]
+    hertz = parsed.get("frequency") or [float(each * s) for s in speeds]
     return {"wheel": {**wheel, "sweep": "speed", "speed": middle}, "response": {**response, "frequency": hertz}}
 
 

@@ -109,7 +109,7 @@ def of_summary(
     scene_numbers = {key: number.value for key, number in varying.numbers.items()}
     in_wear = {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}
     values, wear_values = ({key: of[key] for key in names_of_keys if key in of} for of in (scene_numbers, in_wear))
-    values = {key: v for key, v in values.items() if not moves_nodes(varying.numbers[key]) or varying.follows(key)}
+    values = {key: v for key, v in values.items() if not moves_nodes(varying.numbers[key]) or varying.is_linear(key)}
     joints = varying.model.balance.contact.joints
     gaps = {"contact.gap" if joint.name == "contact" else f"contacts.{joint.name}.gap": joint.rows for joint in joints}
     gaps = {key: rows for key, rows in gaps.items() if key in names_of_keys}

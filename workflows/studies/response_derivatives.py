@@ -250,6 +250,6 @@ def _of_scene(
         {joint.name: joint.rows for joint in balance.contact.joints},
         solved - clock,
         process_time() - solved,
-        tuple(key for key in derivatives_found.parameters if varying.anew(key)),
+        tuple(key for key in derivatives_found.parameters if varying.is_reduced_again(key)),
         without or {},
     )
