@@ -44,7 +44,7 @@ SMALL = (
 )  # fmt: skip
 ALSO_KEYS = {"amplitude", "cycles", "damping", "depth", "energy", "phase", "preload", "volume"}
 """Words that are keys of a scene, fields of a mesh or columns of other tables too."""
-MOST_LITERALS = 20  # lines of the package that name one of the others
+MOST_LITERALS = 15  # lines of the package that name one of the others
 MOST_IN_ROOMS = 6  # lines of the rooms that loop over answers that name any
 
 
