@@ -12,8 +12,6 @@ second order, of first order for friction that lifts, where the sampled Jacobian
 test_contact_located). Cost, measured from H = 1 to 15: two to three times that of 128 samples where all slip, less
 where most pairs cannot. A response curve with lifting pairs took as long either way: Newton needed 15 % fewer steps.
 
-numba keeps `_cycle` on disk with the kernels of trigonometric and segment_integrals inside and sees changes of this
-file alone: after an edit there, save this file too.
 Source  Petrov and Ewins 2003 (friction element exact between transitions); moving walls and root isolation ours.
 """
 
@@ -24,6 +22,8 @@ import math
 import numba
 import numpy as np
 
+from tribodyn.hbm.contact import segment_integrals, trigonometric
+from tribodyn.hbm.contact.compiled_law import stamp_with
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.contact.segment_integrals import STICK, integrate
 from tribodyn.hbm.contact.trigonometric import (
@@ -257,3 +257,6 @@ def _append(knots, ends, segments, n, start, stop, kind, w, origin, tilt):
     ends[n, 0], ends[n, 1], ends[n, 2] = start, stop, origin
     segments[n, 0], segments[n, 1], segments[n, 2] = kind, w, tilt
     return n + 1
+
+
+stamp_with(globals(), segment_integrals, trigonometric)

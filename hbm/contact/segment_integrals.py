@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+from tribodyn.hbm.contact import trigonometric
+from tribodyn.hbm.contact.compiled_law import stamp_with
 from tribodyn.hbm.contact.trigonometric import TURN, compiled, fill_wave, inlined, values_on
 
 STICK = 0.0  # kind of a segment; a slip has the sign of T
@@ -128,3 +130,6 @@ def _subtract_slider(pull, span, waves, origin, tilt, rows, hs, force, by_u, by_
             by_u[a, 2 + 2 * q] -= sine
             by_load[a, 1 + 2 * q] -= tilt * cosine
             by_load[a, 2 + 2 * q] -= tilt * sine
+
+
+stamp_with(globals(), trigonometric)

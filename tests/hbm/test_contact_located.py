@@ -1,5 +1,9 @@
 """Located transitions: against an independent fine integration, against the samples, and in the awkward cases."""
 
+from hashlib import sha256
+from pathlib import Path
+
+import numba
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -296,3 +300,11 @@ def test_without_numba_the_kernels_give_the_same(monkeypatch):
     plain = aft.cycle(law, x, p, WITH_STATIC, memory)
     np.testing.assert_allclose(plain.force, compiled.force, atol=1e-14)
     np.testing.assert_allclose(plain.jacobian, compiled.jacobian, atol=1e-13)
+
+
+def test_kernels_on_disk_are_stamped_with_the_files_of_their_callees() -> None:
+    """Else numba runs the old physics after an edit of a callee in another file."""
+    plain = numba.njit(cache=True)(jenkins_cycle._cycle.py_func)._cache._cache_file._source_stamp
+    stamp = jenkins_cycle._cycle._cache._cache_file._source_stamp
+    files = (jenkins_cycle.segment_integrals, jenkins_cycle.trigonometric)
+    assert stamp == (plain, *(sha256(Path(module.__file__).read_bytes()).digest() for module in files))

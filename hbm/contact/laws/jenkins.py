@@ -23,6 +23,7 @@ LINEAR_WHERE_STUCK = True
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3  # kinds of samples; slip by its sense
 SIDE = np.array([0.0, 0.0, 1.0, -1.0])  # sign of T in slip
 
+
 @dataclass(frozen=True)
 class Parameters:
     """The law's own numbers."""

@@ -19,6 +19,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 COMPONENTS = (("t1", "t2"), ("t1",), ("t2",))
 LINEAR_WHERE_STUCK = True
 
+
 @dataclass(frozen=True)
 class Parameters:
     """The law's own numbers."""

@@ -26,9 +26,10 @@ import numba
 import numpy as np
 
 from tribodyn.declarations import number
-from tribodyn.hbm.contact import bed_cycle
+from tribodyn.hbm.contact import bed_cycle, bed_table
 from tribodyn.hbm.contact.asperity import asperity, tangential_ratio
 from tribodyn.hbm.contact.bed_table import ROWS, SPRINGS, TABULATED, bed_springs, look_up, tabulate_bed
+from tribodyn.hbm.contact.compiled_law import stamp_with
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
@@ -188,3 +189,6 @@ def event_based_cycle(
 ) -> ContactCycle:
     """The periodic cycle with the transitions of every spring and the deepest approach located between samples."""
     return bed_cycle.cycle(x, parameters, parameters.numbers["friction"], memory, basis, jacobian, located=True)
+
+
+stamp_with(globals(), bed_table)
