@@ -49,7 +49,7 @@ def scene_values(table: Table, path: tuple[str, ...] = ()) -> Iterator[SceneValu
             marks = has_mark(field, RESUMABLE), has_mark(field, SMOOTH)
             inner = [SceneValue((*path, name), value, table, stage, *marks)]
         yield from inner
-    for name, number in table.numbers.items():
+    for name, number in (getattr(table, PARAMETERS, {}) | table.numbers).items():
         yield SceneValue((*path, name), number, table, table.NUMBERS_STAGE, is_smooth=isinstance(number, float))
 
 
