@@ -35,47 +35,47 @@ ALL = ("t1", "t2", "n")
 
 def split(balance: HarmonicBalance, parts: list[np.ndarray]) -> HarmonicBalance:
     """The same balance with its one joint cut into several."""
-    whole = balance.contact.joints[0]
-    joints = [Joint(f"part {i}", whole.law, whole.parameters.subset(p), p) for i, p in enumerate(parts)]
+    full = balance.contact.joints[0]
+    joints = [Joint(f"part {i}", full.law, full.parameters.subset(p), p) for i, p in enumerate(parts)]
     return HarmonicBalance.of(balance.model, joints, balance.basis, balance.excitation, balance.omega_max)
 
 
 @pytest.mark.parametrize("located", [False, True])
 def test_a_face_split_into_joints_is_the_face(located: bool) -> None:
-    whole = balance_of(pressed_body()).with_samples(64, located)
-    parts = split(whole, [np.array([2]), np.array([3, 0, 1])])  # the order of a joint's pairs is its own
-    one, many = (newton.solve_from_rest(b, OMEGA, TIGHT) for b in (whole, parts))
-    assert one.converged
-    assert many.converged
-    assert set(np.unique(one.state.cycle.status)) - {1}  # not all stick all the time
-    np.testing.assert_allclose(many.state.x, one.state.x, atol=1e-12 * np.abs(one.state.x).max())
-    force = one.state.cycle.force
-    np.testing.assert_allclose(many.state.cycle.force, force, atol=1e-12 * np.abs(force).max())
-    jacobian = one.state.cycle.jacobian
+    full = balance_of(pressed_body()).with_samples(64, located)
+    parts = split(full, [np.array([2]), np.array([3, 0, 1])])  # the order of a joint's pairs is its own
+    item, large = (newton.solve_from_rest(b, OMEGA, TIGHT) for b in (full, parts))
+    assert item.converged
+    assert large.converged
+    assert set(np.unique(item.state.cycle.status)) - {1}  # not all stick all the time
+    np.testing.assert_allclose(large.state.x, item.state.x, atol=1e-12 * np.abs(item.state.x).max())
+    force = item.state.cycle.force
+    np.testing.assert_allclose(large.state.cycle.force, force, atol=1e-12 * np.abs(force).max())
+    jacobian = item.state.cycle.jacobian
     np.testing.assert_allclose(
-        parts.evaluate(OMEGA, one.state.x).cycle.jacobian, jacobian, atol=1e-12 * np.abs(jacobian).max()
+        parts.evaluate(OMEGA, item.state.x).cycle.jacobian, jacobian, atol=1e-12 * np.abs(jacobian).max()
     )
-    np.testing.assert_array_equal(many.state.cycle.status, one.state.cycle.status)
-    np.testing.assert_allclose(parts.energy(many.state), whole.energy(one.state), rtol=1e-10, atol=1e-15)
-    of_whole, of_parts = whole.history(one.state), parts.history(many.state)
+    np.testing.assert_array_equal(large.state.cycle.status, item.state.cycle.status)
+    np.testing.assert_allclose(parts.energy(large.state), full.energy(item.state), rtol=1e-10, atol=1e-15)
+    of_whole, of_parts = full.history(item.state), parts.history(large.state)
     for a, b in zip(of_whole, of_parts, strict=True):
         np.testing.assert_allclose(b, a, atol=1e-11 * np.abs(a).max())
-    preload = parts.preload_by_joint(many.state)
-    assert sum(preload.values()) == pytest.approx(whole.preload(one.state), rel=1e-12)
-    energy = parts.contact.by_joint(parts.energy(many.state))
+    preload = parts.preload_by_joint(large.state)
+    assert sum(preload.values()) == pytest.approx(full.preload(item.state), rel=1e-12)
+    energy = parts.contact.by_joint(parts.energy(large.state))
     assert list(energy) == ["part 0", "part 1"]
     assert [len(e) for e in energy.values()] == [1, 3]
 
 
 def test_bounds_and_stability_of_a_split_face_are_those_of_the_face() -> None:
-    whole = balance_of(pressed_body(), (0, 1, 2, 3), 20.0)
-    parts = split(whole, [np.arange(2), np.arange(2, N_PAIR)])
-    one, many = (response_bounds(b, OMEGA, options=TIGHT) for b in (whole, parts))
-    assert one.converged.all()
-    np.testing.assert_allclose(many.shear, one.shear, atol=1e-9 * np.abs(one.shear).max())
-    np.testing.assert_array_equal(many.stuck, one.stuck)
-    states = [newton.solve_from_rest(b, OMEGA, TIGHT).state for b in (whole, parts)]
-    first, second = (exponents.stability(b, s) for b, s in zip((whole, parts), states, strict=True))
+    full = balance_of(pressed_body(), (0, 1, 2, 3), 20.0)
+    parts = split(full, [np.arange(2), np.arange(2, N_PAIR)])
+    item, large = (response_bounds(b, OMEGA, options=TIGHT) for b in (full, parts))
+    assert item.converged.all()
+    np.testing.assert_allclose(large.shear, item.shear, atol=1e-9 * np.abs(item.shear).max())
+    np.testing.assert_array_equal(large.stuck, item.stuck)
+    states = [newton.solve_from_rest(b, OMEGA, TIGHT).state for b in (full, parts)]
+    first, second = (exponents.stability(b, s) for b, s in zip((full, parts), states, strict=True))
     np.testing.assert_allclose(np.sort(second.exponents.real), np.sort(first.exponents.real), atol=1e-7 * OMEGA)
 
 
@@ -111,16 +111,16 @@ def two_bodies() -> tuple[ReducedModel, ReducedModel, ReducedModel]:
         loads,
         outputs,
     )
-    one = np.eye(6, n)
+    item = np.eye(6, n)
     return (
-        ReducedModel(first, interface(one, ALL)),
-        ReducedModel(second, interface(one, ALL)),
-        ReducedModel(system, interface(block(one, one), ALL)),
+        ReducedModel(first, interface(item, ALL)),
+        ReducedModel(second, interface(item, ALL)),
+        ReducedModel(system, interface(block(item, item), ALL)),
     )
 
 
 def test_two_laws_in_one_balance_are_two_models_with_one_law_each() -> None:
-    left, right, both = two_bodies()
+    remaining, right, two_results = two_bodies()
     k = np.tile([2e5, 2e5, 3e5], (2, 1))
     jenkins = Joint("left", "jenkins", ContactParameters.of(ALL, k, friction=0.4), np.arange(2))
     planar = Joint("right", "coulomb_planar", ContactParameters.of(ALL, 2 * k, friction=0.2), np.arange(2, 4))
@@ -136,27 +136,27 @@ def test_two_laws_in_one_balance_are_two_models_with_one_law_each() -> None:
         assert solution.converged, solution.outcome
         return balance, solution
 
-    whole, together = solved(both, [jenkins, planar], (1, 2))
-    states = whole.contact.by_joint(together.state.x)
+    full, together = solved(two_results, [jenkins, planar], (1, 2))
+    states = full.contact.by_joint(together.state.x)
     slips = []
-    for model, joint, name in ((left, jenkins, "left"), (right, planar, "right")):
-        _, alone = solved(model, replace(joint, pairs=None), (1,))
-        np.testing.assert_allclose(states[name], alone.state.x, atol=1e-11 * np.abs(alone.state.x).max())
+    for model, joint, name in ((remaining, jenkins, "left"), (right, planar, "right")):
+        _, single = solved(model, replace(joint, pairs=None), (1,))
+        np.testing.assert_allclose(states[name], single.state.x, atol=1e-11 * np.abs(single.state.x).max())
         np.testing.assert_array_equal(
-            whole.contact.by_joint(together.state.cycle.status)[name], alone.state.cycle.status
+            full.contact.by_joint(together.state.cycle.status)[name], single.state.cycle.status
         )
-        slips.append(bool(np.any(alone.state.cycle.status & 2)))
+        slips.append(bool(np.any(single.state.cycle.status & 2)))
     assert all(slips)
 
 
 def test_a_joint_has_no_spring_and_no_force_where_it_does_not_see() -> None:
-    left, _, both = two_bodies()
+    remaining, _, two_results = two_bodies()
     k = np.tile([2e5, 2e5, 3e5], (2, 1))
     normal = Joint("pad", "unilateral", ContactParameters.of(("n",), k[:, 2:]), slice(0, 2))
     other = Joint("wedge", "jenkins", ContactParameters.of(("t2", "n"), k[:, 1:], friction=0.3), slice(2, 4))
     basis = HarmonicBasis((0, 1, 2), 64, "located")
     excitation = Excitation.of({"press1": 60.0, "press2": 40.0}, {1: {"shake1": 90.0, "shake2": 90.0}})
-    balance = HarmonicBalance.of(both, [normal, other], basis, excitation, 900.0)
+    balance = HarmonicBalance.of(two_results, [normal, other], basis, excitation, 900.0)
     np.testing.assert_array_equal(balance.contact.stiffness[:2, :2], 0.0)
     np.testing.assert_array_equal(balance.contact.stiffness[2:, 0], 0.0)
     assert balance.memory.shape == (4, 1)  # the pad has no memory, the wedge one slider a pair
@@ -167,24 +167,24 @@ def test_a_joint_has_no_spring_and_no_force_where_it_does_not_see() -> None:
     np.testing.assert_array_equal(force[2:, 0], 0.0)
     assert np.all(np.abs(force[:, 2, 0]) > 0)
     # the pad alone, on a model that has nothing but its normal direction
-    system = left.system
-    seen = ReducedModel(system, interface(np.eye(6, len(system.mass))[[2, 5]], ("n",)))
-    alone = HarmonicBalance.of(
-        seen, replace(normal, pairs=None), basis, Excitation.of({"press": 60.0}, {1: {"shake": 90.0}}), 900.0
+    system = remaining.system
+    observed = ReducedModel(system, interface(np.eye(6, len(system.mass))[[2, 5]], ("n",)))
+    single = HarmonicBalance.of(
+        observed, replace(normal, pairs=None), basis, Excitation.of({"press": 60.0}, {1: {"shake": 90.0}}), 900.0
     )
-    same = newton.solve_from_rest(alone, 600.0, TIGHT)
-    np.testing.assert_allclose(solution.state.x[:2, 2:], same.state.x, atol=1e-11 * np.abs(same.state.x).max())
+    equal = newton.solve_from_rest(single, 600.0, TIGHT)
+    np.testing.assert_allclose(solution.state.x[:2, 2:], equal.state.x, atol=1e-11 * np.abs(equal.state.x).max())
 
 
 def test_joints_share_out_the_pairs() -> None:
     balance = balance_of(pressed_body())
-    whole = balance.contact.joints[0]
+    full = balance.contact.joints[0]
 
     def made(*joints: Joint) -> None:
         HarmonicBalance.of(balance.model, joints, balance.basis, balance.excitation, balance.omega_max)
 
     def part(name: str, *pairs: int) -> Joint:
-        return Joint(name, "jenkins", whole.parameters.subset(np.array(pairs)), np.array(pairs))
+        return Joint(name, "jenkins", full.parameters.subset(np.array(pairs)), np.array(pairs))
 
     with pytest.raises(ValueError, match="pair 3 of the contact belongs to 0 joints"):
         made(part("a", 0, 1, 2))
@@ -199,41 +199,41 @@ def test_joints_share_out_the_pairs() -> None:
     with pytest.raises(ValueError, match="at least one joint"):
         made()
     with pytest.raises(ValueError, match="'unilateral' has components"):
-        made(replace(whole, law="unilateral"))
+        made(replace(full, law="unilateral"))
 
 
 @pytest.mark.parametrize("rule", ["thesis", "error controlled"])
 def test_joints_wear_by_their_own_laws(rule: str) -> None:
-    whole = wear_problem()
-    cut = split(whole.balance, [np.arange(2), np.arange(2, N_PAIR)])
+    full = wear_problem()
+    cut = split(full.balance, [np.arange(2), np.arange(2, N_PAIR)])
 
     def worn(problem: object) -> np.ndarray:
         if rule == "thesis":
             return evolve(thesis.Rule(problem, 5e-7), max_steps=6).depth[-1]
         return evolve(error_controlled.Rule(problem, Tolerance(0.05, 2e-4)), max_steps=4).depth[-1]
 
-    one = worn(whole)
-    assert np.all(one > 0)
-    same = {"part 0": JointWear.of("energy", coefficient=1e-9), "part 1": JointWear.of("energy", coefficient=1e-9)}
-    np.testing.assert_allclose(worn(replace(whole, balance=cut, wear=same)), one, rtol=1e-7)
-    still = worn(replace(whole, balance=cut, wear={"part 1": JointWear.of("energy", coefficient=1e-9)}))
+    item = worn(full)
+    assert np.all(item > 0)
+    equal = {"part 0": JointWear.of("energy", coefficient=1e-9), "part 1": JointWear.of("energy", coefficient=1e-9)}
+    np.testing.assert_allclose(worn(replace(full, balance=cut, wear=equal)), item, rtol=1e-7)
+    still = worn(replace(full, balance=cut, wear={"part 1": JointWear.of("energy", coefficient=1e-9)}))
     np.testing.assert_array_equal(still[:2], 0.0)
     assert np.all(still[2:] > 0)
     archard = JointWear.of("archard", coefficient=4e-10)
     law_and_law = {"part 0": archard, "part 1": JointWear.of("energy", coefficient=1e-9)}
-    other = worn(replace(whole, balance=cut, wear=law_and_law))
-    np.testing.assert_allclose(other[2:], one[2:], rtol=0.05)
+    other = worn(replace(full, balance=cut, wear=law_and_law))
+    np.testing.assert_allclose(other[2:], item[2:], rtol=0.05)
     # k = mu alpha is the energy law along a line; in the plane a path is up to sqrt(2) shorter than its two parts
-    assert np.all((other[:2] > 0.6 * one[:2]) & (other[:2] < 1.03 * one[:2]))
+    assert np.all((other[:2] > 0.6 * item[:2]) & (other[:2] < 1.03 * item[:2]))
     with pytest.raises(ValueError, match="no joint 'part 2': there are part 0, part 1"):
-        worn(replace(whole, balance=cut, wear={"part 2": JointWear.of("energy", coefficient=1e-9)}))
+        worn(replace(full, balance=cut, wear={"part 2": JointWear.of("energy", coefficient=1e-9)}))
 
 
 def test_only_the_preload_of_wearing_joints_counts() -> None:
-    whole = wear_problem(lost_below=0.5)
-    cut = split(whole.balance, [np.arange(2), np.arange(2, N_PAIR)])
+    full = wear_problem(lost_below=0.5)
+    cut = split(full.balance, [np.arange(2), np.arange(2, N_PAIR)])
     problem = replace(
-        whole,
+        full,
         balance=cut,
         mission=(Duty(AtFrequency("tip", OMEGA)),),
         wear={"part 1": JointWear.of("energy", coefficient=1e-9)},

@@ -9,8 +9,8 @@ from tribodyn.workflows.result.faces import Face
 
 def node_of_pair(face: Face) -> np.ndarray:
     """(n_pair,) node of the mesh that stands where the pair does, -1 where none does."""
-    found = np.full(len(face.points), -1)
+    node = np.full(len(face.points), -1)
     at = face.weights.tocoo()
     current = at.data > 1 - 1e-4
-    found[at.col[current]] = face.nodes[at.row[current]]
-    return found
+    node[at.col[current]] = face.nodes[at.row[current]]
+    return node

@@ -11,5 +11,5 @@ from tribodyn.hbm.stability.exponents import Stability
 
 def stability_in_time(balance: HarmonicBalance, state: State) -> Stability:
     """The stability of the motion that time integration finds from a state: no assumption of Hill's method."""
-    found = floquet.floquet_exponents(balance.standing(state.omega), state)
-    return Stability(state.omega, found[np.lexsort((found.imag, -found.real))])
+    exponents = floquet.floquet_exponents(balance.standing(state.omega), state)
+    return Stability(state.omega, exponents[np.lexsort((exponents.imag, -exponents.real))])

@@ -26,7 +26,7 @@ def test_every_rule_that_is_listed_is_a_field_with_another_default():
     for place, rules in ablations.RULES.items():
         name, _, kind = place.rpartition(".")
         fields_of_rules = {
-            one.name: one.default for one in fields(getattr(import_module(f"tribodyn.hbm.{name}"), kind))
+            field.name: field.default for field in fields(getattr(import_module(f"tribodyn.hbm.{name}"), kind))
         }
         for rule, neutral in rules.items():
             assert fields_of_rules[rule] != neutral, rule

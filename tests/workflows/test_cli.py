@@ -233,11 +233,11 @@ def test_a_full_disk_is_told_by_name(capsys: pytest.CaptureFixture[str], tmp_pat
 
     with pytest.raises(SystemExit) as stop:
         guard(writes)
-    said = capsys.readouterr().err
+    message = capsys.readouterr().err
     assert stop.value.code == BAD_INPUT
-    assert said.startswith("tribodyn: the disk is full")
-    assert "a.png" in said
-    assert said.count("\n") == 1
+    assert message.startswith("tribodyn: the disk is full")
+    assert "a.png" in message
+    assert message.count("\n") == 1
 
 
 def curve(peak: int, unstable: range | None = None):

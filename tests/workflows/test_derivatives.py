@@ -49,9 +49,9 @@ def test_the_laws_of_scaling_hold(beam):
     All mass times c, damping as a ratio, is all time times sqrt(c); all stiffness times c, loads too, time over sqrt(c)
     """
     rows, names = beam.elasticities, beam.derivatives.names
-    wanted = {"peak_frequency": 0.0, "amplitude": 1.0, "phase": 0.0, "energy": 2.0, "preload": 1.0, "wear_rate": 2.0}
+    expected = {"peak_frequency": 0.0, "amplitude": 1.0, "phase": 0.0, "energy": 2.0, "preload": 1.0, "wear_rate": 2.0}
     loads = sum(row for key, row in rows.items() if key.startswith("loads."))
-    np.testing.assert_allclose(loads, [wanted[name] for name in names], atol=2e-6)
+    np.testing.assert_allclose(loads, [expected[name] for name in names], atol=2e-6)
     heavier = [-0.5 if name == "peak_frequency" else 0.0 for name in names]
     np.testing.assert_allclose(rows["material.density"], heavier, atol=1e-6)
     stiffer = sum(row for key, row in rows.items() if key.endswith(("_stiffness", "young")))
@@ -73,28 +73,28 @@ def test_the_law_of_similarity_holds_of_lengths():
     """Bodies that are alike have time and displacements by c, work by c^3, forces by c^2."""
     file = scene_file.read("beam", COARSE["beam"])
     found = td.studies.derivatives(file, only=(*keys(file.scene), *LENGTHS))
-    wanted = {"peak_frequency": -1.0, "amplitude": 1.0, "phase": 0.0, "energy": 3.0, "preload": 2.0, "wear_rate": 3.0}
+    expected = {"peak_frequency": -1.0, "amplitude": 1.0, "phase": 0.0, "energy": 3.0, "preload": 2.0, "wear_rate": 3.0}
     total = similar(found.elasticities, LENGTHS, {})
-    np.testing.assert_allclose(total, [wanted[name] for name in found.derivatives.names], atol=2e-6)
+    np.testing.assert_allclose(total, [expected[name] for name in found.derivatives.names], atol=2e-6)
 
 
 @pytest.mark.slow
 def test_rows_of_studies_go_by_lengths_whose_mesh_stays_the_same(monkeypatch):
     """One that the mesh does not follow takes nothing from the others."""
     without = (*COARSE["beam"], "wear=", "verdict.enabled=false")
-    file, moved = scene_file.read("beam", without), ParameterVariation.nodes_moved
+    file, shifted = scene_file.read("beam", without), ParameterVariation.nodes_moved
 
     def refused(self, key):
         if key == "geometry.height":
             raise NoDerivative("another mesh")
-        return moved(self, key)
+        return shifted(self, key)
 
     monkeypatch.setattr(ParameterVariation, "nodes_moved", refused)
-    wanted = ["geometry.length", "geometry.height", "contact.friction"]
-    found = of_summary(ParameterVariation(file, Progress()), td.run("beam", overrides=without), wanted)
-    assert {key for _, key in found} == {"geometry.length", "contact.friction"}
-    along = td.studies.derivatives(file, only=("geometry.length",)).derivatives
-    assert found["peak_frequency_first", "geometry.length"] == pytest.approx(along.slopes[0, 0], rel=1e-6)
+    expected = ["geometry.length", "geometry.height", "contact.friction"]
+    result = of_summary(ParameterVariation(file, Progress()), td.run("beam", overrides=without), expected)
+    assert {key for _, key in result} == {"geometry.length", "contact.friction"}
+    path = td.studies.derivatives(file, only=("geometry.length",)).derivatives
+    assert result["peak_frequency_first", "geometry.length"] == pytest.approx(path.slopes[0, 0], rel=1e-6)
 
 
 @pytest.mark.slow
@@ -141,8 +141,8 @@ def test_the_law_of_scaling_holds_of_springs_that_the_reduction_follows(modes):
     found = td.studies.derivatives("rig", overrides=(*COARSE["rig"], f"reduction.modes={modes}"))
     rows = found.elasticities
     total = sum(row for key, row in rows.items() if key.endswith((".stiffness", ".young", "shaker.value")))
-    wanted = {"peak_frequency": 0.5, "energy": 1.0, "preload": 1.0, "wear_rate": 1.0}
-    np.testing.assert_allclose(total, [wanted.get(name, 0.0) for name in found.derivatives.names], atol=1e-5)
+    expected = {"peak_frequency": 0.5, "energy": 1.0, "preload": 1.0, "wear_rate": 1.0}
+    np.testing.assert_allclose(total, [expected.get(name, 0.0) for name in found.derivatives.names], atol=1e-5)
 
 
 def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
@@ -174,25 +174,25 @@ def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
 def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, step, order):
     """At a fixed frequency, and along the peak."""
     file = scene_file.read(name.split()[-1], COARSE[name])
-    along = td.studies.derivatives(file, only=only).derivatives
-    value, omega = keys(file.scene) | geometry_keys(file.scene), along.state.omega
-    fixed = td.studies.derivatives(file, at=omega / (2 * np.pi), only=along.parameters).derivatives
+    path = td.studies.derivatives(file, only=only).derivatives
+    value, omega = keys(file.scene) | geometry_keys(file.scene), path.state.omega
+    fixed = td.studies.derivatives(file, at=omega / (2 * np.pi), only=path.parameters).derivatives
 
     def solved(key, factor):
         with limited(1):
             balance = ParameterVariation(file.changed(f"{key}={value[key] * factor!r}"), Progress()).model.balance
-            there = cycle_derivatives.at_frequency(balance, fixed.state, "response", ())
-            return there.values, cycle_derivatives.at_peak(balance, along.state, "response", ()).values
+            refined = cycle_derivatives.at_frequency(balance, fixed.state, "response", ())
+            return refined.values, cycle_derivatives.at_peak(balance, path.state, "response", ()).values
 
     floor = 0.2 if "geometry.shroud_angle" in only else 0.1  # below it differences are rounding; of this one, 3e-6
-    for i, key in enumerate(along.parameters):
+    for i, key in enumerate(path.parameters):
         sides = {factor: solved(key, factor) for factor in (1 + step, 1 - step, 1 + step / 2, 1 - step / 2)}
-        for which, found, error in ((0, fixed, 1e-5), (1, along, 1e-5)):
-            wide, narrow = ((sides[1 + h][which] - sides[1 - h][which]) / (2 * h) for h in (step, step / 2))
-            kept = len(wide)  # all but the wear rate
+        for selection, result, error in ((0, fixed, 1e-5), (1, path, 1e-5)):
+            wide, narrow = ((sides[1 + h][selection] - sides[1 - h][selection]) / (2 * h) for h in (step, step / 2))
+            count = len(wide)  # all but the wear rate
             # second derivatives jump where a transition comes or goes: by small steps the error is linear in them
-            difference = (2**order * narrow - wide) / (2**order - 1) / found.values[:kept]
-            elasticity = found.slopes[:kept, i] * value[key] / found.values[:kept]
+            difference = (2**order * narrow - wide) / (2**order - 1) / result.values[:count]
+            elasticity = result.slopes[:count, i] * value[key] / result.values[:count]
             size = np.maximum(np.abs(difference), floor)
             assert (np.abs(elasticity - difference) <= error * size).all(), (key, elasticity, difference)
 
@@ -313,11 +313,11 @@ def test_derivatives_of_the_blades_life_are_those_of_its_steps_taken_again(site,
         return exactly(wear_run.wear_problem(file.scene, file.folder, varying(factor).model.balance, share), **site)
 
     with limited(1):
-        own, problem = varying(), problem_of(1.0)
-        scale = settings.depth_scale(file.scene, references.free_deflection(own.model.balance), problem.area)
+        base, problem = varying(), problem_of(1.0)
+        scale = settings.depth_scale(file.scene, references.free_deflection(base.model.balance), problem.area)
         worn = evolve(wear_run.rule_of(file.scene, problem, scale), file.scene.wear.max_steps)
-        found = tangent.of_life(problem, worn, [own.change(key, 0.5)], {}, share)
-        elasticity = found.slopes[:, 0] * 0.5 / found.values
+        result = tangent.of_life(problem, worn, [base.change(key, 0.5)], {}, share)
+        elasticity = result.slopes[:, 0] * 0.5 / result.values
         difference = elasticity_anew(worn, share, problem_of, elasticity[0])
     np.testing.assert_allclose(elasticity, difference, rtol=1e-5, atol=5e-6)
 

@@ -231,10 +231,10 @@ def test_a_life_is_off_by_the_mean_of_its_states(steepness: float) -> None:
     done = np.linspace(0.0, 1.0, 401)
     off, rate = 0.03 + 0.04 * done[:-1], np.exp(-steepness * done[:-1])
     cycles_taken = np.diff(done) / rate
-    cycles, left = np.cumsum(cycles_taken) - cycles_taken, np.linspace(1.0, 0.9, 400)
+    cycles, remaining = np.cumsum(cycles_taken) - cycles_taken, np.linspace(1.0, 0.9, 400)
     worn = np.diff(done)[:, None] * [1.0, 0.5]
     wear = SimpleNamespace(
-        cycles=cycles, cycles_in_step=cycles_taken, preload=left, in_time=np.zeros(400, bool), worn=worn
+        cycles=cycles, cycles_in_step=cycles_taken, preload=remaining, in_time=np.zeros(400, bool), worn=worn
     )
     wear.depth = np.cumsum(worn, axis=0) - worn
     result = cast(td.Result, SimpleNamespace(wear=wear))
@@ -304,10 +304,10 @@ def test_an_end_of_the_range_is_no_peak() -> None:
 
 
 def test_the_verdict_is_kept(small: td.Result, tmp_path: Path) -> None:
-    found = verdict_of(small)
+    result = verdict_of(small)
     store.save(tmp_path / "result.h5", small)
-    assert store.load(tmp_path / "result.h5").verdict == found
-    assert small.summary()["changes"] == [vars(row) for row in found.changes]
+    assert store.load(tmp_path / "result.h5").verdict == result
+    assert small.summary()["changes"] == [vars(row) for row in result.changes]
 
 
 @pytest.fixture(scope="module")
@@ -354,15 +354,15 @@ def verdict_from(changes: dict[str, dict[str, float | None]]) -> Verdict:
 
 def search(accuracy_text: str, verdicts: list[Verdict]) -> tuple[ErrorBound, list[tuple[str, ...]]]:
     """A search whose runs have given verdicts; returns the overrides of every round, too."""
-    asked: list[tuple[str, ...]] = []
+    requested: list[tuple[str, ...]] = []
 
     def run(file: td.SceneFile, number: int) -> td.Result:
-        asked.append(file.overrides)
-        given = verdicts[min(number, len(verdicts)) - 1]
-        return cast(td.Result, SimpleNamespace(verdict=given, harmonics=(0, 1)))
+        requested.append(file.overrides)
+        inputs = verdicts[min(number, len(verdicts)) - 1]
+        return cast(td.Result, SimpleNamespace(verdict=inputs, harmonics=(0, 1)))
 
     file = td.read_scene("beam", ["harmonics.kept=[0, 1]"])
-    return accuracy.to_accuracy(file, accuracy_text, run, lambda sentence: None)[1], asked
+    return accuracy.to_accuracy(file, accuracy_text, run, lambda sentence: None)[1], requested
 
 
 def test_only_what_contributes_is_refined() -> None:

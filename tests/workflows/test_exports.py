@@ -158,9 +158,9 @@ def test_the_contact_over_a_cycle_has_forces_and_status_of_its_instants(series: 
     fields = reader.GetOutput().GetPointData()
     force = vtk_to_numpy(fields.GetArray("contact_force"))
     np.testing.assert_allclose(np.einsum("pcx,px->pc", patch.frames, force), loops.force[1, :, :, sample], atol=1e-9)
-    moved = vtk_to_numpy(fields.GetArray("relative_displacement"))
+    shifted = vtk_to_numpy(fields.GetArray("relative_displacement"))
     np.testing.assert_allclose(
-        np.einsum("pcx,px->pc", patch.frames, moved), loops.displacement[1, :, :, sample], atol=1e-15
+        np.einsum("pcx,px->pc", patch.frames, shifted), loops.displacement[1, :, :, sample], atol=1e-15
     )
     status = vtk_to_numpy(fields.GetArray("status_now"))
     np.testing.assert_array_equal(status, contact_states.instant_status(synthetic, 1)[:, sample])

@@ -37,8 +37,8 @@ BEAM = (
 
 def found_again(scene, overrides, true, looked, measured):
     """Measure the scene with the true numbers, then look for them from the scene as it stands."""
-    known = {name: MeasuredTarget(value=1.0, **table) for name, table in measured.items()}
-    answers = predict(scene_file.read(scene, (*overrides, *true)), known)
+    reference = {name: MeasuredTarget(value=1.0, **table) for name, table in measured.items()}
+    answers = predict(scene_file.read(scene, (*overrides, *true)), reference)
     assert (answers > 0).all()
     task = FitTables.model_validate(
         {
@@ -55,7 +55,7 @@ def found_again(scene, overrides, true, looked, measured):
 
 def test_contact_springs_and_friction_are_found_again():
     true = ("contact.tangential_stiffness=300e6", "contact.friction=0.42")
-    looked = {
+    searched = {
         "k_t": {"keys": ["contact.tangential_stiffness"], "low": "100 N/um", "high": "1 N/nm"},
         "mu": {"keys": ["contact.friction"], "low": 0.1, "high": 0.9, "ratio": False},
     }
@@ -63,13 +63,13 @@ def test_contact_springs_and_friction_are_found_again():
         "mode": {"of": "stuck frequency", "mode": 1},
         "energy": {"of": "energy", "at": "700 Hz", "load": 2.0},
     }
-    found, changes = found_again("beam", BEAM, true, looked, measured)
-    assert found.values == pytest.approx([300e6, 0.42], rel=1e-3)
-    assert found.origin == pytest.approx([470e6, 0.5])  # the scene's own, where it starts
+    result, changes = found_again("beam", BEAM, true, searched, measured)
+    assert result.values == pytest.approx([300e6, 0.42], rel=1e-3)
+    assert result.origin == pytest.approx([470e6, 0.5])  # the scene's own, where it starts
     assert changes[0].startswith("contact.tangential_stiffness=3")
     assert changes[0].endswith(" N/m")
     assert scene_file.read("beam", (*BEAM, *changes)).scene.contact.numbers["friction"] == pytest.approx(0.42, rel=1e-3)
-    assert abs(found.sensitivity[0, 1]) < 1e-9  # a stuck mode knows no friction
+    assert abs(result.sensitivity[0, 1]) < 1e-9  # a stuck mode knows no friction
 
 
 LOCATED = ("harmonics.transitions=located", "wear=")  # where derivatives are exact
@@ -98,35 +98,37 @@ PLANTED = {  # scene, overrides, what is planted with bounds, what is measured, 
 @pytest.mark.parametrize("problem", PLANTED)
 def test_planted_numbers_are_found_in_few_trials(problem):
     """From starts that lie 20 to 50 % beside them; differences took 21 to 30 trials (docs/howto/identify.md)."""
-    scene, overrides, planted, measured, most = PLANTED[problem]
+    scene, overrides, planted, measured, largest = PLANTED[problem]
     true = {key: value for key, (value, *_) in planted.items()}
-    looked = {
+    searched = {
         key: {"keys": [key], "low": low, "high": high, "start": list(start)}
         for key, (_, low, high, *start) in planted.items()
     }
-    found, _ = found_again(scene, overrides, tuple(f"{key}={value!r}" for key, value in true.items()), looked, measured)
-    off = np.abs(np.array([p.starts[0] for p in found.parameters]) / list(true.values()) - 1)
+    result, _ = found_again(
+        scene, overrides, tuple(f"{key}={value!r}" for key, value in true.items()), searched, measured
+    )
+    off = np.abs(np.array([p.starts[0] for p in result.parameters]) / list(true.values()) - 1)
     assert (off > 0.19).all()
     assert (off < 0.51).all()
-    np.testing.assert_allclose(found.values, list(true.values()), rtol=1e-3)
-    assert found.evaluations <= most
+    np.testing.assert_allclose(result.values, list(true.values()), rtol=1e-3)
+    assert result.evaluations <= largest
 
 
 def test_the_wear_coefficient_is_found_from_life_and_work():
     """Life and work both go with its inverse, as the volume that is to be worn is given."""
-    looked = {"alpha": {"keys": ["wear.coefficient"], "low": "2e2 um3/J", "high": "2e4 um3/J"}}
+    searched = {"alpha": {"keys": ["wear.coefficient"], "low": "2e2 um3/J", "high": "2e4 um3/J"}}
     measured = {"life": {"of": "life", "left": 0.9}, "work": {"of": "friction_work", "left": 0.9}}
-    found, _ = found_again("beam", BEAM, ("wear.coefficient=5e3 um3/J",), looked, measured)
-    assert found.values == pytest.approx([5e-15], rel=1e-3)
-    assert found.sensitivity.ravel() == pytest.approx([-1.0, -1.0], abs=0.01)
+    result, _ = found_again("beam", BEAM, ("wear.coefficient=5e3 um3/J",), searched, measured)
+    assert result.values == pytest.approx([5e-15], rel=1e-3)
+    assert result.sensitivity.ravel() == pytest.approx([-1.0, -1.0], abs=0.01)
 
 
 def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monkeypatch):
     """From the scene's own zero, where a relative step would have no length; against the rig's own preload."""
-    made = []
+    rows = []
     original = modelling.make_mesh
     monkeypatch.setenv("TRIBODYN_CACHE", "off")
-    monkeypatch.setattr(modelling, "make_mesh", lambda *args: made.append(1) or original(*args))
+    monkeypatch.setattr(modelling, "make_mesh", lambda *args: rows.append(1) or original(*args))
     task = FitTables.model_validate(
         {
             "parameters": {"height": {"keys": ["surfaces.mating_height"], "low": "-5 um", "high": "5 um"}},
@@ -135,7 +137,7 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
     )
     fit = scene_fit.best(scene_file.read("rig", RIG), task, Progress())
     found, changes = fit.identification, fit.changes
-    assert len(made) == 1
+    assert len(rows) == 1
     assert 1e-6 < found.values[0] < 4e-6
     assert changes[0].endswith(" m")
     file = scene_file.read("rig", (*RIG, *changes, "loads.harmonic.shaker.value=0"))
@@ -149,13 +151,13 @@ def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypa
         "energy": MeasuredTarget(of="energy", at="290 Hz", value=1.0),
         "shaken": MeasuredTarget(of="preload", at="290 Hz", value=31.0),
     }
-    made, answers, original = [], [], modelling.plain_model
+    rows, answers, original = [], [], modelling.plain_model
     monkeypatch.setenv("TRIBODYN_CACHE", str(tmp_path))
-    monkeypatch.setattr(modelling, "plain_model", lambda *args: made.append(1) or original(*args))
+    monkeypatch.setattr(modelling, "plain_model", lambda *args: rows.append(1) or original(*args))
     for overrides in ((), ("springs.base_across.stiffness=5e8",), ("springs.base_across.stiffness=5e8", "wear=")):
-        before = len(made)
+        before = len(rows)
         answers.append(predict(scene_file.read("rig", (*RIG, *overrides)), measured))
-        assert (len(made) == before) == ("wear=" in overrides)
+        assert (len(rows) == before) == ("wear=" in overrides)
     assert answers[1][0] < 0.99 * answers[0][0]
     assert answers[2] == pytest.approx(answers[1])
     file = scene_file.read("rig", RIG)
@@ -165,21 +167,23 @@ def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypa
 
 
 def test_a_wheel_has_the_frequencies_of_its_wave():
-    known = {"first": MeasuredTarget(of="stuck frequency", mode=1, value=341.0)}
-    one, two = (predict(scene_file.read("blade_thesis", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2))
-    assert 300 < one[0] < 400 < two[0] < 550
+    reference = {"first": MeasuredTarget(of="stuck frequency", mode=1, value=341.0)}
+    item, pair = (
+        predict(scene_file.read("blade_thesis", (*BLADE, f"wheel.engine_order={o}")), reference) for o in (1, 2)
+    )
+    assert 300 < item[0] < 400 < pair[0] < 550
 
 
 def test_derivatives_at_zero_and_at_a_bound_are_those_of_the_prediction():
     """An unknown that starts at zero, and one that starts at its upper bound, both find their way."""
     parameters = [FitParameter("x", -1.0, 1.0, (0.0,), ratio=False), FitParameter("y", 1.0, 2.0, (2.0,))]
-    found = fit_by_differences(
+    result = fit_by_differences(
         parameters,
         [MeasuredNumber("a", 1.3), MeasuredNumber("b", 2.6)],
         lambda v: np.array([1.0 + v["x"], v["y"] * (1 + v["x"])]) * (1 + 1e-7 * np.sin(1e9 * v["x"])),  # rounding
     )
-    assert found.values == pytest.approx([0.3, 2.0], rel=1e-3)
-    assert found.evaluations < 60
+    assert result.values == pytest.approx([0.3, 2.0], rel=1e-3)
+    assert result.evaluations < 60
 
 
 PARAMETER = '[parameters.k]\nkeys = ["damping.modal"]\nlow = 0.01\nhigh = 0.06\n'
@@ -263,15 +267,15 @@ def test_friction_is_found_again_from_a_measured_curve(tmp_path):
 
 def test_residual_flexibility_is_that_beside_the_springs_of_each_trial():
     """What a reduction without masters leaves out depends on the contact springs; a trial with others has its own."""
-    own = (*BEAM, "harmonics.kept=[0, 1]", "reduction.method=residual_flexibility")
-    found = []
+    base = (*BEAM, "harmonics.kept=[0, 1]", "reduction.method=residual_flexibility")
+    rows = []
     for stiffness in ("470 N/um", "200 N/um"):
-        file = scene_file.read("beam_thesis", (*own, f"contact.tangential_stiffness={stiffness}"))
-        found.append(plain(file).residual.stiffness)
+        file = scene_file.read("beam_thesis", (*base, f"contact.tangential_stiffness={stiffness}"))
+        rows.append(plain(file).residual.stiffness)
         own_part = modelling.part_of(file, Progress())
         fresh = modelling.plain_model(file.mesh_scene, own_part)
-        np.testing.assert_array_equal(found[-1], fresh.residual.stiffness)
-    assert not np.array_equal(*found)
+        np.testing.assert_array_equal(rows[-1], fresh.residual.stiffness)
+    assert not np.array_equal(*rows)
 
 
 def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path):
@@ -280,9 +284,9 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
     (tmp_path / "open.csv").write_text("\n".join(rows), encoding="utf-8")
     scene = tmp_path / "blocks.toml"
     scene.write_text(BLOCKS.replace('t1 = "x"', 't1 = "x"\ngap_map = "open.csv"'), encoding="utf-8")
-    own = ("harmonics.kept=[0, 1]", "harmonics.samples=32", "response.points=6")
+    base = ("harmonics.kept=[0, 1]", "harmonics.samples=32", "response.points=6")
     true = td.run(
-        scene, overrides=(*own, "contacts.lap.tangential_stiffness=130 N/um", "verdict.enabled=false")
+        scene, overrides=(*base, "contacts.lap.tangential_stiffness=130 N/um", "verdict.enabled=false")
     ).response
     w, x = true.omega, true.response[:, 0, 1] - 1j * true.response[:, 0, 2]
     columns = {"frequency_Hz": w / (2 * np.pi), "acceleration_m_s2": w**2 * np.abs(x), "control": ["force"] * len(w)}
@@ -291,10 +295,10 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
         "parameters": {"kt": {"keys": ["contacts.lap.tangential_stiffness"], "low": "60 N/um", "high": "200 N/um"}},
         "curves": {"sweep": {"file": str(tmp_path / "sweep.csv")}},
     }
-    found = td.studies.identify(scene, task, overrides=own).identification
+    found = td.studies.identify(scene, task, overrides=base).identification
     assert found.values == pytest.approx([130e6], rel=1e-3)
     assert found.rms < 1e-3
-    file = scene_file.read(scene, own)
+    file = scene_file.read(scene, base)
     opened = modelling.build(file, Progress()).reduced.interface.gap
     np.testing.assert_allclose(plain(file).interface.gap, opened, rtol=0, atol=1e-20)
     assert np.ptp(opened) > 1e-9
@@ -306,10 +310,10 @@ def test_errors_that_are_given_go_before_those_of_a_curve():
     at, none = np.ones(1), np.full(1, np.nan)
     run = Run("1", "force", 80 * at, 1e-4 * at + 0j, none, 2e-3 * at, np.array([[1e-5, 1e-2]]))
     measured: Any = SimpleNamespace(kind="backbone", runs=(run,))
-    for given, errors in (
+    for inputs, errors in (
         ({}, [1e-5, 1e-2]),
         ({"error": 0.15}, [1e-5, 0.15]),
         ({"frequency_error": 3e-3}, [3e-3, 1e-2]),
     ):
-        numbers = CurveTarget("curve", Curve.model_validate({"file": "a.csv", **given}), measured).numbers()
-        assert [one.error for one in numbers] == errors
+        numbers = CurveTarget("curve", Curve.model_validate({"file": "a.csv", **inputs}), measured).numbers()
+        assert [number.error for number in numbers] == errors

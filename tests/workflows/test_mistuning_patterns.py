@@ -49,15 +49,15 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_pattern_depends_on_seed_and_number_alone() -> None:
-    asked = Mistuning(frequency=0.02, friction=0.1, gap=1e-6, patterns=3)
-    more = asked.model_copy(update={"patterns": 9})
-    one, again = mistuned_blades.drawn(asked, 400, 7), mistuned_blades.drawn(more, 400, 7)
-    np.testing.assert_array_equal(one.stiffness, again.stiffness)
-    assert np.sqrt(1 + one.stiffness).std() == pytest.approx(0.02, rel=0.1)
-    assert one.friction.std() == pytest.approx(0.1, rel=0.1)
-    assert one.gap.std() == pytest.approx(1e-6, rel=0.1)
-    assert abs(np.corrcoef(one.stiffness, one.friction)[0, 1]) < 0.2
-    assert not np.allclose(one.stiffness, mistuned_blades.drawn(asked, 400, 8).stiffness)
+    requested = Mistuning(frequency=0.02, friction=0.1, gap=1e-6, patterns=3)
+    extra = requested.model_copy(update={"patterns": 9})
+    item, again = mistuned_blades.drawn(requested, 400, 7), mistuned_blades.drawn(extra, 400, 7)
+    np.testing.assert_array_equal(item.stiffness, again.stiffness)
+    assert np.sqrt(1 + item.stiffness).std() == pytest.approx(0.02, rel=0.1)
+    assert item.friction.std() == pytest.approx(0.1, rel=0.1)
+    assert item.gap.std() == pytest.approx(1e-6, rel=0.1)
+    assert abs(np.corrcoef(item.stiffness, item.friction)[0, 1]) < 0.2
+    assert not np.allclose(item.stiffness, mistuned_blades.drawn(requested, 400, 8).stiffness)
 
 
 def test_the_command_draws_patterns_and_resumes(
@@ -65,14 +65,14 @@ def test_the_command_draws_patterns_and_resumes(
 ) -> None:
     words = ["wheel", "patterns", str(scene), "--workers", "1", "--out", str(tmp_path), "--json"]
     cli.app(words, result_action="return_value")
-    said = json.loads(capsys.readouterr().out)
-    assert said["complete"] == 2
-    assert 1.0 < said["largest"] < said["whitehead"] == pytest.approx(0.5 * (1 + np.sqrt(6)))
+    record = json.loads(capsys.readouterr().out)
+    assert record["complete"] == 2
+    assert 1.0 < record["largest"] < record["whitehead"] == pytest.approx(0.5 * (1 + np.sqrt(6)))
     assert (tmp_path / "mistuning.png").stat().st_size > 5000
     table = (tmp_path / "patterns.csv").read_text(encoding="utf-8").splitlines()
     assert table[0].startswith("pattern,status,amplification,peak_m,peak_hz,blade")
     cli.app([*words, "--resume"], result_action="return_value")
-    assert json.loads(capsys.readouterr().out) == said
+    assert json.loads(capsys.readouterr().out) == record
 
 
 def test_blades_alike_amplify_nothing(scene: Path) -> None:
@@ -80,9 +80,9 @@ def test_blades_alike_amplify_nothing(scene: Path) -> None:
     file = scene_file.read(str(scene), ("mistuning.frequency=0", "mistuning.friction=0"))
     blades = mistuned_blades.MistunedBlades.of(file)
     none = np.zeros(6)
-    found, _ = blades.peak(mistuned_blades.Pattern(0, none, none, none))
-    assert found.amplitude == pytest.approx(blades.tuned.amplitude, rel=1e-4)
-    assert found.state.omega == pytest.approx(blades.tuned.state.omega, rel=1e-4)
+    result, _ = blades.peak(mistuned_blades.Pattern(0, none, none, none))
+    assert result.amplitude == pytest.approx(blades.tuned.amplitude, rel=1e-4)
+    assert result.state.omega == pytest.approx(blades.tuned.state.omega, rel=1e-4)
 
 
 def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) -> None:

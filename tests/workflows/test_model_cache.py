@@ -81,30 +81,30 @@ def test_residual_flexibility_and_waves_are_those_of_their_springs(made: list[st
     stiff = built(method, other).reduced.residual
     assert made == ALL[2:]
     os.environ["TRIBODYN_CACHE"] = "off"  # put back by the fixture's monkeypatch
-    alone = built(method, other).reduced.residual
+    single = built(method, other).reduced.residual
     assert stiff is not None
-    assert alone is not None
-    np.testing.assert_array_equal(stiff.stiffness, alone.stiffness)
+    assert single is not None
+    np.testing.assert_array_equal(stiff.stiffness, single.stiffness)
 
 
 @pytest.mark.parametrize("scene", ["beam", "blade", "leaf_seal"])
 def test_a_result_is_that_without_anything_kept(
     made: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, scene: str
 ) -> None:
-    few = ("response.points=6", "wear=", "harmonics.kept=[0, 1]", "verdict.enabled=false")
-    leaf = ("geometry.n_column=7", "geometry.pin_column=2", *few)
-    small = {"beam": TINY, "blade": few, "leaf_seal": leaf}[scene]
+    coarse = ("response.points=6", "wear=", "harmonics.kept=[0, 1]", "verdict.enabled=false")
+    leaf = ("geometry.n_column=7", "geometry.pin_column=2", *coarse)
+    small = {"beam": TINY, "blade": coarse, "leaf_seal": leaf}[scene]
     file = scene_file.read(scene, small)
     results = [pipeline.run(file, None, Progress()) for _ in range(2)]
     assert made == ALL
     monkeypatch.setenv("TRIBODYN_CACHE", "off")
     results.append(pipeline.run(file, None, Progress()))
     assert made == 2 * ALL
-    for one in results[1:]:
-        assert one.response is not None
+    for result in results[1:]:
+        assert result.response is not None
         assert results[0].response is not None
-        np.testing.assert_array_equal(one.response.response, results[0].response.response)
-        np.testing.assert_array_equal(one.patch.area, results[0].patch.area)
+        np.testing.assert_array_equal(result.response.response, results[0].response.response)
+        np.testing.assert_array_equal(result.patch.area, results[0].patch.area)
 
 
 def test_a_file_that_is_named_counts_by_its_bytes(made: list[str], tmp_path: Path) -> None:
@@ -122,12 +122,12 @@ def test_a_file_that_is_named_counts_by_its_bytes(made: list[str], tmp_path: Pat
 
 def own_mesh(folder: Path) -> tuple[str, str, tuple[str, ...], Path]:
     """The beam by a mesh file, as `scene_file.parse` takes it."""
-    given = scene_file.read("beam", TINY)
-    modelling.make_mesh(given, folder)
+    inputs = scene_file.read("beam", TINY)
+    modelling.make_mesh(inputs, folder)
     (folder / "mesh.msh").rename(folder / "part.msh")
-    begin, end = given.text.index("[geometry]"), given.text.index("[material]")
-    text = given.text[:begin] + '[geometry]\nmesh = "part.msh"\nfixed = ["clamp"]\n' + given.text[end:]
-    return text, "own.toml", tuple(one for one in TINY if not one.startswith("geometry")), folder
+    begin, end = inputs.text.index("[geometry]"), inputs.text.index("[material]")
+    text = inputs.text[:begin] + '[geometry]\nmesh = "part.msh"\nfixed = ["clamp"]\n' + inputs.text[end:]
+    return text, "own.toml", tuple(item for item in TINY if not item.startswith("geometry")), folder
 
 
 @pytest.mark.parametrize(
@@ -184,10 +184,10 @@ def empty(path: Path) -> None:
 @pytest.mark.faults
 @pytest.mark.parametrize("damage", [cut, flipped, empty])
 def test_a_damaged_entry_is_made_again(made: list[str], tmp_path: Path, damage: Callable[[Path], None]) -> None:
-    whole = built().reduced.system.stiffness
+    full = built().reduced.system.stiffness
     for path in entries(tmp_path / "kept"):
         damage(path)
-    np.testing.assert_array_equal(built().reduced.system.stiffness, whole)
+    np.testing.assert_array_equal(built().reduced.system.stiffness, full)
     assert made == 2 * ALL
     built()
     assert made == 2 * ALL
@@ -249,8 +249,8 @@ def test_another_temperature_of_a_contact_reduces_nothing() -> None:
     table = {"temperature": ["0 K", "400 K"], "friction": [0.5, 0.4]}
     text = ", ".join(f"{name}={value}" for name, value in table.items()).replace("'", '"')
     cold, hot = (
-        scene_file.read("beam", (*TINY, "contact.friction=", f"contact.by_temperature={{{text}}}", *more)).mesh_scene
-        for more in ((), ("contact.temperature=300 K",))
+        scene_file.read("beam", (*TINY, "contact.friction=", f"contact.by_temperature={{{text}}}", *extra)).mesh_scene
+        for extra in ((), ("contact.temperature=300 K",))
     )
     assert cold.joints["contact"].numbers != hot.joints["contact"].numbers
     assert values_through(cold, REDUCTION) == values_through(hot, REDUCTION)

@@ -48,8 +48,8 @@ def test_transforms_are_each_others_inverse_and_the_rate_is_the_derivative() -> 
     c = np.random.default_rng(0).normal(size=(5, BASIS.n_coeff))
     np.testing.assert_allclose(BASIS.from_time(BASIS.to_time(c)), c, atol=1e-13)
     step = 1e-6
-    ahead, behind = (BASIS.functions(BASIS.angle + way * step) for way in (1, -1))
-    np.testing.assert_allclose(BASIS.to_time(c @ BASIS.rate), c @ (ahead - behind).T / (2 * step), atol=1e-8)
+    ahead, previous = (BASIS.functions(BASIS.angle + way * step) for way in (1, -1))
+    np.testing.assert_allclose(BASIS.to_time(c @ BASIS.rate), c @ (ahead - previous).T / (2 * step), atol=1e-8)
 
 
 def test_work_is_force_times_velocity_over_the_cycle() -> None:
@@ -62,7 +62,7 @@ def test_work_is_force_times_velocity_over_the_cycle() -> None:
 
 
 def test_forces_and_friction_work_are_those_of_a_plain_march(solved: tuple[HarmonicBalance, State]) -> None:
-    assert [one.name for one in march_checks(*solved) if one.off > one.allowed] == []
+    assert [march_check.name for march_check in march_checks(*solved) if march_check.off > march_check.allowed] == []
 
 
 def test_outputs_and_preload_follow_from_the_coordinates(solved: tuple[HarmonicBalance, State]) -> None:
@@ -71,7 +71,7 @@ def test_outputs_and_preload_follow_from_the_coordinates(solved: tuple[HarmonicB
     shape = (-1, balance.basis.n_coeff)
     q = recovery.coordinates(balance, state.x.reshape(shape), state.cycle.force.reshape(shape), state.omega)
     row = balance.model.system.outputs["edge"]
-    edge = balance.basis.to_real(np.array([[row @ one for one in q]]))
+    edge = balance.basis.to_real(np.array([[row @ item for item in q]]))
     place = balance.compliance.output_names.index("edge")
     np.testing.assert_allclose(balance.outputs(state)[place], edge[0], rtol=1e-6, atol=1e-9 * np.abs(edge).max())
     weight = np.zeros(len(q[0]))
@@ -86,13 +86,13 @@ def test_outputs_and_preload_follow_from_the_coordinates(solved: tuple[HarmonicB
 
 def test_the_slope_over_frequency_is_the_difference(solved: tuple[HarmonicBalance, State]) -> None:
     balance, state = solved
-    found, outputs = balance.frequency_slope(state)
+    result, outputs = balance.frequency_slope(state)
     step = 1e-5 * state.omega
     ends = [balance.evaluate(state.omega + way * step, state.x) for way in (1, -1)]
     residual = (ends[0].residual - ends[1].residual) / (2 * step)
-    np.testing.assert_allclose(found, residual, atol=1e-5 * np.abs(residual).max())
-    moved = (balance.outputs(ends[0]) - balance.outputs(ends[1])) / (2 * step)
-    np.testing.assert_allclose(outputs, moved, atol=1e-5 * np.abs(moved).max())
+    np.testing.assert_allclose(result, residual, atol=1e-5 * np.abs(residual).max())
+    shifted = (balance.outputs(ends[0]) - balance.outputs(ends[1])) / (2 * step)
+    np.testing.assert_allclose(outputs, shifted, atol=1e-5 * np.abs(shifted).max())
 
 
 def test_a_converged_state_leaves_what_the_tolerance_says(solved: tuple[HarmonicBalance, State]) -> None:
@@ -102,9 +102,9 @@ def test_a_converged_state_leaves_what_the_tolerance_says(solved: tuple[Harmonic
 
 def test_the_load_factor_scales_vibration_alone(solved: tuple[HarmonicBalance, State]) -> None:
     balance, state = solved
-    whole, half = balance.x_lin(state.omega), balance.with_load(0.5).x_lin(state.omega)
-    np.testing.assert_allclose(half, whole * np.where(balance.basis.order > 0, 0.5, 1.0), rtol=1e-12)
-    assert np.abs(whole[:, balance.basis.order == 1]).max() > 0
+    full, half = balance.x_lin(state.omega), balance.with_load(0.5).x_lin(state.omega)
+    np.testing.assert_allclose(half, full * np.where(balance.basis.order > 0, 0.5, 1.0), rtol=1e-12)
+    assert np.abs(full[:, balance.basis.order == 1]).max() > 0
 
 
 def test_static_loads_add_up() -> None:
@@ -136,8 +136,8 @@ def test_delta_max_of_a_wheel_is_half_the_mean_approach() -> None:
 def test_gravity_acts_along_its_direction_and_an_accelerated_ground_against_it() -> None:
     for key, sign in (("acceleration", 1.0), ("base_acceleration", -1.0)):
         load = StaticLoad(**{key: 9.81}, direction=(0.0, 0.0, 1.0))
-        found = modelling.make_load(load, None, None, None)
-        np.testing.assert_allclose(found.direction, [0, 0, sign])
+        result = modelling.make_load(load, None, None, None)
+        np.testing.assert_allclose(result.direction, [0, 0, sign])
 
 
 def test_the_ground_moves_ahead_by_its_phase() -> None:
@@ -154,8 +154,8 @@ def test_the_ground_moves_ahead_by_its_phase() -> None:
 
 
 def test_a_sequence_of_known_order_is_extrapolated_to_its_limit() -> None:
-    found = limit_of([1, 2, 4], [1 + 1.0, 1 + 0.25, 1 + 0.0625])
-    assert (found.value, found.order) == (pytest.approx(1.0), pytest.approx(2.0))
+    result = limit_of([1, 2, 4], [1 + 1.0, 1 + 0.25, 1 + 0.0625])
+    assert (result.value, result.order) == (pytest.approx(1.0), pytest.approx(2.0))
 
 
 @pytest.mark.parametrize(
@@ -204,9 +204,9 @@ def test_the_peak_of_one_mode_is_where_the_slopes_at_two_points_tell() -> None:
         x = SimpleNamespace(state=SimpleNamespace(x=w**3 - 2 * w))
         of = {"omega": w, "height": 7 / np.sqrt(level), "slope": -49 * 2 * (w - 3.0) / level**2}
         solved.append(SimpleNamespace(**of, dx=3 * w**2 - 2, solution=x))
-    for one, other in (solved, solved[::-1]):
-        assert AmplitudeSlope.peak_before(one, other) == pytest.approx(3.0)  # type: ignore[arg-type]
-        assert AmplitudeSlope.between(one, other, 2.5) == pytest.approx(2.5**3 - 5.0)  # type: ignore[arg-type]
+    for item, other in (solved, solved[::-1]):
+        assert AmplitudeSlope.peak_before(item, other) == pytest.approx(3.0)  # type: ignore[arg-type]
+        assert AmplitudeSlope.between(item, other, 2.5) == pytest.approx(2.5**3 - 5.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("transitions", ["located", "sampled"])
@@ -215,7 +215,11 @@ def test_forces_over_gaps_are_those_of_a_plain_march(transitions: str) -> None:
     balance = body.balance(replace(body.ordinary, gap=-2e-6, transitions=transitions))
     solution = arc_length.solve_along_load(balance, body.ordinary.omega)
     assert solution.converged
-    assert [one.name for one in march_checks(balance, solution.state) if one.off > one.allowed] == []
+    assert [
+        march_check.name
+        for march_check in march_checks(balance, solution.state)
+        if march_check.off > march_check.allowed
+    ] == []
 
 
 def test_the_derivative_of_the_contact_forces_is_the_difference(solved: tuple[HarmonicBalance, State]) -> None:
@@ -224,6 +228,6 @@ def test_the_derivative_of_the_contact_forces_is_the_difference(solved: tuple[Ha
     step = 1e-7 * np.abs(state.x).max()
     for way in np.random.default_rng(0).normal(size=(3, *shape)):
         ends = [balance.evaluate(state.omega, state.x + side * step * way, False).cycle.force for side in (1, -1)]
-        found = np.einsum("pij,pj->pi", jacobian, way.reshape(shape[0], -1)).reshape(shape)
+        values = np.einsum("pij,pj->pi", jacobian, way.reshape(shape[0], -1)).reshape(shape)
         difference = (ends[0] - ends[1]) / (2 * step)
-        assert np.abs(found - difference).max() < 1e-4 * np.abs(difference).max()
+        assert np.abs(values - difference).max() < 1e-4 * np.abs(difference).max()

@@ -78,8 +78,8 @@ def with_value(table: Any, path: tuple[str, ...], value: object) -> Any:
         extra = table.model_extra
         changed: Any = table.model_copy(update={name: value} if extra else {PARAMETERS: {**table.numbers, name: value}})
         return changed
-    new = with_value(getattr(table, name), tuple(inner), value) if inner else value
-    return table.model_copy(update={name: new})
+    updated = with_value(getattr(table, name), tuple(inner), value) if inner else value
+    return table.model_copy(update={name: updated})
 
 
 @pytest.mark.parametrize("scene", [*SCENES, "beam"])
@@ -120,17 +120,17 @@ def outcomes(file: scene_file.SceneFile, last: SceneStage) -> dict[SceneStage, l
     part = modelling.part_of(file, Progress())
     system, interface = part.system, part.interface
     matrices = (system.mass, system.stiffness, system.loads, system.outputs)
-    made: dict[SceneStage, Any] = {PART: (*matrices, interface.B, interface.area, part.free)}
+    built: dict[SceneStage, Any] = {PART: (*matrices, interface.B, interface.area, part.free)}
     if last > PART:
         part, _ = modelling.with_surfaces(file, part)
         model = modelling.plain_of(file, part)
-        made[REDUCTION] = (model.system.mass, model.system.stiffness, model.system.loads, model.interface.B)
+        built[REDUCTION] = (model.system.mass, model.system.stiffness, model.system.loads, model.interface.B)
     if last > REDUCTION:
         parameters = [joint.parameters for joint in joints.make_joints(scene, model)]
-        made[CONTACT] = [(p.stiffness, p.gap, dict(p.numbers), p.table) for p in parameters]
+        built[CONTACT] = [(p.stiffness, p.gap, dict(p.numbers), p.table) for p in parameters]
     if last > CONTACT:
-        made[LOADS] = joints.excite(scene, None).loads
-    return {stage: list(arrays(value)) for stage, value in made.items()}
+        built[LOADS] = joints.excite(scene, None).loads
+    return {stage: list(arrays(value)) for stage, value in built.items()}
 
 
 # changes that belong together, of keys that no earlier stage may see: the stage whose predecessors are compared
