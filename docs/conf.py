@@ -7,11 +7,11 @@ import os
 import sys
 from pathlib import Path
 
-HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
-os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+FOLDER = Path(__file__).parent
+sys.path.insert(0, str(FOLDER))
+os.environ["PYTHONPATH"] = os.pathsep.join([str(FOLDER.parent / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
 os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # it names a path of this machine
-sys.path.insert(0, str(HERE.parent / "src"))
+sys.path.insert(0, str(FOLDER.parent / "src"))
 
 import docstrings  # noqa: E402
 import examples_pages  # noqa: E402
@@ -59,7 +59,7 @@ def setup(app: Sphinx) -> None:
     """Make the generated pages before anything is read; docstrings are read in the form that this project has."""
     for name in ("skfem", "traitlets"):  # they tell every step of what the pages run
         logging.getLogger(name).setLevel(logging.WARNING)
-    generated_pages.write(HERE / "generated")
-    examples_pages.write(HERE / "examples" / "generated")
+    generated_pages.write(FOLDER / "generated")
+    examples_pages.write(FOLDER / "examples" / "generated")
     app.connect("source-read", outputs.add)
     app.connect("autodoc-process-docstring", docstrings.process)

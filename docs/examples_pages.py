@@ -18,7 +18,7 @@ from typing import Any
 import nbformat
 from PIL import Image
 
-HERE = Path(__file__).parent / "examples"
+FOLDER = Path(__file__).parent / "examples"
 WIDEST = 900  # pixels of a picture, of a thumbnail a third
 
 
@@ -27,7 +27,7 @@ def write(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     cards = ["# Examples", "", "Each is a script that the build of this site has run.", "", "::::{container} cards"]
     names = []
-    for script in sorted(HERE.glob("*.py")):
+    for script in sorted(FOLDER.glob("*.py")):
         name, source = script.stem, script.read_text(encoding="utf-8")
         title, _, text = (ast.get_docstring(ast.parse(source)) or name).partition("\n")
         seconds, printed, pictures = run(source, script.name, folder / name)
@@ -51,8 +51,10 @@ def write(folder: Path) -> None:
 
 def as_notebook(title: str, text: str, code: str) -> Any:
     """The same text and code in two cells."""
-    new = nbformat.v4
-    return new.new_notebook(cells=[new.new_markdown_cell(f"# {title}\n\n{text}"), new.new_code_cell(code)])
+    notebook = nbformat.v4
+    return notebook.new_notebook(
+        cells=[notebook.new_markdown_cell(f"# {title}\n\n{text}"), notebook.new_code_cell(code)]
+    )
 
 
 def run(source: str, name: str, out: Path) -> tuple[float, str, list[str]]:

@@ -71,12 +71,12 @@ def scene_keys(kind: type[BaseModel], without: type[BaseModel] | None = None) ->
     """A section for each table of a scene; tables that the scene `without` has just so are left out."""
     lines: list[str] = []
     for path, table in _tables(kind, ()):
-        if without is not None and any(path == other and table is known for other, known in _tables(without, ())):
+        if without is not None and any(path == other and table is shared for other, shared in _tables(without, ())):
             continue
         lines += [f"## `[{'.'.join(path)}]`", "", _paragraph(table.__doc__), ""]
-        said = json_schema.meanings(table)
+        meaning_of = json_schema.meanings(table)
         keys = [(name, field) for name, field in table.model_fields.items() if _is_key(name, field, path)]
-        rows = [_row(name, field, said.get(name)) for name, field in keys]
+        rows = [_row(name, field, meaning_of.get(name)) for name, field in keys]
         lines += _table(("key", "unit", "default", "meaning"), rows)
     return "\n".join(lines)
 
@@ -141,7 +141,7 @@ def _marks(annotation: Any) -> Iterator[Any]:
 def _choices(annotation: Any) -> tuple[Any, ...]:
     if get_origin(annotation) is Literal:
         return get_args(annotation)
-    return next((found for inner in get_args(annotation) if (found := _choices(inner))), ())
+    return next((choices for inner in get_args(annotation) if (choices := _choices(inner))), ())
 
 
 def _default(field: Any) -> str:
@@ -151,8 +151,8 @@ def _default(field: Any) -> str:
     if value is None or value is PydanticUndefined or value in ((), {}, ""):
         return ""
     if isinstance(value, BaseModel):
-        said = {key: part for key, part in value.model_dump().items() if part is not None}
-        return '`"peak"`' if said == {"peak": 1.0} else f"`{said}`"
+        parts = {key: part for key, part in value.model_dump().items() if part is not None}
+        return '`"peak"`' if parts == {"peak": 1.0} else f"`{parts}`"
     if isinstance(value, tuple):
         value = list(value)
     text = str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else repr(value)
@@ -184,18 +184,18 @@ def numbers_of(kind: PluginKind) -> str:
         head = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").split("\n\n")[0]
         lines += [f"## `{path.stem}`", "", _paragraph(head), ""]
         rows = []
-        for own in kind.declared(path.stem):
-            default = "required" if own.required else "" if own.default is None else f"`{own.default:g}`"
-            limits = (("at least", own.low), ("above", own.above), ("at most", own.high))
+        for number in kind.declared(path.stem):
+            default = "required" if number.required else "" if number.default is None else f"`{number.default:g}`"
+            limits = (("at least", number.low), ("above", number.above), ("at most", number.high))
             bounds = [f"{word} {limit:g}" for word, limit in limits if limit is not None]
-            meaning = " ".join(filter(None, [_paragraph(own.meaning), _bounds(bounds)]))
-            rows.append((f"`{own.name}`", own.unit or ("" if own.integer else "ratio"), default, meaning))
+            meaning = " ".join(filter(None, [_paragraph(number.meaning), _bounds(bounds)]))
+            rows.append((f"`{number.name}`", number.unit or ("" if number.integer else "ratio"), default, meaning))
         lines += _table(("key", "unit", "default", "meaning"), rows) or ["It has no numbers of its own.", ""]
     return "\n".join(lines)
 
 
-def _head(thing: ModuleType | type) -> str:
-    return (thing.__doc__ or "").strip().split("\n\n")[0]
+def _head(documented: ModuleType | type) -> str:
+    return (documented.__doc__ or "").strip().split("\n\n")[0]
 
 
 def _meanings(kind: type) -> dict[str, str]:
@@ -205,8 +205,8 @@ def _meanings(kind: type) -> dict[str, str]:
     names = {item.name for item in dataclasses.fields(kind)}
     for line in text.splitlines():
         for piece in re.split(r"; (?=\w+(?:, \w+)* : )", line):
-            said, colon, meaning = piece.partition(" : ")
-            listed = [name.strip() for name in said.split(",")]
+            names_text, colon, meaning = piece.partition(" : ")
+            listed = [name.strip() for name in names_text.split(",")]
             if colon and names.issuperset(listed):
                 meanings |= dict.fromkeys(listed, meaning.strip())
     return meanings
@@ -276,9 +276,12 @@ def cards() -> str:
         ("Nastran", nastran.TABLE),
         ("ANSYS", ansys.TABLE),
     ):
-        mine = {"read": table.reads, **{f"not used: {why}": words_of(of) for why, of in table.harmless.items()}}
-        mine["of no effect"] = table.silents
-        rows = [(what, ", ".join(f"`{card}`" for card in sorted(of))) for what, of in mine.items()]
+        cards_by_use = {
+            "read": table.reads,
+            **{f"not used: {reason}": words_of(of) for reason, of in table.harmless.items()},
+        }
+        cards_by_use["of no effect"] = table.silents
+        rows = [(use, ", ".join(f"`{card}`" for card in sorted(of))) for use, of in cards_by_use.items()]
         lines += [f"## {name}", "", *_table(("what becomes of it", "cards"), rows)]
     return "\n".join(lines)
 
@@ -295,7 +298,9 @@ def folders() -> str:
     for top in TOP:
         inside = sorted({path.parent for path in (ROOT / top).rglob("*.py")}) if top != "tests" else []
         rows += [(f"`{path.relative_to(ROOT)}/`", _paragraph(_head_of(path))) for path in inside]
-    rows += [(f"`tests/{room}/`", said) for room, said in ROOMS_OF_TESTS.items() if (ROOT / "tests" / room).is_dir()]
+    rows += [
+        (f"`tests/{room}/`", meaning) for room, meaning in ROOMS_OF_TESTS.items() if (ROOT / "tests" / room).is_dir()
+    ]
     return "\n".join(_table(("folder", "what it holds"), rows))
 
 

@@ -23,9 +23,9 @@ import tribodyn as td
 from tribodyn.workflows.pictures import response_plots
 from tribodyn.workflows.studies import front_door
 
-HERE = Path(__file__).parent
-PICTURES = HERE / "gallery" / "pictures"
-PAGE = HERE / "gallery" / "pictures.md"
+FOLDER = Path(__file__).parent
+PICTURES = FOLDER / "gallery" / "pictures"
+PAGE = FOLDER / "gallery" / "pictures.md"
 DPI, FILM_DPI, FILM_IMAGES = 100, 55, 16
 COLOURS = 256  # of a picture on the site
 ELSEWHERE = {
@@ -67,13 +67,13 @@ def main() -> None:
     words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     words.add_argument("--results", type=Path, default=Path("results/gallery"), help="folder of the results")
     words.add_argument("--only", nargs="*", default=None, help="names of scenes, or studies; all by default")
-    given = words.parse_args()
+    arguments = words.parse_args()
     PICTURES.mkdir(parents=True, exist_ok=True)
     for name in [*td.scene_names(), "studies"]:
-        if given.only is None or name in given.only:
+        if arguments.only is None or name in arguments.only:
             print(name, flush=True)
             with TemporaryDirectory() as folder:
-                for picture in studies(Path(folder)) if name == "studies" else of_scene(name, given.results / name):
+                for picture in studies(Path(folder)) if name == "studies" else of_scene(name, arguments.results / name):
                     print(f"  {picture.name}, {picture.stat().st_size / 1e3:.0f} kB", flush=True)
     write_page()
 
@@ -81,8 +81,8 @@ def main() -> None:
 def of_scene(name: str, folder: Path) -> Iterator[Path]:
     """Run a scene, and draw all that its result has."""
     result = td.run(name, folder, overrides=CHANGED.get(name, ()), resume=(folder / "result.h5").exists())
-    for old in PICTURES.glob(f"{name}_contact*.png"):
-        old.unlink()  # its contacts may have other names now
+    for stale in PICTURES.glob(f"{name}_contact*.png"):
+        stale.unlink()  # its contacts may have other names now
     with TemporaryDirectory() as place:
         start, spent = time.perf_counter(), time.process_time()
         written, missing = front_door.draw(result, Path(place), dpi=DPI)
@@ -94,7 +94,7 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
             yield small(path, f"{name}_{path.stem}")
             if (name, path.stem) in ELSEWHERE:
                 shutil.copy(
-                    PICTURES / f"{name}_{path.stem}.png", HERE / "figures" / f"{ELSEWHERE[name, path.stem]}.png"
+                    PICTURES / f"{name}_{path.stem}.png", FOLDER / "figures" / f"{ELSEWHERE[name, path.stem]}.png"
                 )
         for over in ("wear", "cycle"):
             if over == "cycle" or result.wear_steps:
@@ -106,7 +106,7 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
                 print(f"  film over {over}: {(time.process_time() - spent) / FILM_IMAGES:.2f} s of processor an image")
                 yield Path(shutil.copy(film, PICTURES / f"{name}_film_{over}.gif"))
         if name == "beam":
-            story(result, HERE / "figures" / "beam_story.png", Path(place))
+            story(result, FOLDER / "figures" / "beam_story.png", Path(place))
 
 
 def story(result: td.Result, path: Path, place: Path) -> Path:
@@ -127,12 +127,12 @@ def story(result: td.Result, path: Path, place: Path) -> Path:
         panel = Image.open(file).convert("RGB")
         panels.append(panel.crop((0, 0, panel.width, int(panel.height * (0.37 if number == 1 else 1)))))
     high = max(panel.height for panel in panels)
-    whole = Image.new("RGB", (sum(panel.width for panel in panels), high), "white")
-    left = 0
+    image = Image.new("RGB", (sum(panel.width for panel in panels), high), "white")
+    x = 0
     for panel in panels:
-        whole.paste(panel, (left, (high - panel.height) // 2))
-        left += panel.width
-    whole.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+        image.paste(panel, (x, (high - panel.height) // 2))
+        x += panel.width
+    image.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
     return path
 
 
@@ -163,15 +163,15 @@ def studies(folder: Path) -> Iterator[Path]:
         path = folder / f"{name}.png"
         figure.savefig(path, dpi=DPI)
         yield small(path, name)
-    shutil.copy(PICTURES / "blade_campbell.png", HERE / "figures" / "blade_campbell.png")
+    shutil.copy(PICTURES / "blade_campbell.png", FOLDER / "figures" / "blade_campbell.png")
 
 
 def small(path: Path, name: str) -> Path:
     """A picture with few colours, as the site has it."""
-    there = PICTURES / f"{name}.png"
+    target = PICTURES / f"{name}.png"
     with Image.open(path) as image:
-        image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(there, optimize=True)
-    return there
+        image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+    return target
 
 
 def write_page() -> None:

@@ -25,7 +25,7 @@ FOLLOWED = (
 )  # fmt: skip
 FENCE = re.compile(r"^```([a-z]+)(?: ([\w.]+))?\n(.*?)^```\n", re.M | re.S)
 FIRST = "./tribodyn run beam"
-MOST = 30  # lines of an output
+LINE_LIMIT = 30  # lines of an output
 
 
 def add(_: Any, name: str, source: list[str]) -> None:
@@ -46,10 +46,10 @@ def _followed(text: str) -> Iterator[str]:
                 if word and language != "sh":
                     Path(word).write_text(code, encoding="utf-8")
                 elif language == "sh" and not word:
-                    said = "".join(map(_said, filter(None, code.splitlines())))
-                    shown = said.splitlines()
-                    more = ["..."] if len(shown) > MOST else []
-                    yield "\n".join(["", "```text", *shown[:MOST], *more, "```", ""])
+                    output = "".join(map(_output_of, filter(None, code.splitlines())))
+                    shown = output.splitlines()
+                    ellipsis = ["..."] if len(shown) > LINE_LIMIT else []
+                    yield "\n".join(["", "```text", *shown[:LINE_LIMIT], *ellipsis, "```", ""])
                 elif language == "python":
                     with contextlib.redirect_stdout(io.StringIO()):
                         exec(compile(code, "page", "exec"), {"__name__": "__main__"})
@@ -58,7 +58,7 @@ def _followed(text: str) -> Iterator[str]:
             os.chdir(back)
 
 
-def _said(command: str) -> str:
+def _output_of(command: str) -> str:
     """What a command prints; raises RuntimeError where it fails."""
     from tribodyn.workflows.command.main import main
 
@@ -68,11 +68,11 @@ def _said(command: str) -> str:
     if words[0] != "./tribodyn":
         raise RuntimeError(f"the build follows commands of tribodyn alone: {command}")
     if command.strip() == FIRST and "TRIBODYN_FIRST" in os.environ:
-        left = Path(os.environ["TRIBODYN_FIRST"])
-        with FileLock(f"{left}.lock"):  # which the tests hold while they run it
-            if left.is_dir():
-                shutil.copytree(left / "results", "results", dirs_exist_ok=True)
-                return (left / "printed").read_text(encoding="utf-8")
+        test_output = Path(os.environ["TRIBODYN_FIRST"])
+        with FileLock(f"{test_output}.lock"):  # which the tests hold while they run it
+            if test_output.is_dir():
+                shutil.copytree(test_output / "results", "results", dirs_exist_ok=True)
+                return (test_output / "printed").read_text(encoding="utf-8")
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         try:

@@ -17,6 +17,6 @@ COARSE = {
 }
 
 result = td.run("beam", overrides=COARSE | {"wear": None, "harmonics.kept": [0, 1, 2, 3]})
-found = td.verify(result)
-print(*found.lines()[:6], sep="\n")
-found.write(Path())
+comparison = td.verify(result)
+print(*comparison.lines()[:6], sep="\n")
+comparison.write(Path())

@@ -8,6 +8,6 @@ from pathlib import Path
 
 import tribodyn as td
 
-found = td.inspect("turbine")
-print(*found.lines()[:8], sep="\n")
-found.write(Path())
+inspection = td.inspect("turbine")
+print(*inspection.lines()[:8], sep="\n")
+inspection.write(Path())

@@ -83,11 +83,11 @@ enabled = false
 print(td.studies.derivatives("slider.toml"))
 with td.plot.axes(12, 4, columns=3) as (figure, (peaks, curves, stop)):
     for friction in np.arange(0.1, 0.75, 0.08):
-        new = {"contact.friction": friction}
-        found = td.studies.derivatives("slider.toml", only=("contact.friction",), overrides=new).derivatives
-        near, amplitude = friction + np.array([-0.03, 0.03]), found.names.index("amplitude")
-        peaks.plot(near, 1e6 * (found.values[amplitude] + found.slopes[amplitude, 0] * (near - friction)), "k")
-        peaks.plot(friction, 1e6 * found.values[amplitude], "C3o", ms=4)
+        changed = {"contact.friction": friction}
+        rates = td.studies.derivatives("slider.toml", only=("contact.friction",), overrides=changed).derivatives
+        span, amplitude = friction + np.array([-0.03, 0.03]), rates.names.index("amplitude")
+        peaks.plot(span, 1e6 * (rates.values[amplitude] + rates.slopes[amplitude, 0] * (span - friction)), "k")
+        peaks.plot(friction, 1e6 * rates.values[amplitude], "C3o", ms=4)
     peaks.set(xlabel="friction", ylabel="peak / \N{MICRO SIGN}m", title="a corner where the peak sticks")
     for friction, style in ((1.0, "k--"), (0.18, "C0"), (0.26, "C1"), (0.34, "C2")):
         curve = td.run("slider.toml", overrides={"contact.friction": friction}).response

@@ -177,12 +177,12 @@ spread = {
 print(td.studies.lives(spread, "results/spread", workers=1))
 
 # td.studies.optimise
-wanted = {
+optimisation = {
     "study": {"scene": "beam", "design": "sobol", "runs": 2, "set": settings},
     "vary": {"damping.modal": {"distribution": "uniform", "low": "1 %", "high": "4 %"}},
     "optimise": {"evaluations": 3, "aims": [{"number": "amplitude_first", "want": "low"}]},
 }
-print(td.studies.optimise(wanted, "results/best", workers=1))
+print(td.studies.optimise(optimisation, "results/best", workers=1))
 
 # td.studies.identify
 task = {
@@ -230,19 +230,19 @@ critical = {order: td.wheel.critical_speeds(speeds, waves["stuck"][:, i, 0], ord
 td.plot.campbell(speeds, waves, (1, 2), critical, "blade").savefig("campbell.png")
 
 # td.wheel.mistuned
-few = {"wheel.sectors": 4, "geometry.n_blades": 4, "geometry.n_along": 3, "geometry.n_up": 2}
-few |= {
+small_wheel = {"wheel.sectors": 4, "geometry.n_blades": 4, "geometry.n_along": 3, "geometry.n_up": 2}
+small_wheel |= {
     "harmonics.kept": [0, 1],
     "wear": None,
     "response.frequency": ["180 Hz", "300 Hz"],
     "response.points": 20,
     "verdict.enabled": False,
 }
-print(td.wheel.mistuned("blade", spread=0.02, overrides=few))
+print(td.wheel.mistuned("blade", spread=0.02, overrides=small_wheel))
 
 # td.wheel.patterns
-apart = {**few, "mistuning.frequency": "1 %", "mistuning.patterns": 2}
-print(td.wheel.patterns("blade", "results/patterns", workers=1, overrides=apart))
+blades = {**small_wheel, "mistuning.frequency": "1 %", "mistuning.patterns": 2}
+print(td.wheel.patterns("blade", "results/patterns", workers=1, overrides=blades))
 
 # td.matrices.from_arrays
 matrices = td.matrices.from_arrays(0.5 * np.eye(3), chain)
