@@ -1,16 +1,19 @@
 """Reduced model -> response: harmonic balance with friction contact, continuation, wear.
 
 harmonics, excitation                 basis and loads
-balance, newton, krylov               the balance and how it is solved
-rest                                  the preloaded state that friction begins from
-mistuning                             wheels whose blades differ
+balance, linearisation                the balance of a cycle and its derivatives
+newton, criterion, krylov             how it is solved
+rest, reference_springs               the preloaded state and the stuck springs that friction begins from
+mistuned_wheel                        wheels whose blades differ
 outcome                               how a solve or a run ended
-gradient, derivatives                 what a solution, a peak, a fold or a mode changes by with every number of it
+quantity, quantity_sources            the numbers that a run states, and the types that they are computed from
 threads                               how many threads may work
 contact/                              joints and their laws
-linear/                               compliance of the structure where it touches
+linear/                               compliance of the structure at the contact
 continuation/                         response curves, folds, peaks, nonlinear modes
-stability/                            which motions persist
-wear/                                 laws of removal and the steps through cycles
-time/                                 integration of the same model, to compare with
+derivatives/                          derivatives of a solution, a peak, a fold or a mode by every number of a scene
+quantities/                           one file for each number that a run states
+stability/                            which periodic solutions are stable
+wear/                                 laws and rules of wear, and the steps through the cycles
+time/                                 time integration of the same model
 """

@@ -192,7 +192,7 @@ def _parts(balance: HarmonicBalance, spent: dict[str, list[float]], points: int)
     assert isinstance(balance.model, FlexibleModel)
     remainder = balance.model.residual
     read = 4 * len(np.unique(remainder.B.indices)) ** 2  # of the factor, each of two times
-    if isinstance(remainder.factor, Pardiso) and not remainder.factor._few:
+    if isinstance(remainder.factor, Pardiso) and not remainder.factor._selects:
         read = 1024 * int(remainder.factor._solver.get_iparm(Pardiso.SIZE))
     blocks, calls = (
         balance.contact.n_pair * (n // balance.contact.n_pair * m) ** 2,

@@ -46,7 +46,7 @@ result = td.run("beam", "results/small", overrides=WORN)
 print(result.summary()["peak_frequency"], result.wear.cycles[-1])
 
 # td.plot.Live
-live = td.plot.Live(every=1.0)  # in a notebook
+live = td.plot.Live(interval=1.0)  # in a notebook
 result = td.run("beam", overrides=WORN, progress=live)
 
 # td.load

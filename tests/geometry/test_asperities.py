@@ -36,12 +36,12 @@ def test_caps_give_their_radius_density_and_gaps():
 
 def test_two_faces_of_caps_that_meet_have_half_the_radius_and_both_heights():
     first = caps(RADIUS, some_heights(), SPACING_OF_SUMMITS, STEP)
-    single, two_results = td.studies.asperities(first).found, td.studies.asperities(first, first).found
+    single, two_results = td.studies.asperities(first).asperities, td.studies.asperities(first, first).asperities
     assert two_results.radius == pytest.approx(RADIUS / 2, rel=1e-4)
     np.testing.assert_allclose(np.sort(two_results.gap), 2 * np.sort(single.gap), atol=1e-12)
     lower = replace(first, z=first.z * (1 - 0.4 * (first.x < first.x.mean()))[:, None])
-    turned = td.studies.asperities(lower, lower, mirror="x").found
-    assert turned.height.std() < 0.8 * td.studies.asperities(lower, lower).found.height.std()
+    turned = td.studies.asperities(lower, lower, mirror="x").asperities
+    assert turned.height.std() < 0.8 * td.studies.asperities(lower, lower).asperities.height.std()
 
 
 def test_two_random_faces_of_different_grids_have_the_sum_of_their_moments():

@@ -304,7 +304,7 @@ def test_a_walk_that_always_lands_astray_with_steps_that_do_not_get_shorter_ends
     def same_again(stepper, index):
         went_back.append(index)
         assert len(went_back) < 100
-        stepper._here = stepper.segments[index].start
+        stepper._point = stepper.segments[index].start
         del stepper.segments[index:]
 
     monkeypatch.setattr(CurveStepper, "arrives", lambda *arguments: False)

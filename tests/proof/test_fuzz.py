@@ -112,7 +112,7 @@ def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_damage_of_several_kinds_at_once_ends_as_it_may() -> None:
-    attempts = fuzz_mixed.tries(12, seed=3, only="run K.mtx", command=cli.main)
+    attempts = fuzz_mixed.tries(12, seed=3, prefix="run K.mtx", command=cli.main)
     assert [item for item in attempts if not item.good] == []
     assert {"success", "refused"} <= {item.end for item in attempts}
     table = fuzz_mixed.as_table(attempts)

@@ -50,7 +50,7 @@ def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixtu
     file = read(str(folder / "own.toml"), [*QUICK, *overrides])
     balance = modelling.build(file, Progress(), kept).balance
     assert balance.basis.harmonics == kept
-    peak = settings.peak_of(file.scene).first(balance).state
+    peak = settings.peak_of(file.scene).solve(balance).state
     own = estimate(widened(balance, 9), kept, peak.omega, peak.x, split=False).error
     assert own == pytest.approx(result.facts.harmonics_error, rel=0.3)
     assert result.scene == file.scene

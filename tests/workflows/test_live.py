@@ -29,7 +29,7 @@ def published() -> Any:
 
 
 def test_a_plot_appears_and_is_updated_during_a_run(published: list[dict[str, Any]]) -> None:
-    result = td.run("beam", overrides=SMALL, progress=td.plot.Live(every=0))
+    result = td.run("beam", overrides=SMALL, progress=td.plot.Live(interval=0))
     plots = [message for message in published if (message.get("transient") or {}).get("display_id")]
     by_plot: dict[str, list[bool]] = {}
     for message in plots:
@@ -48,6 +48,6 @@ def test_the_plot_shows_the_points_of_the_curve() -> None:
 
 
 def test_outside_of_a_notebook_nothing_is_drawn(capsys: pytest.CaptureFixture[str]) -> None:
-    with td.plot.Live(every=0).track("frequency response") as advance:
+    with td.plot.Live(interval=0).track("frequency response") as advance:
         advance(1.0, "", (2 * np.pi * 100.0, 2e-6))
     assert "Figure" not in capsys.readouterr().out

@@ -30,7 +30,7 @@ from tribodyn.workflows.scene import scene_file
 ROOT = Path(__file__).parents[2]
 ALWAYS = {"facts", "frf", "patch", "provenance", "references"}
 DRAWN = {"fields", "loops", "part"}
-WEAR = {"wear"} | DRAWN
+WEAR = {"wear", "wear/memory"} | DRAWN
 RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "beam": (
         (
@@ -45,7 +45,7 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
             "harmonics.kept=[0, 1]", "geometry.n_patch=5", "response.points=6", "wear.max_steps=2",
             "pictures.plots=false", "pictures.renders=false", "wear.at=peak", "wear.motion=balance",
         ),
-        {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"wear"}},
+        {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"wear", "wear/memory"}},
     ),
     "leaf_seal_thesis": (
         ("response.frequency=[250, 300]",),
