@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh, eigvalsh
+from scipy.linalg import LinAlgError, eigh, eigvalsh
 from scipy.sparse import block_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
@@ -41,6 +41,10 @@ class StaticDivergence(Refusal):
     """The structure is unstable at rest."""
 
 
+class IndefiniteMass(Refusal, LinAlgError):
+    """A direction without mass, or with a negative one, so that there are no modes."""
+
+
 def modes(
     K: Any, M: Any, n: int, sigma: float | None = None, factor: Factor | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -52,13 +56,18 @@ def modes(
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its
         first large entry positive
     Raises  Refusal where n is not between 1 and N, or the iteration does not converge; StaticDivergence where a
-        squared frequency is negative beyond rounding
+        squared frequency is negative beyond rounding; IndefiniteMass
     """
     size = K.shape[0]
     if not 1 <= n <= size:
         raise Refusal(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
     if isinstance(K, np.ndarray) or size <= EIGEN.dense_below or 2 * n >= size:
-        values, phi = eigh(dense(K), dense(M), subset_by_index=[0, n - 1])
+        try:
+            values, phi = eigh(dense(K), dense(M), subset_by_index=[0, n - 1])
+        except LinAlgError as error:
+            raise IndefiniteMass(
+                "the mass matrix is not positive definite: mend it, or remove massless DOFs"
+            ) from error
     else:
         if factor is None:
             factor, sigma = _factorise_shifted(K, M, sigma)

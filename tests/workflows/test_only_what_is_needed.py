@@ -30,7 +30,7 @@ from tribodyn.workflows.scene import scene_file
 ROOT = Path(__file__).parents[2]
 ALWAYS = {"facts", "frf", "patch", "provenance", "references"}
 DRAWN = {"fields", "loops", "part"}
-WEAR = {"wear", "wear/memory"} | DRAWN
+WEAR = {"wear"} | DRAWN
 RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "beam": (
         (
