@@ -220,8 +220,8 @@ def run_file(path: Path, title: str, functions: tuple[str, ...]) -> ModuleType:
     # the same name in every process: kernels that numba has cached on disk refer to their module by it
     name = f"tribodyn_own_{path.stem}_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:16]}"
     spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
+    if spec is None or spec.loader is None:
+        raise Refusal(f"the {title} file '{path}' is no Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses look their module up
     try:

@@ -208,7 +208,7 @@ def test_a_convergence_keeps_the_peaks_of_grids_whose_wear_has_no_end(tmp_path: 
     (tmp_path / "joint.study.toml").write_text(GRIDS)
     found = convergence.converge(scene, settings=["mesh"], overrides=COARSE)
     (one,) = found.table.ladders
-    measured = [row.measured for row in one.rows]
+    measured = [row.solved for row in one.rows]
     assert [m.outcome for m in measured] == ["stopped after 1 wear steps", "converged", "converged"]
     assert [len(m.area) for m in measured] == [11, 35, 117]
     assert one.limits["amplitude"].value == pytest.approx(measured[-1].values["amplitude"], rel=2e-3)

@@ -26,6 +26,7 @@ Targets = Annotated[tuple[str, ...], Parameter(name="--to", negative=(), consume
 Verbose = Annotated[Flag, Parameter(name=("--verbose", "-v"))]
 Films = Annotated[tuple[Literal["wear", "cycle"], ...], Parameter(name="--film", negative=(), consume_multiple=True)]
 
+
 def run(
     scene: str,
     *,

@@ -13,24 +13,11 @@ from matplotlib.patches import Patch as Swatch
 from tribodyn.hbm.contact.contact_law import SEPARATES, SLIPS, STICKS
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import opened as book
-from tribodyn.workflows.pictures.figures import (
-    heading,
-    length_unit,
-    scale_bar,
-    status_name,
-)
+from tribodyn.workflows.pictures.figures import heading, length_unit, scale_bar, status_name
 from tribodyn.workflows.pictures.loop_plots import loop_of, loop_size
 from tribodyn.workflows.pictures.render import MovingPart
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
-from tribodyn.workflows.pictures.theme import (
-    BLUE,
-    INK,
-    LAYOUT,
-    MOTION_MAP,
-    RED,
-    STATUS,
-    STYLE,
-)
+from tribodyn.workflows.pictures.theme import BLUE, INK, LAYOUT, MOTION_MAP, RED, STATUS, STYLE
 from tribodyn.workflows.result.contact_states import instant_status, over_a_cycle, shown_states
 from tribodyn.workflows.result.result import Result
 

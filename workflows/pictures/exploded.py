@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.workflows.pictures import view as drawing
-from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, scale_bar
+from tribodyn.workflows.pictures.figures import heading, length_unit, present, pressure_unit, scale_bar
 from tribodyn.workflows.pictures.opened import FieldPaint
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.theme import BODIES, LAYOUT, PRESSURE_MAP, STYLE, WEAR_MAP
@@ -42,8 +42,7 @@ EXPLOSION = Explosion()
 
 def explosion_offsets(result: Result) -> np.ndarray:
     """(n_node, 3) how far each node moves with its body so that the bodies stand apart, zero where there is one [m]."""
-    part = result.part
-    assert part is not None
+    part = present(result.part)
     body = bodies(part)
     offsets = np.zeros((body.max() + 1, 3))
     if len(offsets) == 1:
@@ -115,8 +114,7 @@ def _touching(first: Any, second: Any) -> tuple[np.ndarray, float]:
 
 def exploded_picture(result: Result) -> Figure:
     """All bodies apart, from two sides; the contacts are coloured by wear depth, or by pressure where nothing wears."""
-    part = result.part
-    assert part is not None
+    part = present(result.part)
     state, offset, body = shown_states(result)[-1], explosion_offsets(result), bodies(part)
     points = (part.points + offset)[body >= 0]
     pressure = np.zeros(len(state.depth)) if state.pressure is None else state.pressure

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -21,6 +21,8 @@ from tribodyn.workflows.pictures.theme import FORMATS, LAYOUT, RED, STATUS, STYL
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import LARGEST_BEND, size_of
 
+Part = TypeVar("Part")
+
 
 @contextmanager
 def axes_of(
@@ -30,6 +32,13 @@ def axes_of(
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(width, height), layout="constrained")
         yield figure, figure.subplots(rows, columns, sharex=share and columns == 1)
+
+
+def present(part: Part | None) -> Part:
+    """A part of a result that a picture is only drawn with."""
+    if part is None:
+        raise ValueError("this picture was asked for of a result that lacks what it shows")
+    return part
 
 
 def heading(figure: Figure, result: Result, title: str) -> None:

@@ -15,7 +15,10 @@ from tribodyn.workflows.run.progress import Advance, Progress
 
 
 class Live(Progress):
-    """Progress as a plot below a notebook's cell, `td.run("beam", progress=td.plot.Live())`, drawn every `every` s."""
+    """Progress as a plot below a notebook's cell, as in `td.run("beam", progress=td.plot.Live())`.
+
+    interval : between two drawings [s]
+    """
 
     def __init__(self, interval: float = 2.0):
         super().__init__(Console(), details=False)

@@ -10,11 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.pictures.figures import (
-    force_unit,
-    heading,
-    length_unit,
-)
+from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, present
 from tribodyn.workflows.pictures.theme import BLUE, STYLE
 from tribodyn.workflows.result.contact_states import state_of
 from tribodyn.workflows.result.result import Result
@@ -75,8 +71,7 @@ def loop_size(result: Result) -> np.ndarray:
 
     The work of the loop [J] where there is friction, 0 of its normal component; else the swing of the force [N]
     """
-    loops, patch = result.loops, result.patch
-    assert loops is not None
+    loops, patch = present(result.loops), result.patch
     if not has_friction(result):
         return np.asarray(np.ptp(loops.force, axis=-1))
     x = loops.displacement
@@ -86,8 +81,7 @@ def loop_size(result: Result) -> np.ndarray:
 
 def loop_of(result: Result, at: int, pair: int, component: int) -> Loop:
     """One loop; its static offset is no part of it. at : which of result.loops"""
-    loops, patch = result.loops, result.patch
-    assert loops is not None
+    loops, patch = present(result.loops), result.patch
     x, force = loops.displacement[at, pair, component], loops.force[at, pair, component]
     x = x - (x.max() + x.min()) / 2
     (unit_x, scale_x), (unit_f, scale_f) = length_unit(float(x.max())), force_unit(float(np.abs(force).max()))

@@ -13,7 +13,15 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
 from tribodyn.workflows.pictures import exploded, maps, offscreen, opened as book, view as drawing
-from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
+from tribodyn.workflows.pictures.figures import (
+    heading,
+    length_unit,
+    present,
+    pressure_unit,
+    save,
+    scale_bar,
+    status_legend,
+)
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.theme import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.contact_states import ContactState, has_states, shown_states
@@ -149,20 +157,18 @@ class MovingPart:
     """
 
     def __init__(self, result: Result, deformation: float | None = None, wear: float | None = None):
-        part, patch, fields = result.part, result.patch, result.fields
-        assert part is not None
-        assert fields is not None
+        part, patch, self.fields = present(result.part), result.patch, present(result.fields)
         self.result, self.part, self.patch, self.deformation = result, part, patch, deformation
         self.size = float(np.ptp(part.points, axis=0).max())
         self.meetings = meetings_of(result)
-        static = drawing.at_rest(fields.displacement, result.harmonics)
+        static = drawing.at_rest(self.fields.displacement, result.harmonics)
         self.rest_scale = deformation or drawing.rest_scale(static, part.points, bodies(part))
         depth = np.stack([state.depth for state in shown_states(result)])
         self.wear = wear or drawing.wear_scale(patch, depth)
         self.shell = drawing.surface(drawing.grid_of(part))
         self.outline = self.shell.extract_feature_edges(30)
         reach = [part.points + self.rest_scale * s for s in static]
-        for s in (drawing.swing(d, result.harmonics) for d in fields.displacement):
+        for s in (drawing.swing(d, result.harmonics) for d in self.fields.displacement):
             reach += [part.points + self.vibration_scale(s) * s, part.points - self.vibration_scale(s) * s]
         self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(result), LAYOUT.view[0] / LAYOUT.view[1])
 
@@ -200,9 +206,7 @@ class MovingPart:
         return f"drawn: static × {self.rest_scale:g}, vibration × {scale:g}{worn}"
 
     def terms(self, state: ContactState) -> np.ndarray:
-        assert self.result.fields is not None
-        assert state.field is not None
-        return np.asarray(self.result.fields.displacement[state.field])
+        return np.asarray(self.fields.displacement[present(state.field)])
 
     def swing(self, state: ContactState) -> np.ndarray:
         return drawing.swing(self.terms(state), self.result.harmonics)

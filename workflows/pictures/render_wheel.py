@@ -18,7 +18,7 @@ from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import view as drawing
-from tribodyn.workflows.pictures.figures import heading, length_unit, named, scale_bar
+from tribodyn.workflows.pictures.figures import heading, length_unit, named, present, scale_bar
 from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, with_room
 from tribodyn.workflows.pictures.theme import BLUE, INK, LAYOUT, MOTION_MAP, ORANGE, STYLE
@@ -56,10 +56,7 @@ class BladeSurface:
 
 def wheel_picture(result: Result, wheel: Around, deformation: float | None = None) -> Figure:
     """All blades at one instant in each shown state, coloured by how far they are from their mean position."""
-    part, fields = result.part, result.fields
-    assert part is not None
-    assert fields is not None
-
+    part, fields = present(result.part), present(result.fields)
     states = [state for state in shown_states(result) if state.field is not None]
     blades = BladeSurface(wheel, part)
     with mpl.rc_context({**STYLE, "axes.grid": False}):

@@ -14,6 +14,7 @@ from tribodyn.workflows.pictures.figures import (
     length_unit,
     log_axis,
     positive_range,
+    present,
     shade_beyond_linear_model,
     titled,
 )
@@ -71,16 +72,14 @@ def response(result: Result) -> Figure:
 
 def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray, scale: float) -> None:
     """The response curve: unstable stretches dashed, bifurcations marked, the range over load paths as a band."""
-    frf, marks, bounds = result.response, result.stability, result.bounds
-    assert frf is not None
-    hertz = frf.frequency
+    marks, bounds, hertz = result.stability, result.bounds, present(result.response).frequency
     if bounds is not None:
         low, high = scale * bounds.amplitude_low, scale * bounds.amplitude_high
         axes.fill_between(hertz[good], low[good], high[good], color=BLUE, alpha=0.25, lw=0, label="any load path")
     if marks is None:
         axes.plot(hertz[good], amplitude[good], color=BLUE, label="unworn contact")
         return
-    # each stretch between neighbouring points is stable where reference_curves are
+    # a stretch between neighbouring points is stable where both are
     both_stable = marks.stable[:-1] & marks.stable[1:]
     solved = good[:-1] & good[1:]
     for kind, style, name in ((both_stable, "-", "unworn contact, stable"), (~both_stable, ":", "unstable")):
@@ -97,8 +96,7 @@ def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray, s
 
 def controlled(result: Result) -> Figure:
     """Fundamental amplitude, force and phase over frequency of a test whose force was found."""
-    frf, force = result.response, result.driving_force
-    assert frf is not None
+    frf, force = present(result.response), result.driving_force
     good, name = frf.converged, frf.output_names[0]
     y = frf.fundamental(name)[good]
     unit, scale = length_unit(float(np.abs(y).max()))
@@ -121,8 +119,7 @@ def controlled(result: Result) -> Figure:
 
 def output_amplitudes(result: Result) -> Figure:
     """Amplitude of every observed output over frequency."""
-    frf = result.response
-    assert frf is not None
+    frf = present(result.response)
     good = frf.converged
     with axes_of() as (figure, axes):
         heights = {name: np.where(good, frf.amplitude(name), np.nan) for name in frf.output_names}

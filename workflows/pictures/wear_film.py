@@ -14,20 +14,13 @@ from tribodyn.workflows.pictures.figures import (
     force_unit,
     heading,
     length_unit,
+    present,
     pressure_unit,
     scale_bar,
     status_legend,
 )
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
-from tribodyn.workflows.pictures.theme import (
-    BLUE,
-    LAYOUT,
-    ORANGE,
-    PRESSURE_MAP,
-    RED,
-    STYLE,
-    WEAR_MAP,
-)
+from tribodyn.workflows.pictures.theme import BLUE, LAYOUT, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.pictures.view import wear_scale
 from tribodyn.workflows.pictures.wear_plots import cycle_axis
 from tribodyn.workflows.result.contact_states import ContactState, shown_cycles, state_of
@@ -118,9 +111,7 @@ class WearFilm:
 
 def _most_worn(result: Result, rows: np.ndarray) -> Meeting:
     """The contact that has lost most volume in the last of some rows."""
-    patch, wear = result.patch, result.wear
-    assert wear is not None
-    volume = wear.depth[rows[-1]] * patch.area
+    volume = present(result.wear).depth[rows[-1]] * result.patch.area
     return max(book.contacts(result), key=lambda contact: float(volume[contact.pairs].sum()))
 
 
@@ -130,8 +121,7 @@ def _pressure(state: ContactState) -> np.ndarray:
 
 def _curves(result: Result, panels: Any, rows: np.ndarray) -> list[tuple[Any, np.ndarray, np.ndarray]]:
     """Depth, amplitude and preload against cycles, each with a mark; returns mark, x and y of the rows."""
-    wear = result.wear
-    assert wear is not None
+    wear = present(result.wear)
     depth, marks = wear.depth.max(axis=1), []
     (unit_d, d), (unit_a, a) = length_unit(depth.max()), length_unit(wear.amplitude.max())
     unit_f, f = force_unit(wear.preload.max())

@@ -16,6 +16,7 @@ from tribodyn.workflows.pictures.figures import (
     length_unit,
     log_axis,
     positive_range,
+    present,
     shade_beyond_linear_model,
     status_name,
     titled,
@@ -39,7 +40,7 @@ def wear(result: Result, quantity: str = "depth") -> Figure:
 
 def cycles_per_step(result: Result) -> Figure:
     """Cycles that each wear step stands for."""
-    wear = _wear(result)
+    wear = present(result.wear)
     with axes_of() as (figure, axes):
         count = wear.cycles_in_step[: result.wear_steps]
         unit, scale = cycle_unit(count.max())
@@ -55,7 +56,7 @@ def cycles_per_step(result: Result) -> Figure:
 
 def amplitude_against_cycles(result: Result) -> Figure:
     """Amplitude and frequency of the cycle that wears, against cycles."""
-    wear = _wear(result)
+    wear = present(result.wear)
     with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
         scale_cycles = cycle_axis(lower, wear)
         unit, scale = length_unit(wear.amplitude.max())
@@ -69,7 +70,7 @@ def amplitude_against_cycles(result: Result) -> Figure:
 
 def preload_against_cycles(result: Result) -> Figure:
     """Mean normal force of the contact against cycles, and that at rest where the run ends by it."""
-    wear = _wear(result)
+    wear = present(result.wear)
     with axes_of() as (figure, axes):
         scale_cycles = cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
@@ -84,7 +85,7 @@ def preload_against_cycles(result: Result) -> Figure:
 
 def depth_against_cycles(result: Result) -> Figure:
     """Largest, mean and smallest wear depth of the patch, and the worn part of its area, against cycles."""
-    wear, patch = _wear(result), result.patch
+    wear, patch = present(result.wear), result.patch
     with axes_of(7.2, 5.6, rows=2) as (figure, (axes, area_axes)):
         scale_cycles = cycle_axis(axes, wear)
         unit, scale = length_unit(wear.depth.max())
@@ -113,7 +114,7 @@ def worn_area(depth: np.ndarray, area: np.ndarray) -> np.ndarray:
 
 def energy_against_cycles(result: Result) -> Figure:
     """Energy per cycle against cycles, and worn volume against accumulated energy."""
-    wear, patch = _wear(result), result.patch
+    wear, patch = present(result.wear), result.patch
     with axes_of(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
         scale_cycles = cycle_axis(upper, wear)
         _course(upper, scale_cycles, wear, wear.energy.sum(1), BLUE)
@@ -126,18 +127,18 @@ def energy_against_cycles(result: Result) -> Figure:
 
 def status_against_cycles(result: Result) -> Figure:
     """Share of the patch in each contact status, against cycles."""
-    wear, patch = _wear(result), result.patch
+    wear, patch = present(result.wear), result.patch
     with axes_of() as (figure, axes):
         scale = cycle_axis(axes, wear)
         shares = [100 * (wear.status == bits) @ patch.area / patch.area.sum() for bits in STATUS]
-        present = [k for k, share in enumerate(shares) if share.any()]
+        occurring = [k for k, share in enumerate(shares) if share.any()]
         kinds = [(status_name(bits, patch.components), color) for bits, (_, color) in STATUS.items()]
         axes.stackplot(
-            scale * wear.cycles, [shares[k] for k in present], labels=[kinds[k][0] for k in present],
-            colors=[kinds[k][1] for k in present], step="mid",
+            scale * wear.cycles, [shares[k] for k in occurring], labels=[kinds[k][0] for k in occurring],
+            colors=[kinds[k][1] for k in occurring], step="mid",
         )  # fmt: skip
         axes.set(ylabel="share of the area / %", ylim=(0, 100), title=titled(result, "contact status under wear"))
-        figure.legend(loc="outside lower center", ncols=min(4, len(present)))
+        figure.legend(loc="outside lower center", ncols=min(4, len(occurring)))
     return figure
 
 
@@ -154,11 +155,6 @@ def _course(axes: Any, scale: float, wear: WearHistory, values: np.ndarray, colo
 def with_gaps(wear: WearHistory, *columns: np.ndarray) -> list[np.ndarray]:
     """Columns by wear step with a gap where the response jumped, so that no jump looks like a slope."""
     return [np.insert(column, wear.jumps + 1, np.nan) for column in columns]
-
-
-def _wear(result: Result) -> WearHistory:
-    assert result.wear is not None
-    return result.wear
 
 
 def cycle_axis(axes: Any, wear: WearHistory) -> float:

@@ -59,8 +59,7 @@ def of_mode(
 
 def life_share(scene: Scene) -> float:
     """Of the first preload, where the life that a result states ends."""
-    assert scene.wear is not None
-    return scene.wear.lost_below or LIFE_SHARE
+    return LIFE_SHARE if scene.wear is None else scene.wear.lost_below or LIFE_SHARE
 
 
 def of_life(

@@ -33,7 +33,7 @@ def plan(source: Source, overrides: Overrides = ()) -> planning.Plan:
 
 
 def picture(source: Source, path: AnyPath, overrides: Overrides = ()) -> Path:
-    """Draw a scene before it is run: bodies, contacts in colour, what is result_of, loads as arrows; its path.
+    """Draw a scene before it is run: bodies, contacts in colour, what is held, loads as arrows; its path.
 
     Raises  SceneError: the scene has no mesh, or asks for what cannot be; RenderingUnavailable
     """

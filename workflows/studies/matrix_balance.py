@@ -215,14 +215,12 @@ class HertzBalance:
         else:
             site = AtFrequency(name, HZ * at, self.newton)
         problem = WearProblem(self.problem, (Duty(site),), law, self.problem.model.interface.area, lost_below)
-        if (step is None) == (tolerance is None) or (tolerance is None) != (scale is None):
-            raise Refusal("wear needs either step, or tolerance with the depth scale that it is a share of")
-        if step is not None:
+        if step is not None and tolerance is None and scale is None:
             return evolve(thesis.Rule(problem, step), max_steps, on_row, resume)
-        assert tolerance is not None
-        assert scale is not None
-        share = Tolerance(tolerance, scale)
-        return evolve(error_controlled.Rule(problem, share), max_steps, on_row, resume)
+        if step is None and tolerance is not None and scale is not None:
+            rule = error_controlled.Rule(problem, Tolerance(tolerance, scale))
+            return evolve(rule, max_steps, on_row, resume)
+        raise Refusal("wear needs either step, or tolerance with the depth scale that it is a share of")
 
     def _output(self, output: str | None) -> str:
         names = self.problem.compliance.output_names

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -263,11 +264,10 @@ def _start(
     """The problem, and the known solution to begin at: its frequency and x on the harmonics of the problem."""
     basis = HarmonicBasis(result.harmonics, scene.harmonics.samples)
     if row is not None:
-        n_rows = 0 if result.wear is None else len(result.wear.cycles)
-        if not 0 <= row < n_rows:
-            raise Refusal(f"the result has no wear row {row}: it has {f'0 to {n_rows - 1}' if n_rows else 'none'}")
-        assert result.wear is not None
-        worn: WearRow = result.wear.rows()[row]
+        rows: Sequence[WearRow] = [] if result.wear is None else result.wear.rows()
+        if not 0 <= row < len(rows):
+            raise Refusal(f"the result has no wear row {row}: it has {f'0 to {len(rows) - 1}' if rows else 'none'}")
+        worn = rows[row]
         load = settings.mission(scene)[0].load if scene.wear is not None else 1.0
         balance = unworn.with_gap(unworn.contact.gap + worn.depth).with_load(load)
         return balance, worn.omega, _carried(worn.displacement, basis, balance)

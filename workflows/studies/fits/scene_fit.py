@@ -163,7 +163,8 @@ class SceneFit:
     def slopes(self, values: Mapping[str, float], targets: Mapping[str, Target | CurveTarget]) -> np.ndarray:
         """(n_measured, n_parameter) derivatives of what the last trial said; values : its own."""
         base = self._last
-        assert base is not None
+        if base is None:
+            raise ValueError("derivatives are those of a trial: make one first")
         sides: list[Side] = []
         for p in self.parameters:
             step = DIFFERENCE * (values[p.name] if p.ratio else p.high - p.low)
@@ -233,7 +234,7 @@ def value_of(scene: MeshScene, key: str) -> float | None:
 
 def _si(key: str, value: NumberText, units: tuple[str, ...]) -> tuple[float, str]:
     """A quantity in the first of the units that it can be counted in; a bare number in the last one."""
-    problem = ValueError()
+    problem: Refusal
     for unit in units if isinstance(value, str) else units[-1:]:
         try:
             return to_si(value, unit), unit

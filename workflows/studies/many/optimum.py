@@ -201,9 +201,7 @@ def _evaluate(study: ParameterStudy, space: ParameterSpace, table: StudyTable) -
     for limit in settings.limits:
         values, slopes = table.values_of(limit.number)[0], space.slopes_of(table.columns, limit.number)
         for end, sign in ((limit.low, -1.0), (limit.high, 1.0)):
-            if end is not None:
-                at = si(end)
-                assert at is not None
+            if (at := si(end)) is not None:
                 size = sign / (abs(at) or 1.0)
                 columns.append((size * (values - at), size * slopes))
     numbers, by = (np.stack(each, axis=1) for each in zip(*columns, strict=True))

@@ -87,7 +87,7 @@ def run(
 ) -> StudyTable:
     """Do the runs of a study, and leave its tables and pictures in a folder.
 
-    more : values of runs beyond those of the design; drawn : whether pictures are wanted
+    added : values of runs beyond those of the design; drawn : whether pictures are wanted
     inside : one worker is this process itself, where few runs are done at a time and starting another would cost more
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
@@ -101,10 +101,8 @@ def run(
         try:
             finish(tasks, runner, rows, solve, inside=inside)
         finally:
-            study_table = table(study.name, varied, rows, folder) if rows else None
-            if study_table is not None:
-                write(study_table, folder)
-        assert study_table is not None
+            if rows:
+                write(study_table := table(study.name, varied, rows, folder), folder)
         if drawn and study_pictures.shown(study_table):
             study_table.plot().savefig(folder / "study.png")
     return study_table

@@ -194,12 +194,9 @@ class MeasurementComparison(StudyResult):
 
     def _draw(self, axes: Any, name: str, run: Run, **look: Any) -> None:
         """A quantity of a run, with its scatter."""
-        shown, shown_format, error = (
-            self._shown(),
-            {**self._columns(run), "force_N": run.force},
-            self._errors(run).get(name),
-        )
-        x, y = (shown[n].factor * shown_format[n] for n in (self.abscissa, name))
+        formats, columns = self._shown(), {**self._columns(run), "force_N": run.force}
+        x, y = (formats[n].factor * columns[n] for n in (self.abscissa, name))
+        error = self._errors(run).get(name)
         axes.errorbar(x, y, None if error is None else np.nan_to_num(error) * y, lw=1.1, **look)
 
 

@@ -129,13 +129,11 @@ def flutter(
 def of_scene(file: SceneFile, start: float | None = None, stop: float | None = None, points: int = 40) -> Flutter:
     """The flutter of the wheel of a scene that was read; arguments as for `flutter`."""
     scene = file.mesh_scene
-    if scene.flow is None:
-        raise SceneError(f"{file.name} has no [flow]: give its influence coefficients")
     if (start is None) != (stop is None):
         raise Refusal("--from and --to: give both amplitudes, or none")
     with limited(scene.solver.threads):
         wheel = wheels.build(file)
-        flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)
+        flow = flow_of(wheel)
         calm = modelling.damped(scene, travelling_wave(wheel.reduced, 1))
         eigenvalues = aeroelastic(calm, wheel.springs, flow)
         cycles: dict[int, tuple[list[LimitCycle], str]] = {}
@@ -163,10 +161,16 @@ def _in_time(cycle: LimitCycle) -> str:
     return f"; in time its amplitude moves by {cycle.moved:+.2%} and {neighbour}"
 
 
+def flow_of(wheel: wheels.Wheel) -> Flow:
+    """The flow of the scene of a wheel; raises SceneError for a scene without [flow]."""
+    table = wheel.scene.flow
+    if table is None:
+        raise SceneError(f"{wheel.file.name} has no [flow]: give its influence coefficients")
+    return Flow(table.coefficients(wheel.n_sectors), table.mode)
+
+
 def in_flow(wheel: wheels.Wheel, index: int) -> HarmonicBalance:
     """The balance of the wave of an index with the forces of the flow of its scene."""
     scene = wheel.scene_for(index)
-    assert scene.flow is not None
-    flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)
-    wave = with_flow(modelling.damped(scene, travelling_wave(wheel.reduced, index)), wheel.springs, flow)
+    wave = with_flow(modelling.damped(scene, travelling_wave(wheel.reduced, index)), wheel.springs, flow_of(wheel))
     return modelling.make_model(scene, wheel.part, wave).balance

@@ -31,6 +31,7 @@ from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import where_it_can_be, write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels.mistuned_blades import MistunedBlades, asked_of
+from tribodyn.workflows.studies.wheels.wheel_model import wheel_table
 
 IMAGES = 32  # of a film
 
@@ -184,8 +185,7 @@ def write_wheel(
 
     Raises  ValueError for a part that has no mesh of one kind; RenderingUnavailable
     """
-    mesh, info = part_mesh(blades.part), blades.file.mesh_scene.wheel
-    assert info is not None
+    mesh, info = part_mesh(blades.part), wheel_table(blades.file)
     if mesh is None:
         raise Refusal("this part has bodies of different elements: its wheel cannot be drawn")
     wheel = Around(info.sectors, info.engine_order, np.array(info.axis, float))

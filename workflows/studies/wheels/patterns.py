@@ -21,12 +21,13 @@ from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, outcome_of
 from tribodyn.workflows.studies.many.study_runs import Runner, finish
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels.mistuned_blades import MistunedBlades, asked_of
+from tribodyn.workflows.studies.wheels.wheel_model import wheel_table
 
 
 def whitehead(n_sectors: int) -> float:
@@ -186,9 +187,7 @@ def patterns(
     """
     file, report = read_scene(scene, overrides), reporter(progress)
     folder = Path("results") / file.name if folder is None else Path(folder)
-    mistuning, wheel = asked_of(file), file.mesh_scene.wheel
-    if wheel is None:
-        raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
+    mistuning, wheel = asked_of(file), wheel_table(file)
     runner = Runner(folder, report, workers, resume=resume, retry=resume)
     folder.mkdir(parents=True, exist_ok=True)
     rows: dict[int, RunRow] = {}

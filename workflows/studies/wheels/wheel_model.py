@@ -22,6 +22,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.wheel_tables import WheelTable
 
 MAX_POINTS = 1000  # of a response
 
@@ -39,6 +40,11 @@ class Wheel:
     def scene(self) -> MeshScene:
         """The scene."""
         return self.file.mesh_scene
+
+    @property
+    def table(self) -> WheelTable:
+        """The table [wheel] of the scene."""
+        return wheel_table(self.file)
 
     @property
     def n_sectors(self) -> int:
@@ -66,14 +72,13 @@ class Wheel:
     def wave(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> HarmonicBalance:
         """The balance under a travelling wave; engine order and range of frequencies [Hz] default to the scene's."""
         scene = self.scene_for(engine_order, frequency)
-        assert scene.wheel is not None
-        reduced = modelling.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
+        order = self.table.engine_order if engine_order is None else engine_order
+        reduced = modelling.damped(scene, travelling_wave(self.reduced, order))
         return modelling.make_model(scene, self.part, reduced).balance
 
     def scene_for(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> MeshScene:
         """The scene with another engine order or range of frequencies [Hz]; raises SceneError along the speed."""
-        wheel, response = self.scene.wheel, self.scene.response
-        assert wheel is not None
+        wheel, response = self.table, self.scene.response
         if wheel.along_speed:
             raise SceneError(
                 'wheel.sweep = "speed": this study is at one speed; give --set wheel.sweep=frequency '
@@ -91,21 +96,19 @@ class Wheel:
         stiffness : (n_sectors,) factor on the stiffness of each sector, such as blades that differ: what a travelling
             wave of one sector cannot say
         """
-        wave_balance, wheel = self.wave(), self.scene.wheel
-        assert wheel is not None
+        wave_balance = self.wave()
         springs = np.tile(wave_balance.contact.stiffness, (self.n_sectors, 1))
         model = wheel_model(self.reduced, stiffness)
         model = model.with_damping(partial(modelling.damping_matrix, self.scene, springs))
-        load = on_wheel(wave_balance.excitation, wheel.engine_order, self.n_sectors)
+        load = on_wheel(wave_balance.excitation, self.table.engine_order, self.n_sectors)
         return HarmonicBalance.of(
             model, wave_balance.contact.repeat(self.n_sectors), wave_balance.basis, load, wave_balance.omega_max
         )
 
     def at_speed(self, speed: float) -> Wheel:
         """The same wheel turning at a speed [Hz]: stiffened by its stress, softened by its frame; not meshed again."""
-        wheel = self.scene.wheel
-        assert wheel is not None
-        scene = self.scene.model_copy(update={"wheel": wheel.model_copy(update={"speed": speed, "sweep": None})})
+        turning = self.table.model_copy(update={"speed": speed, "sweep": None})
+        scene = self.scene.model_copy(update={"wheel": turning})
         part = modelling.make_part(scene, self.part.mesh, dict(self.part.node_sets), self.file.folder)
         return assembled(replace(self.file, scene=scene), part)
 
@@ -125,9 +128,15 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
 
 def build(file: SceneFile) -> Wheel:
     """Mesh, assemble and reduce the sector of a scene; raises SceneError for a scene without a wheel."""
+    wheel_table(file)
+    return assembled(file, modelling.part_of(file, Progress()))
+
+
+def wheel_table(file: SceneFile) -> WheelTable:
+    """The table [wheel] of a scene; raises SceneError for a scene without it."""
     if file.mesh_scene.wheel is None:
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
-    return assembled(file, modelling.part_of(file, Progress()))
+    return file.mesh_scene.wheel
 
 
 def assembled(file: SceneFile, part: Part) -> Wheel:

@@ -148,8 +148,6 @@ def modes(
     file = read_scene(scene, overrides)
     with limited(file.scene.solver.threads):
         wheel = build(file)
-        default_orders = wheel.scene.wheel
-        assert default_orders is not None
         diameters = range(wheel.n_sectors // 2 + 1)
         diagrams = {state: wheel.diagram(diameters, families, state == "stuck") for state in ("free", "stuck")}
         if turns := wheel.full.system.gyroscopic is not None:
@@ -157,7 +155,7 @@ def modes(
             diagrams |= {
                 state + AGAINST: wheel.diagram(back, families, state == "stuck") for state in ("free", "stuck")
             }
-        chosen = tuple(orders) or (default_orders.engine_order or 1,)
+        chosen = tuple(orders) or (wheel.table.engine_order or 1,)
         turning, waves = np.zeros(0), dict[str, np.ndarray]()
         if fast is not None:
             shown = chosen + (tuple(-order for order in chosen) if turns else ())
