@@ -183,10 +183,13 @@ def write_page() -> None:
         "Each is drawn by `tribodyn run`, `draw` or `wheel`.", "",
     ]  # fmt: skip
     for name in td.scene_names():
-        lines += [f"## {name.replace('_', ' ')}", ""]
-        for kind, caption in KINDS.items():
-            for path in sorted(PICTURES.glob(f"{name}_{kind}.*")):
-                lines += [f"![{name}: {caption}](pictures/{path.name})", "", caption, ""]
+        pictures = [
+            line
+            for kind, caption in KINDS.items()
+            for path in sorted(PICTURES.glob(f"{name}_{kind}.*"))
+            for line in (f"![{name}: {caption}](pictures/{path.name})", "", caption, "")
+        ]
+        lines += [f"## {name.replace('_', ' ')}", "", *pictures] if pictures else []
     PAGE.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
 
 

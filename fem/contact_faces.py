@@ -107,10 +107,9 @@ class ContactFaces:
             of its own sector: relative displacement = B q - B_2 q_2
         Raises  Refusal, naming the faces, where they do not meet, or do not match where nodes are to be paired
         """
-        assert self.opposite is not None
         faces = mesh.boundaries or {}
         try:
-            first, second = (find_group(faces, name, "face") for name in (self.face, self.opposite))
+            first, second = (find_group(faces, name, "face") for name in (self.face, self.opposite or ""))
             return self._facing(mesh, first, second)
         except Refusal as trouble:
             raise type(trouble)(f"contact of '{self.face}' and '{self.opposite}': {trouble}") from None

@@ -61,9 +61,9 @@ def locate_on_facets(points: np.ndarray, at: np.ndarray, e: np.ndarray) -> np.nd
     """
     k = points.shape[1]
     xi = np.full((2, len(at)), 0.5 if k in (9, 4) else 1 / 3)
-    first = None
+    first = xi
     open_ = np.arange(len(at))
-    for _ in range(25):
+    for iteration in range(25):
         N, slopes = tabulate(k, xi[:, open_])
         local = points[open_]
         off = np.einsum("nix,nx->ni", e[open_], at[open_] - np.einsum("an,nax->nx", N, local))
@@ -75,14 +75,12 @@ def locate_on_facets(points: np.ndarray, at: np.ndarray, e: np.ndarray) -> np.nd
             / det
         )
         xi[:, open_] += step
-        if first is None:
+        if iteration == 0:
             first = xi.copy()
         open_ = open_[np.abs(step).max(axis=0) > 1e-13]
         if not len(open_):
             break
-    assert first is not None or not len(at)
     lost = ~(np.abs(xi - 0.5).max(axis=0, initial=0) < 3.0)
     lost[open_] |= np.abs(xi[:, open_] - 0.5).max(axis=0, initial=0) > 1.0
-    if lost.any() and first is not None:
-        xi[:, lost] = first[:, lost]
+    xi[:, lost] = first[:, lost]
     return xi

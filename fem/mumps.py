@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import IO, cast
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -60,6 +61,7 @@ class Mumps:
             )  # fmt: skip
         except OSError as trouble:
             raise Refusal(f"the solver mumps cannot start {command[0]} ({trouble.strerror}): {CURE}") from None
+        self._input, self._output = cast("tuple[IO[str], IO[str]]", (self._process.stdin, self._process.stdout))
         words = self._answer()
         if words[:1] == ["trouble"]:
             raise ArithmeticError(f"MUMPS's error {words[1]}")
@@ -77,10 +79,9 @@ class Mumps:
         right_side = np.memmap(folder / "rhs", np.float64, "w+", shape=columns.shape, order="F")
         right_side[:] = columns
         right_side.flush()
-        assert self._process.stdin is not None
         try:
-            self._process.stdin.write(f"{columns.shape[1]}\n")
-            self._process.stdin.flush()
+            self._input.write(f"{columns.shape[1]}\n")
+            self._input.flush()
         except OSError:
             pass  # its last answer has the reason
         if self._answer() != ["solved"]:
@@ -89,8 +90,7 @@ class Mumps:
 
     def _answer(self) -> list[str]:
         """Words of the next line of the first process; none where it has ended."""
-        assert self._process.stdout is not None
-        return self._process.stdout.readline().split()
+        return self._output.readline().split()
 
     def _last_error(self) -> str:
         """The last line of what they wrote as they ended."""

@@ -252,8 +252,6 @@ class _Cards(MaterialCards):
         else:
             self._refused(card, card.option("TYPE").upper())
 
-    # places
-
     # the end
 
     def finished(self) -> RawMesh:

@@ -101,8 +101,6 @@ class _Archive(ArchiveMesh):
             return item
         return replace(item, engineering=(*young, *poisson, *shear))  # type: ignore[arg-type]
 
-    # mesh
-
     # types, materials, systems
 
     def mp(self, words: list[str]) -> None:

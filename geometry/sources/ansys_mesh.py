@@ -140,35 +140,15 @@ class ArchiveMesh:
 
 # equal corners of a brick I..P -> (kind, its corners, its edge nodes) among the twenty nodes
 _TETRA = ("tetra", [0, 1, 2, 4], [8, 9, 11, 16, 17, 18])
-
-
 _WEDGE = ("wedge", [0, 1, 2, 4, 5, 6], [8, 9, 11, 12, 13, 15, 16, 17, 18])
-
-
 _PYRAMID = ("pyramid", [0, 1, 2, 3, 4], [8, 9, 10, 11, 16, 17, 18, 19])
-
-
 _BRICK = ("hexahedron", list(range(8)), list(range(8, 20)))
-
-
 _SECOND = {"tetra": "tetra10", "wedge": "wedge15", "pyramid": "pyramid13", "hexahedron": "hexahedron20"}
-
-
 SOLID_TYPES = {5, 45, 62, 64, 65, 69, 70, 72, 73, 87, 90, 92, 95, 96, 147, 148, 168, 185, 186, 187, 225, 226, 227}
-
-
 SOLID_TYPES |= {278, 279, 285, 291}
-
-
 HARMLESS_TYPES = {154: "they carry loads", 169: "contact", 170: "contact", 200: "they only mesh"}
-
-
 CONTACT_TYPES = range(171, 179)
-
-
 LAYERED = (185, 186)  # by their option 3
-
-
 BONDED = {2: ("2",), 12: ("5", "6")}  # options of a contact that glues: constraint equations, bonded always or at first
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -26,10 +27,12 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
-from tribodyn.hbm.stability import perturbed_contact, wave_exponents
-from tribodyn.hbm.stability.wave_exponents import WaveModes
+from tribodyn.hbm.stability import hill_problem, perturbed_contact
 from tribodyn.hbm.threads import single
 from tribodyn.refusal import Refusal
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.stability.wave_exponents import WaveModes
 
 FOLD = "fold"
 _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
@@ -130,11 +133,13 @@ def _moving(balance: HarmonicBalance, state: State, n_modes: int | None, top: in
 
 
 def _of_wave(balance: HarmonicBalance, state: State, n_modes: int | None, top: int | None) -> Stability:
+    from tribodyn.hbm.stability import wave_exponents  # only wheels need it
+
     basis, linear = _perturbed(balance, top), balance.compliance
     n_modes_moving = _moving(balance, state, n_modes, basis.harmonics[-1])
     modes = _WAVES.get(linear)
     if modes is None or modes.m != n_modes_moving:
-        modes = _WAVES[linear] = WaveModes(balance.model, linear.k, n_modes_moving)
+        modes = _WAVES[linear] = wave_exponents.WaveModes(balance.model, linear.k, n_modes_moving)
     slope, answer = _departure_slope(balance, state, basis), _answer(balance, state, basis)
     values, diameters = wave_exponents.exponents(balance, modes, state.omega, slope, answer)
     exponents, order = _sorted(values, state.omega)
@@ -167,12 +172,12 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
         distinct, of = np.unique(
             np.where(exponents.imag < 0, exponents.conj(), exponents), return_inverse=True
         )  # each with its conjugate
-        distinct = wave_exponents.refined(distinct, (lambda index: modes, 0, 0, state.omega), slope, answer)[of]
+        distinct = hill_problem.refined(distinct, (lambda index: modes, 0, 0, state.omega), slope, answer)[of]
         exponents = np.where(exponents.imag < 0, distinct.conj(), distinct)
     return exponents * state.omega
 
 
-def _answer(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> wave_exponents.Answer | None:
+def _answer(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> hill_problem.Answer | None:
     """The contact's answer to a perturbation; None of large contacts and several laws."""
     if balance.contact.stiffness.size * basis.n_coeff > RULES.most_refined:
         return None
