@@ -99,7 +99,7 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
 def _unpressed(balance: HarmonicBalance, omega: float) -> bool:
     """Whether pairs that touch without a gap bear nothing under the static loads, every contact stuck."""
     contact = balance.contact
-    if "n" not in contact.components or not balance.basis.has_static or contact.gap.min() > 0:
+    if "n" not in contact.components or not balance.basis.has_static or not (contact.gap <= 0).any():
         return False
     x = balance.stuck(omega)
     x[..., 1:] = 0.0
