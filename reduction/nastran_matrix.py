@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from tribodyn.geometry.sources.nastran_text import cards_of, lines_of
+from tribodyn.geometry.sources.nastran_cards import cards_of, lines_of
 from tribodyn.reduction.abaqus_matrix import Labels
 from tribodyn.reduction.harwell_boeing import number
 from tribodyn.refusal import Refusal

@@ -11,8 +11,8 @@ import numpy as np
 
 from tribodyn.geometry.sources import abaqus, deck
 from tribodyn.geometry.sources.abaqus_materials import MaterialCards
+from tribodyn.geometry.sources.abaqus_places import TABLE as TABLE
 from tribodyn.geometry.sources.abaqus_sets import raw_of
-from tribodyn.geometry.sources.abaqus_table import TABLE as TABLE
 from tribodyn.geometry.sources.keywords import Card
 from tribodyn.geometry.sources.raw_mesh import RawMesh
 from tribodyn.refusal import Refusal

@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tribodyn.geometry.sources import abaqus
 from tribodyn.geometry.sources.abaqus import DeckAssembly, Node
-from tribodyn.geometry.sources.abaqus_table import TABLE
-from tribodyn.geometry.sources.card_table import SkippedCards
+from tribodyn.geometry.sources.abaqus_sets import chosen_elements
+from tribodyn.geometry.sources.card_table import CardTable, SkippedCards
 from tribodyn.geometry.sources.keywords import Card
-from tribodyn.geometry.sources.raw_mesh import VOLUMES, RawMesh
+from tribodyn.geometry.sources.raw_mesh import RawMesh
 from tribodyn.refusal import Refusal
 
 
@@ -105,13 +104,33 @@ class DeckPlaces:
         except KeyError:
             element_keys = []
         solids = np.array([self.number[key] for key in element_keys if key in self.number], dtype=int)
-        face_corners, start = [], 0
-        for block in self.raw.cells:
-            inside = solids[(solids >= start) & (solids < start + len(block.nodes))] - start
-            start += len(block.nodes)
-            faces = abaqus.FACES[VOLUMES[block.kind][0].corners]
-            if len(inside) and face <= len(faces):
-                face_corners.append(block.nodes[inside][:, list(faces[face - 1])])
+        chosen = chosen_elements(self.raw.cells, solids)
+        face_corners = [nodes[:, list(faces[face - 1])] for nodes, faces in chosen if face <= len(faces)]
         if not face_corners:
             self._refused(card, f"on '{text}', which is no solid element")
         return face_corners
+
+
+TABLE: CardTable = CardTable(
+    read="""NODE, ELEMENT, NSET, ELSET, SURFACE, SOLID SECTION, PART, END PART, INSTANCE, END INSTANCE, ASSEMBLY,
+        END ASSEMBLY, INCLUDE, SYSTEM, ORIENTATION, DISTRIBUTION, MATERIAL, ELASTIC, DENSITY, EXPANSION, MASS, SPRING,
+        TIE, EQUATION, COUPLING, KINEMATIC, DISTRIBUTING, KINEMATIC COUPLING, DISTRIBUTING COUPLING, RIGID BODY, CLOAD,
+        BOUNDARY, DSLOAD, DLOAD, INITIAL CONDITIONS, STEP, CONTACT PAIR, SURFACE INTERACTION, CHANGE FRICTION,
+        FRICTION""",
+    silent="""HEADING, PREPRINT, RESTART, OUTPUT, NODE OUTPUT, ELEMENT OUTPUT, CONTACT OUTPUT, ENERGY OUTPUT,
+        NODE PRINT, NODE FILE, EL PRINT, EL FILE, CONTACT PRINT, CONTACT FILE, END STEP, MONITOR, PRINT, ENERGY PRINT,
+        SECTION PRINT, FILE FORMAT""",
+    harmless={
+        "the step is the scene's": """STATIC, FREQUENCY, DYNAMIC, BUCKLE, VISCO, STEADY STATE DYNAMICS, MODAL DYNAMIC,
+            RANDOM RESPONSE, RESPONSE SPECTRUM, COMPLEX FREQUENCY, HEAT TRANSFER, SUBSTRUCTURE GENERATE,
+            SUBSTRUCTURE MATRIX OUTPUT, SUBSTRUCTURE LOAD CASE, RETAINED NODAL DOFS, SELECT EIGENMODES, AMPLITUDE,
+            MATRIX GENERATE, MATRIX OUTPUT, CONTROLS, SOLUTION TECHNIQUE, TIME POINTS, SECTION CONTROLS,
+            HOURGLASS STIFFNESS, DISTRIBUTION TABLE, PHYSICAL CONSTANTS, USER OUTPUT, FILTER, NORMAL""",
+        "damping is the scene's": "DAMPING, MODAL DAMPING, GLOBAL DAMPING, DAMPING CONTROLS",
+        "bodies are elastic": "PLASTIC, CREEP, CYCLIC HARDENING, RATE DEPENDENT, CONDUCTIVITY, SPECIFIC HEAT",
+        "contact is the scene's": """SURFACE BEHAVIOR, CONTACT, CONTACT INCLUSIONS,
+            CONTACT EXCLUSIONS, CONTACT PROPERTY ASSIGNMENT, CONTACT CONTROLS, CONTACT CONTROLS ASSIGNMENT,
+            CONTACT FORMULATION, CONTACT INITIALIZATION ASSIGNMENT, CONTACT INITIALIZATION DATA, CONTACT DAMPING,
+            CLEARANCE, GAP CONDUCTANCE, SURFACE PROPERTY ASSIGNMENT""",
+    },
+)

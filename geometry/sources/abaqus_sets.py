@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -150,20 +150,27 @@ class _Sets:
             self.faces[name] = corners
 
     def _faces(self, numbers: np.ndarray, face: str, name: str) -> list[np.ndarray]:
-        corners_of_faces, start = [], 0
-        for block in self.blocks:
-            inside = numbers[(numbers >= start) & (numbers < start + len(block.nodes))] - start
-            start += len(block.nodes)
-            if not len(inside):
-                continue
-            faces = FACES[VOLUMES[block.kind][0].corners]
+        corners_of_faces = []
+        for nodes, faces in chosen_elements(self.blocks, numbers):
             if face in ("", "SPOS"):
-                corners_of_faces += [block.nodes[inside][:, list(corners)] for corners in faces]
+                corners_of_faces += [nodes[:, list(corners)] for corners in faces]
             elif face[1:].isdigit() and 1 <= int(face[1:]) <= len(faces):
-                corners_of_faces.append(block.nodes[inside][:, list(faces[int(face[1:]) - 1])])
+                corners_of_faces.append(nodes[:, list(faces[int(face[1:]) - 1])])
             else:
-                self.unused.append(f"face {face} of {len(inside)} elements of surface '{name}', which they have not")
+                self.unused.append(f"face {face} of {len(nodes)} elements of surface '{name}', which they have not")
         return free_faces(corners_of_faces, self.blocks) if face in ("", "SPOS") else corners_of_faces
+
+
+def chosen_elements(
+    blocks: Sequence[Cells], numbers: np.ndarray
+) -> Iterator[tuple[np.ndarray, tuple[tuple[int, ...], ...]]]:
+    """Nodes (k, n) of the elements of these numbers, block by block, and the corners of the faces of their kind."""
+    start = 0
+    for block in blocks:
+        inside = numbers[(numbers >= start) & (numbers < start + len(block.nodes))] - start
+        start += len(block.nodes)
+        if len(inside):
+            yield block.nodes[inside], FACES[VOLUMES[block.kind][0].corners]
 
 
 def free_faces(parts: list[np.ndarray], blocks: Sequence[Cells]) -> list[np.ndarray]:

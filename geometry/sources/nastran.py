@@ -15,8 +15,8 @@ import numpy as np
 from tribodyn.geometry.sources import deck
 from tribodyn.geometry.sources.card_table import CardTable, SkippedCards
 from tribodyn.geometry.sources.directions import System
-from tribodyn.geometry.sources.nastran_references import ReferenceCards
-from tribodyn.geometry.sources.nastran_text import (
+from tribodyn.geometry.sources.nastran_cards import (
+    ReferenceCards,
     cards_of,
     case_sets,
     expand_list,

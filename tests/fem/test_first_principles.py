@@ -10,12 +10,11 @@ from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.bolts import Bolt
 from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.elasticity import assemble
-from tribodyn.fem.load_vectors import NodalForce, Sum
+from tribodyn.fem.load_vectors import Heating, NodalForce, Sum
 from tribodyn.fem.material import Material, Orthotropic
 from tribodyn.fem.prestress import coriolis, geometric_stiffness, spin_softening
 from tribodyn.fem.springs import Mass
 from tribodyn.fem.surface import surface
-from tribodyn.fem.thermal import Heating
 
 STEEL = Material(210e9, 0.3, 7860.0, expansion=1e-5)
 SIZE = (2.0, 1.0, 0.5)

@@ -13,12 +13,11 @@ from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import factorise
-from tribodyn.fem.load_vectors import Moment, NodalForce, Pressure
+from tribodyn.fem.load_vectors import Heating, Moment, NodalForce, Pressure
 from tribodyn.fem.material import Material, Orthotropic
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part, build
 from tribodyn.fem.springs import Mass
-from tribodyn.fem.thermal import Heating
 
 STEEL = Material(210e9, 0.3, 7860.0, 12e-6)
 L = np.linspace

@@ -10,9 +10,9 @@ import skfem
 
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
+from tribodyn.fem.load_vectors import Heating
 from tribodyn.fem.material import Material
 from tribodyn.fem.prestress import geometric_stiffness
-from tribodyn.fem.thermal import Heating
 
 REDUCED = Material(E=210e9, nu=0.3, rho=7860.0, linear_reduced=True)
 

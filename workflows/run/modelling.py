@@ -14,9 +14,18 @@ import numpy as np
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import NoMeanRotation
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.load_vectors import BodyForce, Centrifugal, Load, Moment, NodalForce, Pressure, Sum
+from tribodyn.fem.load_vectors import (
+    BodyForce,
+    Centrifugal,
+    Heating,
+    Load,
+    Moment,
+    NodalForce,
+    Pressure,
+    Sum,
+    temperature_at,
+)
 from tribodyn.fem.part import Part, unbalanced_load
-from tribodyn.fem.thermal import Heating, temperature_at
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.continuation.harmonic_choice import ChoiceOptions, HarmonicChoice
