@@ -56,7 +56,7 @@ class WearStepRow:
     seconds: float
     depth_m: float
     depth_error: float | None
-    life_cycles: float
+    life: float
     life_error: float | None
     roughness: float
     end: str
@@ -94,18 +94,18 @@ def compare(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] =
     # second order in the step, whose square the tolerance bounds: errors are proportional to the tolerance
     extrapolation = REFERENCE_TOLERANCES[1] / (REFERENCE_TOLERANCES[0] - REFERENCE_TOLERANCES[1])
     depth = fine[1].depth_m + extrapolation * (fine[1].depth_m - fine[0].depth_m)
-    life = fine[1].life_cycles + extrapolation * (fine[1].life_cycles - fine[0].life_cycles)
-    reference = replace(fine[1], depth_m=depth, life_cycles=life, step=0.0)
+    life = fine[1].life + extrapolation * (fine[1].life - fine[0].life)
+    reference = replace(fine[1], depth_m=depth, life=life, step=0.0)
 
     def judged(row: WearStepRow) -> WearStepRow:
-        return replace(row, depth_error=row.depth_m / depth - 1, life_error=row.life_cycles / life - 1)
+        return replace(row, depth_error=row.depth_m / depth - 1, life_error=row.life / life - 1)
 
     return WearStepTable(
         file.name,
         tuple(judged(row) for row in (*rows, *fine)),
         reference,
         abs(fine[1].depth_m / depth - 1),
-        abs(fine[1].life_cycles / life - 1),
+        abs(fine[1].life / life - 1),
         published_wear_steps(file),
     )
 
@@ -134,7 +134,7 @@ def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Ca
         seconds=seconds,
         depth_m=_depth_at_life(worn, life),
         depth_error=None,
-        life_cycles=float("nan") if life is None else life,
+        life=float("nan") if life is None else life,
         life_error=None,
         roughness=roughness(problem.balance.model.interface.points, worn.depth[-1]),
         end=str(worn.end),
@@ -208,12 +208,12 @@ def as_text(table: WearStepTable) -> str:
         lines.append(
             f"{row.rule:17} {100 * row.step:5.3g} % {row.wear_steps:6d} {_bracket(steps, 'd'):8} {row.hbm_solves:6d} "
             f"{row.seconds:8.1f} {_bracket(seconds, 'd'):9} {1e3 * row.depth_m:8.4f} {_bracket(depth, '.4f'):9} "
-            f"{_percent(row.depth_error):>7} {1e-6 * row.life_cycles:9.3f} {_percent(row.life_error):>7} "
+            f"{_percent(row.depth_error):>7} {1e-6 * row.life:9.3f} {_percent(row.life_error):>7} "
             f"{100 * row.roughness:8.2f} %"
         )
     lines.append(
         f"reference: {1e3 * table.reference.depth_m:.4f} mm (to {100 * table.depth_uncertainty:.2f} %), "
-        f"{table.reference.life_cycles:.4g} cycles (to {100 * table.life_uncertainty:.2f} %), extrapolated from the "
+        f"{table.reference.life:.4g} cycles (to {100 * table.life_uncertainty:.2f} %), extrapolated from the "
         f"error-controlled rule at {', '.join(f'{100 * s:g} %' for s in REFERENCE_TOLERANCES)}"
     )
     lines += [

@@ -20,7 +20,7 @@ EXTRA = {
 
 
 def package(name: str) -> Any:
-    """A module of such a package; raises ValueError that says how to install it."""
+    """A module of such a package; raises Refusal that says how to install it."""
     try:
         return importlib.import_module(name)
     except ImportError:

@@ -70,7 +70,7 @@ def test_the_command_draws_patterns_and_resumes(
     assert 1.0 < record["largest"] < record["whitehead"] == pytest.approx(0.5 * (1 + np.sqrt(6)))
     assert (tmp_path / "mistuning.png").stat().st_size > 5000
     table = (tmp_path / "patterns.csv").read_text(encoding="utf-8").splitlines()
-    assert table[0].startswith("pattern,status,amplification,peak_m,peak_hz,blade")
+    assert table[0].startswith("pattern,status,amplification,amplitude,peak_frequency,blade")
     cli.app([*words, "--resume"], result_action="return_value")
     assert json.loads(capsys.readouterr().out) == record
 
@@ -96,7 +96,7 @@ def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) 
     np.testing.assert_allclose(volume, 1e-13 * work, rtol=1e-6)
     assert np.abs(found.heights[-1] / found.heights[0] - 1).max() > 1e-4
     table, _, drawn = found.write(tmp_path)
-    assert table.read_text(encoding="utf-8").startswith("cycles,peak_Hz,amplitude_m@0")
+    assert table.read_text(encoding="utf-8").startswith("cycles,peak_frequency_Hz,amplitude_m@0")
     states = found.state(0), found.state(-1)
     tips = np.linalg.norm(np.linalg.norm(states[1].displacement[..., 1:], axis=-1), axis=-1).max(axis=1)
     assert np.corrcoef(tips, states[1].heights)[0, 1] > 0.9  # who vibrates most does so in the picture too

@@ -32,7 +32,7 @@ def test_errors_fall_with_the_step(table: wear_steps.WearStepTable) -> None:
     assert [row.step for row in thesis] == [0.5, 0.25, 0.15]
     errors = [abs(row.life_error or 0.0) for row in thesis]
     assert errors[-1] < errors[0]
-    assert all(row.life_cycles > 0 and 0 < row.depth_m < 0.02 for row in table.rows)
+    assert all(row.life > 0 and 0 < row.depth_m < 0.02 for row in table.rows)
     assert all(row.wear_steps <= row.hbm_solves for row in table.rows)
 
 
@@ -47,7 +47,7 @@ def test_text_and_records_hold_every_row(table: wear_steps.WearStepTable) -> Non
     assert "extrapolated" in text
     records = json.loads(json.dumps(wear_steps.as_records(table)))
     keys = {"rule", "step", "hbm_solves", "wear_steps", "seconds"}
-    keys |= {"depth_m", "depth_error", "life_cycles", "life_error"}
+    keys |= {"depth_m", "depth_error", "life", "life_error"}
     assert all(keys <= set(record) for record in records)
 
 

@@ -30,7 +30,7 @@ class CycleFilm:
     row : of the wear history, or point of the response; that whose contact works most where None
     count : of images, evenly over the period
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
-    Raises  ValueError where nothing is kept of the cycle
+    Raises  Refusal where nothing is kept of the cycle
     """
 
     def __init__(

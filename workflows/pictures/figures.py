@@ -66,7 +66,7 @@ def log_axis(axis: Any, low: float, high: float) -> None:
 
 
 def save(figure: Figure, stem: Path, formats: Sequence[str] = ("png",), dpi: int | None = None) -> list[Path]:
-    """Write a figure in some formats; returns the paths. Raises ValueError for a format that is not known."""
+    """Write a figure in some formats; returns the paths. Raises Refusal for a format that is not known."""
     written = []
     with mpl.rc_context(STYLE):
         for name in formats:

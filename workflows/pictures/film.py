@@ -61,7 +61,7 @@ def film(
     row : of the wear history, or point of the response, whose cycle is shown; that whose contact works most by default
     dpi : dots per inch; a film is 12.8 by 7.2 inches
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
-    Raises  ValueError: the result has nothing of the kind to show; RenderingUnavailable
+    Raises  Refusal: the result has nothing of the kind to show; RenderingUnavailable
     """
     if images < 2:
         raise Refusal(f"a film of {images} images: ask for 2 at least")
@@ -93,7 +93,7 @@ def encode(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str]) -> 
     """Write a film in some formats, each image drawn once.
 
     images : (height, width, 3), 8 bits a colour, all of one size
-    Returns the paths. Raises ValueError: a format that is not known, or no encoder for MP4
+    Returns the paths. Raises Refusal: a format that is not known, or no encoder for MP4
     """
     for name in formats:
         if name not in FORMATS:

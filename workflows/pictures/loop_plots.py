@@ -20,7 +20,7 @@ def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
     """Loops in chosen states (columns) of some pairs (rows), those with the largest loops by default.
 
     Of a contact without friction normal force over approach.
-    Raises  ValueError where no loops are kept, or for a pair that there is not
+    Raises  Refusal where no loops are kept, or for a pair that there is not
     """
     loops, patch = result.loops, result.patch
     if loops is None:

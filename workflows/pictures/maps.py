@@ -39,7 +39,7 @@ def patch_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -
     """Depth, status over the cycle and mean pressure, one column for each state, each map with its own scale.
 
     rows : of the wear history, or points of a response that does not wear; those of the result by default
-    Raises  ValueError where the patch has no faces
+    Raises  Refusal where the patch has no faces
     """
     patch = _with_faces(result)
     states = shown_states(result) if rows is None else [state_of(result, int(row)) for row in rows]
@@ -61,7 +61,7 @@ def patch_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -
 def status_maps(result: Result, count: int = 8) -> Figure:
     """Status over the cycle at up to `count` wear steps, evenly chosen among the rows that curves show.
 
-    Raises  ValueError where nothing was worn or the patch has no faces
+    Raises  Refusal where nothing was worn or the patch has no faces
     """
     patch, wear = _with_faces(result), result.wear
     if wear is None or not result.wear_steps:
@@ -86,7 +86,7 @@ def status_maps(result: Result, count: int = 8) -> Figure:
 def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -> Figure:
     """What the pairs of a worn contact do in a cycle at wear rows, the first, a middle and the last by default.
 
-    Raises  ValueError where nothing was worn or the patch has no faces
+    Raises  Refusal where nothing was worn or the patch has no faces
     """
     patch, wear = _with_faces(result), result.wear
     if wear is None or not result.wear_steps:

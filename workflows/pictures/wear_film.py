@@ -36,7 +36,7 @@ class WearFilm:
 
     images : wear states at the most, evenly chosen among the rows that curves show
     wear : factor by which the depth is exaggerated, chosen by size where None
-    Raises  ValueError where the result has no worn contact with faces
+    Raises  Refusal where the result has no worn contact with faces
     """
 
     def __init__(self, result: Result, images: int, wear: float | None = None):

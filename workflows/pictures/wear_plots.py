@@ -29,7 +29,7 @@ from tribodyn.workflows.result.result import Result
 def wear(result: Result, quantity: str = "depth") -> Figure:
     """Course of the wear against cycles: depth, peak, preload, energy or status, or the cycles_per_step.
 
-    Raises  ValueError where nothing was worn, or for another word
+    Raises  Refusal where nothing was worn, or for another word
     """
     if not result.wear_steps:
         raise Refusal("the result holds no wear steps: its scene needs [wear] with max_steps above 0")

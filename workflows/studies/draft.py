@@ -101,9 +101,9 @@ class Draft(StudyResult):
 def draft(file: AnyPath, *, unit: str | None = None) -> Draft:
     """Write a commented scene that begins from a mesh, a deck or a CAD file, and the schema of scenes for editors.
 
-    what : a file of a mesh, a deck or a CAD program
+    file : file of a mesh, a deck or a CAD program
     unit : unit of length of the file: m, mm, cm, um, in, ft; guessed and said by default
-    Raises  ValueError: the file cannot be read, one sentence
+    Raises  Refusal: the file cannot be read, one sentence
     """
     path = Path(file)
     if path.suffix.lower() not in sources.ENDINGS:

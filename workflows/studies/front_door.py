@@ -63,7 +63,7 @@ def run(
     pictures : draw what the scene wants drawn into folder/pictures
     progress : function (text, share): a sentence with None, or a stage with the share of it that is done
     resume : continue an unfinished result in the folder
-    Raises  SceneError, ValueError: the scene asks for what cannot be; SolveFailed: folder keeps what was computed
+    Raises  Refusal: the scene asks for what cannot be; SolveFailed: folder keeps what was computed
     """
     file = read_scene(source, overrides)
     if folder is None:
@@ -99,7 +99,7 @@ def run_to_accuracy(
     folder : where result.h5 of the last run is kept, and those of all runs in rounds/1, rounds/2, ...
     resume : take the runs that the folder holds already
     Returns the last result and its errors; `met` says whether all are below the bound
-    Raises  ValueError: the accuracy or the scene asks for what cannot be; SolveFailed: folder keeps what was computed
+    Raises  Refusal: the accuracy or the scene asks for what cannot be; SolveFailed: folder keeps what was computed
     """
     file, report = read_scene(source, overrides), reporter(progress)
 
@@ -150,7 +150,7 @@ def animate(
 ) -> list[Path]:
     """Make a film of a result with the factors of exaggeration of its scene, see pictures.film; returns its files.
 
-    Raises  ValueError: the result has nothing of the kind to show; RenderingUnavailable
+    Raises  Refusal: the result has nothing of the kind to show; RenderingUnavailable
     """
     from tribodyn.workflows.pictures.film import film
 

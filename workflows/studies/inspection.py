@@ -123,7 +123,7 @@ def inspect(
 ) -> Inspection:
     """Show what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, warnings.
 
-    what : a file of a mesh, a deck or a CAD program, a scene's name, or a .toml file
+    source : a file of a mesh, a deck or a CAD program, a scene's name, or a .toml file
     unit : unit of length of a file: m, mm, cm, um, in, ft
     young : Young's modulus of a file that gives no material, such as 210GPa
     poisson : Poisson's ratio likewise
@@ -131,7 +131,7 @@ def inspect(
     modes : number of natural frequencies to compute, free of contact; what a deck or a scene says joins and holds
     free : of the bodies of a file by themselves, each free in space
     elements : how hexahedra of first order of a file are computed: raised to second order, or with reduced integration
-    Raises  ValueError: what cannot be, one sentence
+    Raises  Refusal: what cannot be, one sentence
     """
     if modes < 0:
         raise Refusal(f"--modes {modes}: give a number of modes, 0 for none")

@@ -142,7 +142,7 @@ class HertzBalance:
         control : what the test holds: the force; the fundamental amplitude [m] of an output, the first by default; or
             its lag of a quarter of a cycle, while the amplitude goes from the first to the last of two and the mode at
             rest lies between the frequencies. The force is then the branch's `load_factor`
-        Raises  ValueError for methods and options that do not exist
+        Raises  Refusal for methods and options that do not exist
         """
         if control == "phase":
             if not isinstance(amplitude, tuple):

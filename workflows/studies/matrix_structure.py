@@ -104,7 +104,7 @@ class Structure:
         static : load -> N; harmonic : order -> {load -> complex amplitude F of Re F exp(i order w t) [N]}
         samples : time samples of a cycle; transitions : "located" finds stick, slip and lift between them, "sampled"
             does not, "auto" does where every contact law can
-        Raises  ValueError for unknown loads, orders that are not kept, laws that do not fit
+        Raises  Refusal for unknown loads, orders that are not kept, laws that do not fit
         """
         chosen = joint_transitions(self.joints) if transitions == "auto" else transitions
         basis = HarmonicBasis(tuple(harmonics), samples, chosen)
@@ -116,7 +116,7 @@ class Structure:
 def wear_law(name: str, **numbers: float | np.ndarray) -> JointWear:
     """A wear law with its own numbers, such as wear_law("energy", coefficient=2e-15), in the units that it declares.
 
-    Raises  ValueError where there is no such law, or a number is missing or unknown
+    Raises  Refusal where there is no such law, or a number is missing or unknown
     """
     return JointWear.of(name, **numbers)
 
@@ -136,7 +136,7 @@ def reduce(
     loads, outputs : name -> a DOF, {DOF: factor} or a vector (n,); an output is a displacement w^T q
     modes : fixed-interface modes kept, or cutoff : all up to this frequency [Hz]; neither keeps the matrices whole
     damping_ratio : of every mode without contact, where the matrices hold no damping; there may be none at all
-    Raises  ValueError for contacts of one name, DOFs that do not exist, two kinds of damping
+    Raises  Refusal for contacts of one name, DOFs that do not exist, two kinds of damping
     """
     touching = (contacts,) if isinstance(contacts, MatrixContact) else tuple(contacts)
     if not touching:

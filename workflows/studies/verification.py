@@ -245,7 +245,7 @@ def held_against(
 def march_alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> FreeMotion:
     """What a plain march does from the motion that a wear run had in a row, also where that is no solution.
 
-    Raises  ValueError: the result has no such row, or its motion cannot be marched; IntegrationFailed
+    Raises  Refusal: the result has no such row, or its motion cannot be marched; IntegrationFailed
     """
     with limited(scene.solver.threads):
         balance, omega, x = _start(result, scene, unworn, None, row)

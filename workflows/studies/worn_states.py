@@ -132,7 +132,7 @@ def verify(
     row : wear row whose depth the contact has; unworn by default
     states : so many worn states of a wear run, spread over its cycles, one line each
     steps : time steps per period; 256 or 32 for each harmonic by default
-    Raises  ValueError: the result has no such row, no wear run or no solution to start from; SolveFailed: no balance
+    Raises  Refusal: the result has no such row, no wear run or no solution to start from; SolveFailed: no balance
         solution
     """
     result, report = result_of(result), reporter(progress)

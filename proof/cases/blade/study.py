@@ -92,7 +92,7 @@ class TradeRow:
     depth_mm: float
     depth_error: float
     cycles: float
-    life_cycles: float
+    life: float
     life_error: float
     end: str
 
@@ -164,7 +164,7 @@ def trade(runs: Sequence[Worn]) -> list[TradeRow]:
             depth_mm=round(depths[run.step], 4),
             depth_error=depths[run.step] / reference - 1,
             cycles=float(run.history.cycles[-1]),
-            life_cycles=lives[run.step],
+            life=lives[run.step],
             life_error=lives[run.step] / lives[min(lives)] - 1,
             end=str(run.history.end),
         )
@@ -185,7 +185,7 @@ def as_text(rows: Sequence[TradeRow]) -> str:
             f"| {100 * row.step:g} % | {row.wear_steps}{_bracket(count, 'd')} | {row.seconds:.0f}, "
             f"{row.processor_seconds:.0f}{_bracket(clock, 'd')} | {row.depth_mm:.4f}{_bracket(depth, '.4f')} | "
             f"{100 * row.depth_error:.2f} %{_bracket(None if error is None else 100 * error, '.2f', ' %')} | "
-            f"{1e-6 * row.life_cycles:.1f} | {100 * row.life_error:.1f} % |"
+            f"{1e-6 * row.life:.1f} | {100 * row.life_error:.1f} % |"
         )
     return "\n".join(lines)
 

@@ -49,7 +49,7 @@ class AmplitudeRange:
     def of(
         cls, file: SceneFile, start: float | None, stop: float | None, mode: int | None, points: int | None
     ) -> AmplitudeRange:
-        """What is asked for, else what the scene has in [backbone]; raises ValueError where neither has it."""
+        """What is asked for, else what the scene has in [backbone]; raises Refusal where neither has it."""
         table = file.scene.backbone
         mode = mode if mode is not None else table.mode if table else 0
         points = points if points is not None else table.points if table else 40
@@ -176,7 +176,7 @@ def backbone(
     stop : amplitude to end at, such as 1mm
     mode : number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default
     points : points where the backbone bends little; there are more elsewhere. 40 or those of [backbone] by default
-    Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
+    Raises  Refusal for what cannot be; SolveFailed where not even the first point is found
     """
     file, report = read_scene(scene, overrides), reporter(progress)
     range_ = AmplitudeRange.of(file, start, stop, mode, points)
@@ -246,7 +246,7 @@ class PublishedBackbone:
 
 
 def published_backbone(file: SceneFile) -> PublishedBackbone | None:
-    """The table [backbone] beside a scene, None where there is none; raises ValueError for one that is incomplete."""
+    """The table [backbone] beside a scene, None where there is none; raises Refusal for one that is incomplete."""
     path = file.folder / f"{file.name}.published.toml"
     table = scene_file.tables(path, "published").get("backbone") if path.is_file() else None
     if table is None:

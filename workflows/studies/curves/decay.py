@@ -159,7 +159,7 @@ def ring_down(
     steps : time steps per period
     impulse : let it begin at rest with a hammer's blow of this size on the harmonic load, such as "0.1 N s", instead of
         in the mode; the amplitude at which it begins then follows, and other modes ring along
-    Raises  ValueError for what cannot be; SolveFailed where the backbone ends before the amplitude asked for
+    Raises  Refusal for what cannot be; SolveFailed where the backbone ends before the amplitude asked for
     """
     file, report = read_scene(scene, overrides), reporter(progress)
     if impulse is not None:

@@ -61,7 +61,7 @@ def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), pr
 
     scene : name of a scene or a .toml file
     within : relative distance to the fold of the balance within which its end in time is looked for, such as "2 %"
-    Raises  SolveFailed where the curve has no first point; ValueError for a sector of a wheel, whose perturbations are
+    Raises  SolveFailed where the curve has no first point; Refusal for a sector of a wheel, whose perturbations are
     other waves than its motion
     """
     if not 0 < within < 1:

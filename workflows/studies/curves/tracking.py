@@ -115,7 +115,7 @@ def track(
     fold : number of the fold to follow, 1 for that of the highest frequency; the peak by default
     points : values of the peak (21), or the most that a line of folds may have (500)
     worn : folder of the result whose last depth is a wear of one
-    Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
+    Raises  Refusal for what cannot be; SolveFailed where not even the first point is found
     """
     ends = [_end(option, value, against) for option, value in (("--from", start), ("--to", stop))]
     if ends[0] == ends[1]:

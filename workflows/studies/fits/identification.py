@@ -161,7 +161,7 @@ def fit(
     predict : parameters by name -> (n_measured,) predictions, above 0
     slopes : parameters by name -> (n_measured, n_parameter) derivatives of the predictions made last
     before : the parameters as they were, for the report; the first starts by default
-    Raises  ValueError where a prediction at a start is not a positive number, or a measured number is not
+    Raises  Refusal where a prediction at a start is not a positive number, or a measured number is not
     Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
     """
     parameters, measured = tuple(parameters), tuple(measured)

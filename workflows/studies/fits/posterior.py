@@ -142,7 +142,7 @@ def sample(
     trial : parameters by name -> (n_measured + n_predicted,) values above 0; SolveFailed where there are none
     predicted : name -> unit of the numbers that follow; priors : of some parameters, the others are spread evenly over
         the bounds of their unknowns; most : trials
-    Raises  ValueError without an error of a measured number, or without emcee; SolveFailed where more than half of the
+    Raises  Refusal without an error of a measured number, or without emcee; SolveFailed where more than half of the
         trials fail
     Source  ensemble sampler with the stretch move: Goodman and Weare 2010, doi 10.2140/camcos.2010.5.65; Gaussian
         process in place of the model, its variance added to that of the errors: Kennedy and O'Hagan 2001, doi

@@ -62,7 +62,7 @@ def identify(
 
     scene : name of a scene or a .toml file; nothing is written into it
     task : file with the numbers that are looked for and those that were measured, as cases/rig/rig.fit.toml
-    Raises  SceneError for a key that is no number of the scene, ValueError for bounds that cannot be, SolveFailed
+    Raises  SceneError for a key that is no number of the scene, Refusal for bounds that cannot be, SolveFailed
     """
     return best(read_scene(scene, overrides), read(task), reporter(progress))
 
@@ -99,7 +99,7 @@ def posterior(
     task : file with the numbers that are looked for and those that were measured, as for `identify`
     trials : runs of the scene that it may take
     seed : seed of the samples
-    Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: most trials fail
+    Raises  Refusal: what is asked for cannot be; SolveFailed: most trials fail
     """
     tables = read(task)
     scene_fit = SceneFit(read_scene(scene, overrides), tables, reporter(progress))

@@ -56,7 +56,7 @@ class Marginal:
 
     @classmethod
     def of(cls, table: Distribution) -> Marginal:
-        """The distribution of a table; raises ValueError with a sentence."""
+        """The distribution of a table; raises Refusal with a sentence."""
         names = {name for name in table.model_fields_set if name != "distribution"}
         must, one_of, may = NUMBERS[table.distribution]
         wants = ", ".join([*sorted(must), *([" or ".join(sorted(one_of, reverse=True))] if one_of else [])])
@@ -122,7 +122,7 @@ def _numbers(names: dict[str, NumberWithUnit]) -> dict[str, float]:
 
 
 def unit_of(value: NumberWithUnit) -> str:
-    """The unit that a scene counts a quantity in; raises ValueError where it is no quantity."""
+    """The unit that a scene counts a quantity in; raises Refusal where it is no quantity."""
     if not isinstance(value, str):
         return ""
     match = units.NUMBER.match(value)

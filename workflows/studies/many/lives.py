@@ -132,7 +132,7 @@ def lives(
     workers : processes; as many as there are cores by default
     scheduler : address of a scheduler of dask.distributed, or "local" for one of its own
     resume : take the runs that the folder holds already, and do the others
-    Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler
+    Raises  Refusal: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler
     """
     plan = study_file.read(study)
     runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, resume)

@@ -127,7 +127,7 @@ def optimise(
     workers : processes; as many as there are cores by default
     scheduler : address of a scheduler of dask.distributed, or "local" for one of its own
     resume : take the runs that the folder holds already, and what was proposed, and do the others
-    Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run keeps the limits, a lost scheduler
+    Raises  Refusal: what is asked for cannot be; SolveFailed: no run keeps the limits, a lost scheduler
     """
     plan = study_file.read(study)
     runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, resume)

@@ -119,7 +119,7 @@ def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callabl
     """Rows as they come, by dask.distributed; all that is distributed about a study is its work.
 
     address : of a scheduler, such as tcp://host:8786, or "local" for a cluster of `workers` processes of its own
-    Raises  ValueError: no scheduler answers there; SolveFailed: the scheduler was lost on the way
+    Raises  Refusal: no scheduler answers there; SolveFailed: the scheduler was lost on the way
     """
     distributed = package("distributed")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told in one sentence

@@ -67,7 +67,7 @@ def grid(
     scheduler : address of a scheduler of dask.distributed, such as tcp://host:8786, or "local" for one of its own
     resume : take the runs that the folder holds already, and do the others
     retry : resume, and do failed runs again
-    Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
+    Raises  Refusal: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
     plan = study_file.read(study)
     return run(plan, Runner(place(plan, folder), reporter(progress), workers, scheduler, resume or retry, retry))
@@ -89,7 +89,7 @@ def run(
 
     added : values of runs beyond those of the design; drawn : whether pictures are wanted
     inside : one worker is this process itself, where few runs are done at a time and starting another would cost more
-    Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
+    Raises  Refusal: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
     if not (runner.scheduler or inside):
         pool.prepared()  # imports while the runs are read

@@ -100,7 +100,7 @@ class Surrogate:
         Of a number that has laws no derivatives are taken.
 
         is_small : where fewer than FEWEST numbers are known, a process that is nearly linear
-        Raises  ValueError where fewer are known, and `is_small` is not asked for
+        Raises  Refusal where fewer are known, and `is_small` is not asked for
         Source  Rasmussen and Williams 2006, eq. 2.30
         """
         slopes = np.full(points.shape, np.nan) if slopes is None else slopes

@@ -218,7 +218,7 @@ def compare(
     resonance : take each run of a response as one point of a backbone, its resonance; so are runs of constant response
     band : compute it again with this changed, such as "contact.friction=0.4", or several keys joined by ";"; the range
         of all is the band of the inputs; can be repeated
-    Raises  ValueError for a measurement that cannot be read or does not belong to the scene; SolveFailed
+    Raises  Refusal for a measurement that cannot be read or does not belong to the scene; SolveFailed
     """
     report = reporter(progress)
     measured = read(Path(measurement), dict(_named(text) for text in facts))

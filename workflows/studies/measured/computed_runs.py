@@ -39,7 +39,7 @@ def compare_runs(
 
     Of a response each run is computed with the force that it has at its largest amplitude, where contacts slip most;
     the measured amplitude is taken in proportion to it.
-    Raises  ValueError, SolveFailed: what the scene cannot compute
+    Raises  Refusal, SolveFailed: what the scene cannot compute
     """
     if measured.kind == "modes":
         table = file.scene.backbone

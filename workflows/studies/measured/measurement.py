@@ -79,7 +79,7 @@ class Measurement:
     def on(self, scene: Scene) -> Measurement:
         """The measurement in the directions of a scene's output and force, in metres, its phase against the force.
 
-        Raises  ValueError: the scene has no such output, force or direction
+        Raises  Refusal: the scene has no such output, force or direction
         """
         outputs = outputs_of(scene)
         if self.output not in outputs:
@@ -107,7 +107,7 @@ class Measurement:
         return len(where) == 2 and where[0] == where[1]
 
     def check_position(self, scene: Scene, part: Part | None) -> None:
-        """Refuse a position farther from the scene's output than a twentieth of the part; raises ValueError."""
+        """Refuse a position farther from the scene's output than a twentieth of the part; raises Refusal."""
         if self.position is None or part is None or isinstance(scene, MatrixScene):
             return
         group = outputs_of(scene)[self.output].group
@@ -123,7 +123,7 @@ class Measurement:
 
 
 def _sign(measured: tuple[float, float, float] | None, ours: tuple[float, float, float], subject: str) -> float:
-    """1, or -1 for the opposite direction; raises ValueError for another one."""
+    """1, or -1 for the opposite direction; raises Refusal for another one."""
     if measured is None:
         return 1.0
     cosine = float(np.dot(measured, ours))
@@ -148,7 +148,7 @@ def outputs_of(scene: Scene) -> dict[str, Any]:
 
 
 def driving_load(scene: Scene) -> tuple[HarmonicLoad, complex]:
-    """The one force that drives a scene in harmonic 1, and its F exp(i phase) [N]; raises ValueError otherwise."""
+    """The one force that drives a scene in harmonic 1, and its F exp(i phase) [N]; raises Refusal otherwise."""
     loads = [load for load in scene.loads.harmonic.values() if load.harmonic == 1 and load.value]
     if len(loads) != 1 or len(scene.loads.harmonic) != 1 or getattr(scene, "motion", None):
         raise Refusal(
@@ -200,7 +200,7 @@ def prepared(measured: Measurement, scene: Scene, resonance: bool) -> Measuremen
 def resonances(measured: Measurement) -> Measurement:
     """Each run of a response as a point of a backbone; runs of one control become one, by amplitude.
 
-    Raises  ValueError where a run has no force or no phase, or no resonance
+    Raises  Refusal where a run has no force or no phase, or no resonance
     """
     if not measured.phased or any(not np.isfinite(run.force).all() for run in measured.runs) or measured.per_force:
         raise Refusal("the resonance of a run needs its force and its phase in every row")
@@ -223,7 +223,7 @@ def _joined(control: str, points: list[Run]) -> Run:
 def resonance(run: Run) -> Run:
     """The point of a run at its largest amplitude, at resonance where that is constant; its force is that of resonance.
 
-    Raises  ValueError where no resonance is within the run
+    Raises  Refusal where no resonance is within the run
     """
     omega, a = 2 * np.pi * run.frequency, run.amplitude
     stiffness, s = run.force / run.displacement, a / a.max() - 1

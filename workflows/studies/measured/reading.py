@@ -45,7 +45,7 @@ def read(path: str | Path, facts: Mapping[str, str] | None = None) -> Measuremen
     """The measurement in a file .csv, .mat, .uff or .unv.
 
     facts : what the file does not say, or says otherwise, see FACTS
-    Raises  ValueError: one sentence that names file, key and cure
+    Raises  Refusal: one sentence that names file, key and cure
     """
     path = Path(path)
     readers = {".csv": _of_csv, ".mat": _of_mat, ".uff": _of_uff, ".unv": _of_uff}

@@ -120,7 +120,7 @@ def flutter(
     start : amplitude of the response from which limit cycles are looked for, such as 1um; none by default
     stop : amplitude up to which they are looked for
     points : points of the backbone between these amplitudes
-    Raises  SceneError for a scene without [wheel] or [flow]; ValueError where one end alone is given
+    Raises  SceneError for a scene without [wheel] or [flow]; Refusal where one end alone is given
     """
     file = read_scene(scene, overrides)
     return of_scene(file, start, stop, points)

@@ -75,15 +75,15 @@ class MistunedWear(StudyResult):
             "blade": self.blade,
             "end": str(h.end),
             "cycles": h.cycles.tolist(),
-            "volume_m3": self.volume[-1].tolist(),
-            "preload_N": [self.preload[0].tolist(), self.preload[-1].tolist()],
-            "amplitude_m": [self.heights[0].tolist(), self.heights[-1].tolist()],
+            "volume": self.volume[-1].tolist(),
+            "preload": [self.preload[0].tolist(), self.preload[-1].tolist()],
+            "amplitude": [self.heights[0].tolist(), self.heights[-1].tolist()],
         }
 
     def write(self, folder: Path) -> list[Path]:
         """Write mistuned_wear.csv, of every blade over the cycles, its picture, and pictures and films of the wheel."""
         h = self.history
-        columns: dict[str, np.ndarray] = {"cycles": h.cycles, "peak_Hz": h.omega / (2 * np.pi)}
+        columns: dict[str, np.ndarray] = {"cycles": h.cycles, "peak_frequency_Hz": h.omega / (2 * np.pi)}
         for name, values in (("amplitude_m", self.heights), ("volume_m3", self.volume), ("preload_N", self.preload)):
             columns |= {f"{name}@{k}": column for k, column in enumerate(values.T)}
         written = write_files(folder, {"mistuned_wear": columns}, {"mistuned_wear": self.plot()})
@@ -183,7 +183,7 @@ def write_wheel(
 ) -> list[Path]:
     """Write mistuned_wheel.png, and a film over one cycle in some formats; returns their paths.
 
-    Raises  ValueError for a part that has no mesh of one kind; RenderingUnavailable
+    Raises  Refusal for a part that has no mesh of one kind; RenderingUnavailable
     """
     mesh, info = part_mesh(blades.part), wheel_table(blades.file)
     if mesh is None:

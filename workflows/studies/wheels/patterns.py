@@ -66,10 +66,10 @@ def solve(task: PatternRun) -> RunRow:
             return RunRow(task.number, task.key, status, " ".join(sentence.split()), {}, time.process_time() - start)
     numbers = {
         "amplification": highest.amplitude / tuned.amplitude,
-        "peak_m": highest.amplitude,
-        "peak_hz": highest.state.omega / (2 * np.pi),
+        "amplitude": highest.amplitude,
+        "peak_frequency": highest.state.omega / (2 * np.pi),
         "blade": float(blade),
-        "peak_alike_m": tuned.amplitude,
+        "amplitude_alike": tuned.amplitude,
         "solves": float(highest.solves),
     }
     return RunRow(task.number, task.key, "complete", "complete", numbers, time.process_time() - start)
@@ -113,7 +113,7 @@ class Patterns(StudyResult):
             "largest_pattern": worst.run,
             "largest_blade": int(worst.numbers["blade"]),
             "whitehead": whitehead(self.n_sectors),
-            "peak_alike_m": worst.numbers["peak_alike_m"],
+            "amplitude_alike": worst.numbers["amplitude_alike"],
             "seconds": float(sum(row.seconds for row in self.rows)),
         }
 
@@ -194,7 +194,7 @@ def patterns(
     with alone_in(folder):
         finish(tasks := tasks_of(file, mistuning.patterns), runner, rows, solve, "patterns", inside=True)
     rows_by_number = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks), folder)
-    names = ("amplification", "peak_m", "peak_hz", "blade", "solves")
+    names = ("amplification", "amplitude", "peak_frequency", "blade", "solves")
     columns = {name: [row.numbers.get(name, np.nan) for row in rows_by_number.rows] for name in names}
     n_patterns = {
         "pattern": [row.run for row in rows_by_number.rows],

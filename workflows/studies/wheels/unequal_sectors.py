@@ -64,8 +64,8 @@ class MistunedSectors(StudyResult):
             "stiffness": self.stiffness.tolist(),
             "amplification": self.amplification,
             "worst_sector": worst,
-            "peak_m": float(self.heights.max()),
-            "peak_alike_m": float(self.tuned.amplitude(OUTPUT).max()),
+            "amplitude": float(self.heights.max()),
+            "amplitude_alike": float(self.tuned.amplitude(OUTPUT).max()),
             "derivatives": None if isinstance(self.peak, NoDerivative) else self.peak.record(),
         }
 
@@ -112,7 +112,7 @@ def deviations(n_sectors: int, spread: float, seed: int) -> np.ndarray:
     """Factors (n_sectors,) on the stiffness, drawn from a normal distribution, then shifted and scaled.
 
     Their mean is one and their standard deviation is `spread`, exactly; the same seed gives the same factors.
-    Raises  ValueError for a spread that makes a factor zero or less
+    Raises  Refusal for a spread that makes a factor zero or less
     """
     drawn = np.random.default_rng(seed).normal(size=n_sectors)
     drawn -= drawn.mean()
@@ -120,7 +120,7 @@ def deviations(n_sectors: int, spread: float, seed: int) -> np.ndarray:
 
 
 def checked(factors: Sequence[float] | np.ndarray, n_sectors: int) -> np.ndarray:
-    """Factors as an array; raises ValueError where there is not one above zero for each sector."""
+    """Factors as an array; raises Refusal where there is not one above zero for each sector."""
     values = np.asarray(factors, float)
     if values.shape != (n_sectors,):
         raise Refusal(f"the wheel has {n_sectors} sectors, but there are {values.size} factors: give one for each")
@@ -164,7 +164,7 @@ def mistuned(
     stiffness : factor on the stiffness of every sector, such as "1.02, 0.99, 1, 0.98"; drawn by default
     spread : standard deviation of the factors that are drawn, such as "2 %"
     seed : seed of the draw; the same seed gives the same factors
-    Raises  SceneError for a scene without [wheel], ValueError for factors that cannot be, SolveFailed
+    Raises  SceneError for a scene without [wheel], Refusal for factors that cannot be, SolveFailed
     """
     file = read_scene(scene, overrides)
     with limited(file.scene.solver.threads):

@@ -132,7 +132,7 @@ def modes(
     families : modes of each nodal diameter
     speeds : speeds of the Campbell diagram, from rest to the highest
     formats : formats of the pictures, png, pdf or svg; can be repeated
-    Raises  SceneError for a scene without a wheel; ValueError for what cannot be
+    Raises  SceneError for a scene without a wheel; Refusal for what cannot be
     """
     slow, fast = start, stop
     if slow is not None and fast is None:
