@@ -276,12 +276,9 @@ def cards() -> str:
         ("Nastran", nastran.TABLE),
         ("ANSYS", ansys.TABLE),
     ):
-        cards_by_use = {
-            "read": table.reads,
-            **{f"not used: {reason}": words_of(of) for reason, of in table.harmless.items()},
-        }
-        cards_by_use["of no effect"] = table.silents
-        rows = [(use, ", ".join(f"`{card}`" for card in sorted(of))) for use, of in cards_by_use.items()]
+        uses = {"read": table.reads, **{f"not used: {reason}": words_of(of) for reason, of in table.harmless.items()}}
+        uses["of no effect"] = table.silents
+        rows = [(use, ", ".join(f"`{card}`" for card in sorted(of))) for use, of in uses.items()]
         lines += [f"## {name}", "", *_table(("what becomes of it", "cards"), rows)]
     return "\n".join(lines)
 
@@ -298,9 +295,7 @@ def folders() -> str:
     for top in TOP:
         inside = sorted({path.parent for path in (ROOT / top).rglob("*.py")}) if top != "tests" else []
         rows += [(f"`{path.relative_to(ROOT)}/`", _paragraph(_head_of(path))) for path in inside]
-    rows += [
-        (f"`tests/{room}/`", meaning) for room, meaning in ROOMS_OF_TESTS.items() if (ROOT / "tests" / room).is_dir()
-    ]
+    rows += [(f"`tests/{room}/`", meaning) for room, meaning in TEST_ROOMS.items() if (ROOT / "tests" / room).is_dir()]
     return "\n".join(_table(("folder", "what it holds"), rows))
 
 
@@ -311,7 +306,7 @@ def _head_of(folder: Path) -> str:
     return head.split("\n")[0]
 
 
-ROOMS_OF_TESTS = {
+TEST_ROOMS = {
     "cases": "What the shipped cases publish and reproduce.",
     "documentation": "Pages do what they print; their numbers are those of data and code; the start script.",
     "fem": "Tests of `fem`.",

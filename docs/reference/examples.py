@@ -161,10 +161,7 @@ print(td.studies.forces("beam", overrides=UNWORN))
 
 # td.studies.grid
 settings = [f"{key}={json.dumps(value)}" for key, value in UNWORN.items() if value is not None] + ["wear="]
-study = {
-    "study": {"scene": "beam", "design": "grid", "set": settings},
-    "vary": {"contact.friction": [0.4, 0.5]},
-}
+study = {"study": {"scene": "beam", "design": "grid", "set": settings}, "vary": {"contact.friction": [0.4, 0.5]}}
 table = td.studies.grid(study, "results/friction", workers=1)
 print(table.columns["amplitude_first"])  # [m]
 

@@ -85,11 +85,7 @@ class CycleFilm:
         self._clock.set_text(f"{share:.2f} of the period")
 
     def _draw(self, result: Result) -> None:
-        views = [
-            name
-            for name, part_of_view in (("part", self._moving), ("contact", self._contact))
-            if part_of_view is not None
-        ]
+        views = [name for name, part in (("part", self._moving), ("contact", self._contact)) if part is not None]
         if views:
             halves: Any = self.figure.subfigures(2, 1, height_ratios=[1.9, 1])
             upper, lower = halves

@@ -95,11 +95,9 @@ def draw_scene(scene: MeshScene, part: Part, path: Path) -> Path:
         for name, load in loads.items():
             if load.direction is None or not load.group:
                 continue
-            load_direction, centre = np.asarray(load.direction), part.points[part.node_sets[load.group]].mean(axis=0)
-            start = centre - ARROW * size * load_direction
-            arrow = pv.Arrow(
-                start=start, direction=load_direction, scale=ARROW * size, shaft_radius=0.03, tip_radius=0.08
-            )
+            axis, centre = np.asarray(load.direction), part.points[part.node_sets[load.group]].mean(axis=0)
+            start = centre - ARROW * size * axis
+            arrow = pv.Arrow(start=start, direction=axis, scale=ARROW * size, shaft_radius=0.03, tip_radius=0.08)
             view.add_mesh(arrow, color=colour)
             legend.append((f"{kind} load {name}", colour))
     for number, (label, colour) in enumerate(legend, 1):

@@ -29,7 +29,7 @@ class OpenedContact:
 
     contact : with its pairs and faces; part : of the result; split : share of the depth on body 1
     flat : (n_pair, 2) along t1, t2 [m]; size : of the patch [m]
-    opening_axis : which of t1, t2 the book opens along, hinge : the place of its hinge there [m]
+    fold_axis : which of t1, t2 the book opens along, hinge : the place of its hinge there [m]
     bounds : lowest and highest t1, t2 of what is shown [m]
     """
 
@@ -38,7 +38,7 @@ class OpenedContact:
     split: float
     flat: np.ndarray
     size: float
-    opening_axis: int
+    fold_axis: int
     hinge: float
     bounds: tuple[np.ndarray, np.ndarray]
     camera: Camera
@@ -72,7 +72,7 @@ class OpenedContact:
     def _turned(self, points: np.ndarray, sign: int) -> np.ndarray:
         """Points of body 2 after it is opened; sign : -1 where their n still points as body 1's does."""
         turned = points.copy()
-        turned[:, self.opening_axis] = 2 * self.hinge - turned[:, self.opening_axis]
+        turned[:, self.fold_axis] = 2 * self.hinge - turned[:, self.fold_axis]
         turned[:, 2] *= sign
         return turned
 
@@ -163,15 +163,13 @@ def opened(result: Result, contact: Meeting, aspect: float = 1.3) -> OpenedConta
     flat = contact.patch.flat
     low, high = flat.min(axis=0), flat.max(axis=0)
     size = float(np.sqrt(np.prod(high - low)))
-    opening_axis = int(np.argmin(high - low))  # open along the shorter side
+    fold_axis = int(np.argmin(high - low))  # open along the shorter side
     box = (low - MARGIN * size, high + MARGIN * size)
-    hinge = float(box[1][opening_axis] + 0.1 * size)
+    hinge = float(box[1][fold_axis] + 0.1 * size)
     (x0, y0), (x1, y1) = box
     corners = np.array([[x, y, z] for x in (x0, x1) for y in (y0, y1) for z in (-0.4 * size, 0)])
     other = corners.copy()
-    other[:, opening_axis] = 2 * hinge - other[:, opening_axis]
-    look = np.array([-0.3, -0.8, 1.0]) if opening_axis == 1 else np.array([-0.8, -0.3, 1.0])
+    other[:, fold_axis] = 2 * hinge - other[:, fold_axis]
+    look = np.array([-0.3, -0.8, 1.0]) if fold_axis == 1 else np.array([-0.8, -0.3, 1.0])
     camera = frame(np.concatenate([corners, other]), look, np.array([0.0, 0, 1]), aspect, 1.05)
-    return OpenedContact(
-        contact, result.part, result.facts.share_of_body_1, flat, size, opening_axis, hinge, box, camera
-    )
+    return OpenedContact(contact, result.part, result.facts.share_of_body_1, flat, size, fold_axis, hinge, box, camera)

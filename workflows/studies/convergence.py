@@ -66,12 +66,9 @@ class Convergence(StudyResult):
 
     def write(self, folder: Path) -> list[Path]:
         """Write a picture of what the settings cost, and of each ladder of grids or meshes one."""
-        grids = [
-            settling for settling in self.table.ladders if len({len(row.solved.area) for row in settling.rows}) > 1
-        ]
+        grids = [ladder for ladder in self.table.ladders if len({len(row.solved.area) for row in ladder.rows}) > 1]
         drawn = {
-            f"converge_{self.table.scene}_{settling.ladder.name}": picture(self.table.scene, settling)
-            for settling in grids
+            f"converge_{self.table.scene}_{ladder.ladder.name}": picture(self.table.scene, ladder) for ladder in grids
         }
         return write_files(folder, {}, {f"converge_{self.table.scene}": self.plot(), **drawn})
 
@@ -106,17 +103,17 @@ def map_difference(coarse: SolvedSetting, fine: SolvedSetting) -> float:
     return float(np.sqrt(coarse.area @ (coarse.work - reference) ** 2 / size)) if size > 0 else 0.0
 
 
-def _record(scene: str, settling: LadderTable, row: LadderRow) -> dict[str, Any]:
+def _record(scene: str, ladder: LadderTable, row: LadderRow) -> dict[str, Any]:
     measured = row.solved
     return plain(
         {
-            "scene": scene, "ladder": settling.ladder.name, "setting": row.setting.label, "size": row.setting.size,
-            "of_the_scene": row.setting.label == settling.scene_setting, "overrides": list(row.setting.overrides),
+            "scene": scene, "ladder": ladder.ladder.name, "setting": row.setting.label, "size": row.setting.size,
+            "of_the_scene": row.setting.label == ladder.scene_setting, "overrides": list(row.setting.overrides),
             "pairs": len(measured.area),
-            "values": measured.values, "errors": {q: settling.error(row, q) for q in names_with_error()},
-            "bounds": {q: settling.bound(row, q) for q in names_with_error()},
-            "orders": {q: limit.order for q, limit in settling.limits.items()},
-            "map_difference": _difference(settling, row),
+            "values": measured.values, "errors": {q: ladder.error(row, q) for q in names_with_error()},
+            "bounds": {q: ladder.bound(row, q) for q in names_with_error()},
+            "orders": {q: limit.order for q, limit in ladder.limits.items()},
+            "map_difference": _difference(ladder, row),
             "seconds": measured.seconds, "share": row.share, "memory": measured.memory, "outcome": measured.outcome,
         }
     )  # fmt: skip
@@ -130,25 +127,25 @@ def _difference(ladder: LadderTable, row: LadderRow) -> float | None:
     return map_difference(row.solved, shown[-1])
 
 
-def _lines(settling: LadderTable) -> Iterator[str]:
-    shown = [q for q in names_with_error() if q in settling.limits]
-    width = max(len(settling.ladder.name), *(len(row.setting.label) for row in settling.rows))
-    yield _line(settling.ladder.name.ljust(width), "pairs", "seconds", "MB", [_name(q) for q in shown], "map")
-    for row in settling.rows:
-        measured, off = row.solved, _difference(settling, row)
+def _lines(ladder: LadderTable) -> Iterator[str]:
+    shown = [q for q in names_with_error() if q in ladder.limits]
+    width = max(len(ladder.ladder.name), *(len(row.setting.label) for row in ladder.rows))
+    yield _line(ladder.ladder.name.ljust(width), "pairs", "seconds", "MB", [_name(q) for q in shown], "map")
+    for row in ladder.rows:
+        measured, off = row.solved, _difference(ladder, row)
         failed = "" if measured.outcome == SOLVED else f"  {measured.outcome}"
-        cells = [_cell(settling, row, q) for q in shown]
+        cells = [_cell(ladder, row, q) for q in shown]
         numbers = str(len(measured.area)), f"{measured.seconds:.2f}", f"{measured.memory / 1e6:.0f}"
         yield _line(row.setting.label.ljust(width), *numbers, cells, ("" if off is None else f"{off:.1%}") + failed)
-    limits = [f"{settling.limits[q].value:.5g} ({_order(settling.limits[q].order)})" for q in shown]
+    limits = [f"{ladder.limits[q].value:.5g} ({_order(ladder.limits[q].order)})" for q in shown]
     yield _line("limit".ljust(width), "", "", "", limits, "")
     for q in shown:
-        enough = settling.coarsest(q, TARGET_ERROR)
+        enough = ladder.coarsest(q, TARGET_ERROR)
         needed = "a finer setting than these" if enough is None else f"{enough.setting.label} or finer"
-        yield f"{TARGET_ERROR:.0%} on {_name(q)} needs {needed}; the limit is known to {settling.limits[q].doubt:.2g}"
-    for row in settling.rows:
-        if row.setting.label == settling.scene_setting and shown:
-            bounds = {q: b for q in shown if (b := settling.bound(row, q)) is not None}
+        yield f"{TARGET_ERROR:.0%} on {_name(q)} needs {needed}; the limit is known to {ladder.limits[q].doubt:.2g}"
+    for row in ladder.rows:
+        if row.setting.label == ladder.scene_setting and shown:
+            bounds = {q: b for q in shown if (b := ladder.bound(row, q)) is not None}
             missed = [_name(q) for q, b in bounds.items() if b > TARGET_ERROR]
             verdict = (
                 f"misses {TARGET_ERROR:.0%} on {', '.join(missed)}"
@@ -156,7 +153,7 @@ def _lines(settling: LadderTable) -> Iterator[str]:
                 else f"is good for {TARGET_ERROR:.0%} on all"
             )
             errors = ", ".join(f"{_name(q)} {b:.2g}" for q, b in bounds.items())
-            yield f"the setting of the scene, {settling.scene_setting}, {verdict}: {errors}"
+            yield f"the setting of the scene, {ladder.scene_setting}, {verdict}: {errors}"
 
 
 def _line(setting: str, pairs: str, seconds: str, memory: str, cells: Sequence[str], maps: str) -> str:
@@ -184,7 +181,7 @@ def _advice(table: LadderTables) -> Iterator[str]:
     yield "in brackets: error from where the setting tends to, behind ~ the doubt in that"
     yield f"each setting alone, the others as {table.scene} has them with {'; '.join(table.base) or 'nothing changed'}"
     for quantity in names_with_error():
-        if any(quantity in settling.limits and settling.ladder.base is None for settling in table.ladders):
+        if any(quantity in ladder.limits and ladder.ladder.base is None for ladder in table.ladders):
             try:
                 rows, error, seconds = table.choose(TARGET_ERROR, quantity)
             except Refusal as refusal:
@@ -199,20 +196,20 @@ def costs(table: LadderTables) -> Figure:
 
     The front is of settings of all ladders together, as they are chosen for smaller and smaller errors.
     """
-    quantities = [q for q in ("amplitude", "energy", "life") if any(q in settling.limits for settling in table.ladders)]
+    quantities = [q for q in ("amplitude", "energy", "life") if any(q in ladder.limits for ladder in table.ladders)]
     shown = quantities or ["amplitude"]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(4.2 * len(shown) + 1.6, 4.0), layout="constrained")
         panes = figure.subplots(1, len(shown), squeeze=False)[0]
         colours = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
         for pane, quantity in zip(panes, shown, strict=True):
-            for i, settling in enumerate(table.ladders):
+            for i, ladder in enumerate(table.ladders):
                 points = [
-                    (row.solved.seconds, b) for row in settling.rows if (b := settling.bound(row, quantity)) is not None
+                    (row.solved.seconds, b) for row in ladder.rows if (b := ladder.bound(row, quantity)) is not None
                 ]
                 seconds, errors = zip(*points, strict=True) if points else ((), ())
                 style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
-                label = settling.ladder.name.replace("_", " ")
+                label = ladder.ladder.name.replace("_", " ")
                 pane.plot(seconds, np.maximum(errors, FLOOR), label=label, markersize=5, **style)
             front = _front(table, quantity)
             pane.plot(*front, color=INK, linewidth=0.8, marker=".", zorder=0, label="all together, as chosen")
@@ -239,15 +236,15 @@ def _front(table: LadderTables, quantity: str) -> tuple[list[float], list[float]
     return seconds, errors
 
 
-def picture(scene: str, settling: LadderTable) -> Figure:
+def picture(scene: str, ladder: LadderTable) -> Figure:
     """Errors against the number of pairs, the work on the finest grid, and where coarser grids differ from it."""
-    by_pairs = {len(m.area): m for m in reversed([row.solved for row in settling.rows]) if m.values["energy"]}
-    *coarser, finest = [by_pairs[n] for n in sorted(by_pairs)][-4:] or [settling.rows[-1].solved]
+    by_pairs = {len(m.area): m for m in reversed([row.solved for row in ladder.rows]) if m.values["energy"]}
+    *coarser, finest = [by_pairs[n] for n in sorted(by_pairs)][-4:] or [ladder.rows[-1].solved]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.1 + 2.5 * len(coarser), 3.6), layout="constrained")
         panes = figure.subplots(1, 2 + len(coarser), width_ratios=[1.7] + [1] * (1 + len(coarser)), squeeze=False)[0]
-        _draw_errors(panes[0], settling)
-        panes[0].set_title(f"{scene}: {settling.ladder.name.replace('_', ' ')}")
+        _draw_errors(panes[0], ladder)
+        panes[0].set_title(f"{scene}: {ladder.ladder.name.replace('_', ' ')}")
         drawn = _map(panes[1], finest, 1e-3 * finest.work, {"cmap": "viridis"})
         figure.colorbar(drawn, ax=panes[1], label="work per cycle and area, kJ/m²", location="bottom")
         reach = max(float(finest.work.max()), 1e-300)

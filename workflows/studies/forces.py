@@ -35,7 +35,7 @@ class BodyForces:
     is_supported : whether a support, a spring or a prescribed displacement carries some of it too
     """
 
-    body: str
+    name: str
     load: np.ndarray
     joints: dict[str, np.ndarray]
     is_supported: bool
@@ -57,26 +57,26 @@ class Forces(StudyResult):
     def record(self) -> dict[str, Any]:
         """For machines."""
         return {
-            forces_on_body.body: {
-                "load_N": forces_on_body.load.tolist(),
-                "joints_N": {name: force.tolist() for name, force in forces_on_body.joints.items()},
-                "imbalance": forces_on_body.imbalance,
-                "supported": forces_on_body.is_supported,
+            body.name: {
+                "load_N": body.load.tolist(),
+                "joints_N": {name: force.tolist() for name, force in body.joints.items()},
+                "imbalance": body.imbalance,
+                "supported": body.is_supported,
             }
-            for forces_on_body in self.bodies
+            for body in self.bodies
         }
 
     def lines(self) -> list[str]:
         """For people."""
         texts = []
-        for forces_on_body in self.bodies:
-            texts.append(f"{forces_on_body.body}: static load {_vector(forces_on_body.load)} N")
-            texts += [f"  {name}: {_vector(force)} N" for name, force in forces_on_body.joints.items()]
-            if forces_on_body.is_supported:
-                remainder = -forces_on_body.load - sum(forces_on_body.joints.values())
+        for body in self.bodies:
+            texts.append(f"{body.name}: static load {_vector(body.load)} N")
+            texts += [f"  {name}: {_vector(force)} N" for name, force in body.joints.items()]
+            if body.is_supported:
+                remainder = -body.load - sum(body.joints.values())
                 texts.append(f"  supports and neighbours: {_vector(remainder)} N")
             else:
-                texts.append(f"  out of balance by {forces_on_body.imbalance:.1e} of the largest")
+                texts.append(f"  out of balance by {body.imbalance:.1e} of the largest")
         return texts
 
 

@@ -78,9 +78,7 @@ class Inspection(StudyResult):
             ("mass", mass),
             ("centre", f"({', '.join(f'{1e3 * x:.5g}' for x in self.centre)}) mm"),
         ]
-        lines += [
-            ("body", f"{name}: {b['elements']} {b['kind']}, {b['nodes']} nodes") for name, b in self.bodies.items()
-        ]
+        lines += [("body", f"{n}: {b['elements']} {b['kind']}, {b['nodes']} nodes") for n, b in self.bodies.items()]
         for name, group in self.groups.items():
             wide = f", {1e6 * group['area_m2']:.5g} mm2" if group["area_m2"] else ""
             lines.append(("group", f"{name}: {group['nodes']} nodes{wide}"))
@@ -286,27 +284,24 @@ def _solids(file: scene_file.SceneFile, part: Any) -> list[Body]:
 
 def measured(solids: Sequence[Body], sentences: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
     """Sizes, volumes, masses, groups and the worst element of bodies."""
-    all_facts = {
-        solid.name: facts(solid.mesh, densities(solid.mesh, solid.material) if solid.material else None)
-        for solid in solids
-    }
-    volume = sum(facts_of_body.volume for facts_of_body in all_facts.values())
-    masses = [facts_of_body.mass for facts_of_body in all_facts.values() if facts_of_body.mass is not None]
+    all_facts = {s.name: facts(s.mesh, densities(s.mesh, s.material) if s.material else None) for s in solids}
+    volume = sum(body_facts.volume for body_facts in all_facts.values())
+    masses = [body_facts.mass for body_facts in all_facts.values() if body_facts.mass is not None]
     mass = sum(masses) if len(masses) == len(solids) else None
     weights = masses if mass else [all_facts[s.name].volume for s in solids]
     centre = np.average([all_facts[s.name].centre for s in solids], axis=0, weights=weights)
-    low = np.min([facts_of_body.low for facts_of_body in all_facts.values()], axis=0)
-    high = np.max([facts_of_body.high for facts_of_body in all_facts.values()], axis=0)
+    low = np.min([body_facts.low for body_facts in all_facts.values()], axis=0)
+    high = np.max([body_facts.high for body_facts in all_facts.values()], axis=0)
     bodies, groups = {}, {}
     for solid in solids:
-        facts_of_body = all_facts[solid.name]
+        body_facts = all_facts[solid.name]
         bodies[solid.name] = {
             "elements": solid.mesh.nelements,
             "kind": "hexahedra" if solid.mesh.t.shape[0] == 8 else "tetrahedra",
             "nodes": solid.mesh.doflocs.shape[1],
-            "volume_m3": facts_of_body.volume,
-            "mass_kg": facts_of_body.mass,
-            "centre_m": facts_of_body.centre.tolist(),
+            "volume_m3": body_facts.volume,
+            "mass_kg": body_facts.mass,
+            "centre_m": body_facts.centre.tolist(),
         }
         faces = solid.mesh.boundaries or {}
         for name, nodes in solid.node_sets.items():

@@ -46,11 +46,8 @@ class MatrixContact:
     def stiffness(self) -> np.ndarray:
         """(n_pair, n_component) contact springs [N/m]."""
         share = self.interface.area / self.interface.area.sum()
-        by_component = {"t1": self.tangential_stiffness, "t2": self.tangential_stiffness, "n": self.normal_stiffness}
-        columns = [
-            by_component[c] * share if np.ndim(by_component[c]) == 0 else by_component[c]
-            for c in self.interface.components
-        ]
+        springs = {"t1": self.tangential_stiffness, "t2": self.tangential_stiffness, "n": self.normal_stiffness}
+        columns = [springs[c] * share if np.ndim(springs[c]) == 0 else springs[c] for c in self.interface.components]
         return np.column_stack([np.broadcast_to(np.asarray(column, float), share.shape) for column in columns])
 
     def joint(self, pairs: np.ndarray) -> Joint:
@@ -81,10 +78,8 @@ class Structure:
         """The lowest natural frequencies (n,) [Hz], contacts absent, or closed and stuck."""
         springs = None
         if stuck:
-            all_components = self.model.interface.components
-            springs = np.concatenate(
-                [_wide(c.stiffness, c.interface.components, all_components) for c in self.contacts]
-            )
+            components = self.model.interface.components
+            springs = np.concatenate([_wide(c.stiffness, c.interface.components, components) for c in self.contacts])
         return linear_modes(self.model, springs, min(n, self.model.system.n_dof))[0]
 
     def balance(

@@ -144,15 +144,9 @@ class TimeComparison(StudyResult):
             shown.append(("mean held", f"to {off:.1g} m of what is prescribed"))
         error = "unknown" if record["step_error"] is None else f"{record['step_error']:.1e}"
         shown.append(("time steps", f"{self.steps} per period, their own error {error}"))
-        shown.append(
-            (
-                "periodic",
-                f"{self.integration.outcome}, {self.integration.periods} periods, drift {self.integration.drift:.1e}",
-            )
-        )
-        shown.append(
-            ("stable", f"{'yes' if self.stable else 'no: a machine leaves this motion'}, by {self.stability_method}")
-        )
+        integration, stable = self.integration, "yes" if self.stable else "no: a machine leaves this motion"
+        periodic = f"{integration.outcome}, {integration.periods} periods, drift {integration.drift:.1e}"
+        shown += [("periodic", periodic), ("stable", f"{stable}, by {self.stability_method}")]
         if (motion := self.left_alone) is not None:
             spread = f"{motion.energy:.6g} J per cycle on average, spread {motion.energy_spread:.2g} J"
             shown.append(("left alone", f"{spread}, drift {motion.drift:.1e} after {motion.periods} periods"))
@@ -161,12 +155,9 @@ class TimeComparison(StudyResult):
     @property
     def failure(self) -> str:
         """Why there is no comparison, empty where there is one."""
-        integration = self.integration
-        return (
-            ""
-            if integration.motion.periodic
-            else f"the time integration found no periodic motion: {integration.outcome}"
-        )
+        if self.integration.motion.periodic:
+            return ""
+        return f"the time integration found no periodic motion: {self.integration.outcome}"
 
     def write(self, folder: Path) -> list[Path]:
         """Write verify_FREQUENCY.png."""
@@ -234,12 +225,10 @@ def held_against(
             options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS)
             integration = march.verify(balance, solution.state, options)
             stable, reason = is_stable(balance, solution.state, integration, options)
-            left_alone = None
+            free = None
             if not stable or not integration.motion.periodic:
-                left_alone = march_freely(balance, target, solution.state, LEFT_ALONE, options)
-    return TimeComparison(
-        balance, solution, integration, stable, reason, row, steps, time.perf_counter() - start, left_alone
-    )
+                free = march_freely(balance, target, solution.state, LEFT_ALONE, options)
+    return TimeComparison(balance, solution, integration, stable, reason, row, steps, time.perf_counter() - start, free)
 
 
 def march_alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> FreeMotion:

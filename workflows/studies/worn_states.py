@@ -80,10 +80,8 @@ class WornStates(StudyResult):
         comparison = row["comparison"]
         if comparison is None:
             return f"{head} {'none':>11} {'-':>11} {'-':>11} {'-':>9} {'-':>7}{motion_alone}   {row['no_comparison']}"
-        energy, step_error = (
-            comparison["energy"],
-            "-" if comparison["step_error"] is None else f"{comparison['step_error']:.2%}",
-        )
+        energy, error = comparison["energy"], comparison["step_error"]
+        step_error = "-" if error is None else f"{error:.2%}"
         integrated = f"{energy['time_J']:11.5g} {energy['difference']:11.2%}"
         if not self._periodic(row["row"]):
             integrated = f"{'none':>11} {'-':>11}"

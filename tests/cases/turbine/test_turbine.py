@@ -26,7 +26,7 @@ JOINTS = {"root_right", "root_left", "damper_right", "damper_left", "shroud"}
 
 @pytest.fixture(scope="module")
 def forces_of() -> dict[str, BodyForces]:
-    return {body_forces.body: body_forces for body_forces in td.studies.forces("turbine", overrides=COARSE).bodies}
+    return {body.name: body for body in td.studies.forces("turbine", overrides=COARSE).bodies}
 
 
 @pytest.mark.parametrize("body", ["blade", "damper"])

@@ -71,9 +71,7 @@ class Track(StudyResult):
     def lines(self) -> list[str]:
         """For people."""
         rows = zip(self.value, self.frequency, self.amplitude, strict=True)
-        texts = [
-            f"{self.name} {f'{v:.6g} {self.unit}':14} {hertz:12.6g} Hz {height:12.6g} m" for v, hertz, height in rows
-        ]
+        texts = [f"{self.name} {f'{v:.6g} {self.unit}':14} {f:12.6g} Hz {height:12.6g} m" for v, f, height in rows]
         return [*texts, f"{self.kind}: {self.end}"]
 
     def write(self, folder: Path) -> list[Path]:

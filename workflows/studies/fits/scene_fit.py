@@ -47,12 +47,8 @@ class Fit(StudyResult):
 
     def lines(self) -> list[str]:
         """For people."""
-        return [
-            self.identification.report(),
-            "",
-            "to continue with what was found:",
-            *(f'  --set "{c}"' for c in self.changes),
-        ]
+        sets = [f'  --set "{change}"' for change in self.changes]
+        return [self.identification.report(), "", "to continue with what was found:", *sets]
 
 
 def identify(
@@ -155,9 +151,7 @@ class SceneFit:
         trial = self.file.changed(*self.changes(values))
         self._last = SceneAnswers(trial, modelling.build(trial, Progress()), self._last if nearby else None)
         numbers = self._last.all_to(targets)
-        self._progress.say(
-            f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items())
-        )
+        self._progress.say(f"trial {self._count}: " + ", ".join(f"{name} {v:.6g}" for name, v in values.items()))
         return numbers
 
     def slopes(self, values: Mapping[str, float], targets: Mapping[str, Target | CurveTarget]) -> np.ndarray:
@@ -177,10 +171,8 @@ class SceneFit:
                 if not isinstance(target, CurveTarget):
                     rows.append(base.slopes(target, sides))
                     continue
-            neighbours = [[scene.all_to({name: target}) for scene in scenes] for _, _, *scenes in sides]
-            rows += list(
-                np.transpose([(up - down) / (2 * s[1]) for (up, down), s in zip(neighbours, sides, strict=True)])
-            )
+            answers = [[scene.all_to({name: target}) for scene in scenes] for _, _, *scenes in sides]
+            rows += list(np.transpose([(up - down) / (2 * s[1]) for (up, down), s in zip(answers, sides, strict=True)]))
         return np.array(rows)
 
     def _neighbour(self, values: Mapping[str, float]) -> SceneAnswers:

@@ -136,7 +136,7 @@ def optimise(
 
 def _search(study: ParameterStudy, runner: Runner) -> Optimum:
     """Runs where they promise most, until nothing is to be gained or there are as many as may be."""
-    optimise_settings, space = study.optimise, _space(study)
+    settings, space = study.optimise, _space(study)
     study = replace(study, settings=study.settings.model_copy(update={"derivatives": True}))
     proposals: list[dict[str, float]] = []
     while True:
@@ -146,7 +146,7 @@ def _search(study: ParameterStudy, runner: Runner) -> Optimum:
         evaluated = _evaluate(study, space, table)
         if not evaluated.solved.any():
             raise SolveFailed(f"no run has all numbers; the first: {table.columns[SENTENCE][0]}")
-        if len(evaluated.share) >= optimise_settings.evaluations:
+        if len(evaluated.share) >= settings.evaluations:
             break
         place, gain = propose(evaluated, lambda share: space.coordinates(space.values(share)), study.settings.seed)
         if gain < GAIN:
@@ -158,14 +158,12 @@ def _search(study: ParameterStudy, runner: Runner) -> Optimum:
     front = evaluated.front
     if not len(front):
         least = evaluated.excess[evaluated.solved].max(axis=1).min()
-        limits = ", ".join(limit.number for limit in optimise_settings.limits)
+        limits = ", ".join(limit.number for limit in settings.limits)
         raise SolveFailed(f"no run keeps the limits of {limits}: the nearest passes one by {100 * least:.2g} % of it")
     low, high = ends(evaluated)
-    best = int(front[chebyshev(evaluated.aims[front], np.ones(len(optimise_settings.aims)), low, high).argmin()])
-    bounded = {
-        aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in optimise_settings.aims
-    }
-    optimum = Optimum(study.name, optimise_settings.aims, table, tuple(int(row) for row in front), best, bounded)
+    best = int(front[chebyshev(evaluated.aims[front], np.ones(len(settings.aims)), low, high).argmin()])
+    bounded = {aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in settings.aims}
+    optimum = Optimum(study.name, settings.aims, table, tuple(int(row) for row in front), best, bounded)
     (runner.folder / "optimum.json").write_text(json.dumps(optimum.record(), indent=2) + "\n", encoding="utf-8")
     optimum.plot().savefig(runner.folder / "optimum.png")
     return optimum

@@ -91,10 +91,8 @@ class ParameterSpace:
         none = np.full(len(next(iter(columns.values()))), np.nan)
         by_key = []
         for key in self.keys:
-            keys_of_parameter = [key, *(copy for copy, original in self.study.settings.same.items() if original == key)]
-            by_key.append(
-                sum(np.asarray(columns.get(slope_column(number, name), none), float) for name in keys_of_parameter)
-            )
+            keys = [key, *(copy for copy, original in self.study.settings.same.items() if original == key)]
+            by_key.append(sum(np.asarray(columns.get(slope_column(number, name), none), float) for name in keys))
         values = self.points_of(columns)
         return np.stack(by_key, axis=1) * self.widths * np.where(self._logarithmic, values, 1.0)
 

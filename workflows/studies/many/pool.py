@@ -60,9 +60,7 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], RunRow
                         waiting.appendleft(task)
                         raise
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
-                for future in sorted(
-                    done, key=lambda done_future: isinstance(done_future.exception(), BrokenProcessPool)
-                ):
+                for future in sorted(done, key=lambda f: isinstance(f.exception(), BrokenProcessPool)):
                     row = future.result()
                     del under_way[future]
                     yield row

@@ -111,37 +111,31 @@ def wide(values: np.ndarray) -> bool:
 
 def picture_of_lives(distribution: LifeDistribution) -> Figure:
     """The share of the parts below a value, on normal probability paper, and Sobol indices as bars."""
-    with axes_of(10.0, 4.4, columns=2, share=False) as (figure, (paper_axes, index_axes)):
+    with axes_of(10.0, 4.4, columns=2, share=False) as (figure, (paper, index_axes)):
         share_below = np.cumsum(distribution.weights) - 0.5 * distribution.weights
         lowest = min(0.5 * min(q.share for q in distribution.quantiles), 0.01)
         shown = (share_below > lowest) & (share_below < 1 - min(lowest, 0.005))
-        paper_axes.plot(distribution.values[shown], stats.norm.ppf(share_below[shown]), color=BLUE, label="surrogate")
+        paper.plot(distribution.values[shown], stats.norm.ppf(share_below[shown]), color=BLUE, label="surrogate")
         columns = distribution.table.columns[distribution.number].astype(float)
         good = np.sort(columns[np.isfinite(columns)])
         for i, q in enumerate(distribution.quantiles):
             at = stats.norm.ppf(q.share)
             if distribution.model_error:
                 error_label = "with the model's own error" if i == 0 else None
-                paper_axes.plot(
-                    [q.low_in_all, q.high_in_all], [at, at], color=ORANGE, lw=5, alpha=0.45, label=error_label
-                )
+                paper.plot([q.low_in_all, q.high_in_all], [at, at], color=ORANGE, lw=5, alpha=0.45, label=error_label)
             sure = f"{100 * distribution.confidence:g} % sure" if i == 0 else None
-            paper_axes.plot(
-                [max(q.low, good[0] * 0.1), q.high], [at, at], color=RED, lw=2, marker="|", ms=9, label=sure
-            )
-            paper_axes.annotate(
-                f"{q.name} {q.value:.3g}", (q.value, at), (6, -11), textcoords="offset points", fontsize=9
-            )
+            paper.plot([max(q.low, good[0] * 0.1), q.high], [at, at], color=RED, lw=2, marker="|", ms=9, label=sure)
+            paper.annotate(f"{q.name} {q.value:.3g}", (q.value, at), (6, -11), textcoords="offset points", fontsize=9)
         ticks = [tick for tick in TICKS if lowest <= tick <= 1 - lowest]
-        paper_axes.set_yticks(stats.norm.ppf(ticks), [f"{100 * tick:g} %" for tick in ticks])
+        paper.set_yticks(stats.norm.ppf(ticks), [f"{100 * tick:g} %" for tick in ticks])
         if distribution.logarithmic:
-            paper_axes.set_xscale("log")
-            paper_axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            paper_axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            paper_axes.xaxis.set_minor_formatter(NullFormatter())
-        paper_axes.set(xlabel=_axis_label(distribution.number), ylabel="share of the parts below")
-        paper_axes.set_title(f"{distribution.name}: {distribution.runs} runs")
-        paper_axes.legend(loc="upper left", fontsize=9)
+            paper.set_xscale("log")
+            paper.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            paper.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            paper.xaxis.set_minor_formatter(NullFormatter())
+        paper.set(xlabel=_axis_label(distribution.number), ylabel="share of the parts below")
+        paper.set_title(f"{distribution.name}: {distribution.runs} runs")
+        paper.legend(loc="upper left", fontsize=9)
         order = distribution.influences[::-1]
         height = np.arange(len(order))
         index_axes.barh(height + 0.19, [influence.first for influence in order], 0.36, color=BLUE, label="first")

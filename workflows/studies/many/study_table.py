@@ -95,11 +95,9 @@ class StudyTable(StudyResult):
                 x, y = self.columns[key], self.columns[number]
                 if x.dtype.kind != "f":
                     continue
-                is_finite = np.isfinite(x) & np.isfinite(y)
-                if is_finite.sum() >= FEWEST and np.ptp(x[is_finite]) > 0 and np.ptp(y[is_finite]) > 0:
-                    correlations.setdefault(number, {})[key] = float(
-                        stats.spearmanr(x[is_finite], y[is_finite]).statistic
-                    )
+                finite = np.isfinite(x) & np.isfinite(y)
+                if finite.sum() >= FEWEST and np.ptp(x[finite]) > 0 and np.ptp(y[finite]) > 0:
+                    correlations.setdefault(number, {})[key] = float(stats.spearmanr(x[finite], y[finite]).statistic)
         return correlations
 
     @property

@@ -241,10 +241,8 @@ def compare(
 def changed(scene: Source, overrides: Overrides, changes: Sequence[str]) -> dict[str, SceneFile]:
     """The scene, and the scene with each of the changes; raises SceneError for one that it does not know."""
     base = read_scene(scene, overrides)
-    base_scene = {
-        change: [override.strip() for override in change.split(";") if override.strip()] for change in changes
-    }
-    return {"": base} | {change: base.changed(*keys) for change, keys in base_scene.items()}
+    keys_of = {change: [override.strip() for override in change.split(";") if override.strip()] for change in changes}
+    return {"": base} | {change: base.changed(*keys) for change, keys in keys_of.items()}
 
 
 def _named(text: str) -> tuple[str, str]:

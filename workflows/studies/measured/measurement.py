@@ -204,12 +204,10 @@ def resonances(measured: Measurement) -> Measurement:
     """
     if not measured.phased or any(not np.isfinite(run.force).all() for run in measured.runs) or measured.per_force:
         raise Refusal("the resonance of a run needs its force and its phase in every row")
-    points_by_control: dict[str, list[Run]] = {}
+    by_control: dict[str, list[Run]] = {}
     for run in measured.runs:
-        points_by_control.setdefault(run.control, []).append(resonance(run))
-    return replace(
-        measured, kind="backbone", runs=tuple(_joined(name, points) for name, points in points_by_control.items())
-    )
+        by_control.setdefault(run.control, []).append(resonance(run))
+    return replace(measured, kind="backbone", runs=tuple(_joined(name, points) for name, points in by_control.items()))
 
 
 def _joined(control: str, points: list[Run]) -> Run:

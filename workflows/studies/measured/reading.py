@@ -75,9 +75,7 @@ def _of_csv(path: Path, facts_given: Mapping[str, str]) -> tuple[dict[str, str],
     rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
     if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
         raise Refusal("expected a line of column names and rows of as many values below it")
-    return facts, {
-        name.strip(): np.array(column) for name, column in zip(rows[0], zip(*rows[1:], strict=True), strict=True)
-    }
+    return facts, {name.strip(): np.array(c) for name, c in zip(rows[0], zip(*rows[1:], strict=True), strict=True)}
 
 
 def _of_mat(path: Path, facts_given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
@@ -174,13 +172,9 @@ def _of_55(sets: list[dict[str, Any]]) -> dict[str, Any]:
 def _word(name: str) -> tuple[str, str]:
     """The word and the unit in the name of a column."""
     for word in sorted(COLUMNS, key=len, reverse=True):
-        column_match = re.match(rf"{word}(?:\s*\[(.*)\]|_(.*))?$", name.strip(), re.IGNORECASE)
-        if column_match:
-            unit = (
-                column_match[1]
-                if column_match[1] is not None
-                else (column_match[2] or "").replace("_per_", "/").replace("_", "/")
-            )
+        match = re.match(rf"{word}(?:\s*\[(.*)\]|_(.*))?$", name.strip(), re.IGNORECASE)
+        if match:
+            unit = match[1] if match[1] is not None else (match[2] or "").replace("_per_", "/").replace("_", "/")
             return word, re.sub(r"\bhz\b", "Hz", unit)
     return name, ""
 
@@ -188,33 +182,31 @@ def _word(name: str) -> tuple[str, str]:
 def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) -> Measurement:
     """Columns as a measurement."""
     output = facts.get("output", OUTPUT)
-    export_columns = {name: raw.get(f"{output}_{name}_m") for name in ("a1", "b1")}
-    timed = all(column is not None for column in export_columns.values())
+    exports = {name: raw.get(f"{output}_{name}_m") for name in ("a1", "b1")}
+    timed = all(column is not None for column in exports.values())
     if timed:  # an export of ours: x = a cos + b sin
         frequency_columns = {name: column for name, column in raw.items() if _word(name)[0] == "frequency"}
         raw = {
             **frequency_columns,
-            "real [m]": export_columns["a1"],
-            "imag [m]": -np.asarray(export_columns["b1"], float),
+            "real [m]": exports["a1"],
+            "imag [m]": -np.asarray(exports["b1"], float),
         }
     columns: Columns = {}
     for name, column in raw.items():
         word, unit = _word(name)
         if word in COLUMNS and word not in columns:
             columns[word] = _numbers(name, column), unit
-    response_word = next((word for word in RESPONSES if word in columns), None)
+    response = next((word for word in RESPONSES if word in columns), None)
     if "frequency" not in columns and "time" not in columns:
         raise Refusal(f"no column frequency or time among {', '.join(raw)}")
-    if response_word is None and "damping" not in columns:
+    if response is None and "damping" not in columns:
         raise Refusal(f"no column {' or '.join(RESPONSES)}, with its unit, among {', '.join(raw)}")
     n = len(columns["frequency" if "frequency" in columns else "time"][0])
     frequency = _si(columns, "frequency", "Hz", n)
     order, factor, per_force = (
-        (0, 1.0, False) if response_word is None else _kind_of_response(response_word, columns[response_word][1])
+        (0, 1.0, False) if response is None else _kind_of_response(response, columns[response][1])
     )
-    values = (
-        np.full(n, np.nan, complex) if response_word is None else factor * columns[response_word][0].astype(complex)
-    )
+    values = np.full(n, np.nan, complex) if response is None else factor * columns[response][0].astype(complex)
     phased = "imag" in columns or "phase" in columns
     if "imag" in columns:
         values = values + 1j * factor * columns["imag"][0]
@@ -227,7 +219,7 @@ def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) 
         values = values.conj()
     damping, force = _si(columns, "damping", "", n), np.abs(_si(columns, "force", "N", n))
     errors = np.stack([_si(columns, f"{name}_error", "", n) for name in ("frequency", "damping")], axis=1)
-    kind: Kind = "modes" if response_word is None else "backbone" if "damping" in columns else "response"
+    kind: Kind = "modes" if response is None else "backbone" if "damping" in columns else "response"
     names, controls = (_texts(raw, key, n, facts.get(key, "")) for key in ("run", "control"))
     labels, runs = list(zip(controls, names, _texts(raw, "repeat", n, ""), strict=True)), []
     if "time" in columns:
@@ -241,9 +233,7 @@ def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) 
         spin = 2j * np.pi * frequency[at]
         x = np.abs(values[at]) / np.abs(spin) ** order if kind == "backbone" else values[at] / spin**order
         runs.append(Run(name, label[0], frequency[at], x.astype(complex), force[at], damping[at], errors[at]))
-    positive = (
-        [run.frequency for run in runs] if response_word is None else [run.frequency * run.amplitude for run in runs]
-    )
+    positive = [run.frequency for run in runs] if response is None else [run.frequency * run.amplitude for run in runs]
     if not all(np.isfinite(k).all() and (k > 0).all() for k in positive):
         raise Refusal("frequency and response must be numbers above 0 in every row")
     return Measurement(

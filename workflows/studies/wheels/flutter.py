@@ -56,15 +56,9 @@ class Flutter(StudyResult):
                 for j, value in self.eigenvalues.items()
             ],
             "limit_cycles": [
-                {
-                    "index": j,
-                    "m": wave_row.amplitude,
-                    "hz": wave_row.frequency,
-                    "moved": wave_row.moved,
-                    "growth": wave_row.growth,
-                }
-                for j, (wave, _) in self.cycles.items()
-                for wave_row in wave
+                {"index": j, "m": c.amplitude, "hz": c.frequency, "moved": c.moved, "growth": c.growth}
+                for j, (cycles, _) in self.cycles.items()
+                for c in cycles
             ],
             "not_found": {str(j): reason for j, (_, reason) in self.cycles.items() if reason},
         }
@@ -76,11 +70,9 @@ class Flutter(StudyResult):
             + (", flutters" if value.real > 0 else "")
             for j, value in self.eigenvalues.items()
         ]
-        for j, (wave, reason) in self.cycles.items():
+        for j, (cycles, reason) in self.cycles.items():
             texts += [
-                f"limit cycle of wave {j}: {wave_row.amplitude:.4g} m at {wave_row.frequency:.6g} Hz"
-                + _in_time(wave_row)
-                for wave_row in wave
+                f"limit cycle of wave {j}: {c.amplitude:.4g} m at {c.frequency:.6g} Hz{_in_time(c)}" for c in cycles
             ]
             if reason:
                 texts.append(f"limit cycles of wave {j}: {reason}")

@@ -67,16 +67,14 @@ class MistunedBlades:
     @classmethod
     def of(cls, file: SceneFile) -> MistunedBlades:
         """Mesh and reduce; raises SceneError for a scene without [wheel] or [mistuning]."""
-        mistuning = asked_of(file)
+        table = asked_of(file)
         wheel = wheels.build(file)
-        K = deviating(wheel, mistuning.body)
+        K = deviating(wheel, table.body)
         loads = sorted({name for _, name in wheel.wave().excitation.loads})
-        shapes = reduction.nominal_shapes(
-            wheel.reduced, wheel.springs, K, mistuning.families, loads, mistuning.left_out
-        )
+        shapes = reduction.nominal_shapes(wheel.reduced, wheel.springs, K, table.families, loads, table.left_out)
         reduced = reduction.with_ports(wheel.reduced, K, shapes)
         wave = replace(wheel, reduced=reduced).wave()
-        if mistuning.friction and not wave.contact.has_friction:
+        if table.friction and not wave.contact.has_friction:
             raise SceneError("mistuning.friction: no contact of this scene has friction: leave it out")
         ports = tuple(reduction.port_name(k) for k in range(shapes.shape[1]))
         return cls(file, wheel.part, reduced, MistunedWheel(wave, ports))

@@ -147,21 +147,12 @@ def pattern_wear(
         n, drawn = blades.wheel.n_sectors, blades.pattern(pattern)
         balance = blades.balance(drawn)
         _, blade = blades.peak(drawn)
-        sector_problem = wear_run.wear_problem(file.scene, file.folder, blades.wheel.wave, wear_settings.lost_below)
+        sector = wear_run.wear_problem(file.scene, file.folder, blades.wheel.wave, wear_settings.lost_below)
         output = f"{OUTPUT}@{blade}"
         duties = [replace(duty, site=_of_output(duty.site, output)) for duty in settings.mission(file.scene)]
-        area = np.tile(sector_problem.area, n)
-        scale = settings.depth_scale(file.scene, references.free_deflection(blades.wheel.wave), sector_problem.area)
-        problem = WearProblem(
-            balance,
-            tuple(duties),
-            sector_problem.wear,
-            area,
-            sector_problem.lost_below,
-            None,
-            sector_problem.any_joint,
-            n,
-        )
+        area = np.tile(sector.area, n)
+        scale = settings.depth_scale(file.scene, references.free_deflection(blades.wheel.wave), sector.area)
+        problem = WearProblem(balance, tuple(duties), sector.wear, area, sector.lost_below, None, sector.any_joint, n)
         history = evolve(wear_run.rule_of(file.scene, problem, scale), wear_settings.max_steps, on_row)
     names = list(balance.compliance.output_names)
     rows = [names.index(f"{OUTPUT}@{k}") for k in range(n)]

@@ -193,15 +193,12 @@ def patterns(
     rows: dict[int, RunRow] = {}
     with alone_in(folder):
         finish(tasks := tasks_of(file, mistuning.patterns), runner, rows, solve, "patterns", inside=True)
-    rows_by_number = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks), folder)
+    result = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks), folder)
     names = ("amplification", "amplitude", "peak_frequency", "blade", "solves")
-    columns = {name: [row.numbers.get(name, np.nan) for row in rows_by_number.rows] for name in names}
-    n_patterns = {
-        "pattern": [row.run for row in rows_by_number.rows],
-        "status": [row.status for row in rows_by_number.rows],
-        **columns,
-    }
-    write_columns({**n_patterns, "seconds": [row.seconds for row in rows_by_number.rows]}, folder / "patterns.csv")
-    if rows_by_number.complete:
-        rows_by_number.plot().savefig(folder / "mistuning.png")
-    return rows_by_number
+    columns = {name: [row.numbers.get(name, np.nan) for row in result.rows] for name in names}
+    runs = {"pattern": [row.run for row in result.rows], "status": [row.status for row in result.rows]}
+    seconds = [row.seconds for row in result.rows]
+    write_columns({**runs, **columns, "seconds": seconds}, folder / "patterns.csv")
+    if result.complete:
+        result.plot().savefig(folder / "mistuning.png")
+    return result

@@ -177,12 +177,10 @@ def mistuned(
         heights = np.column_stack([branch.amplitude(f"{OUTPUT}@{i}") for i in range(n)])
         solved, output = process_time(), f"{OUTPUT}@{heights.max(axis=0).argmax()}"
         try:
-            derivatives_found = of_branch(file.scene, balance, branch, stiffer(wheel, balance), output=output)
-            at = dict(zip(derivatives_found.parameters, factors.tolist(), strict=True))
+            rates = of_branch(file.scene, balance, branch, stiffer(wheel, balance), output=output)
+            at = dict(zip(rates.parameters, factors.tolist(), strict=True))
             times = solved - start, process_time() - solved
-            peak: ResponseDerivatives | NoDerivative = ResponseDerivatives(
-                file.name, derivatives_found, at, {}, *times, ()
-            )
+            peak: ResponseDerivatives | NoDerivative = ResponseDerivatives(file.name, rates, at, {}, *times, ())
         except NoDerivative as reason:
             peak = reason
         tuned = wheels.follow(wheel.wave(), frequency, TOLERANCE)

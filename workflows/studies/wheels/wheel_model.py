@@ -96,14 +96,12 @@ class Wheel:
         stiffness : (n_sectors,) factor on the stiffness of each sector, such as blades that differ: what a travelling
             wave of one sector cannot say
         """
-        wave_balance = self.wave()
-        springs = np.tile(wave_balance.contact.stiffness, (self.n_sectors, 1))
+        wave = self.wave()
+        springs = np.tile(wave.contact.stiffness, (self.n_sectors, 1))
         model = wheel_model(self.reduced, stiffness)
         model = model.with_damping(partial(modelling.damping_matrix, self.scene, springs))
-        load = on_wheel(wave_balance.excitation, self.table.engine_order, self.n_sectors)
-        return HarmonicBalance.of(
-            model, wave_balance.contact.repeat(self.n_sectors), wave_balance.basis, load, wave_balance.omega_max
-        )
+        load = on_wheel(wave.excitation, self.table.engine_order, self.n_sectors)
+        return HarmonicBalance.of(model, wave.contact.repeat(self.n_sectors), wave.basis, load, wave.omega_max)
 
     def at_speed(self, speed: float) -> Wheel:
         """The same wheel turning at a speed [Hz]: stiffened by its stress, softened by its frame; not meshed again."""

@@ -61,16 +61,14 @@ class WheelModes(StudyResult):
 
     def figures(self) -> dict[str, Figure]:
         """The pictures by name."""
-        figures_by_name = {"nodal_diameters": wheel_diagrams.nodal_diameters(self.families, self.name)}
+        figures = {"nodal_diameters": wheel_diagrams.nodal_diameters(self.families, self.name)}
         if self.slow is not None and self.fast is not None:
-            figures_by_name["safe"] = wheel_diagrams.safe(
-                self.families, self.n_sectors, self.slow, self.fast, self.name
-            )
+            figures["safe"] = wheel_diagrams.safe(self.families, self.n_sectors, self.slow, self.fast, self.name)
         if len(self.speeds):
-            figures_by_name["campbell"] = wheel_diagrams.campbell(
+            figures["campbell"] = wheel_diagrams.campbell(
                 self.speeds, self.waves, self.orders, self.critical, self.name
             )
-        return figures_by_name
+        return figures
 
     def record(self) -> dict[str, Any]:
         """What was found, for machines."""
