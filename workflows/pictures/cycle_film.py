@@ -50,9 +50,7 @@ class CycleFilm:
         size = loop_size(result)[at]
         busiest, component = (int(index) for index in np.unravel_index(int(np.argmax(size)), size.shape))
         self._loop = loop_of(result, at, busiest, component)
-        shown = [
-            contact for contact in book.contacts(result) if busiest in range(*contact.pairs.indices(len(patch.area)))
-        ]
+        shown = [c for c in book.contacts(result) if busiest in range(*c.pairs.indices(len(patch.area)))]
         self._contact = book.opened(result, shown[0]) if shown else None
         self._moving = None
         if self.state.field is not None and result.part is not None and len(patch.faces):

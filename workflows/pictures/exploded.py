@@ -87,9 +87,7 @@ def _links(result: Result, part: PartMesh, body: np.ndarray) -> dict[tuple[int, 
                 direction, area = _touching(shells[first], shells[second])
                 if area > 0:
                     add(first, second, direction, area)
-    return {
-        pair: v if np.linalg.norm(v) > EXPLOSION.one_way * areas[pair] else np.zeros(3) for pair, v in links.items()
-    }
+    return {key: v if np.linalg.norm(v) > EXPLOSION.one_way * areas[key] else np.zeros(3) for key, v in links.items()}
 
 
 def _shell(part: PartMesh, mine: np.ndarray) -> Any:

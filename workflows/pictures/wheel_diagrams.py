@@ -137,12 +137,10 @@ def campbell(
             float(np.nanmax(frequencies["stuck"])), *(s * abs(o) for o, at in critical.items() for s in at), 0.0
         )
         for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
-            wave_frequencies = frequencies["stuck"][:, i]
-            axes.plot(rpm, wave_frequencies, color=color, label=_first(f"stuck, wave {order}", wave_frequencies))
+            waves = frequencies["stuck"][:, i]
+            axes.plot(rpm, waves, color=color, label=_first(f"stuck, wave {order}", waves))
             if (backward := frequencies.get("stuck" + AGAINST)) is not None and -order not in orders:
-                axes.plot(
-                    rpm, backward[:, i], "--", color=color, label=_first(f"stuck, wave {-order}", wave_frequencies)
-                )
+                axes.plot(rpm, backward[:, i], "--", color=color, label=_first(f"stuck, wave {-order}", waves))
             axes.plot(rpm, abs(order) * speeds, ":", color=color)
             end = min(1.0, top / (abs(order) * speeds[-1]))
             axes.annotate(
@@ -177,15 +175,13 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
     with axes_of(7.6, 5.2) as (figure, axes):
         orders = np.arange(1, min(int(top / slow) + 1, n_sectors) + 1)
         places = np.array([diameter_of(int(order), n_sectors) for order in orders])
-        is_shown = places <= max_diameter
+        shown = places <= max_diameter
         for speed, style in ((slow, "-"), (fast, "--")):
             label = f"engine orders to {orders[-1]} at {60 * speed:.5g} rpm"
             axes.plot(
-                places[is_shown], orders[is_shown] * speed, style, color=ORANGE, label=label, zorder=1,
+                places[shown], orders[shown] * speed, style, color=ORANGE, label=label, zorder=1,
             )  # fmt: skip
-        axes.vlines(
-            places[is_shown], orders[is_shown] * slow, orders[is_shown] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1
-        )
+        axes.vlines(places[shown], orders[shown] * slow, orders[shown] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1)
         for state, values in families.items():
             _families(axes, values, *STATES[state])
         rings = [match for matches in meetings(families, n_sectors, slow, fast).values() for match in matches]
@@ -194,7 +190,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
                 [m.diameter for m in rings], [m.frequency for m in rings], "o", ms=10, mfc="none", color=RED,
                 label=f"met by an engine order ({len(rings)})",
             )  # fmt: skip
-        for order, place in zip(orders[is_shown], places[is_shown], strict=True):
+        for order, place in zip(orders[shown], places[shown], strict=True):
             if order * fast < top:
                 axes.annotate(
                     f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center",

@@ -152,9 +152,7 @@ def _candidates(source: Any) -> Iterator[Candidate]:
             faced = frozenset((first[1], second[1]))
             pairs.append((Candidate(names[0], names[1], *match, faced in declared, declared.get(faced)), first, second))
     used_facets: dict[tuple[str, str], set[int]] = defaultdict(set)  # bodies that touch -> facets of the first one
-    for pair, first, second in sorted(
-        pairs, key=lambda at: (not at[0].declared, -round(at[0].share, 2), at[0].distance)
-    ):
+    for pair, first, second in sorted(pairs, key=lambda p: (not p[0].declared, -round(p[0].share, 2), p[0].distance)):
         ends = ((used_facets[first[0], second[0]], first[2]), (used_facets[second[0], first[0]], second[2]))
         if all(
             used.isdisjoint(facets_of_group) for used, facets_of_group in ends
@@ -222,16 +220,12 @@ def _text(
         yield from (f"first = {json.dumps(pair.first)}", f"second = {json.dumps(pair.second)}")
         yield from ('tangential_stiffness = "100 N/um"  # GUESS', 'normal_stiffness = "100 N/um"  # GUESS')
         yield "friction = 0.5  # GUESS" if pair.friction is None else f"friction = {pair.friction}  # of the deck"
-    fixed_bodies = {
-        name for name, body in source.bodies.items() for s in source.deck.supports if s.group in body.node_sets
-    }
-    loaded_body = [*fixed_bodies, *(name for name in source.bodies if name not in fixed_bodies)][-1]
-    face = json.dumps(group_name(loaded_body, first_face[loaded_body], source.bodies[loaded_body].node_sets))
-    loaded_ends = [
-        (pair, end) for pair in candidates for end in (pair.first, pair.second) if end.startswith(f"{loaded_body}.")
-    ]
-    if loaded_ends and not (source.deck.forces or source.deck.pressures):
-        pair, end = loaded_ends[0]
+    fixed = {name for name, body in source.bodies.items() for s in source.deck.supports if s.group in body.node_sets}
+    loaded = [*fixed, *(name for name in source.bodies if name not in fixed)][-1]
+    face = json.dumps(group_name(loaded, first_face[loaded], source.bodies[loaded].node_sets))
+    ends = [(pair, end) for pair in candidates for end in (pair.first, pair.second) if end.startswith(f"{loaded}.")]
+    if ends and not (source.deck.forces or source.deck.pressures):
+        pair, end = ends[0]
         towards = [(1 if end == pair.first else -1) * component + 0.0 for component in pair.normal]
         yield from ("", "[loads.static.press]  # GUESS: presses the faces together, the drive shall not lift them")
         yield from (f"group = {json.dumps(end)}", f"direction = {towards}", 'value = "1 kN"')

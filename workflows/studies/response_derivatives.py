@@ -90,9 +90,7 @@ class ResponseDerivatives(StudyResult):
     @property
     def corners(self) -> tuple[str, ...]:
         """Keys at a corner of the contact forces."""
-        return tuple(
-            key for key, corner in zip(self.derivatives.parameters, self.derivatives.corner, strict=True) if corner
-        )
+        return tuple(key for key, c in zip(self.derivatives.parameters, self.derivatives.corner, strict=True) if c)
 
     def record(self) -> dict[str, Any]:
         """For machines, SI units."""

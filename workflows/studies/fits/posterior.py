@@ -76,10 +76,8 @@ class Posterior(StudyResult):
         """Of parameters and predicted numbers."""
         columns = [(p.name, p.unit, self.samples[:, i]) for i, p in enumerate(self.parameters)]
         columns += [(name, self.units[name], values) for name, values in self.predicted.items()]
-        return tuple(
-            Summary(name, unit, *(float(v) for v in np.quantile(values, [0.5, 0.05, 0.95])))
-            for name, unit, values in columns
-        )
+        shares = [0.5, 0.05, 0.95]
+        return tuple(Summary(n, unit, *map(float, np.quantile(values, shares))) for n, unit, values in columns)
 
     @property
     def doubts(self) -> list[str]:

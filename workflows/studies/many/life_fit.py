@@ -81,9 +81,7 @@ class LifeFit:
         if share == self.share_sought:
             return float(low), float(high)
         of = self.surrogate
-        values, predictions = (
-            (each - self.by_ratio)[self.drawn, None] + self.ratios for each in (of.values, of.left_out)
-        )
+        values, predictions = ((x - self.by_ratio)[self.drawn, None] + self.ratios for x in (of.values, of.left_out))
         lowest, highest = quantiles.counted(sample, values, predictions, at, confidence)
         return float(min(low, lowest)), float(max(high, highest))
 
@@ -152,10 +150,8 @@ def quantile_of(life_fit: LifeFit, sample: Sample, share: float, confidence: flo
     for at, side in ((lowest_share, 0), (highest_share, 1)):
         draws = quantiles.drawn(sample, life_fit.surrogate, at)
         end = life_fit.ends(sample, share, at, draws, confidence)[side]
-        shares = 0.5 - confidence / 2, 0.5 + confidence / 2
-        shift = np.quantile(_shifted(draws, error, life_fit.logarithmic), shares[side]) - np.quantile(
-            draws, shares[side]
-        )
+        tails = 0.5 - confidence / 2, 0.5 + confidence / 2
+        shift = np.quantile(_shifted(draws, error, life_fit.logarithmic), tails[side]) - np.quantile(draws, tails[side])
         ends.append((end, end + float(shift)))
     back = np.exp if life_fit.logarithmic else float
     (own_low, all_low), (own_high, all_high) = ([float(back(end)) for end in side] for side in ends)
