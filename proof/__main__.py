@@ -16,6 +16,7 @@ from proof.cases.blade.commands import blade
 from proof.cases.leaf_seal.commands import leaf
 from proof.cases.rig.commands import rig
 from proof.words import PICTURE, report_progress
+from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.command.main import guard
 from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room
 
@@ -109,7 +110,7 @@ def scoreboard(
     print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else table.summary(rows))
     broken = sum(statement.violated for row in rows for statement in (*row.judged, *row.bound))
     if broken:
-        raise RuntimeError(f"{broken} stated errors are violated, see {out / 'scoreboard.csv'}")
+        raise SolverFailure(f"{broken} stated errors are violated, see {out / 'scoreboard.csv'}")
 
 
 def faults(*, tree: Path = Path(), seconds: float = 20.0, out: Path = Path("faults"), as_json: Json = False) -> None:
@@ -195,7 +196,7 @@ def fuzz(
     else:
         print(fuzz_mixed.as_table(cases) if scene is None else measured.as_text(cases))
     if wrong:
-        raise RuntimeError(f"{len(wrong)} of {sum(not case.same_as for case in cases)} values did not end as they may")
+        raise SolverFailure(f"{len(wrong)} of {sum(not case.same_as for case in cases)} values did not end as they may")
 
 
 def branches(*, problems: int = 20, first: int = 0, as_json: Json = False) -> None:
@@ -219,7 +220,7 @@ def branches(*, problems: int = 20, first: int = 0, as_json: Json = False) -> No
     print(json.dumps(curves.as_records(rows), indent=2) if as_json else curves.as_text(rows))
     wrong = sum(row.outcome == curves.WRONG for row in rows)
     if wrong:
-        raise RuntimeError(f"{wrong} of {len(rows)} curves are wrong, see the table")
+        raise SolverFailure(f"{wrong} of {len(rows)} curves are wrong, see the table")
 
 
 def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: Json = False) -> None:
@@ -242,7 +243,7 @@ def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: 
     print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
     wrong = table.counts(rows)["wrong"]
     if wrong:
-        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
+        raise SolverFailure(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
 
 
 def ablations(
@@ -285,12 +286,12 @@ def mistuned(*, count: int = 100, dense: int = 3, as_json: Json = False) -> None
     from proof import mistuned as proof
 
     if not 1 <= dense <= count:
-        raise ValueError(f"--count {count} --dense {dense}: give at least 1 pattern, and at most as many dense")
+        raise Refusal(f"--count {count} --dense {dense}: give at least 1 pattern, and at most as many dense")
     groups = proof.run(count, dense, report_progress)
     print(json.dumps(proof.as_records(groups), indent=2) if as_json else "\n".join(group.line() for group in groups))
     wrong = sum(group.wrong(dense) for group in groups)
     if wrong:
-        raise RuntimeError(f"{wrong} of {len(groups)} settings of mistuned wheels are wrong, see the table")
+        raise SolverFailure(f"{wrong} of {len(groups)} settings of mistuned wheels are wrong, see the table")
 
 
 def wear_steps(scene: str, *, overrides: Overrides = (), out: Path | None = None, as_json: Json = False) -> None:
@@ -335,7 +336,7 @@ def wear(*, scenes: int = 12, seconds: float = 60.0, as_json: Json = False) -> N
     records = [{**asdict(row), "outcome": row.outcome} for row in rows]
     print(json.dumps(records, indent=2) if as_json else brute_wear.as_text(rows))
     if broken := sum(row.outcome == "violated" for row in rows):
-        raise RuntimeError(f"{broken} stated lives are violated, see the table")
+        raise SolverFailure(f"{broken} stated lives are violated, see the table")
 
 
 app = cyclopts.App(name="prove", help="Proofs of tribodyn: speed, extremes, faults, errors of unseen scenes.")

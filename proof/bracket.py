@@ -12,6 +12,7 @@ import numpy as np
 
 from tribodyn.geometry import checks
 from tribodyn.geometry.gmsh_session import save, session
+from tribodyn.refusal import Refusal
 
 MESH = ("n_length",)  # numbers of elements
 
@@ -40,11 +41,11 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.numbers(self, holes=0, n_length=3, sides=3)
         if self.thickness >= self.height or self.thickness + self.pad_length >= self.length:
-            raise ValueError(
+            raise Refusal(
                 f"geometry.thickness is {self.thickness}: keep it below height, and with pad_length below length"
             )
         if self.holes and self.hole >= min(self.width, (self.height - self.thickness) / self.holes):
-            raise ValueError(f"geometry.hole is {self.hole}: keep it below width, and all holes within the height")
+            raise Refusal(f"geometry.hole is {self.hole}: keep it below width, and all holes within the height")
 
 
 def build(parameters: Parameters, path: str | Path) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 
 from proof.fuzz_runs import ACCEPTED, REFUSED, Case, Command, FuzzEnd, Runs, scene_job
 from proof.time_limit import TimeUp, processor_seconds
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import scene_file
 
 INPUTS = (
@@ -83,7 +84,7 @@ def fuzz(
         the scene as it is does not end well
     """
     if not hasattr(os, "fork"):
-        raise ValueError("this system cannot fork processes, as fuzz does")
+        raise Refusal("this system cannot fork processes, as fuzz does")
     rows = _Rows(folder, scene, overrides)
     refused, scenes, unclear = _read_all(scene, overrides, cases(scene, overrides, values, seed), seconds, say, rows)
     order = np.random.default_rng(seed).permutation(len(scenes))[:runs]
@@ -156,7 +157,7 @@ class _Rows:
             self._write(of)
         first, *lines = (json.loads(line) for line in self._path.read_text(encoding="utf-8").splitlines())
         if first != of:
-            raise ValueError(f"{folder} keeps runs of {first['scene']} with other changes: give another folder")
+            raise Refusal(f"{folder} keeps runs of {first['scene']} with other changes: give another folder")
         for line in lines:
             self._take(FuzzEnd(**line) if "end" in line else _Meant(**line))
 

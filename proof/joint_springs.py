@@ -21,6 +21,7 @@ from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import hold
 from tribodyn.reduction.relative import relative
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import joints, modelling
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.solution_tables import Output
@@ -67,7 +68,7 @@ def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None 
     """
     scene = file.mesh_scene
     if not scene.springs:
-        raise ValueError(f"{file.name} has no springs whose stiffness could change: add a table such as [springs.seat]")
+        raise Refusal(f"{file.name} has no springs whose stiffness could change: add a table such as [springs.seat]")
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     outputs = scene.response.others
     if probes is not None:

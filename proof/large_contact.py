@@ -35,6 +35,7 @@ from tribodyn.hbm.linear.compliance_point import CompliancePoint
 from tribodyn.hbm.linearisation import Linearisation
 from tribodyn.reduction import residual_flexibility
 from tribodyn.reduction.residual_flexibility import FlexibleModel, ResidualFlexibility
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import memory, modelling, settings
 from tribodyn.workflows.scene import scene_file
 
@@ -101,7 +102,7 @@ def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[ContactCost]:
     """Measure sizes by name, each way in a process of its own; raises ValueError for a size that is not known."""
     unknown = [size for size in sizes if size not in SIZES]
     if unknown:
-        raise ValueError(f'no size "{unknown[0]}": there are {", ".join(SIZES)}')
+        raise Refusal(f'no size "{unknown[0]}": there are {", ".join(SIZES)}')
     rows = []
     for size in sizes:
         theirs: np.ndarray | None = None

@@ -27,6 +27,7 @@ from tribodyn.fem.part import Part
 from tribodyn.geometry import parts
 from tribodyn.reduction import craig_bampton, residual_flexibility
 from tribodyn.reduction.craig_bampton import master_dofs
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import memory, modelling, part_reduction
 from tribodyn.workflows.scene import scene_file
 
@@ -78,11 +79,11 @@ def run(sizes: Sequence[str], say: Callable[[str], None], ways: Sequence[str] = 
     ways_by_name = dict.fromkeys([*PRODUCTS, *WAYS])
     for way in ways:
         if way not in ways_by_name:
-            raise ValueError(f'no way "{way}": there are {", ".join(ways_by_name)}')
+            raise Refusal(f'no way "{way}": there are {", ".join(ways_by_name)}')
     rows = []
     for size in sizes:
         if size not in SIZES | ASSEMBLIES:
-            raise ValueError(f'no size "{size}": there are {", ".join(SIZES | ASSEMBLIES)}')
+            raise Refusal(f'no size "{size}": there are {", ".join(SIZES | ASSEMBLIES)}')
         for way in ways or WAYS_OF_SIZE.get(size, WAYS):
             say(f"{size}{' DOFs' if size in SIZES else ''}, {way}")
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:

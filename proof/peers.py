@@ -31,6 +31,7 @@ from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
+from tribodyn.refusal import SolverFailure
 
 SAMPLES, TOLERANCE = 128, 1e-8
 LIMIT, SPRING, NORMAL = 0.1, 0.5, 5.0  # limit force, tangential and normal stiffness of a Jenkins element
@@ -126,7 +127,7 @@ def _theirs(python: Path, problem: dict[str, Any], points: int) -> dict[str, Any
             text=True, env={**os.environ, **single_thread}, cwd=gettempdir(),  # where it writes a file of its own
         )  # fmt: skip
         if done.returncode:
-            raise RuntimeError(f"pyHarm ended with: {done.stderr.strip().splitlines()[-1]}")
+            raise SolverFailure(f"pyHarm ended with: {done.stderr.strip().splitlines()[-1]}")
         answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])[0]
         return answer
 

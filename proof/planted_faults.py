@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from proof.rewriting import Rule, rewritten
+from tribodyn.refusal import Refusal, SolverFailure
 
 LIST = Path(__file__).with_suffix(".toml")
 ROWS = "rows.jsonl"
@@ -50,9 +51,9 @@ class Fault:
         try:
             module = rewritten(source, self.function, Rule.parse(self.rule))
         except ValueError as failure:
-            raise ValueError(f"{self.file}: {self.effect}: {failure}") from failure
+            raise Refusal(f"{self.file}: {self.effect}: {failure}") from failure
         if ast.dump(module) == ast.dump(ast.parse(source)):
-            raise ValueError(f"{self.file}: {self.effect}: nothing changes by {self.rule}")
+            raise Refusal(f"{self.file}: {self.effect}: nothing changes by {self.rule}")
         return module
 
 
@@ -101,7 +102,7 @@ def run(tree: Path, folder: Path, report: Callable[[str], None], seconds: float 
     """
     planned, _ = faults()
     if not (tree / "tests").is_dir():
-        raise ValueError(f"{tree} holds no tests: plant faults from a clone of the repository")
+        raise Refusal(f"{tree} holds no tests: plant faults from a clone of the repository")
     for fault in planned:
         fault.faulty(tree)
     uses_numba = ["numba" in (tree / fault.file).read_text(encoding="utf-8") for fault in planned]
@@ -132,7 +133,7 @@ def _plant_in_process(
         for line in process.stdout:
             report(line.strip())
     if process.returncode:
-        raise RuntimeError(f"planting ended with exit code {process.returncode}: see {folder / 'printed'}")
+        raise SolverFailure(f"planting ended with exit code {process.returncode}: see {folder / 'printed'}")
 
 
 def rows_in(folder: Path) -> list[Detection]:

@@ -18,6 +18,7 @@ from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import impact
 from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.result import Patch, References, Result
 from tribodyn.workflows.run import references, response_curve, settings, wear_run
 from tribodyn.workflows.run.description import described
@@ -87,7 +88,7 @@ def wear(file: SceneFile, balance: HarmonicBalance) -> WearHistory:
     """
     table = file.scene.wear
     if table is None:
-        raise ValueError(f"{file.name} has no [wear]: say how it wears")
+        raise Refusal(f"{file.name} has no [wear]: say how it wears")
     at_rest = table.end_at == "at_rest"
     problem = wear_run.wear_problem(file.scene, file.folder, balance, table.lost_below, at_rest)
     scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)

@@ -20,6 +20,7 @@ from proof import reference
 from proof.scoreboard_scenes import draw
 from proof.time_limit import TimeUp, processor_seconds
 from tribodyn.hbm.quantity import names_with_error
+from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.errors import accuracy, judgement
 from tribodyn.workflows.errors.operating_states import relative_change
 from tribodyn.workflows.result.result import Result
@@ -189,7 +190,7 @@ def _bound(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
 
     def round_of(scene_file: SceneFile, number: int) -> Result:
         if process_time() - start > seconds:
-            raise RuntimeError(f"the bound takes above {seconds:g} s")
+            raise SolverFailure(f"the bound takes above {seconds:g} s")
         result, model = solved(scene_file)
         return judgement.with_verdict(scene_file, model, result, Progress())
 

@@ -18,6 +18,7 @@ from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE, STYLE
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
@@ -85,7 +86,7 @@ def compare(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] =
     """
     file = scene_file.read(scene, overrides)
     if file.scene.wear is None:
-        raise ValueError(f"scene {file.name} has no [wear]: there is no wear step to trade")
+        raise Refusal(f"scene {file.name} has no [wear]: there is no wear step to trade")
     problem, delta = _problem(file)
     with threadpool_limits(1):
         fine = [_measure(problem, delta, "error_controlled", step, say) for step in REFERENCE_TOLERANCES]

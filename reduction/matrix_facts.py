@@ -52,9 +52,7 @@ def matrix_facts(stiffness: sp.csr_matrix, mass_matrix: sp.csr_matrix, labels: L
             mass.append(float(translation @ (M @ translation)))
     remarks = []
     if n_rigid not in (0, 6):
-        remarks.append(
-            f"{n_rigid} rigid-body modes: a structure has none where it is held, and six where it is free"
-        )
+        remarks.append(f"{n_rigid} rigid-body modes: a structure has none where it is held, and six where it is free")
     if mass and max(mass) > 1.01 * min(mass):
         each = ", ".join(f"{m:.4g}" for m in mass)
         remarks.append(f"its mass is not the same in all directions ({each} kg): rows are missing or turned")

@@ -28,8 +28,6 @@ def relative(
         through T to get back to the full field
     Raises  Refusal where a component is missing, or where a body-1 DOF is held or shared by two pairs
     """
-    if interface.components != COMPONENTS:
-        raise Refusal(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
     averaged, interface = interface, interface.nodes or interface
     n, n_pair = system.n_dof, interface.n_pair
     B = csr_matrix(interface.B)
@@ -50,8 +48,10 @@ def relative(
 def body_1_dofs(interface: ContactInterface) -> np.ndarray:
     """DOFs (n_pair, 3) of the body-1 nodes along x, y, z: the columns of B that hold the frames themselves.
 
-    Raises  Refusal where one is not among the DOFs of the system
+    Raises  Refusal where one is not among the DOFs of the system, or the contact has not all three components
     """
+    if interface.components != COMPONENTS:
+        raise Refusal(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
     interface = interface.nodes or interface
     n_pair = interface.n_pair
     B = csr_matrix(interface.B)

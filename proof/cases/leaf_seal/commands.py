@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from proof.words import report_progress
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.command.word import Flag, Json, make_room
 
 
@@ -38,7 +39,7 @@ def leaf(
     make_room(out)
     folder = out or Path("results") / f"leaf_{work}"
     if resume and work != "study":
-        raise ValueError(f"--resume is for leaf study, leaf {work} has nothing to resume: run it without")
+        raise Refusal(f"--resume is for leaf study, leaf {work} has nothing to resume: run it without")
 
     def tell(line: str) -> None:
         print(line, file=sys.stderr if as_json else sys.stdout, flush=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from proof.words import Changes, report_progress
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.command.word import Flag, Json, Overrides, make_room
 
 
@@ -46,7 +47,7 @@ def rig(
     from proof.cases.rig import fit as rig_fit, life as rig_life, study as rig_study, table as rig_table
 
     if change and work != "life":
-        raise ValueError(f"--change is for rig life; for rig {work} use --set")
+        raise Refusal(f"--change is for rig life; for rig {work} use --set")
     if work == "life":
         rows = rig_life.run(scene, overrides, change, report_progress)
         print(json.dumps(rig_life.as_records(rows), indent=2) if as_json else rig_life.as_text(rows))

@@ -24,6 +24,7 @@ from proof.cases.rig.model import TIED, Rig, check
 from proof.cases.rig.published import LIFE_MEASURED, OPEN, PRELOAD, STUCK, TABLE_5_3, WORK
 from proof.cases.rig.wear import RigWear, wear_down
 from tests.helpers.fits import fit_by_differences as identify
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import read_scene
@@ -102,7 +103,7 @@ def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
     Raises  ValueError where the run did not end with the preload lost
     """
     if not run.lost:
-        raise ValueError(f"a wear coefficient needs a run that loses its preload, but this one: {run.end}")
+        raise Refusal(f"a wear coefficient needs a run that loses its preload, but this one: {run.end}")
     final = np.array([run.history.cycles[-1], run.spent[-1]])
     measured = [MeasuredNumber("cycles to loss", LIFE_MEASURED), MeasuredNumber("work to loss", WORK, "J")]
     parameter = FitParameter("coefficient", coefficient / 10, 10 * coefficient, (coefficient,), "m3/J")
