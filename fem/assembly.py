@@ -22,7 +22,7 @@ Materials = AnyMaterial | Mapping[str, AnyMaterial]
 class Body:
     """name : unique in an assembly, may be empty for an only body, whose groups then keep their names;
     mesh, node_sets : as geometry.mesh.read gives them; material : one, or by subdomain
-    notes : sentences on what was done to its file, and on what of it is not used
+    notes : sentences on conversions of its file, and on its unused content
     """
 
     name: str
@@ -34,7 +34,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Piece:
-    """A mesh and where its numbers start in the whole: those of nodes, elements and facets."""
+    """A mesh, and the first numbers of its nodes, elements and facets in the assembly."""
 
     mesh: Any
     node: int = 0
@@ -110,7 +110,7 @@ def pieces(mesh: Any) -> tuple[Piece, ...]:
 
 
 def materials_of(mesh: Any, material: Any) -> Iterator[tuple[Piece, Materials]]:
-    """Every piece with its material; that of an assembly is one for all, or body -> material."""
+    """Every piece with its material. An assembly has one material for all, or a table body -> material."""
     for i, piece in enumerate(pieces(mesh)):
         named = isinstance(mesh, Assembly) and isinstance(material, Mapping)
         yield piece, material[mesh.bodies[i].name] if named else material

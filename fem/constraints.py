@@ -130,7 +130,7 @@ class ClampAlong:
 
 
 def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Dependence]) -> tuple[np.ndarray, csr_matrix]:
-    """The DOFs (n_free,) that are left, and the map (n_dof, n_free) from them to all.
+    """The independent DOFs (n_free,), and the map (n_dof, n_free) from them to all DOFs.
 
     free : DOFs that no clamp holds
     Raises  Refusal, naming the constraints, where a DOF follows twice, is clamped and follows, or follows itself

@@ -26,7 +26,7 @@ class ContactFaces:
 
     face : boundary name of body 1; opposite : boundary name of body 2, None for the ground
     t1 : (3,) direction whose part along the face is t1; components : those modelled, of t1, t2, n
-    gap : opening before loading [m], one or (n_pair,); None takes that of the geometry between two faces, interference
+    gap : opening before loading [m], one or (n_pair,); None takes the geometric gap between two faces, interference
         negative, and 0 to the ground
     vertices_only : no pairs at mid-side and mid-face nodes; without, six-node faces have theirs at mid-side nodes only
     face_centres : one pair at the centre of each polygon between nodes, moved and opened by the mean of its corners
@@ -36,7 +36,7 @@ class ContactFaces:
     pairing : "nodes" pairs matching nodes, "mortar" weighs both faces over the surface they share, "auto" pairs nodes
         where every facet of the first face has its like on the second
     reach : farthest opening at which two faces still meet [m], a tenth of the length of the first by default
-    joint : name of the joint that it belongs to, that of the face by default
+    joint : name of its joint, by default the name of the face
     turn : (3, 3) rotation from a sector of a wheel to the next one, whose opposite face is met; None for the same body
     Raises  Refusal, as its methods, for what contradicts itself
     """

@@ -75,7 +75,7 @@ def with_neighbours(
         raise Refusal(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     missing = [contact.face for contact in contacts if contact.opposite is None]
     if missing:
-        raise Refusal(f"contact '{missing[0]}' of a cyclic part needs the opposite face, that of the next sector")
+        raise Refusal(f"contact '{missing[0]}' of a cyclic part needs the opposite face, which lies on the next sector")
     turn = rotation(unit(axis, "the axis of rotation"), 2 * np.pi / n_sectors)
     return [replace(contact, turn=turn) for contact in contacts]
 

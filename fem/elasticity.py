@@ -196,7 +196,7 @@ def reduced_elements(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     """Nodes (n, 8), mean gradient (n, 3, 8) [1/m] and volume (n,) [m3] of the linear elements of a mesh; n goes through
     all 27-node ones eight times, through 8-node ones once.
 
-    They are those of a first-order mesh, or eight on the nodes of each 27-node one. The gradient is the mean over the
+    The elements are those of a first-order mesh, or eight in each 27-node one. The gradient is the mean over the
     element and the mass lumped: what explicit programs and many published models have, softer than the 27-node element.
     The fourth, (n, 8, 8) [m], times the shear modulus and a unit matrix (3, 3), holds hourglass modes
     Raises  Refusal for a mesh of other elements

@@ -18,7 +18,7 @@ def partners(points: np.ndarray, candidates: np.ndarray, label: str, length: flo
     """The candidate that lies at each point.
 
     points : (k, 3), candidates : (m, 3), m >= k [m]; label : the two faces, for the error
-    length : that the tolerance is a part of, by default that of the first face [m]
+    length : reference of the relative tolerance, by default the length of the first face [m]
     Returns (k,) numbers of candidates, all different
     Raises  Mismatch, naming the faces and the worst place, where a point has no partner
     """

@@ -1,6 +1,6 @@
 """Contact of two faces whose meshes do not match: weighted relative displacements at points of the first face.
 
-At point A with weight function phi_A the relative displacement is the mean of that of the two faces,
+At point A with weight function phi_A the relative displacement is a weighted mean over the two faces,
 x_A = (1 / a_A) integral of phi_A (u_1 - u_2), a_A = integral of phi_A > 0. The functions sum to one, so that a
 constant pressure acts on both bodies as its consistent nodal forces. On a whole nine-node facet phi are its shape
 functions, on a whole six-node one the linear functions of its sides: they keep the first and second moments of the
@@ -114,7 +114,7 @@ def describe_separation(first_side: Side, second_side: Side, reach: float) -> st
     if facing < 0 and inside < -reach and lateral < facet:
         return (
             f"the bodies overlap: the second face lies about {-inside:.3g} m inside the first body, farther than the "
-            f"{reach:.3g} m where faces are looked for; move a body, or give reach"
+            f"{reach:.3g} m where opposite faces are searched for; move a body, or give reach"
         )
     return (
         f"the two faces do not meet: they are about {distance.min():.3g} m apart, farther than the "

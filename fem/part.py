@@ -33,7 +33,7 @@ class Part:
     """system : over the free DOFs; interface : likewise; free : (n_free,) DOF of the mesh that each one is,
     node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; nodes : (n_pair,) nearest to the pairs
     mesh : scikit-fem's, or an assembly
-    held_rows : (k, n_free) motions held besides, held_rows @ q = 0, for reduction.prescribed
+    held_rows : (k, n_free) further prescribed motions, held_rows @ q = 0, for reduction.prescribed
     pairs : contact face -> its pairs in the interface; node_sets : as geometry.mesh.read gives them
     joints : joint -> its pairs
     dependence : (n_dof, n_free) displacement of all DOFs where some depend on others, else None
@@ -108,7 +108,7 @@ def build(
     mesh, node_sets : as geometry.mesh.read gives them, or an Assembly and its node sets
     material : one, or subdomain name -> material; of an assembly one, or body name -> these
     springs : joints that give way, to the ground or between sets
-    held_motions : held besides the clamps; constraints : DOFs that depend on others; masses : on points or sets
+    held_motions : prescribed, too; constraints : DOFs that depend on others; masses : on points or sets
     Raises  Refusal where a name is unknown or a group is empty, one sentence
     """
     M, K = assemble(mesh, material)

@@ -61,7 +61,7 @@ class Asperities:
     """Summits of a face.
 
     height : (n,) above the mean of the face [m];  curvature : (n,) mean of that along x and y, positive [1/m]
-    area : in which they were looked for [m2];  moments : of the same face
+    area : searched for summits [m2];  moments : of the same face
     repairs : one sentence for each thing that was changed in a map
     """
 
@@ -159,7 +159,7 @@ def summits(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     """
     z = surface.z
     if not np.isfinite(z).all():
-        raise Refusal(f"{surface.name}: it has points without height: fill the holes before summits are looked for")
+        raise Refusal(f"{surface.name}: it has points without height: fill the holes before the search for summits")
     inner = z[1:-1, 1:-1]
     is_summit = inner > _highest_neighbour(z)
     count = int(is_summit.sum())

@@ -1,7 +1,7 @@
 """Measured height maps: level, mirror and sample them at contact nodes; the gap between two of them.
 
-Coordinates are those of the contact patch seen along the normal of body 1. A face of body 2 is measured looking at it,
-so it must be mirrored once before it faces body 1.
+Coordinates are those of the contact patch seen along the normal of body 1. A map of body 2 is seen along the
+normal of body 2, so it must be mirrored once before it faces body 1.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def prepare(surface: HeightMap, cutoff: float, expected_size: tuple[float, float
 
 
 def repair(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> tuple[HeightMap, tuple[str, ...]]:
-    """The map without spikes and holes, levelled, and what was changed; arguments and errors as of `prepare`."""
+    """The map without spikes and holes, levelled, and the list of changes; arguments and errors as of `prepare`."""
     check(surface, expected_size)
     without_spikes, spikes = remove_outliers(surface)
     filled, holes = fill_holes(without_spikes)
@@ -113,7 +113,7 @@ def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) 
 def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     """Turn spikes into holes: points far off the median of the 5 x 5 points around them.
 
-    Returns the map with NaN at spikes, and what was done
+    Returns the map with NaN at spikes, and a sentence on each change
     """
     measured = np.isfinite(surface.z)
     nearest = scipy.ndimage.distance_transform_edt(~measured, return_distances=False, return_indices=True)
@@ -138,7 +138,7 @@ def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
 def fill_holes(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     """Close holes with the surface that has no curvature of its own there (Laplace), bounded by its rim.
 
-    Returns the map without NaN, and what was done
+    Returns the map without NaN, and a sentence on each change
     """
     holes = ~np.isfinite(surface.z)
     count = int(holes.sum())
@@ -179,7 +179,7 @@ def fill_holes(surface: HeightMap) -> tuple[HeightMap, list[str]]:
 def split(surface: HeightMap, cutoff: float) -> tuple[HeightMap, HeightMap]:
     """Part waviness from roughness by the areal Gaussian filter.
 
-    cutoff : wavelength [m] of which one half of the amplitude goes to either part
+    cutoff : wavelength [m] at which each part takes half of the amplitude
     Returns (waviness, roughness), their sum is the surface
     Raises  Refusal: holes, or a cut-off that the map cannot hold
     Source  ISO 16610-61 (areal Gaussian, separable), weights of ISO 16610-21 out to one cut-off; at the edges the local

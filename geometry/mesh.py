@@ -32,7 +32,7 @@ def read(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, Groups]:
 
 
 def read_with_notes(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, Groups, tuple[str, ...]]:
-    """The same as `read`, and sentences on what was done to the file and on what of it is not used."""
+    """The same as `read`, with notes on conversions of the file and on its unused content."""
     raw = sources.read_raw(path, sizes=sizes)
     body = solid_body.build(raw)
     lost = sources.missing_groups(raw, {"": body})

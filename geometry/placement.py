@@ -90,7 +90,7 @@ def overlap(first: Any, second: Any) -> tuple[float, np.ndarray] | None:
 
 
 def _middles(mesh: Any) -> np.ndarray:
-    """(n, 3) middles of elements: those of their corners lie elsewhere where few elements go around a ring."""
+    """(n, 3) middles of elements; the mean of the corners would lie elsewhere in a ring of few elements."""
     element, at = mesh.elem(), mesh.refdom.p.mean(axis=1, keepdims=True)
     nodes = mesh.dofs.element_dofs
     weight = [float(np.ravel(element.lbasis(at, a)[0])[0]) for a in range(len(nodes))]

@@ -1,4 +1,4 @@
-"""What a deck of Abaqus or CalculiX holds beside its mesh: materials, constraints, loads, supports."""
+"""Constraints, springs, masses, loads and supports of a deck of Abaqus or CalculiX."""
 
 from __future__ import annotations
 

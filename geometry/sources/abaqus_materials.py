@@ -141,7 +141,7 @@ class MaterialCards(DeckPlaces):
         return system.transformed(turn, shift)
 
     def _listed(self, card: Card, instance: str, turn: np.ndarray, local: np.ndarray) -> ElementAxes:
-        """Axes element by element; those that no line names have those of the first line."""
+        """Axes element by element; elements that no line names have the axes of the first line."""
         centres = np.vstack([self.raw.points[block.nodes].mean(axis=1) for block in self.raw.cells])
         mine = [number for (where, _), number in self.number.items() if where == instance]  # labels are those of a part
         axes: list[np.ndarray] = []
@@ -176,5 +176,5 @@ def _normal_block(D: list[float]) -> np.ndarray:
 
 
 def _regular(D: list[float]) -> bool:
-    """Whether a stiffness can be inverted; those of fluids cannot."""
+    """Whether a stiffness can be inverted; the stiffness of a fluid cannot."""
     return bool(np.linalg.eigvalsh(_normal_block(D))[0] > 0)

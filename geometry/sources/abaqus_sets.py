@@ -98,7 +98,7 @@ class _Sets:
     unused: list[str] = field(default_factory=list)
 
     def collect(self, scopes: dict[str, Scope]) -> None:
-        """Resolve the sets of all scopes; those of an instance bear its name before a dot."""
+        """Resolve the sets of all scopes; a set of an instance is named "instance.set"."""
         for instance in self.assembly.instances:
             solids = [self.number[key] for key in self.number if key[0] == instance]
             if solids:

@@ -43,7 +43,7 @@ def with_added_nodes(source: Source) -> Source:
         name: replace(body, node_sets=body.node_sets | {names[p]: np.array([p[1]]) for p in used if p[0] == name})
         for name, body in source.bodies.items()
     }
-    notes = [f"{len(equations)} equations more are for nodes added between those of its own"] if equations else []
+    notes = [f"{len(equations)} more equations are for nodes that were added to its elements"] if equations else []
     deck = replace(source.deck, equations=(*source.deck.equations, *equations))
     return replace(source, bodies=bodies, deck=deck, notes=(*source.notes, *notes))
 

@@ -77,7 +77,7 @@ class _Archive(ArchiveMesh):
         return self.mesh.raw(self.path, tuple(self._material(number) for number in self.constants))
 
     def _material(self, number: int) -> deck.DeckMaterial:
-        """A material from its constants, isotropic where nothing tells directions apart."""
+        """A material from its constants, isotropic unless a constant depends on direction."""
         of = self.constants[number]
         mine = [name for name, (material, _) in self.of_solids.items() if material == number]
         at = {name: self.of_solids[name][1] for name in mine}

@@ -41,7 +41,7 @@ class Sizes:
 
 
 def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
-    """Mesh a CAD file. Lengths are those of the file: Gmsh does not convert them.
+    """Mesh a CAD file. Lengths keep the unit of the file: Gmsh does not convert them.
 
     Raises  Refusal: a file that cannot be read, has no solid or cannot be meshed, a size for what is not there
     """
@@ -119,7 +119,7 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
     all_sizes = [everywhere, *sizes.bodies.values(), *sizes.faces.values()]
     gmsh.option.setNumber("Mesh.MeshSizeMax", max(all_sizes))
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(all_sizes) / sizes.finest)
-    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)  # those of a CAD file are 0, which asks for the least one
+    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)  # a CAD file gives 0 there, which asks for the least size
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", sizes.elements_per_turn)
     if fields:
         least = model.mesh.field.add("Min")

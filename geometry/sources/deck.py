@@ -1,4 +1,4 @@
-"""What a file of another FE program holds beside its mesh, as plain data.
+"""Materials, constraints, loads and supports of a file of another FE program, as plain data.
 
 Every place is the name of a group of the source: a node set, a surface or a reference point. Where a card names a bare
 node number, the source gets a node set "node N". Values are in SI units: a file in millimetres is taken to count in N,
@@ -127,7 +127,7 @@ class PointMass:
 def stiffness(upper: list[float], order: Sequence[int]) -> tuple[tuple[float, ...], ...]:
     """(6, 6) of an anisotropic material from the 21 values of its upper triangle, row by row.
 
-    order : where each of our stresses 11, 22, 33, 23, 13, 12 stands among those of the file
+    order : position in the file of each of our stresses 11, 22, 33, 23, 13, 12
     """
     full = np.zeros((6, 6))
     full[np.triu_indices(6)] = upper
@@ -137,7 +137,7 @@ def stiffness(upper: list[float], order: Sequence[int]) -> tuple[tuple[float, ..
 
 @dataclass(frozen=True)
 class Deck:
-    """All of it; empty for files that hold a mesh alone. contacts : pairs of faces, of which a scene makes contacts"""
+    """Everything except the mesh; empty for a file with a mesh alone. contacts : pairs of faces that may touch"""
 
     materials: tuple[DeckMaterial, ...] = ()
     ties: tuple[DeckTie, ...] = ()

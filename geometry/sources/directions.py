@@ -107,7 +107,7 @@ class System:
 
 @dataclass(frozen=True)
 class ElementAxes:
-    """Directions that a file lists by element or node; at a place those of the nearest centre hold, or their mean.
+    """Directions that a file lists by element or node; the nearest centre counts, or the mean of equally near ones.
 
     centres : (n, 3); rows : (n, 3, 3)
     """

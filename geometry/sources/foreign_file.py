@@ -43,9 +43,9 @@ class Source:
     bodies : name -> body; parts of the file that share no nodes, see `solid.bodies`
     deck : materials, ties, loads and supports that the file gives; empty for a mesh
     points : name -> (3,) reference points that belong to no element [m]
-    notes : sentences on what was done to it; raised : on elements of first order that were raised to second
-    unused : clauses that name what was found and is not used
-    refused : name -> clause of what is not carried over and would change stiffness, mass, support or load
+    notes : sentences on conversions of the file; order_notes : on elements of first order, raised to second order
+    unused : clauses that name unused content
+    refused : name -> clause; content that is not read but would change stiffness, mass, support or load
     counts : group of nodes -> body -> how many of its nodes the file lists there, before edge nodes were added
     """
 
@@ -62,7 +62,7 @@ class Source:
 def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> Source:
     """Read a mesh file, a deck or a CAD file as bodies.
 
-    path : its ending tells the format; unit : of length in the file, "m", "mm", "in", ...
+    path : its ending determines the format; unit : of length in the file, "m", "mm", "in", ...
     sizes : of the elements of a CAD file, in its unit
     Raises  Refusal: one sentence that names the file and the cure
     """
@@ -146,7 +146,7 @@ def order_notes(raw: RawMesh) -> tuple[str, ...]:
 
 
 def conversion_notes(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
-    """Sentences on what was done to a file on the way to bodies."""
+    """Sentences on the conversion of a file into bodies."""
     notes = list(raw.notes)
     for name, body in built.items():
         if body.cut:

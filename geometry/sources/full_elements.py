@@ -152,6 +152,6 @@ def _ten_nodes(solid: Solid, corners: tuple[int, ...], place: dict[frozenset[int
 
 
 def _volume(corners: np.ndarray, solid: Solid) -> np.ndarray:
-    """Signed volume (n,) of the parallelepiped at the first corner, which tells the orientation of the numbering."""
+    """Signed volume (n,) of the parallelepiped at the first corner, whose sign is the orientation of the numbering."""
     step = {4: [1, 2, 3], 6: [1, 2, 3]}.get(solid.corners, [1, 3, 4])
     return np.asarray(np.linalg.det(corners[:, step] - corners[:, :1]))

@@ -52,7 +52,7 @@ class Card:
 
 
 def cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[Card]:
-    """All cards of a deck in order, those of included files in their place.
+    """All cards of a deck in order; the cards of an included file stand in place of its *INCLUDE.
 
     within : files that include this one
     Raises  Refusal: an included file that is not there, or data before the first card
@@ -75,7 +75,7 @@ def cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[Card]:
             if card.name == "INCLUDE":
                 other = path.parent / card.option("INPUT").strip("\"'")
                 if not other.is_file():
-                    raise Refusal(f"{card.where} names the file '{other.name}', which does not exist: put it beside")
+                    raise Refusal(f"{card.where} names the file '{other.name}', which does not exist: put it there")
                 yield from cards(other, (*within, path.resolve()))
                 card = None
         elif card is None:

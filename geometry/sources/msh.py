@@ -49,7 +49,7 @@ def read(path: Path) -> RawMesh:
 
 
 def from_gmsh(gmsh: Any) -> RawMesh:
-    """The mesh that a Gmsh session holds; where volumes belong to groups, those that do not are left out.
+    """The mesh that a Gmsh session holds; if some volumes belong to groups, all others are left out.
 
     A surface with elements that no group has is one itself, "face N" by its number in Gmsh or in the CAD model.
     """

@@ -131,7 +131,7 @@ class _Bulk(ReferenceCards):
         self.sets[to_int(fields[0], card)] = expand_list(fields[1:])
 
     def param(self, card: str, fields: list[str]) -> None:
-        """A parameter: the weight of a unit of mass, or one that is told by its name."""
+        """A parameter: WTMASS scales masses; any other one is skipped and recorded by name."""
         if fields[0].upper() == "WTMASS":
             self.weight = to_float(fields[1], card)
         else:

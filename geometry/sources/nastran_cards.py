@@ -21,7 +21,7 @@ _EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
 
 def lines_of(path: Path, within: tuple[Path, ...] = ()) -> Iterator[str]:
-    """Lines of a file without comments, those of included files in their place."""
+    """Lines of a file without comments; the lines of an included file stand in place of its INCLUDE."""
     if path.resolve() in within:
         raise Refusal(f"'{path}' includes itself: take the INCLUDE out")
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():

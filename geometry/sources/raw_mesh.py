@@ -34,8 +34,8 @@ class RawMesh:
     """points : (n, 3) in the file's unit of length; labels : (n,) node numbers in the file; cells : volume elements
     volumes : group -> element numbers, counted through all blocks of `cells`
     faces : group -> list of (k, 3) and (k, 4) corner nodes, in cyclic order
-    nodes : group -> rows of `points`; bodies : those of `volumes` that the file calls bodies
-    skins : those of `nodes` that may stand for a face
+    nodes : group -> rows of `points`; bodies : names of volume groups that the file calls bodies
+    skins : names of node groups that may stand for a face
     points_of_reference : name -> (3,) points that belong to no element
     unused : one clause for each thing that was met and changes nothing here; notes : what a user should know
     refused : name of a card or element -> clause, which would change stiffness, mass, support or load

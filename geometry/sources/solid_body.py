@@ -32,8 +32,8 @@ class SolidBody:
     node_sets : group of any kind -> its nodes, sorted columns of mesh.doflocs
     node_of : (n_point,) node that each point of the file is, -1 where it is none of this body
     cut : whether its elements were cut into tetrahedra because kinds mix
-    unmatched : surface groups of which some faces are no faces of the volume mesh; they are no boundaries
-    added : nodes (k,) that the file has not, and those of it (k, m) between which each lies, by the kind of place
+    unmatched : surface groups with faces that are not faces of the volume mesh; they become no boundaries
+    added : nodes (k,) that are not in the file, and the nodes (k, m) that each interpolates, by kind of place
     """
 
     mesh: Any
@@ -63,7 +63,7 @@ def bodies(raw: RawMesh) -> dict[str, np.ndarray]:
                 chosen.setdefault(i, name)
             else:
                 inside.setdefault(i, []).append(name)
-    if not raw.bodies:  # a group of all elements tells nothing where there are several parts
+    if not raw.bodies:  # a group of all elements identifies no part where there are several
         chosen = {i: name for i, name in chosen.items() if len(raw.volumes[name]) < len(piece) or n_piece == 1}
     nameless = [i for i in range(n_piece) if i not in chosen and i not in inside]
     for count, i in enumerate(nameless, 1):
@@ -164,7 +164,7 @@ def _mesh(rows: np.ndarray, points: np.ndarray, hexahedra: bool, n_point: int) -
 
 
 def _facets(mesh: Any, node_of: np.ndarray, parts: Iterable[np.ndarray]) -> np.ndarray | None:
-    """Facets by their corners, rows of the file (k, 3) or (k, 4); those of other bodies are left out.
+    """Facets by their corners, rows of the file (k, 3) or (k, 4); facets of other bodies are left out.
 
     Returns None where some are no faces of this mesh, though they touch it. The three lowest nodes tell facets apart.
     """
@@ -191,7 +191,7 @@ def _facets(mesh: Any, node_of: np.ndarray, parts: Iterable[np.ndarray]) -> np.n
 
 
 def _added(mesh: Any, fulls: Sequence[Full], pieces: Sequence[Pieces]) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """The nodes that were added to those of the file, and the nodes that each interpolates.
+    """The nodes that were added to the file, and the nodes that each interpolates.
 
     These are the two ends of an edge, the corners and edges of a face, the whole hexahedron
     """

@@ -1,4 +1,4 @@
-"""Materials of a deck, or those of the scene that replace them."""
+"""Materials of a deck; materials of the scene replace them by name."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ ALL_AXES = (0, 1, 2, 3, 4, 5)
 @dataclass
 class CarriedDeck:
     """What a deck brings into a scene. points : name -> (3,) of its reference points [m]; load : all its loads
-    notes : sentences on what was done to it, and on what of it is not used"""
+    notes : sentences on its conversion, and on its unused content"""
 
     bodies: list[Body]
     points: dict[str, np.ndarray] = field(default_factory=dict)
@@ -55,7 +55,7 @@ def load_name(deck_name: str) -> str:
 def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], folder: Path) -> CarriedDeck:
     """What the deck of a table brings.
 
-    materials : those of the scene, which take the place of the deck's of the same name; folder : of the scene
+    materials : of the scene; they replace materials of the deck with the same name; folder : of the scene
     Raises  Refusal, one sentence: the deck cannot be read, lacks a material, or has what cannot be carried over
     """
     path = folder / table.file
@@ -79,7 +79,7 @@ def _read(path: Path, unit: str, stamp: int) -> foreign_file.Source:
 
 
 def notes_of(source: foreign_file.Source, table: Table) -> tuple[str, ...]:
-    """Sentences on what was done to a deck."""
+    """Sentences on the conversion of a deck."""
     corners = ("its hexahedra are computed on their eight corners, with reduced integration",)
     return (*(corners if table.elements == "linear_reduced" else source.order_notes), *source.notes)
 

@@ -1,6 +1,6 @@
-"""Example of a wear law of one's own: the energy law whose coefficient falls while the faces run in.
+"""Example of a user's wear law: the energy law whose coefficient falls while the faces run in.
 
-In a scene, beside which this file lies: law = "running_in.py" in [wear]. A fresh face wears `ratio` times as fast as
+In a scene in the same folder: law = "running_in.py" in [wear]. A fresh face wears `ratio` times as fast as
 one that has lost a depth well above `depth`; both are further keys of [wear].
 """
 

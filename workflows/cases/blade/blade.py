@@ -178,7 +178,7 @@ def _root(p: Parameters) -> Platform:
 
 
 def _disk(p: Parameters, root: Platform, rows: tuple[int, ...], columns: tuple[int, ...]) -> list[blocks.Block]:
-    """Disk sector under the root block: five columns, of which the outer two end at the cyclic faces."""
+    """Disk sector under the root block: five columns; the outer two end at the cyclic faces."""
     rim = root.corners[0]
     columns = (1, *columns, 1)
     edges = {}  # of the outer columns, from left to right: (corner of the root block, cyclic face)

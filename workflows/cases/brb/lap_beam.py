@@ -25,7 +25,7 @@ class Parameters:
     hole, pad : diameters of the holes and of the disks about them under the washers [m]
     n_side : elements along each side of the field about a hole; n_pad, n_field : from hole to rim of the pad, and on to
     the border of the field; n_lap : through the lap; n_end : along the strips at both ends of the lap
-    n_length, grading : along the full beam, the last element so many times as long as the first one beside the lap
+    n_length, grading : along the full beam, the last over the first one next to the lap
     """
 
     length: float = 0.42

@@ -168,7 +168,7 @@ def _contact_lines(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _column(p: Parameters) -> blocks.JoinedBlocks:
-    """Bulk column beside the beam, whose seat on it is the side y = thickness / 2."""
+    """Bulk column next to the beam; its side y = thickness / 2 is the seat of the beam."""
     root, up = _root_lines(p), np.unique(np.concatenate(_height_lines(p)))
     back = np.array([-p.column_length, root[0]])
     full_x = np.append(back[0], root)
