@@ -325,10 +325,10 @@ def test_memory_repeats(name, components):
     samples, phi, none = basis.to_time(x), np.zeros((64, 0)), np.zeros((memory.shape[1], 0))
 
     def settle(start):
-        there = start.copy()
-        for u, p, s in zip(samples, parameters.packed(), there, strict=True):
+        other = start.copy()
+        for u, p, s in zip(samples, parameters.packed(), other, strict=True):
             assert aft._settle(pointer(law.step), u, p, phi, s, none) >= 0
-        return there
+        return other
 
     stationary = settle(memory)
     np.testing.assert_allclose(settle(stationary), stationary, atol=1e-12)

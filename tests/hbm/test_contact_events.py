@@ -41,11 +41,11 @@ def test_forces_and_jacobians_are_those_of_the_closed_form(name, components, har
     law, basis = contact_law.load(name), HarmonicBasis(harmonics, 16, "located")
     x, parameters, memory = draw(name, components, basis, 40, seed=7)
     exact = law.event_based_cycle(x, parameters, memory, basis, True)
-    found = event_cycle.cycle(law, x, parameters, memory, basis, True)
+    computed = event_cycle.cycle(law, x, parameters, memory, basis, True)
     size = np.abs(exact.force).max()
-    np.testing.assert_allclose(found.force, exact.force, atol=1e-10 * size)
-    np.testing.assert_allclose(found.jacobian, exact.jacobian, atol=2e-5 * np.abs(exact.jacobian).max())
-    assert (found.status == exact.status).mean() > 0.95  # but where a transition merely grazes
+    np.testing.assert_allclose(computed.force, exact.force, atol=1e-10 * size)
+    np.testing.assert_allclose(computed.jacobian, exact.jacobian, atol=2e-5 * np.abs(exact.jacobian).max())
+    assert (computed.status == exact.status).mean() > 0.95  # but where a transition merely grazes
     single = event_cycle.cycle(law, x, parameters, memory, basis, False)
     np.testing.assert_allclose(single.force, exact.force, atol=1e-10 * size)
     assert single.jacobian is None
@@ -64,17 +64,17 @@ def test_a_kink_that_only_the_slope_tells_is_located():
     law, basis = SimpleNamespace(step=two_slopes), HarmonicBasis((0, 1, 2, 3), 16, "located")
     x = np.random.default_rng(5).normal(size=(20, 1, basis.n_coeff)) * 0.4
     parameters = ContactParameters.of(("n",), np.full((20, 1), 2.0))
-    found = event_cycle.cycle(law, x, parameters, np.zeros((20, 0)), basis)
+    computed = event_cycle.cycle(law, x, parameters, np.zeros((20, 0)), basis)
     edges = np.linspace(0, 2 * np.pi, 200_001)
     t = 0.5 * (edges[1:] + edges[:-1])
     phi = basis.functions(t)
     motion = x[:, 0] @ phi.T
     outside = np.maximum(np.abs(motion) - 0.4, 0) * np.sign(motion)
     exact = 2.0 * (motion + 2 * outside) @ phi / len(t) * np.where(np.arange(basis.n_coeff) > 0, 2, 1)
-    np.testing.assert_allclose(found.force[:, 0], exact, atol=1e-8)
+    np.testing.assert_allclose(computed.force[:, 0], exact, atol=1e-8)
     step = 1e-6 * np.random.default_rng(6).normal(size=x.shape)
     ahead, back = (event_cycle.cycle(law, x + e * step, parameters, np.zeros((20, 0)), basis).force for e in (1, -1))
-    slope = (found.jacobian @ step.reshape(20, -1, 1))[..., 0]
+    slope = (computed.jacobian @ step.reshape(20, -1, 1))[..., 0]
     np.testing.assert_allclose(slope, (ahead - back)[:, 0] / 2, atol=1e-11)
 
 

@@ -50,18 +50,18 @@ def static_preload(problem: WearProblem, depth: np.ndarray) -> float:
 @pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
 def test_a_run_ends_where_the_preload_at_rest_is_lost(problem: WearProblem, rule: str) -> None:
     result = worn(problem, rule)
-    rest = result.preload_at_rest
-    assert rest is not None
+    at_rest = result.preload_at_rest
+    assert at_rest is not None
     assert str(result.end) == f"{WearEnd.LOST_AT_REST.say()} 0.4 of its first value"
-    assert rest[-1] <= 0.4 * rest[0] < rest[-2]
+    assert at_rest[-1] <= 0.4 * at_rest[0] < at_rest[-2]
     assert result.cycles_in_step[-1] == 0.0
     life = cycles_to_preload(result, 0.4)
     assert life is not None
     assert result.cycles[-2] < life <= result.cycles[-1]
-    for row in (0, len(rest) // 3):
-        assert rest[row] == pytest.approx(static_preload(problem, result.depth[row]), rel=1e-6)
-    assert (np.diff(rest) < 0).all()
-    assert np.abs(rest[0] / result.preload[0] - 1) > 1e-3  # another number than the mean force while it vibrates
+    for row in (0, len(at_rest) // 3):
+        assert at_rest[row] == pytest.approx(static_preload(problem, result.depth[row]), rel=1e-6)
+    assert (np.diff(at_rest) < 0).all()
+    assert np.abs(at_rest[0] / result.preload[0] - 1) > 1e-3  # another number than the mean force while it vibrates
 
 
 def test_steps_before_the_end_are_those_of_a_run_that_does_not_look(problem: WearProblem) -> None:

@@ -83,7 +83,7 @@ def test_55_sliding_pairs_of_which_40_lift_agree_with_time_integration_within_on
 @pytest.mark.slow
 def test_four_periodic_motions_at_one_frequency_and_time_integration_finds_each():
     """Two curves with a fold each pass 800 Hz: which motion a solve from rest finds is a matter of its way."""
-    found = {}
+    computed = {}
     for start, stop in ((700.0, 900.0), (900.0, 700.0)):
         balance = slab_balance((900.0, 60.0, 12.0), 7)
         branch = arc_length.follow(balance, 2 * np.pi * start, 2 * np.pi * stop)
@@ -96,9 +96,9 @@ def test_four_periodic_motions_at_one_frequency_and_time_integration_finds_each(
             solution = newton.solve(balance, 2 * np.pi * 800.0, guess.reshape(55, 3, -1))
             assert solution.converged
             lifting = int(np.sum(solution.state.cycle.status & SEPARATES > 0))
-            found[lifting] = verify(balance, solution.state, Options(steps=512))
-    assert sorted(found) == [5, 15, 50, 55]
-    for result in found.values():
+            computed[lifting] = verify(balance, solution.state, Options(steps=512))
+    assert sorted(computed) == [5, 15, 50, 55]
+    for result in computed.values():
         assert result.outcome == CONVERGED
         assert max(result.largest, result.waveform["edge"], result.contact) < 0.01
 

@@ -170,10 +170,10 @@ def test_a_slow_push_drives_a_motion_away_only_if_it_grows_in_finer_steps(
     finest: int, after: int, left: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """finest : steps a period up to which it grows; after : periods in which it has left"""
-    seen = []
+    observed = []
 
     def grows(plain: PeriodSearch, period: Period, interval: int) -> PerturbedMotion:
-        seen.append(plain.options.steps)
+        observed.append(plain.options.steps)
         if plain.options.steps > finest:
             return perturb(plain, period, interval)
         motion = period.end
@@ -187,7 +187,7 @@ def test_a_slow_push_drives_a_motion_away_only_if_it_grows_in_finer_steps(
     follower.start(balance, newton.solve_from_rest(balance, 420.0).state)
     follower.mean(balance, 420.0, lambda motion: motion.energy, 0.05)
     assert bool(follower.stored_state()[2]) is left  # whether it passes on as a motion that does not repeat itself
-    assert seen == [128, 256][: 1 + (after > follower.options.search)]
+    assert observed == [128, 256][: 1 + (after > follower.options.search)]
 
 
 def test_a_motion_that_takes_two_periods_is_told() -> None:
@@ -221,7 +221,7 @@ def test_a_motion_that_passes_is_marched_as_far_as_each_place_asks() -> None:
     assert stationary.periods > 2 * passing.periods == 2 * follower.options.block
     assert passing.error > 0.02 >= precise.error
     assert passing.energy.sum() == pytest.approx(stationary.energy.sum(), rel=0.01)
-    later = [one.mean(flips, FLIPS_AT, lambda motion: motion.energy, 1.0) for one in (follower, restored)]
+    later = [item.mean(flips, FLIPS_AT, lambda motion: motion.energy, 1.0) for item in (follower, restored)]
     np.testing.assert_array_equal(later[1].energy, later[0].energy)
 
 

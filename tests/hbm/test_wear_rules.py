@@ -390,8 +390,8 @@ def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypat
     solve = newton.solve
 
     def ends(balance: HarmonicBalance, omega: float, *options: object) -> newton.Solution:
-        found = solve(balance, omega, *options)
-        return found if omega < 0.97 * peak.omega else replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1"))
+        computed = solve(balance, omega, *options)
+        return computed if omega < 0.97 * peak.omega else replace(computed, outcome=SolveEnd.NO_DESCENT.say(" 1"))
 
     monkeypatch.setattr(newton, "solve", ends)
     stopped = site.solve_near(problem.balance, 0.96 * peak.omega, peak.x)
@@ -407,16 +407,16 @@ def test_no_lower_peak_is_taken_for_one_that_is_not_refined(
     highest, solve = site.solve(problem.balance), newton.solve
 
     def ends(balance: HarmonicBalance, omega: float, x: np.ndarray, *options: object) -> newton.Solution:
-        found = solve(balance, omega, x, *options)
+        computed = solve(balance, omega, x, *options)
         nearby = abs(omega / highest.state.omega - 1) < 0.004
-        return replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1")) if nearby else found
+        return replace(computed, outcome=SolveEnd.NO_DESCENT.say(" 1")) if nearby else computed
 
     branch = site._scan(problem.balance)
     monkeypatch.setattr(AtPeak, "_scan", lambda *options: branch)
     monkeypatch.setattr(newton, "solve", ends)
-    found = site.solve(problem.balance)
-    assert not found.solution.converged
-    assert found.amplitude > 0.7 * highest.amplitude
+    computed = site.solve(problem.balance)
+    assert not computed.solution.converged
+    assert computed.amplitude > 0.7 * highest.amplitude
 
 
 LEAP_DEPTH, SECOND = 2e-5, 520.0  # depth [m] from which on a second place is the higher one, and its frequency [rad/s]

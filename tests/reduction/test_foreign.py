@@ -226,10 +226,10 @@ def test_facts_of_a_free_and_of_a_held_structure():
     chain = 1e6 * (2 * np.eye(N_NODE) - np.eye(N_NODE, k=1) - np.eye(N_NODE, k=-1))
     chain[0, 0] = chain[-1, -1] = 1e6
     free, mass = np.kron(chain, np.eye(3)), np.kron(np.diag([0.5, 1, 1, 1, 0.5]), np.eye(3))
-    found = from_arrays(mass, free, labels=tuple(LABELS)).facts()
-    assert found.n_rigid == 3
-    assert found.mass == pytest.approx((4.0, 4.0, 4.0))
-    assert "3 rigid-body modes" in found.remarks[0]
+    computed = from_arrays(mass, free, labels=tuple(LABELS)).facts()
+    assert computed.n_rigid == 3
+    assert computed.mass == pytest.approx((4.0, 4.0, 4.0))
+    assert "3 rigid-body modes" in computed.remarks[0]
     mass[0, 0] = 0.1
     assert any("rows are missing" in r for r in from_arrays(mass, free, labels=tuple(LABELS)).facts().remarks)
     assert any("tonnes" in r for r in from_arrays(mass / 1e6, free / 1e6, labels=tuple(LABELS)).facts().remarks)

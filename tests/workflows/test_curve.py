@@ -34,25 +34,25 @@ def run(folder: Path, *overrides: str) -> store.Result:
 def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     overrides = ["harmonics.kept=auto", "harmonics.tolerance=2 %", "harmonics.highest=9", "harmonics.samples=512"]
     result = run(folder, *overrides)
-    kept = result.harmonics
-    assert {0, 1} < set(kept)
-    assert max(kept) <= 9
+    chosen = result.harmonics
+    assert {0, 1} < set(chosen)
+    assert max(chosen) <= 9
     assert result.response is not None
-    assert result.response.response.shape[2] == 2 * len(kept) - 1
+    assert result.response.response.shape[2] == 2 * len(chosen) - 1
     assert 0 < result.facts.harmonics_error <= 0.02
     code, out, _ = leave(["show", str(folder), "--json"], capsys)
     numbers = json.loads(out)
     assert code == 0
-    assert numbers["harmonics"] == list(kept)
+    assert numbers["harmonics"] == list(chosen)
     assert numbers["harmonics_error"] == result.facts.harmonics_error
     assert "estimated truncation error" in leave(["show", str(folder)], capsys)[1]
     # the estimate is that of the balance which was solved, at the peak
     file = read(str(folder / "own.toml"), [*QUICK, *overrides])
-    balance = modelling.build(file, Progress(), kept).balance
-    assert balance.basis.harmonics == kept
+    balance = modelling.build(file, Progress(), chosen).balance
+    assert balance.basis.harmonics == chosen
     peak = settings.peak_of(file.scene).solve(balance).state
-    own = estimate(widened(balance, 9), kept, peak.omega, peak.x, split=False).error
-    assert own == pytest.approx(result.facts.harmonics_error, rel=0.3)
+    base = estimate(widened(balance, 9), chosen, peak.omega, peak.x, split=False).error
+    assert base == pytest.approx(result.facts.harmonics_error, rel=0.3)
     assert result.scene == file.scene
 
 

@@ -79,32 +79,32 @@ def part(text: str, folder: Path, deck: str = TEXT) -> Part:
 
 
 def test_a_deck_is_the_structure_that_the_same_tables_by_hand_make(tmp_path: Path) -> None:
-    known = '["ties", "couplings", "supports", "forces", "pressures"]'
-    brought, said = (part(text, tmp_path) for text in (DECK + f"use = {known}\n", BY_HAND))
-    omega = [modes(of.system.stiffness, of.system.mass, 6)[0] for of in (brought, said)]
+    reference = '["ties", "couplings", "supports", "forces", "pressures"]'
+    brought, message = (part(text, tmp_path) for text in (DECK + f"use = {reference}\n", BY_HAND))
+    omega = [modes(of.system.stiffness, of.system.mass, 6)[0] for of in (brought, message)]
     np.testing.assert_allclose(*omega, rtol=1e-9)
-    by_hand = said.system.loads["cload"] * -100.0 + said.system.loads["press"] * 3e6
+    by_hand = message.system.loads["cload"] * -100.0 + message.system.loads["press"] * 3e6
     np.testing.assert_allclose(brought.system.loads["decks.lap"], by_hand, atol=1e-9 * np.abs(by_hand).max())
 
 
 def test_hexahedra_of_first_order_may_stay_what_they_are(tmp_path: Path) -> None:
     """An eighth of the nodes, softer than second order, and towards it as the elements are halved."""
-    asked = DECK + 'use = ["ties", "supports"]\n'
-    best = part(asked + "halved = 1\n", tmp_path)
-    found = []
+    requested = DECK + 'use = ["ties", "supports"]\n'
+    best = part(requested + "halved = 1\n", tmp_path)
+    rows = []
     for halved in (1, 2):
-        reduced = part(f'{asked}halved = {halved}\nelements = "linear_reduced"\n', tmp_path)
-        found.append(modes(reduced.system.stiffness, reduced.system.mass, 3)[0])
+        reduced = part(f'{requested}halved = {halved}\nelements = "linear_reduced"\n', tmp_path)
+        rows.append(modes(reduced.system.stiffness, reduced.system.mass, 3)[0])
         assert len(reduced.points) < len(best.points) * (1, 8)[halved - 1] / 3
     exact = modes(best.system.stiffness, best.system.mass, 3)[0]
-    errors = [np.abs(omega / exact - 1).max() for omega in found]
+    errors = [np.abs(omega / exact - 1).max() for omega in rows]
     assert errors[1] < errors[0] / 2
     assert errors[1] < 0.1
     drawn = part_mesh(reduced)
     assert drawn is not None
     assert drawn.kind == "hexahedron"
     assert view.grid_of(drawn).volume == pytest.approx(4e-6, rel=1e-9)
-    file = scene_file.parse(asked + 'elements = "linear_reduced"\n' + REST, "scene.toml", (), tmp_path)
+    file = scene_file.parse(requested + 'elements = "linear_reduced"\n' + REST, "scene.toml", (), tmp_path)
     notes = [note for deck in scene_assembly.carried_decks(file.scene, tmp_path).values() for note in deck.notes]
     assert not any("second order" in note for note in notes)
 
@@ -112,19 +112,19 @@ def test_hexahedra_of_first_order_may_stay_what_they_are(tmp_path: Path) -> None
 def test_an_equation_of_a_deck_holds(tmp_path: Path) -> None:
     of = part(DECK, tmp_path)
     u = of.field(factorise(of.system.stiffness).solve(of.system.loads["decks.lap"]))
-    one, other = (int(of.node_sets[f"Block-2.node Block-2.{n}"][0]) for n in (11, 12))
-    assert abs(u[one, 0]) > 1e-9
-    assert u[one, 0] == pytest.approx(u[other, 0], rel=1e-12)
-    assert u[one, 1] != pytest.approx(u[other, 1], rel=1e-3)
+    item, other = (int(of.node_sets[f"Block-2.node Block-2.{n}"][0]) for n in (11, 12))
+    assert abs(u[item, 0]) > 1e-9
+    assert u[item, 0] == pytest.approx(u[other, 0], rel=1e-12)
+    assert u[item, 1] != pytest.approx(u[other, 1], rel=1e-3)
 
 
 def test_what_is_not_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "lap.inp").write_text(TEXT)
     file = scene_file.parse(DECK + 'use = ["supports"]\n' + REST, "scene.toml", (), tmp_path)
     notes = [note for deck in scene_assembly.carried_decks(file.scene, tmp_path).values() for note in deck.notes]
-    said = "; ".join(notes)
+    text = "; ".join(notes)
     for clause in ("*PLASTIC", "1 of its ties that use leaves", "1 of its pressures that", "points RP, which carry"):
-        assert clause in said, clause
+        assert clause in text, clause
 
 
 @pytest.mark.parametrize(
@@ -186,9 +186,9 @@ def of_page(folder: Path, *changes: tuple[str, str]) -> Path:
     for fence in fences(ROOT / "docs/howto/deck.md"):
         text = fence.text
         if fence.word == "lap.inp":
-            for old, new in changes:
-                assert old in text
-                text = text.replace(old, new)
+            for previous, updated in changes:
+                assert previous in text
+                text = text.replace(previous, updated)
         if fence.word in ("lap.inp", "joint.toml"):
             (folder / fence.word).write_text(text)
     return folder / "joint.toml"
@@ -206,14 +206,14 @@ worn_up_to = 1
 def test_a_convergence_keeps_the_peaks_of_grids_whose_wear_has_no_end(tmp_path: Path) -> None:
     scene = of_page(tmp_path)
     (tmp_path / "joint.study.toml").write_text(GRIDS)
-    found = convergence.converge(scene, settings=["mesh"], overrides=COARSE)
-    (one,) = found.table.ladders
-    measured = [row.solved for row in one.rows]
+    result = convergence.converge(scene, settings=["mesh"], overrides=COARSE)
+    (item,) = result.table.ladders
+    measured = [row.solved for row in item.rows]
     assert [m.outcome for m in measured] == ["stopped after 1 wear steps", "converged", "converged"]
     assert [len(m.area) for m in measured] == [11, 35, 117]
-    assert one.limits["amplitude"].value == pytest.approx(measured[-1].values["amplitude"], rel=2e-3)
-    assert any(line.startswith("1% on amplitude needs halved=2") for line in found.lines())
-    assert [path.name for path in found.write(tmp_path)] == ["converge_joint.png", "converge_joint_mesh.png"]
+    assert item.limits["amplitude"].value == pytest.approx(measured[-1].values["amplitude"], rel=2e-3)
+    assert any(line.startswith("1% on amplitude needs halved=2") for line in result.lines())
+    assert [path.name for path in result.write(tmp_path)] == ["converge_joint.png", "converge_joint_mesh.png"]
 
 
 def test_a_body_that_tips_over_has_no_state_of_rest(tmp_path: Path) -> None:

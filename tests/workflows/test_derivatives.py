@@ -72,10 +72,10 @@ def similar(rows, lengths, rest):
 def test_the_law_of_similarity_holds_of_lengths():
     """Bodies that are alike have time and displacements by c, work by c^3, forces by c^2."""
     file = scene_file.read("beam", COARSE["beam"])
-    found = td.studies.derivatives(file, only=(*keys(file.scene), *LENGTHS))
+    computed = td.studies.derivatives(file, only=(*keys(file.scene), *LENGTHS))
     expected = {"peak_frequency": -1.0, "amplitude": 1.0, "phase": 0.0, "energy": 3.0, "preload": 2.0, "wear_rate": 3.0}
-    total = similar(found.elasticities, LENGTHS, {})
-    np.testing.assert_allclose(total, [expected[name] for name in found.derivatives.names], atol=2e-6)
+    total = similar(computed.elasticities, LENGTHS, {})
+    np.testing.assert_allclose(total, [expected[name] for name in computed.derivatives.names], atol=2e-6)
 
 
 @pytest.mark.slow
@@ -101,8 +101,8 @@ def test_rows_of_studies_go_by_lengths_whose_mesh_stays_the_same(monkeypatch):
 def test_the_law_of_similarity_holds_of_a_life():
     """At a given frequency, which takes the density by 1 / c^2: c times as deep in the same life."""
     file = scene_file.read("beam", AT_800_HZ)
-    found = td.studies.derivatives(file, of="life", only=(*keys(file.scene), *LENGTHS))
-    total = similar(found.elasticities, LENGTHS, {"material.density": -2})
+    computed = td.studies.derivatives(file, of="life", only=(*keys(file.scene), *LENGTHS))
+    total = similar(computed.elasticities, LENGTHS, {"material.density": -2})
     np.testing.assert_allclose(total, [0.0, 1.0, 3.0], atol=2e-5)
 
 
@@ -138,11 +138,11 @@ def test_a_scene_with_another_value_is_the_one_that_would_be_read(name):
 @pytest.mark.parametrize("modes", ["6", "30"])
 def test_the_law_of_scaling_holds_of_springs_that_the_reduction_follows(modes):
     """All stiffness times c and the force that shakes: at the same displacements time goes by 1 / sqrt(c)."""
-    found = td.studies.derivatives("rig", overrides=(*COARSE["rig"], f"reduction.modes={modes}"))
-    rows = found.elasticities
+    computed = td.studies.derivatives("rig", overrides=(*COARSE["rig"], f"reduction.modes={modes}"))
+    rows = computed.elasticities
     total = sum(row for key, row in rows.items() if key.endswith((".stiffness", ".young", "shaker.value")))
     expected = {"peak_frequency": 0.5, "energy": 1.0, "preload": 1.0, "wear_rate": 1.0}
-    np.testing.assert_allclose(total, [expected.get(name, 0.0) for name in found.derivatives.names], atol=1e-5)
+    np.testing.assert_allclose(total, [expected.get(name, 0.0) for name in computed.derivatives.names], atol=1e-5)
 
 
 def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
@@ -198,8 +198,8 @@ def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, only, ste
 
 
 def test_a_temperature_acts_through_the_numbers_of_its_table():
-    found = td.studies.derivatives("beam", overrides=(*HOT_BEAM, "contact.temperature=150 K"))
-    rows, value = found.elasticities, found.at
+    computed = td.studies.derivatives("beam", overrides=(*HOT_BEAM, "contact.temperature=150 K"))
+    rows, value = computed.elasticities, computed.at
     parts = {"contact.friction": -0.05 / 200, "contact.tangential_stiffness": -30e6 / 200}
     chain = sum(slope * 150 / value[key] * rows[key] for key, slope in parts.items())
     np.testing.assert_allclose(rows["contact.temperature"], chain, atol=2e-6)
@@ -208,22 +208,22 @@ def test_a_temperature_acts_through_the_numbers_of_its_table():
 def test_at_a_row_of_its_table_a_temperature_has_two_derivatives():
     """By the slopes of the table above the row and below it; all other keys keep theirs."""
     at_row = td.studies.derivatives("beam", overrides=(*HOT_BEAM, "contact.temperature=200 K"))
-    found = at_row.derivatives
-    i, amplitude = found.parameters.index("contact.temperature"), found.names.index("amplitude")
+    computed = at_row.derivatives
+    i, amplitude = computed.parameters.index("contact.temperature"), computed.names.index("amplitude")
     assert at_row.corners == ("contact.temperature",)
-    for side, friction, stiffness in ((found.above, -0.15, -90e6), (found.below, -0.05, -30e6)):
+    for side, friction, stiffness in ((computed.above, -0.15, -90e6), (computed.below, -0.05, -30e6)):
         parts = {"contact.friction": friction, "contact.tangential_stiffness": stiffness}
-        chain = sum(slope * side[amplitude, found.parameters.index(key)] for key, slope in parts.items())
+        chain = sum(slope * side[amplitude, computed.parameters.index(key)] for key, slope in parts.items())
         assert side[amplitude, i] * 200 == pytest.approx(chain, rel=1e-5)
     assert {"material.young", "contact.friction"} <= at_row.at.keys()
 
 
 def test_at_the_end_of_its_table_a_temperature_has_no_derivative():
     overrides = (*HOT_BEAM, "contact.temperature=400 K")
-    found = td.studies.derivatives("beam", overrides=overrides)
-    assert "contact.friction" in found.at
-    assert "contact.temperature" not in found.at
-    assert any("without contact.temperature" in line and "extend it" in line for line in found.lines())
+    computed = td.studies.derivatives("beam", overrides=overrides)
+    assert "contact.friction" in computed.at
+    assert "contact.temperature" not in computed.at
+    assert any("without contact.temperature" in line and "extend it" in line for line in computed.lines())
     with pytest.raises(ValueError, match="extend it"):
         td.studies.derivatives("beam", overrides=overrides, only=("contact.temperature",))
 
@@ -234,9 +234,9 @@ LEAF = ("geometry.n_column=7", "geometry.pin_column=2", "response.frequency=['12
 def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
     """All stiffness times c: time goes by 1 / sqrt(c) at c times the loads; so does all mass at the same motion."""
     file = scene_file.read("leaf_seal", LEAF)
-    found = td.studies.derivatives(file, of="fold")
-    rows = {key: row[0] for key, row in found.elasticities.items()}
-    assert found.derivatives.names == ("fold_frequency",)
+    computed = td.studies.derivatives(file, of="fold")
+    rows = {key: row[0] for key, row in computed.elasticities.items()}
+    assert computed.derivatives.names == ("fold_frequency",)
     stiffness, loads = (
         sum(row for key, row in rows.items() if key.endswith(end)) for end in (("stiffness", "young"), "pressure")
     )
@@ -247,9 +247,9 @@ def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
         changed = file.changed(f"damping.modal={value['damping.modal'] * factor!r}")
         with limited(1):
             balance = ParameterVariation(changed, Progress()).model.balance
-            return fold_derivatives.at_fold(balance, found.derivatives.state, ()).values[0]
+            return fold_derivatives.at_fold(balance, computed.derivatives.state, ()).values[0]
 
-    difference = (again(1 + h) - again(1 - h)) / (2 * h) / found.derivatives.values[0]
+    difference = (again(1 + h) - again(1 - h)) / (2 * h) / computed.derivatives.values[0]
     assert rows["damping.modal"] == pytest.approx(difference, rel=1e-5)
 
 
@@ -260,38 +260,38 @@ def test_a_mode_follows_the_laws_of_scaling():
     """At the same motion time goes by 1 / sqrt(c) where all stiffness and the static load are c times, by sqrt(c) where
     all mass is.
     """
-    found = td.studies.derivatives("beam", **MODE)
-    assert found.derivatives.names == ("mode_frequency", "damping")
-    assert found.lines()[0].endswith(f"damping {found.derivatives.values[1]:.6g}")
+    computed = td.studies.derivatives("beam", **MODE)
+    assert computed.derivatives.names == ("mode_frequency", "damping")
+    assert computed.lines()[0].endswith(f"damping {computed.derivatives.values[1]:.6g}")
     stiffer = sum(
-        row for key, row in found.elasticities.items() if key.endswith(("_stiffness", "young", "press.value"))
+        row for key, row in computed.elasticities.items() if key.endswith(("_stiffness", "young", "press.value"))
     )
     np.testing.assert_allclose(stiffer, [0.5, 0.0], atol=3e-5)  # young by differences of 1e-3
-    np.testing.assert_allclose(found.elasticities["material.density"], [-0.5, 0.0], atol=1e-5)
+    np.testing.assert_allclose(computed.elasticities["material.density"], [-0.5, 0.0], atol=1e-5)
 
 
 @pytest.mark.slow
 def test_derivatives_of_a_mode_are_those_of_modes_found_anew():
-    found = td.studies.derivatives("beam", **MODE, only=("contact.friction",))
+    computed = td.studies.derivatives("beam", **MODE, only=("contact.friction",))
     values, h = [], 1e-4
     for friction in (0.5 * (1 + h), 0.5 * (1 - h)):
         changed = MODE | {"overrides": (*COARSE["beam"], f"contact.friction={friction!r}")}
         values.append(td.studies.derivatives("beam", **changed, only=("damping.modal",)).derivatives.values)
-    difference = (values[0] - values[1]) / (2 * h) / found.derivatives.values
-    np.testing.assert_allclose(found.elasticities["contact.friction"], difference, rtol=1e-5)
+    difference = (values[0] - values[1]) / (2 * h) / computed.derivatives.values
+    np.testing.assert_allclose(computed.elasticities["contact.friction"], difference, rtol=1e-5)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("scene", "overrides"), [("beam", AT_800_HZ), ("blade", BLADE)], ids=["beam", "blade"])
 def test_the_laws_of_scaling_hold_for_a_life(scene, overrides):
     """All loads times c: c times as deep in a life over c. All stiffness and mass times c: over c as deep, as long."""
-    found = td.studies.derivatives(scene, of="life", overrides=overrides)
-    rows = found.elasticities
+    computed = td.studies.derivatives(scene, of="life", overrides=overrides)
+    rows = computed.elasticities
     loads = sum(row for key, row in rows.items() if key.startswith("loads."))
     body = sum(row for key, row in rows.items() if key.endswith(("stiffness", "young", "density")))
     np.testing.assert_allclose([loads, body], [[-1, 1, 1], [0, -1, -1]], atol=2e-5)
     np.testing.assert_allclose(rows["wear.coefficient"], [-1, 0, 0], atol=1e-9)
-    assert found.lines()[0].startswith("life ")
+    assert computed.lines()[0].startswith("life ")
 
 
 @pytest.mark.slow

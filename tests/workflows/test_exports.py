@@ -265,11 +265,13 @@ def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) ->
 def two_blocks(fine: int) -> Result:
     """Two blocks one upon the other, the lower one with a mesh of its own."""
     synthetic = result()
-    part, below = synthetic.part, block(fine, fine // 4, 2)
+    part, lower_body = synthetic.part, block(fine, fine // 4, 2)
     assert part is not None
-    lower = below.points - [0, 0, np.ptp(below.points[:, 2])]
+    lower = lower_body.points - [0, 0, np.ptp(lower_body.points[:, 2])]
     blocks = replace(
-        part, points=np.concatenate([lower, part.points]), cells=np.concatenate([below.cells, part.cells + len(lower)])
+        part,
+        points=np.concatenate([lower, part.points]),
+        cells=np.concatenate([lower_body.cells, part.cells + len(lower)]),
     )
     assert synthetic.patch is not None
     patch = replace(synthetic.patch, nodes=synthetic.patch.nodes + len(lower))

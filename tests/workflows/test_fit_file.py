@@ -136,9 +136,9 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
         }
     )
     fit = scene_fit.best(scene_file.read("rig", RIG), task, Progress())
-    found, changes = fit.identification, fit.changes
+    computed, changes = fit.identification, fit.changes
     assert len(rows) == 1
-    assert 1e-6 < found.values[0] < 4e-6
+    assert 1e-6 < computed.values[0] < 4e-6
     assert changes[0].endswith(" m")
     file = scene_file.read("rig", (*RIG, *changes, "loads.harmonic.shaker.value=0"))
     balance = modelling.build(file, Progress()).balance
@@ -255,11 +255,11 @@ def test_friction_is_found_again_from_a_measured_curve(tmp_path):
     write_columns(columns, tmp_path / "sweep.csv")
     friction = {"keys": ["contact.friction"], "low": 0.2, "high": 0.8}
     task = {"parameters": {"mu": friction}, "curves": {"sweep": {"file": str(tmp_path / "sweep.csv"), "error": "5 %"}}}
-    found = td.studies.identify(base[0], task, overrides=base[1]).identification
-    assert found.values == pytest.approx([0.38], rel=1e-3)
-    assert found.rms < 1e-3
-    assert len(found.measured) == len(w)
-    assert found.measured[0].weight == pytest.approx(0.2)
+    computed = td.studies.identify(base[0], task, overrides=base[1]).identification
+    assert computed.values == pytest.approx([0.38], rel=1e-3)
+    assert computed.rms < 1e-3
+    assert len(computed.measured) == len(w)
+    assert computed.measured[0].weight == pytest.approx(0.2)
     task["curves"]["sweep"]["control"] = "response"
     with pytest.raises(td.SceneError, match=r"curves\.sweep: no run has control = response"):
         td.studies.identify(base[0], task, overrides=base[1])
@@ -295,9 +295,9 @@ def test_a_joint_of_several_bodies_is_found_again_from_a_measured_curve(tmp_path
         "parameters": {"kt": {"keys": ["contacts.lap.tangential_stiffness"], "low": "60 N/um", "high": "200 N/um"}},
         "curves": {"sweep": {"file": str(tmp_path / "sweep.csv")}},
     }
-    found = td.studies.identify(scene, task, overrides=base).identification
-    assert found.values == pytest.approx([130e6], rel=1e-3)
-    assert found.rms < 1e-3
+    computed = td.studies.identify(scene, task, overrides=base).identification
+    assert computed.values == pytest.approx([130e6], rel=1e-3)
+    assert computed.rms < 1e-3
     file = scene_file.read(scene, base)
     opened = modelling.build(file, Progress()).reduced.interface.gap
     np.testing.assert_allclose(plain(file).interface.gap, opened, rtol=0, atol=1e-20)

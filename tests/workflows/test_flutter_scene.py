@@ -31,15 +31,15 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_waves_of_a_scene_have_the_eigenvalues_of_its_coefficients(scene: Path) -> None:
     """Also by nodal diameter, which is the same flow written otherwise."""
     file = scene_file.read(str(scene))
-    found = flutter.flutter(file).eigenvalues
+    computed = flutter.flutter(file).eigenvalues
     wheel = wheels.build(file)
     calm = modelling.damped(wheel.scene, travelling_wave(wheel.reduced, 1))
     expected = aeroelastic(calm, wheel.springs, Flow(COEFFICIENTS))
-    assert found == pytest.approx(expected, rel=1e-9)
-    assert min(value.real for value in found.values()) < 0 < max(value.real for value in found.values())
+    assert computed == pytest.approx(expected, rel=1e-9)
+    assert min(value.real for value in computed.values()) < 0 < max(value.real for value in computed.values())
     waves = [[j, (c := Flow(COEFFICIENTS).of_index(j, 6)).real, c.imag] for j in range(-2, 4)]
     repeated = flutter.flutter(file.changed("flow.influence=", f"flow.by_diameter={waves}")).eigenvalues
-    assert repeated == pytest.approx(found, rel=1e-9)
+    assert repeated == pytest.approx(computed, rel=1e-9)
 
 
 def test_a_limit_cycle_needs_no_load(scene: Path) -> None:

@@ -49,10 +49,10 @@ def test_factors_that_move_on_by_a_sector_move_the_amplitudes_on(scene: Path) ->
 
 
 def test_sectors_alike_are_amplified_by_nothing(scene: Path) -> None:
-    found = unequal_sectors.mistuned(scene, np.ones(6))
-    assert found.amplification == pytest.approx(1.0, rel=5e-3)
-    assert "it has no derivatives by the factors: the response is highest at an end" in found.lines()[-1]
-    assert found.record()["derivatives"] is None
+    computed = unequal_sectors.mistuned(scene, np.ones(6))
+    assert computed.amplification == pytest.approx(1.0, rel=5e-3)
+    assert "it has no derivatives by the factors: the response is highest at an end" in computed.lines()[-1]
+    assert computed.record()["derivatives"] is None
 
 
 SLOW = ("modal='2 %', state='stuck'", "mass=20.0, stiffness='1e-5 s'")
@@ -68,34 +68,34 @@ def test_derivatives_by_the_factors_are_those_of_other_wheels(scene: Path, dampi
         wheels.build(scene_file.read(str(scene), overrides)),
         unequal_sectors.mistuned(scene, overrides=overrides),
     )
-    found, output = solved.peak.derivatives, f"response@{solved.record()['worst_sector']}"
-    assert found.names[3] == "energy"
-    assert found.values[3] > 0
+    computed, output = solved.peak.derivatives, f"response@{solved.record()['worst_sector']}"
+    assert computed.names[3] == "energy"
+    assert computed.values[3] > 0
     step = 3e-5
     ends = (wheel.whole_wheel([float(end) for end in factors + side * way]) for side in (step, -step))
-    up, down = (cycle_derivatives.at_peak(end, found.state, output, ()).values[:2] for end in ends)
-    off, size = found.slopes[:2] @ way - (up - down) / (2 * step), np.linalg.norm(found.slopes[:2], axis=1)
+    up, down = (cycle_derivatives.at_peak(end, computed.state, output, ()).values[:2] for end in ends)
+    off, size = computed.slopes[:2] @ way - (up - down) / (2 * step), np.linalg.norm(computed.slopes[:2], axis=1)
     assert (abs(off) < 1e-5 * size).all(), off / size
 
 
 def test_a_wheel_shows_the_derivatives_of_its_peak(scene: Path, tmp_path: Path) -> None:
     overrides = ("response.frequency=['640 Hz', '680 Hz']",)
-    found = unequal_sectors.mistuned(scene, spread=0.02, overrides=overrides)
-    rows = found.record()["derivatives"]["elasticities"]
+    computed = unequal_sectors.mistuned(scene, spread=0.02, overrides=overrides)
+    rows = computed.record()["derivatives"]["elasticities"]
     size = [abs(row["amplitude"]) for row in rows.values()]
     assert size == sorted(size, reverse=True)
     assert sum(row["peak_frequency"] for row in rows.values()) == pytest.approx(0.263, abs=0.002)
     assert (
         f"to first order a scatter of 0.1 % of all factors scatters the amplitude by {np.linalg.norm(size) / 10:.3g} %"
-        in str(found)
+        in str(computed)
     )
-    assert tmp_path / "derivatives.csv" in found.write(tmp_path)
+    assert tmp_path / "derivatives.csv" in computed.write(tmp_path)
 
 
 def test_damping_by_two_modes_of_a_wheel_has_no_derivatives(scene: Path) -> None:
     pair = ("response.frequency=['640 Hz', '680 Hz']", "damping={ratios=['2 %', '2 %'], modes=[0, 6]}")
-    found = unequal_sectors.mistuned(scene, overrides=pair)
-    assert found.lines()[-1].endswith("give damping.modal, or mass and stiffness")
+    computed = unequal_sectors.mistuned(scene, overrides=pair)
+    assert computed.lines()[-1].endswith("give damping.modal, or mass and stiffness")
 
 
 def test_the_command_takes_any_wheel(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

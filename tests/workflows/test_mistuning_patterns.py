@@ -51,8 +51,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_pattern_depends_on_seed_and_number_alone() -> None:
     requested = Mistuning(frequency=0.02, friction=0.1, gap=1e-6, patterns=3)
     extra = requested.model_copy(update={"patterns": 9})
-    item, again = mistuned_blades.drawn(requested, 400, 7), mistuned_blades.drawn(extra, 400, 7)
-    np.testing.assert_array_equal(item.stiffness, again.stiffness)
+    item, repeated = mistuned_blades.drawn(requested, 400, 7), mistuned_blades.drawn(extra, 400, 7)
+    np.testing.assert_array_equal(item.stiffness, repeated.stiffness)
     assert np.sqrt(1 + item.stiffness).std() == pytest.approx(0.02, rel=0.1)
     assert item.friction.std() == pytest.approx(0.1, rel=0.1)
     assert item.gap.std() == pytest.approx(1e-6, rel=0.1)
@@ -87,17 +87,17 @@ def test_blades_alike_amplify_nothing(scene: Path) -> None:
 
 def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) -> None:
     """Worn volume differs by blade, is that of its own work, and changes whose amplitude is how large."""
-    found = mistuned_wear.pattern_wear(scene, 1)
-    assert len(found.history.cycles) == 2
-    volume = found.volume[-1]
+    computed = mistuned_wear.pattern_wear(scene, 1)
+    assert len(computed.history.cycles) == 2
+    volume = computed.volume[-1]
     assert volume.min() >= 0
     assert np.ptp(volume) > 0.05 * volume.max() > 0
-    work = found.history.work[:-1].sum(axis=0).reshape(6, -1).sum(axis=1)
+    work = computed.history.work[:-1].sum(axis=0).reshape(6, -1).sum(axis=1)
     np.testing.assert_allclose(volume, 1e-13 * work, rtol=1e-6)
-    assert np.abs(found.heights[-1] / found.heights[0] - 1).max() > 1e-4
-    table, _, drawn = found.write(tmp_path)
+    assert np.abs(computed.heights[-1] / computed.heights[0] - 1).max() > 1e-4
+    table, _, drawn = computed.write(tmp_path)
     assert table.read_text(encoding="utf-8").startswith("cycles,peak_frequency_Hz,amplitude_m@0")
-    states = found.state(0), found.state(-1)
+    states = computed.state(0), computed.state(-1)
     tips = np.linalg.norm(np.linalg.norm(states[1].displacement[..., 1:], axis=-1), axis=-1).max(axis=1)
     assert np.corrcoef(tips, states[1].heights)[0, 1] > 0.9  # who vibrates most does so in the picture too
     assert drawn.stat().st_size > 50_000

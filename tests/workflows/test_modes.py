@@ -56,11 +56,11 @@ def test_the_backbone_goes_from_the_stuck_to_the_free_mode(capsys: pytest.Captur
 
 def test_maps_along_the_backbone_hold_its_friction_work_and_its_motion() -> None:
     bone = backbones.backbone("beam", 1e-7, 2e-4, points=6, overrides=SMALL)
-    found, balance, slides = bone.mode, bone.balance, []
-    for at in range(len(found.omega)):
-        slide, gap, work = backbone_motion(balance, found, at)
-        assert work @ balance.model.interface.area == pytest.approx(found.energy[at], rel=1e-12)
-        x = found.contact[at].reshape(len(gap), 3, -1)
+    computed, balance, slides = bone.mode, bone.balance, []
+    for at in range(len(computed.omega)):
+        slide, gap, work = backbone_motion(balance, computed, at)
+        assert work @ balance.model.interface.area == pytest.approx(computed.energy[at], rel=1e-12)
+        x = computed.contact[at].reshape(len(gap), 3, -1)
         phase = np.linspace(0, 2 * np.pi, 721)
         shifted = x[:, :, 1, None] * np.cos(phase) + x[:, :, 2, None] * np.sin(phase)  # harmonics 0 and 1
         np.testing.assert_allclose(slide, np.hypot(shifted[:, 0], shifted[:, 1]).max(axis=1), rtol=5e-3)

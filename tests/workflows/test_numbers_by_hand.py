@@ -109,8 +109,8 @@ def test_the_load_factor_scales_vibration_alone(solved: tuple[HarmonicBalance, S
 
 def test_static_loads_add_up() -> None:
     loads = Excitation({(0, "a"): 2.0, (0, "b"): -3.0, (1, "a"): 5.0})
-    found = loads.force(0, {"a": np.array([1.0, 0.0]), "b": np.array([0.0, 1.0])}, 2)
-    np.testing.assert_allclose(found, [2.0, -3.0])
+    computed = loads.force(0, {"a": np.array([1.0, 0.0]), "b": np.array([0.0, 1.0])}, 2)
+    np.testing.assert_allclose(computed, [2.0, -3.0])
 
 
 def test_rayleigh_gives_two_modes_their_ratios() -> None:
@@ -149,8 +149,8 @@ def test_the_ground_moves_ahead_by_its_phase() -> None:
     moves = SimpleNamespace(static=0.0, harmonic=2.0, phase=0.3, direction=(1.0, 0.0, 0.0))
     scene = SimpleNamespace(motion={"foot": moves})
     part = SimpleNamespace(interface=interface, pairs={"foot": slice(0, 1)})
-    found = modelling.ground_motion(scene, part, HarmonicBasis((0, 1)))
-    np.testing.assert_allclose(found[0], [0.0, 2 * np.cos(0.3), -2 * np.sin(0.3)], atol=1e-15)
+    computed = modelling.ground_motion(scene, part, HarmonicBasis((0, 1)))
+    np.testing.assert_allclose(computed[0], [0.0, 2 * np.cos(0.3), -2 * np.sin(0.3)], atol=1e-15)
 
 
 def test_a_sequence_of_known_order_is_extrapolated_to_its_limit() -> None:

@@ -80,10 +80,12 @@ def test_an_oscillator_that_hammers_on_a_stop_is_right_or_not_reported(gap: floa
     stop = 300 * OMEGA**2
     contact = f'components = ["n"]\nlaw = "unilateral"\nnormal_stiffness = {stop}\ngap = {gap}'
     result = ran(tmp_path, 0.05, contact, 0.1, [5.0, 25.0], list(range(top + 1)))
-    said = result.verdict
-    assert said is not None
-    item = said.statements["amplitude"]
-    combined = [row for row in said.changes if row.refinement == Refinement.COMBINED and row.quantity == "amplitude"]
+    statement = result.verdict
+    assert statement is not None
+    item = statement.statements["amplitude"]
+    combined = [
+        row for row in statement.changes if row.refinement == Refinement.COMBINED and row.quantity == "amplitude"
+    ]
     assert [row.relative is not None for row in combined] == [True]
     assert item.value is not None
     assert item.error is not None

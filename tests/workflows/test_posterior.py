@@ -42,30 +42,30 @@ def measured(noise: np.ndarray) -> list[MeasuredNumber]:
 
 def test_a_linear_problem_has_its_normal_posterior() -> None:
     noise = np.array([0.03, -0.05, 0.02])
-    found = posterior.sample(BOX, measured(noise), linear, {"follows": "N"})
+    computed = posterior.sample(BOX, measured(noise), linear, {"follows": "N"})
     weights = SLOPES / ERRORS[:, None]
     covariance = np.linalg.inv(weights.T @ weights)
     mean = covariance @ weights.T @ ((SLOPES @ TRUE + noise) / ERRORS)
-    samples = np.log(found.samples)
+    samples = np.log(computed.samples)
     assert samples.mean(axis=0) == pytest.approx(mean, abs=0.1 * covariance[0, 0] ** 0.5)
     assert np.cov(samples.T) == pytest.approx(covariance, rel=0.15, abs=0.05 * covariance[0, 0])
     slope = np.array([2.0, -1.0])
-    follows = np.log(found.predicted["follows"])
+    follows = np.log(computed.predicted["follows"])
     assert follows.mean() == pytest.approx(slope @ mean, abs=0.1 * follows.std())
     assert follows.std() == pytest.approx(np.sqrt(slope @ covariance @ slope), rel=0.1)
-    assert found.doubts == []
-    assert found.plot().axes
+    assert computed.doubts == []
+    assert computed.plot().axes
 
 
 def test_a_prior_counts_and_what_is_not_told_is_said() -> None:
     only_a = [MeasuredNumber("m", 1.2, error=0.1)]
     prior = {"a": Marginal.of(Distribution(distribution="lognormal", median=1.0, cov="10 %"))}
-    found = posterior.sample(BOX, only_a, lambda values: np.array([values["a"]]), priors=prior)
+    computed = posterior.sample(BOX, only_a, lambda values: np.array([values["a"]]), priors=prior)
     width = np.sqrt(np.log1p(0.01))
     share = width**2 / (width**2 + 0.01)
-    assert np.log(found.samples[:, 0]).mean() == pytest.approx(share * np.log(1.2), abs=0.01)
-    assert np.log(found.samples[:, 0]).std() == pytest.approx(np.sqrt(share) * 0.1, rel=0.1)
-    assert any(doubt.startswith("b: the numbers say little") for doubt in found.doubts)
+    assert np.log(computed.samples[:, 0]).mean() == pytest.approx(share * np.log(1.2), abs=0.01)
+    assert np.log(computed.samples[:, 0]).std() == pytest.approx(np.sqrt(share) * 0.1, rel=0.1)
+    assert any(doubt.startswith("b: the numbers say little") for doubt in computed.doubts)
 
 
 def test_trials_that_fail_are_left_out_and_too_many_end_it() -> None:
@@ -77,9 +77,9 @@ def test_trials_that_fail_are_left_out_and_too_many_end_it() -> None:
 
         return trial
 
-    found = posterior.sample(BOX, measured(np.zeros(3)), fails_above(1.6))
-    assert found.failed > 0
-    assert np.median(found.samples[:, 0]) == pytest.approx(1.1, rel=0.05)
+    computed = posterior.sample(BOX, measured(np.zeros(3)), fails_above(1.6))
+    assert computed.failed > 0
+    assert np.median(computed.samples[:, 0]) == pytest.approx(1.1, rel=0.05)
     with pytest.raises(SolveFailed, match="narrow the bounds; the last: no peak"):
         posterior.sample(BOX, measured(np.zeros(3)), fails_above(0.7))
     with pytest.raises(ValueError, match=r"measured.m.error: a posterior needs the error"):

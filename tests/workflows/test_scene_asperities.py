@@ -31,9 +31,9 @@ def scene(tmp_path: Path) -> Path:
 def test_the_scan_gives_radius_and_table(scene: Path):
     read = scene_file.read(str(scene), [NO_TABLE, "contacts.lap.radius=", *FACES]).scene.joints["lap"]
     scales = {"cutoff": CUTOFF, "shortest": SHORTEST, "spacing": (SPACING, SPACING)}
-    found = td.studies.asperities(scene.parent / "scan.txt", **scales).asperities
-    assert read.numbers["radius"] == pytest.approx(found.radius, rel=1e-12)
-    np.testing.assert_allclose(np.array(read.table), found.table(), rtol=1e-12)
+    computed = td.studies.asperities(scene.parent / "scan.txt", **scales).asperities
+    assert read.numbers["radius"] == pytest.approx(computed.radius, rel=1e-12)
+    np.testing.assert_allclose(np.array(read.table), computed.table(), rtol=1e-12)
     inputs = scene_file.read(str(scene), [NO_TABLE, *FACES]).scene.joints["lap"]
     assert inputs.numbers["radius"] == pytest.approx(1.36493e-3)  # what the file says is kept
     assert inputs.table == read.table

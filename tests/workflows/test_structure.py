@@ -172,9 +172,9 @@ def test_a_part_without_contact_has_its_linear_response(tmp_path: Path) -> None:
     assert result.facts.contact_pairs == 0
     assert result.references is not None
     assert result.response is not None
-    found = result.response.amplitude("response")
-    assert found[0] == pytest.approx(result.references.free[0], rel=1e-6)
-    assert found[-1] == pytest.approx(result.references.free[-1], rel=1e-6)
+    computed = result.response.amplitude("response")
+    assert computed[0] == pytest.approx(result.references.free[0], rel=1e-6)
+    assert computed[-1] == pytest.approx(result.references.free[-1], rel=1e-6)
 
 
 def test_a_free_structure_is_the_limit_of_one_on_weak_springs(tmp_path: Path) -> None:
@@ -341,9 +341,9 @@ def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path)
 def test_every_body_of_a_scene_is_refined_or_the_elements_of_all_are_halved(tmp_path: Path) -> None:
     """Parts by their counts, CAD files by their sizes; a mesh file cannot be made again, but its elements cut."""
     file = scene_file.parse(BLOCKS, "blocks.toml", folder=tmp_path)
-    own, (finer, ratio) = file.scene, refine.mesh(file, 2.0)
+    base, (finer, ratio) = file.scene, refine.mesh(file, 2.0)
     for name in ("lower", "upper"):
-        assert finer.scene.bodies[name].parameters["n_length"] == 2 * own.bodies[name].parameters["n_length"]
+        assert finer.scene.bodies[name].parameters["n_length"] == 2 * base.bodies[name].parameters["n_length"]
     assert ratio == pytest.approx(2.0, rel=0.1)
     with session() as gmsh:
         gmsh.model.occ.addBox(0, 0, 0, 40, 10, 10)
@@ -352,17 +352,17 @@ def test_every_body_of_a_scene_is_refined_or_the_elements_of_all_are_halved(tmp_
     drawn = (
         'mesh = "box.step"\nunit = "mm"\nface_sizes = { "face 2" = "3 mm" }\ntranslation = ["55 mm", "3 mm", "10 mm"]'
     )
-    own = BLOCKS[: BLOCKS.index("[bodies.upper]")] + f'[bodies.upper]\n{drawn}\nmaterial = "aluminium"\n'
+    base = BLOCKS[: BLOCKS.index("[bodies.upper]")] + f'[bodies.upper]\n{drawn}\nmaterial = "aluminium"\n'
     tail = (
         BLOCKS[BLOCKS.index("[contacts.lap]") :]
         .replace("upper.z_min", "upper.face 5")
         .replace("upper.z_max", "upper.face 6")
     )
-    drawn_file = scene_file.parse(own + tail, "drawn.toml", folder=tmp_path)
+    drawn_file = scene_file.parse(base + tail, "drawn.toml", folder=tmp_path)
     upper = refine.mesh(drawn_file, 2.0)[0].scene.bodies["upper"]
     assert upper.size == pytest.approx(2e-3)  # half of a tenth of 40 mm
     assert upper.face_sizes == {"face 2": pytest.approx(1.5e-3)}
-    inputs = (own + tail).replace("box.step", "box.msh").replace('face_sizes = { "face 2" = "3 mm" }\n', "")
+    inputs = (base + tail).replace("box.step", "box.msh").replace('face_sizes = { "face 2" = "3 mm" }\n', "")
     file = scene_file.parse(inputs, "given.toml", folder=tmp_path)
     finer, ratio = refine.mesh(file, 1.5)
     assert [finer.scene.bodies[name].halved for name in ("lower", "upper")] == [1, 1]

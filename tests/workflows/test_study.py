@@ -62,7 +62,7 @@ def test_draws_have_the_moments_of_their_distributions(kind: str) -> None:
     })  # fmt: skip
     values = {key: np.array([row[key] for row in rows]) for key in "abcdef"}
     width = math.sqrt(math.log(1.25))
-    wanted = {  # mean and standard deviation
+    expected = {  # mean and standard deviation
         "a": (2e-3, 2e-3 / math.sqrt(12)),
         "b": (20e3, 2e3),
         "c": (2e3 * math.exp(width**2 / 2), 2e3 * math.exp(width**2 / 2) * 0.5),
@@ -70,7 +70,7 @@ def test_draws_have_the_moments_of_their_distributions(kind: str) -> None:
         "e": (math.sqrt(2 / math.pi), math.sqrt(1 - 2 / math.pi)),  # half normal
         "f": (1.5, 0.5),
     }
-    for key, (mean, deviation) in wanted.items():
+    for key, (mean, deviation) in expected.items():
         assert values[key].mean() == pytest.approx(mean, rel=0.01), key
         assert values[key].std() == pytest.approx(deviation, rel=0.03), key
     assert values["e"].min() > 0
@@ -87,9 +87,9 @@ def test_correlations_are_those_of_a_gaussian_copula() -> None:
     assert stats.spearmanr(a, b).statistic == pytest.approx(6 / math.pi * math.asin(0.35), abs=0.01)
     assert stats.spearmanr(a, c).statistic == pytest.approx(0, abs=0.02)
     assert b.mean() == pytest.approx(math.sqrt(1.09), rel=0.01)  # its own distribution stays
-    one = [{"keys": ["a", "b"], "value": 0.9}, {"keys": ["b", "c"], "value": 0.9}, {"keys": ["a", "c"], "value": -0.9}]
+    item = [{"keys": ["a", "b"], "value": 0.9}, {"keys": ["b", "c"], "value": 0.9}, {"keys": ["a", "c"], "value": -0.9}]
     with pytest.raises(td.SceneError, match="no variables have all of these correlations"):
-        drawn("sobol", 8, vary, correlations=one)
+        drawn("sobol", 8, vary, correlations=item)
 
 
 @pytest.mark.parametrize(
@@ -143,9 +143,9 @@ def test_a_row_is_what_the_run_itself_gives(done: Path) -> None:
     assert list(frame["status"]) == ["complete", "complete", "refused", "refused"]
     assert "friction" in frame["sentence"][3]
     assert list(frame[PRESS]) == [10e3, 20e3] * 2  # in SI units
-    own = td.run("beam", overrides=[*TINY, f"{FRICTION}=0.3", f"{PRESS}=20 kN", "verdict.enabled=false"]).summary()
-    assert frame["amplitude_first"][2] == pytest.approx(own["amplitude"]["first"], rel=1e-9)
-    assert frame["peak_frequency_first"][2] == own["peak_frequency"]["first"]
+    base = td.run("beam", overrides=[*TINY, f"{FRICTION}=0.3", f"{PRESS}=20 kN", "verdict.enabled=false"]).summary()
+    assert frame["amplitude_first"][2] == pytest.approx(base["amplitude"]["first"], rel=1e-9)
+    assert frame["peak_frequency_first"][2] == base["peak_frequency"]["first"]
     assert (done / "study.png").stat().st_size > 5000
 
 
@@ -161,19 +161,19 @@ def test_runs_that_share_their_linear_side_give_what_each_gives_by_itself(monkey
     tasks = [
         StudyRun(n, base.name, base.text, (*always, *filter(None, [c])), base.folder) for n, c in enumerate(changes)
     ]
-    alone = [solve(task).numbers for task in tasks]
-    assert len({tuple(numbers.values()) for numbers in alone}) == len(tasks), alone
-    made: list[float] = []
+    single = [solve(task).numbers for task in tasks]
+    assert len({tuple(numbers.values()) for numbers in single}) == len(tasks), single
+    rows: list[float] = []
     expansion = compliance.Expansion.__init__
 
     def counted(self: compliance.Expansion, *arguments: Any) -> None:
-        made.append(1.0)
+        rows.append(1.0)
         expansion(self, *arguments)
 
     monkeypatch.setattr(compliance.Expansion, "__init__", counted)
     with model_cache.memory_cache():
-        assert [solve(task).numbers for task in tasks] == alone
-    assert len(made) == 4  # the first, other springs, other damping, and back: not for friction and loads
+        assert [solve(task).numbers for task in tasks] == single
+    assert len(rows) == 4  # the first, other springs, other damping, and back: not for friction and loads
 
 
 def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
@@ -182,35 +182,35 @@ def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
     lines = (done / "rows.jsonl").read_text().splitlines(keepends=True)
     assert len(lines) == 2
     (tmp_path / "rows.jsonl").write_text(lines[0] + lines[1] + '{"run": 2, "key": "torn')
-    asked: list[int] = []
+    requested: list[int] = []
 
     def pretend(tasks: list[StudyRun], workers: int, solve: Any) -> Any:
-        for one in tasks:
-            asked.append(one.number)
-            yield RunRow(one.number, one.key, "failed", "at 400 Hz")
+        for task in tasks:
+            requested.append(task.number)
+            yield RunRow(task.number, task.key, "failed", "at 400 Hz")
 
     monkeypatch.setattr(pool, "finished", pretend)
-    found = td.studies.grid(TABLES, tmp_path, resume=True)
-    assert asked == []
+    computed = td.studies.grid(TABLES, tmp_path, resume=True)
+    assert requested == []
     assert (tmp_path / "study.csv").read_bytes() == (done / "study.csv").read_bytes()
     larger = TABLES | {"vary": {FRICTION: [0.2, 0.3], PRESS: ["10 kN", "20 kN"]}}
-    found = td.studies.grid(larger, tmp_path, resume=True)
-    assert asked == [1, 2]
-    assert list(found.columns["status"]) == ["failed", "failed", "complete", "complete"]
+    computed = td.studies.grid(larger, tmp_path, resume=True)
+    assert requested == [1, 2]
+    assert list(computed.columns["status"]) == ["failed", "failed", "complete", "complete"]
     td.studies.grid(larger, tmp_path, resume=True)
-    assert asked == [1, 2]  # what failed fails again
+    assert requested == [1, 2]  # what failed fails again
     td.studies.grid(larger, tmp_path, retry=True)
-    assert asked == [1, 2, 1, 2]
+    assert requested == [1, 2, 1, 2]
 
 
 def test_the_key_of_a_run_follows_its_files(tmp_path: Path) -> None:
     (tmp_path / "map.txt").write_text("1")
-    one = StudyRun(1, "own", 'file = "map.txt"', ("a=1",), tmp_path)
-    assert one.key == replace(one, number=2).key
-    assert one.key != replace(one, overrides=("a=2",)).key
-    before = one.key
+    item = StudyRun(1, "own", 'file = "map.txt"', ("a=1",), tmp_path)
+    assert item.key == replace(item, number=2).key
+    assert item.key != replace(item, overrides=("a=2",)).key
+    before = item.key
     (tmp_path / "map.txt").write_text("22")
-    assert one.key != before
+    assert item.key != before
 
 
 @pytest.mark.faults
@@ -239,15 +239,15 @@ def test_the_command_resumes_a_study_that_was_killed(
     journal = Journal(tmp_path / "out")
     while not journal.rows() and process.poll() is None:
         time.sleep(0.02)
-    own = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+    base = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
     process.kill()
     process.wait()
     before = journal.rows()
     assert before
-    assert own
-    until = time.monotonic() + 60
-    while any(_runs(pid) for pid in own):
-        assert time.monotonic() < until  # none waits for ever for a study that is gone
+    assert base
+    end = time.monotonic() + 60
+    while any(_runs(pid) for pid in base):
+        assert time.monotonic() < end  # none waits for ever for a study that is gone
         time.sleep(0.05)
     code, out, _ = leave([*words, "--resume", "--json"], capsys)
     assert code == 0
@@ -285,15 +285,15 @@ def test_a_defect_stops_its_own_run_alone_and_shows_its_place(
 
 
 def test_what_runs_share_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Any] = []
-    both = {FRICTION: [0.3, 0.4], "geometry.n_length": [3, 4]}
-    own = modelling.make_mesh
+    rows: list[Any] = []
+    two_results = {FRICTION: [0.3, 0.4], "geometry.n_length": [3, 4]}
+    base = modelling.make_mesh
     monkeypatch.setenv("TRIBODYN_CACHE", str(tmp_path / "kept"))
-    monkeypatch.setattr(modelling, "make_mesh", lambda *which: made.append(which) or own(*which))
+    monkeypatch.setattr(modelling, "make_mesh", lambda *which: rows.append(which) or base(*which))
     monkeypatch.setattr(pool, "finished", lambda tasks, workers, solve: map(solve, tasks))
-    found = td.studies.grid(TABLES | {"vary": both}, tmp_path, workers=2)
-    assert found.count("complete") == 4
-    assert len(made) == 2
+    computed = td.studies.grid(TABLES | {"vary": two_results}, tmp_path, workers=2)
+    assert computed.count("complete") == 4
+    assert len(rows) == 2
 
 
 def test_runs_without_a_peak_have_nothing_to_draw() -> None:

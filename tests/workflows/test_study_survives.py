@@ -169,10 +169,12 @@ def test_a_killed_worker_and_a_killed_scheduler_lose_nothing(kind: Any, tmp_path
     assert 2 <= len(before) < RUNS
 
     repeated = kind() if kind is InProcess else None
-    found = td.studies.grid(TABLES, folder, workers=1, scheduler=repeated.address if repeated else "local", resume=True)
+    computed = td.studies.grid(
+        TABLES, folder, workers=1, scheduler=repeated.address if repeated else "local", resume=True
+    )
     if repeated:
         repeated.kill_scheduler()
-    assert found.count("complete") == RUNS
+    assert computed.count("complete") == RUNS
     after = journal.rows()
     assert all(after[key].seconds == row.seconds for key, row in before.items())  # none was done again
     assert (folder / "study.csv").read_bytes() == (reference / "study.csv").read_bytes()

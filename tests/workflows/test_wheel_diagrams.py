@@ -26,11 +26,11 @@ def test_an_engine_order_excites_the_diameter_that_its_samples_have(n_sectors: i
 
 def test_meetings_are_modes_on_lines_of_engine_orders() -> None:
     frequency = np.array([[100.0, 400.0], [120.0, 420.0], [150.0, 450.0]])  # of diameters 0, 1, 2 of four sectors
-    found = wheel_diagrams.crossings(frequency, 4, 30.0, 60.0)
+    computed = wheel_diagrams.crossings(frequency, 4, 30.0, 60.0)
     low = {(3, 1, 0)}  # 120 Hz by order 3; diameter 0 needs orders 4, 8, ..., diameter 2 needs 2, 6, ...
     high = {(7, 1, 1), (8, 0, 1), (9, 1, 1), (10, 2, 1), (11, 1, 1), (12, 0, 1), (13, 1, 1), (14, 2, 1)}
-    assert {(m.engine_order, m.diameter, m.family) for m in found} == low | high
-    for m in found:
+    assert {(m.engine_order, m.diameter, m.family) for m in computed} == low | high
+    for m in computed:
         assert 30.0 <= m.speed <= 60.0
         assert m.engine_order * m.speed == pytest.approx(frequency[m.diameter, m.family])
 
@@ -39,9 +39,9 @@ def test_orders_in_space_excite_waves_against_the_rotation_up_to_half_the_sector
     """Of four sectors order 1 is the wave -1, and order 3, through the sectors, the wave 1."""
     with_it, against = np.array([[100.0], [120.0], [150.0]]), np.array([[100.0], [126.0], [150.0]])
     families = {"stuck": with_it, "stuck, against": against}
-    found = wheel_diagrams.meetings(families, 4, 20.0, 200.0)
-    assert list(found) == ["stuck"]
-    matched = {m.engine_order: m.frequency for m in found["stuck"]}
+    computed = wheel_diagrams.meetings(families, 4, 20.0, 200.0)
+    assert list(computed) == ["stuck"]
+    matched = {m.engine_order: m.frequency for m in computed["stuck"]}
     assert matched == {1: 126.0, 2: 150.0, 3: 120.0, 4: 100.0}  # none above the number of sectors
 
 

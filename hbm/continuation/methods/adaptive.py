@@ -102,17 +102,17 @@ def follow(
     return sweep.builder.finish(end)
 
 
-def _begin(path: Parameter, start: float, stop: float, options: Options) -> _Sweep:
+def _begin(path: Parameter, start: float, stop: float, options: Options) -> _AdaptiveSweep:
     """The first point, from which to follow."""
     first = None
     if options.guess is not None:
         first = newton.solve(*path.place(start), options.guess, options.newton)
     if first is None or not first.converged:
         first = solve_along_load(*path.place(start), options.newton)
-    return _Sweep(path, options, first, start, stop)
+    return _AdaptiveSweep(path, options, first, start, stop)
 
 
-class _Sweep:
+class _AdaptiveSweep:
     """The last points, the step to come, and points solved ahead."""
 
     def __init__(self, path: Parameter, options: Options, first: Solution, start: float, stop: float):

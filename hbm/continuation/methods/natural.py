@@ -76,7 +76,7 @@ def follow(
         of the branch that are folds are marked
     """
     options = options or Options()
-    sweep, end = _Sweep(parameter.of(problem), start, stop, options), None
+    sweep, end = _NaturalSweep(parameter.of(problem), start, stop, options), None
     while end is None:
         end = sweep.advance()
         if on_point is not None and sweep.done:
@@ -84,7 +84,7 @@ def follow(
     return sweep.builder.finish(end)
 
 
-class _Sweep:
+class _NaturalSweep:
     """The values to come, and the solution at the last. done : values that are behind, the first not counted."""
 
     def __init__(self, path: Parameter, start: float, stop: float, options: Options):
