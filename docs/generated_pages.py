@@ -95,7 +95,7 @@ def _tables(kind: type[BaseModel], path: tuple[str, ...]) -> Iterator[tuple[tupl
 
 def _is_value(table: type[BaseModel]) -> bool:
     """Whether a table stands for a value that is written as a text or a small inline table."""
-    return table.__name__ in ("Place", "WearStep", "Variable")
+    return table.__name__ in ("Place", "WearStepLimit", "Variable")
 
 
 def _is_key(name: str, field: Any, path: tuple[str, ...]) -> bool:

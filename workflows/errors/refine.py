@@ -19,7 +19,7 @@ from tribodyn.workflows.scene.part_tables import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.structure_tables import BodyTable, DeckTable
-from tribodyn.workflows.scene.wear import Wear, WearStep
+from tribodyn.workflows.scene.wear import Wear, WearStepLimit
 
 WEAR_FACTOR = 3.0  # finer wear steps of another round
 HALVED = 2.0  # ratio of element sizes where every element of an imported mesh is cut into eight
@@ -105,7 +105,7 @@ def _finer(table: Wear, key: str, factor: float) -> str:
     """Override that divides a key of the accuracy of wear steps by a factor."""
     value, unit = table.parameters.get(key, table.tolerance), ""
     if key == "step":
-        step = table.step or WearStep()
+        step = table.step or WearStepLimit()
         value, unit = (step.depth or 0.0, " m") if step.share is None else (step.share, "")
     return f"wear.{key}={value / factor!r}{unit}"
 

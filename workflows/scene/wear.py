@@ -24,7 +24,7 @@ from tribodyn.workflows.scene.user_files import (
 )
 
 
-class WearStep(Table, stage=WEAR):
+class WearStepLimit(Table, stage=WEAR):
     """Largest depth that one wear step may add: a share of delta_max, or a depth [m]."""
 
     share: Annotated[float, Field(gt=0)] | None = None
@@ -34,11 +34,11 @@ class WearStep(Table, stage=WEAR):
 
 
 def _step(value: object) -> object:
-    if isinstance(value, (WearStep, dict)):
+    if isinstance(value, (WearStepLimit, dict)):
         return value
     for unit, name in (("", "share"), ("m", "depth")):
         try:
-            return WearStep(**{name: to_si(value, unit)})
+            return WearStepLimit(**{name: to_si(value, unit)})
         except ValueError:
             continue
     raise Refusal(f'expected a share of delta_max such as "5 %" or a depth such as "50 um", above 0, got {value!r}')
@@ -162,7 +162,7 @@ class Wear(JointWearTable, stage=WEAR):
     """Whose preload `lost_below` counts: of all joints that wear together, or of whichever joint falls first."""
     end_at: Literal["vibrating", "at_rest"] = "vibrating"
     """Whose preload that is: of the vibrating contact, its mean force, or of the contact without harmonic loads."""
-    step: Annotated[WearStep, BeforeValidator(_step)] | None = None
+    step: Annotated[WearStepLimit, BeforeValidator(_step)] | None = None
     """Largest depth that one step of the thesis's rule may add: a share of delta_max such as "5 %", or a depth."""
     at: Annotated[Place | Sweep, BeforeValidator(_place_or_sweep)] = Place(peak=1.0)
     """Where the cycles are taken: "peak", a share of its frequency such as "98 % of peak", a frequency, or a slow sweep

@@ -87,7 +87,7 @@ class Aim(Table):
     """Which of its values are better."""
 
 
-class Constraint(Table):
+class OptimumLimit(Table):
     """One entry of optimise.limits."""
 
     number: str
@@ -98,7 +98,7 @@ class Constraint(Table):
     """Largest value that may be."""
 
     @model_validator(mode="after")
-    def _has_an_end(self) -> Constraint:
+    def _has_an_end(self) -> OptimumLimit:
         if self.low is None and self.high is None:
             raise Refusal(f"a limit of {self.number} needs low or high")
         for end in (self.low, self.high):
@@ -115,7 +115,7 @@ class OptimiseSettings(Table):
 
     aims: Annotated[tuple[Aim, ...], Field(min_length=1, max_length=3)] = AIMS
     """What is wanted; of several aims the best trades are looked for."""
-    limits: tuple[Constraint, ...] = ()
+    limits: tuple[OptimumLimit, ...] = ()
     """What a run must keep to."""
     evaluations: Annotated[StrictInt, Field(ge=2)] = 40
     """Most runs, those of the design among them."""
