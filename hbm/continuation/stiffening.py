@@ -141,10 +141,10 @@ def _damped(
     state = balance.evaluate(omega, start)
     for step in range(options.max_steps):
         small = newton.relative_residual(state, x_lin) <= newton.required_residual(balance, state, x_lin, options)
-        try:
-            factor = sla.lu_factor(balance.linearise(state).dense(), check_finite=True)
-        except ValueError:  # numbers beyond all bounds
+        jacobian = balance.linearise(state).dense()
+        if not np.isfinite(jacobian).all():
             return None, step
+        factor = sla.lu_factor(jacobian, check_finite=False)
         with np.errstate(all="ignore"):
             direction = sla.lu_solve(factor, -state.residual.ravel(), check_finite=False)
         size, length = float(np.linalg.norm(direction)), 1.0

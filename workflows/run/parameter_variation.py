@@ -22,6 +22,7 @@ from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel, ReductionBasis
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import joints, matrix_model, modelling, part_reduction, scene_assembly
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.contact import ContactTable
@@ -291,7 +292,7 @@ class ParameterVariation:
             value, reach = self.numbers[key].value, self._reach(key)
             try:
                 up, down = (self._part(self._changed(key, value * side)) for side in (1 + reach, 1 - reach))
-            except ValueError as reason:
+            except Refusal as reason:
                 raise NoDerivative(f"beside {key} = {value:g}: {reason}") from None
             if not _smooth(up, self.part, down):
                 raise NoDerivative(f"beside {key} = {value:g} its mesh or what meets at the contact is another one")

@@ -12,7 +12,7 @@ from scipy.sparse import issparse
 
 from tribodyn.fem.assembly import materials_of
 from tribodyn.fem.elasticity import densities
-from tribodyn.fem.factor import factorise
+from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part
@@ -198,7 +198,7 @@ def check_deflection(
     displacement: dict[str, tuple[float, str]] = {}
     try:
         solve = _solver(system.stiffness)
-    except (ValueError, LinAlgError):  # nothing holds it but the contact
+    except (SingularStiffness, LinAlgError):  # nothing holds it but the contact
         return []
     if _free(system):
         return []

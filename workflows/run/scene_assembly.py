@@ -60,7 +60,7 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
                 mesh, node_sets, notes = _placed_mesh(table, folder, scratch / f"mesh_{name}.msh")
                 remarks = tuple(f"bodies.{name}: {note}" for note in notes)
                 bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), remarks))
-            except ValueError as trouble:
+            except Refusal as trouble:
                 raise Refusal(f"bodies.{name}: {trouble}") from None
         _refuse_overlap(bodies)
     brought = carried_decks(scene, folder)

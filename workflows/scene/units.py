@@ -117,7 +117,7 @@ def _text_to_si(value: str, unit: str) -> float:
         raise Refusal(f'{expected}, got "{value}" without a unit')
     try:
         source_unit = parse_unit(match[2])
-    except ValueError as error:
+    except Refusal as error:
         raise Refusal(f'{expected}, got "{value}" in which {error}') from None
     if source_unit.dimension != target_unit.dimension:
         raise Refusal(f'{expected}, got "{value}" which is {_name(source_unit.dimension)}')

@@ -6,7 +6,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationError, ValidationInfo, model_validator
 
 from tribodyn.declarations import Role, read
 from tribodyn.hbm.wear import law as wear_law, wear_rule
@@ -39,7 +39,7 @@ def _step(value: object) -> object:
     for unit, name in (("", "share"), ("m", "depth")):
         try:
             return WearStepLimit(**{name: to_si(value, unit)})
-        except ValueError:
+        except (Refusal, ValidationError):
             continue
     raise Refusal(f'expected a share of delta_max such as "5 %" or a depth such as "50 um", above 0, got {value!r}')
 
@@ -67,7 +67,7 @@ def _place(value: object) -> object:
         if value == "peak":
             return Place(peak=1.0)
         return Place(peak=to_si(share, "")) if of and not peak else Place(frequency=to_si(value, "Hz"))
-    except ValueError:
+    except (Refusal, ValidationError):
         raise Refusal(
             f'expected "peak", a share of its frequency such as "98 % of peak", or a frequency such as "410 Hz", '
             f"got {value!r}"
