@@ -90,7 +90,7 @@ class Follower:
     def start(self, balance: HarmonicBalance, state: State) -> None:
         """Begin at a state of a balance.
 
-        Raises  ValueError for models with no equation of motion in time; IntegrationFailed
+        Raises  Refusal for models with no equation of motion in time; IntegrationFailed
         """
         if balance.model.is_wave:
             raise Refusal("means over a motion serve one part or several bodies, not a travelling wave of a wheel")

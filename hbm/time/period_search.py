@@ -162,20 +162,20 @@ class PeriodSearch:
 
             def product(v: np.ndarray, state: Period = state, size: float = size) -> np.ndarray:
                 length = float(np.linalg.norm(v)) / size
-                there = self.step(self.vector.unpack(state.start + v / length, state.end))
-                return (there.image - state.image) * length - v
+                trial = self.step(self.vector.unpack(state.start + v / length, state.end))
+                return (trial.image - state.image) * length - v
 
             derivative = LinearOperator((len(miss), len(miss)), product, dtype=float)
             step = gmres(derivative, -miss, rtol=RULES.forcing, restart=RULES.krylov, maxiter=1)[0]
             share = 1.0
             while True:
-                there = self.step(self.vector.unpack(state.start + share * step, state.end))
-                if there.drift < (1 - 0.1 * share) * state.drift:
+                trial = self.step(self.vector.unpack(state.start + share * step, state.end))
+                if trial.drift < (1 - 0.1 * share) * state.drift:
                     break
                 share *= 0.5
                 if share < RULES.shortest:
                     return state
-            state = there
+            state = trial
         return state
 
 

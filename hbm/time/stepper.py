@@ -96,9 +96,10 @@ class TimeStepper:
         self.damping = full
         self.flow = np.zeros((m, m)) if system.circulatory is None else moving.T @ system.circulatory @ moving
         flow = None if system.circulatory is None else self.flow
-        own = np.abs(np.diag(full))
+        damping_size = np.abs(np.diag(full))
         off = np.abs(full - np.diag(np.diag(full)))
-        diagonal = flow is None and bool(np.all(off <= 1e-9 * np.sqrt(np.outer(own, own)) + 1e-13 * own.max()))
+        limit = 1e-9 * np.sqrt(np.outer(damping_size, damping_size)) + 1e-13 * damping_size.max()
+        diagonal = flow is None and bool(np.all(off <= limit))
         names = balance.compliance.output_names
         rows = np.array([system.outputs[name] for name in names]).reshape(len(names), len(phi))
         basis = balance.basis

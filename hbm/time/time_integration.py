@@ -115,7 +115,7 @@ def integrate(
     Of a travelling wave all sectors are marched until it repeats itself, and the first of them is shown; its slopes
     are of all of them
     Returns the last period, also where it is not periodic within max_periods, as its outcome then says
-    Raises  ValueError for models with no equation of motion in time; IntegrationFailed
+    Raises  Refusal for models with no equation of motion in time; IntegrationFailed
     """
     options, balance = options or Options(), balance.standing(omega)
     full_balance, begin = in_time(balance, omega, start, options)
@@ -138,7 +138,7 @@ def march_freely(
     added : damping ratio that sustains the start where it is a point of a nonlinear mode, gone at t = 0
     An unstable periodic motion is left, for another one or for one that never repeats itself; means over many periods
     then are what a machine shows
-    Raises  ValueError for models with no equation of motion in time; IntegrationFailed
+    Raises  Refusal for models with no equation of motion in time; IntegrationFailed
     """
     options, balance = replace(options or Options(), accelerate=False), balance.standing(omega)
     full_balance, begin = in_time(balance, omega, start, options)

@@ -104,9 +104,8 @@ def earlier(path: Path, file: SceneFile) -> Result | None:
 
 def is_complete(result: Result, scene: Scene) -> bool:
     """Whether a result holds everything that a scene of the same problem asks for."""
-    if not result.finished or not scene.wears:
+    if not result.finished or scene.wear is None or not scene.wears:
         return result.finished
-    assert scene.wear is not None
     stopped = result.wear is None or result.wear.ended is WearEnd.STEPS_DONE
     return not stopped or result.wear_steps >= scene.wear.max_steps
 

@@ -59,9 +59,9 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
         advance(done, note, (row.cycles + row.cycles_in_step, row.preload))
 
     problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
-    found = result.response
-    if found is not None and (peak := found.peak(settings.OUTPUT)) is not None:
-        problem = _start(problem, (float(found.omega[peak]), model.balance.shaped(found.contact[peak])))
+    response = result.response
+    if response is not None and (peak := response.peak(settings.OUTPUT)) is not None:
+        problem = _start(problem, (float(response.omega[peak]), model.balance.shaped(response.contact[peak])))
     scale = settings.depth_scale(scene, patch.free_deflection, patch.area)
     rule = rule_of(scene, problem, scale)
     try:
@@ -77,25 +77,24 @@ def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advan
 
 
 def _start(problem: WearProblem, start: tuple[float, np.ndarray] | None) -> WearProblem:
-    """A problem whose duties at the peak begin at one that is known, see `Duty.start`."""
-
-    there = [duty.load == 1 and duty.balance is None and isinstance(duty.site, AtPeak) for duty in problem.mission]
-    mission = (replace(duty, start=start) if at else duty for duty, at in zip(problem.mission, there, strict=True))
+    """The problem with the known peak as the start of its duties at a peak, see `Duty.start`."""
+    at_peak = [duty.load == 1 and duty.balance is None and isinstance(duty.site, AtPeak) for duty in problem.mission]
+    mission = (replace(duty, start=start) if at else duty for duty, at in zip(problem.mission, at_peak, strict=True))
     return replace(problem, mission=tuple(mission))
 
 
 def worn_out(
     file: SceneFile, model: Model, left: float = LIFE_SHARE, start: tuple[float, np.ndarray] | None = None
 ) -> WearHistory:
-    """Wear by the scene's rule until a share `left` of the preload is left, of which nothing is kept.
+    """Wear by the scene's rule until a share `left` of the preload is left; nothing is stored.
 
     start : peak that its duties there begin at, as `Duty.start` has it
     """
-    wanted, balance = file.scene.wear, model.balance
-    assert wanted is not None
-    problem = _start(wear_problem(file.scene, file.folder, balance, left, wanted.end_at == "at_rest"), start)
+    wear, balance = file.scene.wear, model.balance
+    assert wear is not None
+    problem = _start(wear_problem(file.scene, file.folder, balance, left, wear.end_at == "at_rest"), start)
     scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)
-    return evolve(rule_of(file.scene, problem, scale, with_growth=False), wanted.max_steps)
+    return evolve(rule_of(file.scene, problem, scale, with_growth=False), wear.max_steps)
 
 
 def wear_problem(
@@ -118,8 +117,8 @@ def wear_problem(
 
 def coefficients(scene: Scene) -> dict[str, float]:
     """Wear coefficient [m3/J] of every joint whose volume goes with the friction work; none where a scene wears not."""
-    own = law_numbers(scene).values()
-    return {joint: value for value, _, joints, law in own if law == "energy" for joint in joints}
+    numbers = law_numbers(scene).values()
+    return {joint: value for value, _, joints, law in numbers if law == "energy" for joint in joints}
 
 
 def law_numbers(scene: Scene) -> dict[str, tuple[float, str, tuple[str, ...], str]]:
@@ -142,19 +141,20 @@ def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
     """The duties of a scene, those at another speed of the wheel with the problem there."""
     assert scene.wear is not None
 
-    def highest(there: HarmonicBalance) -> float:
-        return references.highest_linear(there, settings.OUTPUT, *settings.response_range(scene))
+    def highest(balance_at_speed: HarmonicBalance) -> float:
+        return references.highest_linear(balance_at_speed, settings.OUTPUT, *settings.response_range(scene))
 
     duties = settings.mission(scene, highest(balance))
     if not balance.at_speed:
         return duties
-    found = []
+    mission = []
     for duty, table in zip(duties, scene.wear.duties, strict=True):
-        own = None if table.speed is None else balance.at_speed.get(table.speed)
-        if own is not None:
-            duty = replace(duty, site=settings.site_of(scene, table.at, highest(own)), balance=own)
-        found.append(duty)
-    return tuple(found)
+        balance_at_speed = None if table.speed is None else balance.at_speed.get(table.speed)
+        if balance_at_speed is not None:
+            site = settings.site_of(scene, table.at, highest(balance_at_speed))
+            duty = replace(duty, site=site, balance=balance_at_speed)
+        mission.append(duty)
+    return tuple(mission)
 
 
 def rule_of(scene: Scene, problem: WearProblem, scale: float, with_growth: bool = True) -> WearRule:
