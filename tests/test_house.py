@@ -65,8 +65,8 @@ MISSED = {
     "lines": 60_678,
     "lines of proof": 10_578,
     "lines of one file": 666,
-    "handlers of ValueError": 43,
-    "assertions of not None": 89,
+    "handlers of ValueError": 35,
+    "assertions of not None": 88,
 }
 
 
