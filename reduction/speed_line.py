@@ -147,7 +147,7 @@ class SpeedLine:
     def error(self, speed: float, exact: np.ndarray, n_modes: int = 6) -> float:
         """Largest relative error of the lowest frequencies of the stuck wave that interpolation makes at a speed.
 
-        there : (n, n) stiffness at this speed
+        exact : (n, n) stiffness at this speed
         """
 
         def wave(stiffness: np.ndarray) -> tuple[SecondOrderSystem, np.ndarray]:
@@ -209,7 +209,10 @@ def _summed(weights: Sequence[float], systems: Sequence[SecondOrderSystem]) -> d
 
 @dataclass(frozen=True, eq=False)
 class AtSpeed:
-    """System, contact map and way back of each harmonic index at one speed [Hz]; of : what is cache from all speeds."""
+    """System, contact map and way back of each harmonic index at one speed [Hz].
+
+    of : computes the system at this speed from the systems at all speeds of the line, see `SpeedLine.between`
+    """
 
     line: SpeedLine
     of: Callable[[Sequence[SecondOrderSystem], float], SecondOrderSystem]

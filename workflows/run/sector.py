@@ -1,6 +1,8 @@
-"""From a part to the sector of a wheel that it is, full and reduced; where it turns, about its equilibrium at speed.
+"""Build the sector of a wheel from a part: the full sector, the reduced one, and the model of its travelling wave.
 
-At speed it has the stress of its deformed state of contact, spin softening and Coriolis forces.
+The sector of a rotating wheel vibrates about its static equilibrium at speed. Its stiffness there includes the stress
+under the static loads with the contact in equilibrium, and spin softening. Coriolis forces act unless
+wheel.coriolis = false.
 """
 
 from __future__ import annotations
@@ -36,19 +38,20 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import joints, part_reduction
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 
-SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
+SEAM = ("cyclic_right", "cyclic_left")  # node sets of a part where the wheel continues without contact
 
 
 def sector(scene: MeshScene, part: Part) -> Sector:
-    """The full sector of the scene's wheel, vibrating about its equilibrium where it spins.
+    """The full sector of the scene's wheel; of a rotating wheel, about its static equilibrium at speed.
 
-    Raises  Refusal where its faces do not match those of its neighbours, or where the disk is left cut open
+    Raises  Refusal where the faces do not match those of the neighbours, or where wheel.seam is missing, so that the
+        disk would be cut open
     """
     wheel = scene.wheel
     assert wheel is not None
-    cuts = [tuple(name for name in part.node_sets if name.rpartition(".")[2] == side) for side in SEAM]
-    if wheel.seam is None and all(cuts):
-        (right, *_), (left_face, *_) = cuts
+    seams = [tuple(name for name in part.node_sets if name.rpartition(".")[2] == side) for side in SEAM]
+    if wheel.seam is None and all(seams):
+        (right, *_), (left_face, *_) = seams
         raise Refusal(
             f"wheel.seam is missing, but the part has {right} and {left_face}, where its disk would be cut open: "
             f'give wheel.seam = ["{right}", "{left_face}"]'
@@ -59,7 +62,7 @@ def sector(scene: MeshScene, part: Part) -> Sector:
         raise Refusal(
             f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
         ) from None
-    return spun(scene, part, cut) if wheel.speed else cut
+    return sector_about_equilibrium(scene, part, cut) if wheel.speed else cut
 
 
 def check_sectors(scene: MeshScene) -> None:
@@ -74,65 +77,67 @@ def check_sectors(scene: MeshScene) -> None:
 
 
 def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
-    """A full sector on its contact, seam and load nodes and a few modes: what serves every engine order.
+    """Reduce a full sector to its contact, seam and load nodes and a few modes. It serves every engine order.
 
-    Raises  Refusal where it cannot stand, by itself or at its speed
+    Raises  Refusal where the reduction fails; at speed the sentence names the speed
     """
     assert scene.wheel is not None
     speed = scene.wheel.speed
     try:
-        attached = distributed(scene, full) if speed else ()
-        return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff, attached)
-    except Refusal as trouble:
+        attached_loads = distributed_loads(scene, full) if speed else ()
+        return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff, attached_loads)
+    except Refusal as refusal:
         if not speed:
             raise
-        raise Refusal(f"at wheel.speed = {60 * speed:.6g} rpm {trouble}, or let it turn slower") from None
+        raise Refusal(f"at wheel.speed = {60 * speed:.6g} rpm {refusal}, or let it turn slower") from None
 
 
 def at_one_speed(scene: MeshScene, part: Part) -> ReducedModel:
-    """The model of the wheel's wave at one speed, not damped."""
+    """The travelling wave of the wheel at one speed, without damping."""
     assert scene.wheel is not None
-    small = reduced(scene, sector(scene, part))
-    springs = joints.contact_stiffness(scene, small.model)
-    return travelling_wave(small, scene.wheel.engine_order, springs=springs)
+    reduced_sector = reduced(scene, sector(scene, part))
+    springs = joints.contact_stiffness(scene, reduced_sector.model)
+    return travelling_wave(reduced_sector, scene.wheel.engine_order, springs=springs)
 
 
 def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
-    """The model of the wheel's wave on its operating line, not damped: that of the speed in the middle, and `along`.
+    """The travelling wave of the wheel along its operating line (frequency = engine order times speed), undamped.
 
-    The sector is reduced at speeds that halve the intervals of their squares until the frequencies which the others
-    foretell at the newest one are right to `LIMITS.speed_spacing_error`, at most seven of them
-    Raises  Refusal where it cannot stand at one of them
+    The model is that of wheel.speed; it interpolates to any other speed of the line. The sector is reduced at the two
+    ends of the range, then at speeds between them, equally spaced in speed^2 and halved. This stops when the
+    frequencies interpolated from the other speeds are right at the newest speed to `LIMITS.speed_spacing_error`: four
+    speeds at least, seven at most.
+    Raises  Refusal where the sector has no equilibrium at one of these speeds
     """
     wheel = scene.wheel
     assert wheel is not None
     low, high = (frequency / abs(wheel.engine_order) for frequency in scene.operating_range)
-    squares = low**2 + (high**2 - low**2) * np.array([0.0, 1.0, 0.5, 0.25, 0.75, 0.125, 0.875])
-    turning: list[Sector] = []
-    speeds = np.sqrt(squares).tolist()
+    squared_speeds = low**2 + (high**2 - low**2) * np.array([0.0, 1.0, 0.5, 0.25, 0.75, 0.125, 0.875])
+    sectors: list[Sector] = []
+    speeds = np.sqrt(squared_speeds).tolist()
     for speed in speeds:
         wheel_at_speed = wheel.model_copy(update={"speed": speed, "sweep": None})
         try:
-            turning.append(sector(scene.model_copy(update={"wheel": wheel_at_speed}), part))
-            if len(turning) == 2:
-                settings = (scene.reduction.modes, scene.reduction.cutoff, distributed(scene, turning[0]))
-                ends = reduce_alike(turning, *settings)
-        except Refusal as trouble:
-            raise Refusal(f"at {60 * speed:.6g} rpm of the operating line {trouble}") from None
-        if len(turning) == 2:
+            sectors.append(sector(scene.model_copy(update={"wheel": wheel_at_speed}), part))
+            if len(sectors) == 2:
+                settings = (scene.reduction.modes, scene.reduction.cutoff, distributed_loads(scene, sectors[0]))
+                ends = reduce_alike(sectors, *settings)
+        except Refusal as refusal:
+            raise Refusal(f"at {60 * speed:.6g} rpm of the operating line {refusal}") from None
+        if len(sectors) == 2:
             springs = joints.contact_stiffness(scene, ends.model)
             stiffness = (ends.sector.system.stiffness,)
             line = SpeedLine(ends, stiffness, (speeds[0],), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
-        if len(turning) > 1:
-            stiffness_there = congruent(turning[-1].system.stiffness, ends.origin.basis)
-            error = line.error(speed, stiffness_there) if len(turning) > 3 else np.inf
+        if len(sectors) > 1:
+            stiffness_there = congruent(sectors[-1].system.stiffness, ends.origin.basis)
+            error = line.error(speed, stiffness_there) if len(sectors) > 3 else np.inf
             line = replace(line, stiffness=(*line.stiffness, stiffness_there), speeds=(*line.speeds, speed))
             if error <= LIMITS.speed_spacing_error:
                 break
-    static = [cut.prestress for cut in turning if cut.prestress is not None]
+    prestresses = [sector_at_speed.prestress for sector_at_speed in sectors if sector_at_speed.prestress is not None]
     accuracy = {
-        "prestress_residual": max(each.residual for each in static),
-        "prestress_rotation": max(each.rotation for each in static),
+        "prestress_residual": max(each.residual for each in prestresses),
+        "prestress_rotation": max(each.rotation for each in prestresses),
     }
     wave = line(2 * np.pi * abs(wheel.engine_order) * wheel.speed)
     return SpeedLineModel(
@@ -142,13 +147,12 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
     )  # fmt: skip
 
 
-def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
-    """The sector `cut` from a part, vibrating about its equilibrium at the scene's speed.
+def sector_about_equilibrium(scene: MeshScene, part: Part, cut_sector: Sector) -> Sector:
+    """The sector `cut_sector` of a part, about its static equilibrium at the scene's speed.
 
-    The stress is that of the static loads with the contact as it settles under it: closed, slipped or open, pair by
-    pair
-    Raises  Refusal where the contact does not settle or a body can move rigidly, StaticDivergence where the sector
-        has no equilibrium, turns far in it, or is unstable in it with its contacts stuck
+    The stress is that under the static loads, solved together with the contact: each pair is closed, slipped or open.
+    Raises  Refusal where no contact state balances the loads or a body is unconstrained, StaticDivergence where the
+        sector has no equilibrium, rotates far in it, or is unstable in it with its contacts stuck
     """
     wheel = scene.wheel
     assert wheel is not None
@@ -156,50 +160,52 @@ def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
     material = part_reduction.material(scene, part.mesh)
     mass, _ = assemble(part.mesh, material)
     softening = part.restricted(spin_softening(mass, wheel.axis, speed))
-    turning = csr_matrix(part.restricted(coriolis(mass, wheel.axis, speed))) if wheel.coriolis else None
+    coriolis_matrix = csr_matrix(part.restricted(coriolis(mass, wheel.axis, speed))) if wheel.coriolis else None
 
     def stiffened(stiffness: csr_matrix) -> Sector:
-        return replace(cut, system=replace(cut.system, stiffness=stiffness, gyroscopic=turning))
+        return replace(cut_sector, system=replace(cut_sector.system, stiffness=stiffness, gyroscopic=coriolis_matrix))
 
-    start = stuck_at_rest(scene, stiffened(csr_matrix(cut.system.stiffness + softening)))
+    start = stuck_displacement(scene, stiffened(csr_matrix(cut_sector.system.stiffness + softening)))
     equilibrium = solve_prestress(
-        part, material, lambda k: at_rest(scene, stiffened(k)), start, softening, temperature(scene, part)
+        part, material, lambda k: static_displacement(scene, stiffened(k)), start, softening, temperature(scene, part)
     )
-    spinning = replace(stiffened(equilibrium.stiffness), prestress=equilibrium)
-    check_stability(stuck_index_0(scene, spinning))
-    return spinning
+    sector_at_speed = replace(stiffened(equilibrium.stiffness), prestress=equilibrium)
+    check_stability(stuck_stiffness_of_index_0(scene, sector_at_speed))
+    return sector_at_speed
 
 
-def stuck_index_0(scene: MeshScene, sector: Sector) -> csr_matrix:
-    """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck."""
+def stuck_stiffness_of_index_0(scene: MeshScene, sector: Sector) -> csr_matrix:
+    """Stiffness (m, m) [N/m] of harmonic index 0, where all sectors move alike, with the contacts stuck."""
     system, B = wave_system(sector, 0)
     model = ReducedModel(sector.system, sector.interface, joints=sector.joints)
     return stuck_stiffness(system.stiffness, B, joints.contact_stiffness(scene, model))
 
 
-def stuck_at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
-    """Displacement (n_free,) [m] under the static loads with all contacts stuck where they stand, whatever their gap:
-    where a body would slide away that only its stress holds upright, this is where the stress is first taken from.
+def stuck_displacement(scene: MeshScene, sector: Sector) -> np.ndarray:
+    """Displacement (n_free,) [m] under the static loads with all contacts stuck, whatever their gap.
+
+    The first stress is taken from it. A body that only its stress stabilises would otherwise slide away in the first
+    pass of `solve_prestress`.
     """
-    stiffness, T = stuck_index_0(scene, sector), seam_map(sector, 0)
+    stiffness, T = stuck_stiffness_of_index_0(scene, sector), seam_map(sector, 0)
     force = sum((v * sector.system.loads[name] for name, v in static_loads(scene).items()), np.zeros(T.shape[0]))
     return np.asarray(T @ factorise(stiffness, definite=False).solve(T.T @ force))
 
 
-def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples: int = 16) -> np.ndarray:
-    """Displacement (n_free,) [m] under the static loads of the scene, the contact settled; the same in every sector.
+def static_displacement(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples: int = 16) -> np.ndarray:
+    """Displacement (n_free,) [m] under the static loads with the contact in equilibrium; the same in every sector.
 
-    Sectors that move alike need no masters on their seams, as waves of other indices do, and statics no masters on the
-    contact: a traction on every pair makes them exact.
-    tolerance : of the balance at rest; samples : of a cycle in which nothing moves
+    The sector is reduced here with residual flexibility, one contact traction per pair. This is exact for statics: it
+    needs no masters on the contact, and none on the seams because all sectors move alike.
+    tolerance : of the static balance; samples : time samples of the cycle, in which nothing moves
     """
     system, B = wave_system(sector, 0)
     static = static_loads(scene)
-    still = replace(system, gyroscopic=None, loads={name: system.loads[name] for name in static}, outputs={})
+    static_system = replace(system, gyroscopic=None, loads={name: system.loads[name] for name in static}, outputs={})
     interface = replace(sector.interface, B=csr_matrix(B))
-    springs = joints.contact_stiffness(scene, ReducedModel(still, interface, joints=sector.joints))
+    springs = joints.contact_stiffness(scene, ReducedModel(static_system, interface, joints=sector.joints))
     try:
-        model = residual_flexibility(still, interface, springs, n_modes=1, clusters=interface.n_pair)
+        model = residual_flexibility(static_system, interface, springs, n_modes=1, clusters=interface.n_pair)
     except SingularStiffness:
         raise StaticDivergence(UNSTABLE) from None
     model = replace(model, joints=dict(sector.joints))
@@ -214,26 +220,26 @@ def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples:
     if not solved.converged:
         raise Refusal(f"the contacts do not settle under the static loads: {solved.outcome}")
     state = solved.state
-    field = full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), omega)[:, 0]
-    return np.asarray(seam_map(sector, 0) @ field)
+    displacement = full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), omega)[:, 0]
+    return np.asarray(seam_map(sector, 0) @ displacement)
 
 
-def distributed(scene: MeshScene, sector: Sector) -> list[str]:
-    """Static loads that act on many nodes, whose statics the reduction is to keep exact."""
+def distributed_loads(scene: MeshScene, sector: Sector) -> list[str]:
+    """Names of the static loads on many nodes, for each of which the reduction keeps the static response exact."""
     static, loads = static_loads(scene), sector.system.loads
     return [name for name in loads if name in static and np.count_nonzero(loads[name]) > LIMITS.point_load]
 
 
 def static_loads(scene: MeshScene) -> dict[str, float]:
-    """Static loads by name."""
+    """Amplitudes of the static loads (harmonic 0) by name."""
     loads = joints.excite(scene, None).loads
     return {name: float(value.real) for (harmonic, name), value in loads.items() if harmonic == 0}
 
 
 def temperature(scene: MeshScene, part: Part) -> np.ndarray | None:
-    """Change of temperature (n_node,) [K] by the static loads of the scene; None where none heats.
+    """Change of temperature (n_node,) [K] by the static loads of the scene; None where no load heats.
 
-    Raises  Refusal for a field from a file
+    Raises  Refusal for a temperature field from a file
     """
     change = None
     for name, load in scene.loads.static.items():
