@@ -38,7 +38,7 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
             "wear.at=peak", "wear.motion=balance",
         ),
         # systems : linear systems that the harmonics see; extra : masters that are neither contact nor modes
-        {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | WEAR},
+        {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | WEAR | {"wear/memory"}},
     ),
     "beam, nothing drawn": (
         (
