@@ -62,7 +62,7 @@ LIMITS = {
 GRANTS: dict[str, dict[int, int]] = {}
 # limits that are not met yet -> what there is; it only falls, and goes when the limit is met
 MISSED = {
-    "lines": 60_678,
+    "lines": 60_626,
     "lines of proof": 10_578,
     "lines of one file": 666,
     "handlers of ValueError": 35,

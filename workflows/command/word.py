@@ -118,12 +118,7 @@ class Option:
         return name.strip(), quantity(f"{self.flag} {name.strip()}", value.strip(), self.unit or "")
 
 
-def word(
-    study: Callable[..., Any],
-    words: str,
-    *,
-    into: Into = "results",
-) -> Callable[..., None]:
+def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Callable[..., None]:
     """Make the function behind a word of the command line.
 
     words : such as "curve track", printed in the command that resumes

@@ -23,10 +23,7 @@ from tribodyn.extras import package
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.cycle_film import CycleFilm
 from tribodyn.workflows.pictures.offscreen import check
-from tribodyn.workflows.pictures.theme import (
-    LAYOUT,
-    STYLE,
-)
+from tribodyn.workflows.pictures.theme import LAYOUT, STYLE
 from tribodyn.workflows.pictures.wear_film import WearFilm
 from tribodyn.workflows.result.result import Result
 

@@ -30,11 +30,7 @@ LIFT = 2e-3  # of the patch, by which the colours of a face lie above it
 
 def charts(results: Sequence[tuple[str, Result]]) -> dict[str, Chart]:
     """Charts by title, each with the curves of all results that have them."""
-    charts_by_title = {
-        "Response": _response(results),
-        **_wear(results),
-        "Hysteresis": _loops(results),
-    }
+    charts_by_title = {"Response": _response(results), **_wear(results), "Hysteresis": _loops(results)}
     return {title: chart for title, chart in charts_by_title.items() if chart["data"]}
 
 

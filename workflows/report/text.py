@@ -6,16 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tribodyn.hbm.quantity import CurveQuantity, StatedQuantity, WearQuantity, quantity_named
-from tribodyn.workflows.result.answers import (
-    FIRST,
-    LAST,
-    PEAK,
-    STABLE,
-    Answer,
-    answers_of,
-    cycles_of,
-    wears_at_peak,
-)
+from tribodyn.workflows.result.answers import FIRST, LAST, PEAK, STABLE, Answer, answers_of, cycles_of, wears_at_peak
 from tribodyn.workflows.result.model_facts import Stage
 from tribodyn.workflows.result.number_format import UNKNOWN, digits, measured, rounded
 from tribodyn.workflows.result.result import Result

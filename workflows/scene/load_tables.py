@@ -5,11 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import (
-    Field,
-    StrictInt,
-    model_validator,
-)
+from pydantic import Field, StrictInt, model_validator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import (

@@ -6,24 +6,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import (
-    Field,
-    PrivateAttr,
-    StrictInt,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import Field, PrivateAttr, StrictInt, ValidationInfo, model_validator
 
 from tribodyn.declarations import read
 from tribodyn.geometry import parts
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import (
-    Direction,
-    Number,
-    Table,
-    quantity,
-    refuse_slips,
-)
+from tribodyn.workflows.scene.fields import Direction, Number, Table, quantity, refuse_slips
 from tribodyn.workflows.scene.stages import PART, SMOOTH
 from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers, optional_user_file, user_file
 

@@ -10,20 +10,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import (
-    Field,
-    ValidationError,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
 from tribodyn.workflows.scene.contact_numbers import needs_asperities, with_asperities, with_numbers_by_temperature
-from tribodyn.workflows.scene.fields import (
-    Table,
-    unknown_key,
-)
+from tribodyn.workflows.scene.fields import Table, unknown_key
 from tribodyn.workflows.scene.load_tables import HarmonicLoad, Loads, Motion, Prescribed, SpringTable, StaticLoad
 from tribodyn.workflows.scene.part_tables import Geometry, SolidMaterial
 from tribodyn.workflows.scene.solution_tables import (

@@ -186,11 +186,7 @@ def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) 
     timed = all(column is not None for column in exports.values())
     if timed:  # an export of ours: x = a cos + b sin
         frequency_columns = {name: column for name, column in raw.items() if _word(name)[0] == "frequency"}
-        raw = {
-            **frequency_columns,
-            "real [m]": exports["a1"],
-            "imag [m]": -np.asarray(exports["b1"], float),
-        }
+        raw = {**frequency_columns, "real [m]": exports["a1"], "imag [m]": -np.asarray(exports["b1"], float)}
     columns: Columns = {}
     for name, column in raw.items():
         word, unit = _word(name)

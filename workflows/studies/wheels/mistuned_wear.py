@@ -117,12 +117,7 @@ class MistunedWear(StudyResult):
 
 
 def pattern_wear(
-    scene: Source,
-    pattern: int,
-    *,
-    formats: Sequence[str] = (),
-    overrides: Overrides = (),
-    progress: Report = None,
+    scene: Source, pattern: int, *, formats: Sequence[str] = (), overrides: Overrides = (), progress: Report = None
 ) -> MistunedWear:
     """Wear the wheel of a pattern of blades that differ: every blade's contacts wear by their own work.
 
