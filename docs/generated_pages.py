@@ -29,7 +29,7 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.scene import json_schema
 from tribodyn.workflows.scene.fields import Direction, Quantity
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
-from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.wheel_scene import WheelScene
 
 ROOT = Path(__file__).parents[1]
 AXES = get_args(Direction)[1]
@@ -45,8 +45,8 @@ def write(folder: Path) -> None:
     """Write all of them; a page that has not changed is left alone, so that Sphinx does not read it again."""
     folder.mkdir(exist_ok=True)
     pages = {
-        "scene_with_a_mesh": scene_keys(MeshScene),
-        "scene_of_matrices": scene_keys(MatrixScene, without=MeshScene),
+        "scene_with_a_mesh": scene_keys(WheelScene),
+        "scene_of_matrices": scene_keys(MatrixScene, without=WheelScene),
         "parts": parameters_of(map(parts.load, parts.names())),
         "continuations": numbers_of(continuation.KIND),
         "contact_laws": numbers_of(contact_law.KIND),
@@ -280,6 +280,11 @@ def cards() -> str:
         uses["of no effect"] = table.silents
         rows = [(use, ", ".join(f"`{card}`" for card in sorted(of))) for use, of in uses.items()]
         lines += [f"## {name}", "", *_table(("what becomes of it", "cards"), rows)]
+        rows = [
+            (f"`{card}`", table.parameters.get(card, "").replace("|", " or "), names)
+            for card, names in table.fields.items()
+        ]
+        lines += _table(("card", "its parameters", "fields of a data line"), rows)
     return "\n".join(lines)
 
 

@@ -4,8 +4,6 @@ A body keeps its own mesh; the assembly only adds where its numbers start, so th
 side by side. Groups of a body are known as "body.group". What works on one mesh works on an assembly through `pieces`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,8 +20,7 @@ Materials = AnyMaterial | Mapping[str, AnyMaterial]
 class Body:
     """name : unique in an assembly, may be empty for an only body, whose groups then keep their names;
     mesh, node_sets : as geometry.mesh.read gives them; material : one, or by subdomain
-    notes : sentences on conversions of its file, and on its unused content
-    """
+    notes : sentences on conversions of its file, and on its unused content"""
 
     name: str
     mesh: Any
@@ -50,8 +47,7 @@ class Assembly:
     doflocs, boundaries, subdomains, nelements : as of a mesh; facets and elements are numbered body by body
     node_sets : "body.group", see `group_name`, -> nodes; "body" -> all nodes of a body; "point" and "point.turn" of a
         reference point
-    Raises  Refusal where two bodies have one name
-    """
+    Raises  Refusal where two bodies have one name"""
 
     def __init__(self, bodies: Sequence[Body], points: Mapping[str, Sequence[float]] | None = None):
         names = [body.name for body in bodies]
@@ -98,8 +94,7 @@ class Assembly:
 def group_name(body: str, group: str, groups: Container[str]) -> str:
     """Name of a group of a body in an assembly: "body.group"; a group that its deck names so already keeps its name.
 
-    groups : of the body; where "group" is one of them too, "body.group" is that one's name
-    """
+    groups : of the body; where "group" is one of them too, "body.group" is that one's name"""
     inner = group.removeprefix(f"{body}.")
     return group if not body or (inner != group and inner not in groups) else f"{body}.{group}"
 
@@ -119,8 +114,7 @@ def materials_of(mesh: Any, material: Any) -> Iterator[tuple[Piece, Materials]]:
 def piece_of_facets(mesh: Any, facets: np.ndarray) -> tuple[Piece, np.ndarray]:
     """The piece that some facets belong to, and their numbers in its mesh.
 
-    Raises  Refusal where they belong to several bodies
-    """
+    Raises  Refusal where they belong to several bodies"""
     facets = np.asarray(facets, dtype=int)
     for piece in pieces(mesh):
         inside = (facets >= piece.facet) & (facets < piece.facet + piece.mesh.facets.shape[1])

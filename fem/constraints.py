@@ -22,8 +22,7 @@ AXES = "xyz"
 def find_group(groups: Mapping[str, np.ndarray], name: str, kind: str = "node set") -> np.ndarray:
     """The group of that name.
 
-    Raises  Refusal that lists the names which exist, or that the group is empty
-    """
+    Raises  Refusal that lists the names which exist, or that the group is empty"""
     if name not in groups:
         matches = get_close_matches(name, groups, 1)
         guess = f" (did you mean '{matches[0]}'?)" if matches else ""
@@ -55,16 +54,14 @@ class NoMeanRotation:
     """Hold the mean rotation about an axis through the centre of mass: c q = 0, c = (M psi)^T, psi the rotation.
 
     Every elastic mode of a free part is orthogonal to psi in this sense and stays as it is; only the rotation is lost.
-    axis : (3,)
-    """
+    axis : (3,)"""
 
     axis: Sequence[float]
 
     def row(self, points: np.ndarray, mass: Any) -> np.ndarray:
         """c (3 n_node,) [kg], for nodes at points (n_node, 3) and the mass over all DOFs.
 
-        Raises  Refusal for an axis that is none
-        """
+        Raises  Refusal for an axis that is none"""
         axis = np.asarray(self.axis, dtype=float)
         if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
             raise Refusal(f"the axis {list(np.ravel(axis))} of a held rotation must be three numbers, not all zero")
@@ -76,8 +73,7 @@ class NoMeanRotation:
 def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
     """Sorted DOFs (n_free,) that no clamp holds.
 
-    Raises  Refusal where everything is held
-    """
+    Raises  Refusal where everything is held"""
     free = np.ones(n_dof, dtype=bool)
     for clamp in clamps:
         free[clamp.dofs(node_sets)] = False
@@ -90,8 +86,7 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
 class Dependence:
     """DOFs (k,) that depend on others: u[dofs] = map @ u with map (k, n_dof); label : of the constraint, for errors.
 
-    equation : each DOF is of an equation, and another of it may follow where this one is held or follows already
-    """
+    equation : each DOF is of an equation, and another of it may follow where this one is held or follows already"""
 
     dofs: np.ndarray
     map: csr_matrix
@@ -133,12 +128,11 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Dependence])
     """The independent DOFs (n_free,), and the map (n_dof, n_free) from them to all DOFs.
 
     free : DOFs that no clamp holds
-    Raises  Refusal, naming the constraints, where a DOF follows twice, is clamped and follows, or follows itself
-    """
+    Raises  Refusal, naming the constraints, where a DOF follows twice, is clamped and follows, or follows itself"""
     owner = np.full(n_dof, -1)
     clamped = np.ones(n_dof, dtype=bool)
     clamped[free] = False
-    constraints = _pivoted(constraints, clamped)
+    constraints = pivoted(constraints, clamped)
     rows, dofs = [], []
     for number, constraint in enumerate(constraints):
         occupied = constraint.dofs[owner[constraint.dofs] >= 0]
@@ -172,7 +166,7 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Dependence])
     return independent, follow
 
 
-def _pivoted(constraints: Sequence[Dependence], clamped: np.ndarray) -> list[Dependence]:
+def pivoted(constraints: Sequence[Dependence], clamped: np.ndarray) -> list[Dependence]:
     """The constraints, equations last and each for a DOF that neither is held nor follows already, by elimination."""
     solved_constraints = [constraint for constraint in constraints if not constraint.equation]
     if len(solved_constraints) == len(constraints):
@@ -220,8 +214,7 @@ def _entries(matrix: csr_matrix, row: int) -> list[tuple[int, float]]:
 def partition(n_dof: int, chosen: np.ndarray, label: str) -> tuple[np.ndarray, np.ndarray]:
     """Split the DOFs of a system into (remaining, chosen), both sorted: prescribed from free ones, masters from slaves.
 
-    Raises  Refusal, naming the chosen ones by `label`, where one lies outside the system
-    """
+    Raises  Refusal, naming the chosen ones by `label`, where one lies outside the system"""
     chosen = np.unique(np.asarray(chosen, dtype=int))
     if len(chosen) and not 0 <= chosen[0] <= chosen[-1] < n_dof:
         raise Refusal(f"a {label} lies outside the {n_dof} DOFs of the system; clamped DOFs are no part of it")

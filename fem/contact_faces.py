@@ -1,7 +1,5 @@
 """Contact interfaces of faces: against the ground, against a plane, or against another face."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -38,8 +36,7 @@ class ContactFaces:
     reach : farthest opening at which two faces still meet [m], a tenth of the length of the first by default
     joint : name of its joint, by default the name of the face
     turn : (3, 3) rotation from a sector of a wheel to the next one, whose opposite face is met; None for the same body
-    Raises  Refusal, as its methods, for what contradicts itself
-    """
+    Raises  Refusal, as its methods, for what contradicts itself"""
 
     face: str
     t1: Sequence[float] | None
@@ -69,8 +66,7 @@ class ContactFaces:
         """The interface with B over all 3 n_node DOFs of the mesh, pairs in ascending node order.
 
         Where the second face is a neighbour's B is the half of the first alone
-        Raises  Refusal for an unknown or empty face, a t1 along the normal, a gap of the wrong length
-        """
+        Raises  Refusal for an unknown or empty face, a t1 along the normal, a gap of the wrong length"""
         if self.face_centres:
             return self._at_centres(replace(self, face_centres=False).build(mesh))
         if self.opposite is not None:
@@ -105,8 +101,7 @@ class ContactFaces:
 
         Returns interface whose B is the half of the first face, and the half B_2 of the second one in the coordinates
             of its own sector: relative displacement = B q - B_2 q_2
-        Raises  Refusal, naming the faces, where they do not meet, or do not match where nodes are to be paired
-        """
+        Raises  Refusal, naming the faces, where they do not meet, or do not match where nodes are to be paired"""
         faces = mesh.boundaries or {}
         try:
             first, second = (find_group(faces, name, "face") for name in (self.face, self.opposite or ""))
@@ -141,8 +136,7 @@ class ContactFaces:
         self, mesh: Any, first: np.ndarray, second: np.ndarray, turn: np.ndarray, reach: float
     ) -> tuple[Surface, np.ndarray, np.ndarray] | None:
         """The first face, the partners of its nodes on the second and their opening (n_pair,) [m]; None where facets do
-        not match.
-        """
+        not match."""
         first_nodes, second_nodes = facet_nodes(mesh, first), facet_nodes(mesh, second)
         if first_nodes.shape[1] != second_nodes.shape[1] or len(first_nodes) > len(second_nodes):
             return None

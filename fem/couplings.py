@@ -2,10 +2,7 @@
 
 Source  ties: Wohlmuth, A mortar finite element method using dual spaces for the Lagrange multiplier, SIAM Journal on
     Numerical Analysis 38, 2000; distributed coupling: the mean motion of a face in the sense of least squares,
-    weighted by area
-"""
-
-from __future__ import annotations
+    weighted by area"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -33,8 +30,7 @@ class Tie:
     The functions are dual to those of its coefficients, so that each of these follows the other face near it alone
 
     label : for errors; first, second : boundary names; reach : farthest opening [m], which is then bridged; where
-        it is None a tenth of the length of the first face, and faces that are apart are refused
-    """
+        it is None a tenth of the length of the first face, and faces that are apart are refused"""
 
     label: str
     first: str
@@ -54,8 +50,7 @@ class Tie:
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The nodes of the first face in terms of the others.
 
-        Raises  Refusal where a face is unknown, or the faces do not meet
-        """
+        Raises  Refusal where a face is unknown, or the faces do not meet"""
         side_1, side_2, shared = self.meeting(mesh)
         gap = float(np.average(np.abs(shared.gap), weights=np.abs(shared.weight)))
         if self.reach is None and gap > MORTAR.separated * side_1.length:
@@ -98,8 +93,7 @@ class Tie:
 class Equation:
     """A linear equation between displacements of single nodes, sum of factor * u = 0; the first one that can follows.
 
-    label : for errors; terms : (group of one node, axis 0..2, factor)
-    """
+    label : for errors; terms : (group of one node, axis 0..2, factor)"""
 
     label: str
     terms: Sequence[tuple[str, int, float]]
@@ -153,8 +147,7 @@ class DistributedCoupling:
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Dependence:
         """The point in terms of the nodes of the face.
 
-        Raises  Refusal where the face is unknown, or its nodes lie on one line, so that it has no turn
-        """
+        Raises  Refusal where the face is unknown, or its nodes lie on one line, so that it has no turn"""
         nodes, share = shares(mesh, node_sets, self.face)
         place, turn = mesh.points[self.point]
         points = coordinates(mesh)
@@ -180,8 +173,7 @@ class Link:
     """Two points of couplings that move alike but for some of their motions.
 
     label : for errors; first, second : the couplings; free : motions out of 0..2 along and 3..5 about x, y, z in
-        which they stay free of each other
-    """
+        which they stay free of each other"""
 
     label: str
     first: RigidCoupling | DistributedCoupling

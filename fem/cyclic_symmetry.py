@@ -3,10 +3,7 @@
 Every sector is described in its own turned frame. Sector n stands n pitches in the positive sense about the axis; its
 left is the side of sector n + 1. In a wave of index j each sector repeats its right neighbour later,
 q_n = q_0 exp(-i 2 pi j n / N), so that right faces touch the left ones of a sector that is ahead by one phase.
-Source  Tamatam 2021, section 3.2.3, whose equation numbers stand as comments; Petrov 2004
-"""
-
-from __future__ import annotations
+Source  Tamatam 2021, section 3.2.3, whose equation numbers stand as comments; Petrov 2004"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -39,8 +36,7 @@ class Sector:
     seam_right, seam_left : (k, 3) coordinates of matched nodes where sectors are joined, x, y, z; k = 0 for none
     turn : (3, 3) rotation by one pitch, from a sector to the one on its left
     n_sectors : sectors of the wheel; joints : joint -> its pairs
-    prestress : of the full sector of a wheel that turns
-    """
+    prestress : of the full sector of a wheel that turns"""
 
     system: SecondOrderSystem
     interface: ContactInterface
@@ -69,8 +65,7 @@ def with_neighbours(
     contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[float] = AXIS
 ) -> list[ContactFaces]:
     """Contacts of a sector, face on its right, with the opposite faces of its neighbours on the left, which each meets
-    after a turn by one pitch about the axis; raises Refusal as `cut_sector` does.
-    """
+    after a turn by one pitch about the axis; raises Refusal as `cut_sector` does."""
     if n_sectors < 2:
         raise Refusal(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     missing = [contact.face for contact in contacts if contact.opposite is None]
@@ -93,8 +88,7 @@ def cut_sector(
     seam : names of the right and the left face where sectors are one piece, None where only contacts couple them
     axis : of the wheel, through the origin
     Raises  Refusal where faces do not match after the turn, a seam is held on one side only, or a contact has no
-        opposite face
-    """
+        opposite face"""
     if n_sectors < 2:
         raise Refusal(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     turn = rotation(unit(axis, "the axis of rotation"), 2 * np.pi / n_sectors)
@@ -176,15 +170,15 @@ def sector_maps(sector: Sector) -> list[csr_matrix]:
 
 
 def assemble_wheel(
-    sector: Sector, stiffness: Sequence[float] | None = None
+    sector: Sector, stiffness: Sequence[float] | None = None, elastic: Any = None
 ) -> tuple[SecondOrderSystem, ContactInterface]:
     """All sectors of the wheel in one real system, with the contacts between all neighbours.
 
     stiffness : (N,) factor on the stiffness of each sector, 1 for all by default: stiffness mistuning
+    elastic : (n, n) the part of the sector's stiffness that the factors act on, all of it by default [N/m]
     Returns the system, dense where the sector's is, loads and outputs named "<name>@<sector>"; the interface: pairs of
         sector 0 against sector N - 1, then of sector 1 against 0, and so on, in the turned frames of each
-    Raises  Refusal where there is not one positive factor per sector
-    """
+    Raises  Refusal where there is not one positive factor per sector"""
     n_sectors, system, half = sector.n_sectors, sector.system, sector.interface
     factors = np.ones(n_sectors) if stiffness is None else np.asarray(stiffness, dtype=float)
     if factors.shape != (n_sectors,) or not (factors > 0).all():
@@ -196,9 +190,10 @@ def assemble_wheel(
         return csr_matrix(total) if issparse(total) else np.asarray(total)
 
     ones = np.ones(n_sectors)
+    deviation = None if elastic is None else summed(elastic, factors - 1)
     wheel = SecondOrderSystem(
         summed(system.mass, ones),
-        summed(system.stiffness, factors),
+        summed(system.stiffness, factors) if elastic is None else summed(system.stiffness, ones) + deviation,
         None if system.damping is None else summed(system.damping, ones),
         {sector_name(name, k): P.T @ load for name, load in system.loads.items() for k, P in enumerate(maps)},
         {sector_name(name, k): P.T @ row for name, row in system.outputs.items() for k, P in enumerate(maps)},

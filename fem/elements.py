@@ -1,9 +1,6 @@
 """Element geometry in batches: shape functions, gradients and weights at the quadrature points.
 
-Nodes are the columns of the mesh's `doflocs`; a displacement DOF is node * 3 + component (x, y, z).
-"""
-
-from __future__ import annotations
+Nodes are the columns of the mesh's `doflocs`; a displacement DOF is node * 3 + component (x, y, z)."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -24,8 +21,7 @@ def coordinates(mesh: Any) -> np.ndarray:
 def connectivity(mesh: Any) -> np.ndarray:
     """Nodes of the elements (n_element, 27, 10 or 8), in scikit-fem's local order.
 
-    Raises  Refusal where the mesh is not of 27-node or 8-node hexahedra or 10-node tetrahedra
-    """
+    Raises  Refusal where the mesh is not of 27-node or 8-node hexahedra or 10-node tetrahedra"""
     if not isinstance(mesh, MeshHex1 | MeshTet2):  # MeshHex2 is a MeshHex1
         raise Refusal(
             f"the mesh is a {type(mesh).__name__}, but elasticity needs hexahedra or second-order tetrahedra "
@@ -35,31 +31,33 @@ def connectivity(mesh: Any) -> np.ndarray:
 
 
 def batches(
-    mesh: Any, order: int = 5, size: int = 256
+    mesh: Any, order: int = 5, size: int = 256, only: np.ndarray | None = None
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield elements (n_e,), N (n_q, n_a) [-], grad N (n_e, n_q, 3, n_a) [1/m], weight, as `mapped` does."""
-    for elements, N, dN, J, weight in mapped_batches(mesh, order, size):
+    """Yield elements (n_e,), N (n_q, n_a) [-], grad N (n_e, n_q, 3, n_a) [1/m], weight, as `mapped_batches` does."""
+    for elements, N, dN, J, weight in mapped_batches(mesh, order, size, only):
         yield elements, N, np.linalg.solve(J, dN[None]), weight
 
 
-def mapped_batches(mesh: Any, order: int = 5, size: int = 256) -> Iterator[tuple[np.ndarray, ...]]:
+def mapped_batches(
+    mesh: Any, order: int = 5, size: int = 256, only: np.ndarray | None = None
+) -> Iterator[tuple[np.ndarray, ...]]:
     """Yield (elements, N, dN, J, weight) for some elements at a time.
 
     order : polynomial order of the quadrature rule; 5 is exact for the mass of straight-sided elements, with 27 Gauss
         points in a hexahedron and 14 points in a tetrahedron
-    size : elements at a time; memory only
+    size : elements at a time; memory only; only : numbers of elements, all by default
     Yields elements (n_e,), N (n_q, n_a) [-], dN (n_q, 3, n_a) in the reference element [-], J (n_e, n_q, 3, 3) [m] with
         d x_j / d X_i at [i, j], weight |J| w (n_e, n_q) [m3]
-    Raises  Refusal where an element is folded
-    """
+    Raises  Refusal where an element is folded"""
     nodes, points = connectivity(mesh), coordinates(mesh)
     element = mesh.elem()
     X, w = get_quadrature(element, order)
     values, slopes = zip(*(element.lbasis(X, a) for a in range(nodes.shape[1])), strict=True)
     N = np.stack(np.broadcast_arrays(*values)).T
     dN = np.stack([np.stack(np.broadcast_arrays(*s)) for s in slopes]).transpose(2, 1, 0)  # n_q, 3 local, n_a
-    for start in range(0, len(nodes), size):
-        elements = np.arange(start, min(start + size, len(nodes)))
+    numbers = np.arange(len(nodes)) if only is None else only
+    for start in range(0, len(numbers), size):
+        elements = numbers[start : start + size]
         J = dN @ points[nodes[elements]][:, None]
         det = np.linalg.det(J)
         folded = (np.sign(det) != np.sign(det[:, :1])).any(axis=1) | (det[:, 0] == 0)
@@ -73,8 +71,7 @@ def scatter(nodes: np.ndarray, n_node: int, blocks: np.ndarray) -> csr_matrix:
     """Sum element matrices into a sparse matrix over node * k + component.
 
     nodes : (n_element, n_a); blocks : (n_element, n_a, n_a, k, k) symmetric element matrices, k components per node
-    Returns (n_node * k, n_node * k)
-    """
+    Returns (n_node * k, n_node * k)"""
     k = blocks.shape[-1]
     key = (nodes[:, :, None].astype(np.int64) * n_node + nodes[:, None, :]).ravel()
     pattern, place = np.unique(key, return_inverse=True)

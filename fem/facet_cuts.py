@@ -1,7 +1,5 @@
 """Plane polygons of facets: their outlines, areas and cuts, and the place of a point on a curved facet."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.fem.surface import tabulate
@@ -29,8 +27,7 @@ def clip_polygons(subject: np.ndarray, region: np.ndarray) -> np.ndarray:
     """Polygons (n, m, 2) cut by convex ones (n, k, 2), counterclockwise; vertices may repeat, none left is all equal.
 
     Source  Sutherland and Hodgman, Communications of the ACM 17, 1974, for all polygons at once: a vertex that is cut
-        off moves to where its edges cross the line, so that each cut doubles no more than the vertices
-    """
+        off moves to where its edges cross the line, so that each cut doubles no more than the vertices"""
     for k in range(region.shape[1]):
         start, end = region[:, k], region[:, (k + 1) % region.shape[1]]
         edge = end - start

@@ -1,7 +1,5 @@
 """Solutions of a symmetric sparse matrix by a factor, of PARDISO, of SuperLU after METIS, or of MUMPS."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys
@@ -35,18 +33,14 @@ class Factor(Protocol):
 
 
 def factorise(
-    K: Any,
-    definite: bool = True,
-    solver: str | None = None,
-    selected_rows: np.ndarray | None = None,
+    K: Any, definite: bool = True, solver: str | None = None, selected_rows: np.ndarray | None = None
 ) -> Factor:
     """Factorise a sparse symmetric real matrix once, for many right-hand sides.
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix).
     solver : "pardiso" or "superlu", the best available by default; "mumps" in MPI processes of another Python
     selected_rows : those that `solve_selected` is to be fast for
-    Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
-    """
+    Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError"""
     K = csr_matrix(K)
     if solver is None:
         solver = "pardiso" if pardiso_available() else "superlu"
@@ -72,8 +66,7 @@ def factorise(
 def solve_selected(factor: Factor, rhs: np.ndarray) -> np.ndarray:
     """The solution in the `selected_rows` of the factor, where rhs (n, k) vanishes in all others.
 
-    The other rows hold no solution
-    """
+    The other rows hold no solution"""
     if not isinstance(factor, Pardiso):
         return factor.solve(rhs)
     padding = -rhs.shape[1] % 4 if rhs.shape[1] > 4 else 0  # PARDISO takes 15 % longer for seven columns than for eight
@@ -83,8 +76,7 @@ def solve_selected(factor: Factor, rhs: np.ndarray) -> np.ndarray:
 def eigenvalues_below(K: Any, M: Any, value: float) -> int:
     """How many eigenvalues of K phi = lambda M phi lie below a value, by one factorisation.
 
-    By Sylvester's law of inertia; K, M : (n, n) scipy.sparse symmetric, M positive definite
-    """
+    By Sylvester's law of inertia; K, M : (n, n) scipy.sparse symmetric, M positive definite"""
     shifted = csr_matrix(K - value * M)
     return (Pardiso(shifted, definite=False) if pardiso_available() else SuperLU(shifted)).negative
 
@@ -92,8 +84,7 @@ def eigenvalues_below(K: Any, M: Any, value: float) -> int:
 def softest_residual(K: Any, solve: Callable[[np.ndarray], np.ndarray]) -> float:
     """|K x - b| / |b| for b along the softest direction, found by two inverse iterations from a fixed start.
 
-    A rigid-body motion cannot be balanced by K, whatever the factorisation made of its pivots.
-    """
+    A rigid-body motion cannot be balanced by K, whatever the factorisation made of its pivots."""
     x = np.random.default_rng(0).standard_normal(K.shape[0])
     residual = np.inf
     for _ in range(2):
@@ -109,8 +100,7 @@ def pardiso_available() -> bool:
     """Whether pypardiso and its MKL library load.
 
     MKL chooses its kernels by where arrays happen to lie in memory, and rounds by that; the variable
-    set here, before it loads, forbids it.
-    """
+    set here, before it loads, forbids it."""
     os.environ.setdefault("MKL_CBWR", "AUTO")
     # pypardiso searches the whole environment, a second of processor at each solver, if the place of MKL is not given
     for path in sorted(Path(sys.prefix).glob("lib/libmkl_rt*")) + sorted(Path(sys.prefix).glob("Library/bin/mkl_rt*")):
@@ -125,8 +115,7 @@ def pardiso_available() -> bool:
 class Pardiso:
     """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite).
 
-    selected_rows : eliminated last, so that a solution in them from forces on them visits no others
-    """
+    selected_rows : eliminated last, so that a solution in them from forces on them visits no others"""
 
     NO_MEMORY = -2  # error code
     ANALYSE, FACTORISE, SOLVE = 11, 22, 33  # phases

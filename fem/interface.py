@@ -26,8 +26,7 @@ class ContactInterface:
     B : (n_pair * n_component, n_dof) row pair * n_component + component, sparse (full model) or dense (reduced)
     faces : (n_face, k) corner-ordered polygons over the pairs, for area and pictures (may be empty)
     nodes, mean : node pairs, and the (n_pair, n_node_pair) weights by which their means are these pairs; None where
-        these are node pairs themselves
-    """
+        these are node pairs themselves"""
 
     components: tuple[str, ...]
     points: np.ndarray
@@ -49,8 +48,7 @@ class ContactInterface:
 
         tangential, normal : stiffness of the whole patch [N/m]
         Returns (n_pair, n_component) [N/m], each column summing to the patch value
-        Source  Tamatam 2021, section 3.3: distribution by elemental area contribution
-        """
+        Source  Tamatam 2021, section 3.3: distribution by elemental area contribution"""
         total = {"t1": tangential, "t2": tangential, "n": normal}
         return np.outer(self.area / self.area.sum(), [total[c] for c in self.components])
 
@@ -68,8 +66,7 @@ def contact_frames(normals: np.ndarray, t1: Sequence[float] | None) -> np.ndarra
 
     t1 : where None the first of x, y, z that lies most along the face
 
-    Raises  Refusal where the direction is along a normal
-    """
+    Raises  Refusal where the direction is along a normal"""
     if t1 is None:
         t1 = np.eye(3)[int(np.argmin(np.round(np.abs(normals).max(axis=0), 3)))]
     direction = unit(t1, "the contact direction t1")
@@ -84,8 +81,7 @@ def contact_frames(normals: np.ndarray, t1: Sequence[float] | None) -> np.ndarra
 def unit(direction: Sequence[float], label: str) -> np.ndarray:
     """Unit vector (3,) along a direction.
 
-    Raises  Refusal, naming it by `label`, for a zero vector or a wrong length
-    """
+    Raises  Refusal, naming it by `label`, for a zero vector or a wrong length"""
     vector = np.asarray(direction, dtype=float)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise Refusal(f"{label} must be three numbers that are not all zero, but is {list(np.ravel(direction))}")
@@ -96,8 +92,7 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     """Several contacts of one structure as one interface, pairs in the order given; triangles become quadrangles that
     repeat a corner where there are quadrangles too.
 
-    Raises  Refusal where they differ in components
-    """
+    Raises  Refusal where they differ in components"""
     if len({i.components for i in interfaces}) > 1:
         raise Refusal("the contacts of a structure must be built with the same components")
     first = np.cumsum([0] + [i.n_pair for i in interfaces])

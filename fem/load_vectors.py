@@ -1,7 +1,5 @@
 """Loads and outputs as vectors over all DOFs of the mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,13 +8,14 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from tribodyn.fem.assembly import Assembly, materials_of
+from tribodyn.fem.assembly import Assembly, materials_of, pieces
 from tribodyn.fem.constraints import find_group
 from tribodyn.fem.elasticity import element_tensors, strain_points
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import unit
 from tribodyn.fem.surface import face_integrals, facet_nodes, require_outside
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import numbers_of, text_of
 
 
 class Load(Protocol):
@@ -31,8 +30,7 @@ class NodalForce:
 
     As an output the same vector observes the mean displacement of the set in that direction [m/m].
     nodes : name of the node set; direction : (3,), need not be a unit vector
-    shared : "nodes" for evenly; "area" for the consistent forces of a uniform traction where the set is a face
-    """
+    shared : "nodes" for evenly; "area" for the consistent forces of a uniform traction where the set is a face"""
 
     nodes: str
     direction: Sequence[float]
@@ -131,27 +129,32 @@ class Heating:
     The strain alpha T, held back, has the stress C : alpha T, which acts as the forces
     f_ai = integral of C_ijkl alpha_kl T dN_a/dx_j
     Source  Cook, Malkus, Plesha and Witt, Concepts and Applications of Finite Element Analysis, 2002, section 3.9
-    material : as for fem.elasticity.assemble; bodies : names, all where empty; values : (n_node,) [K], None for 1 K
-    """
+    material : as for fem.elasticity.assemble; bodies : names, all where empty; values : (n_node,) [K], None for 1 K"""
 
     material: Any
     bodies: Sequence[str] = ()
     values: np.ndarray | None = None
 
-    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
-        """Force vector (3 n_node,) [N/K].
-
-        Raises  Refusal for a body that is not there, or where nothing expands
-        """
+    def temperature(self, mesh: Any) -> np.ndarray:
+        """Change of temperature (n_node,) [K], 0 in bodies that are not heated; refuses a body that is not there."""
         names = [body.name for body in mesh.bodies] if isinstance(mesh, Assembly) else [""]
         for name in self.bodies:
             if name not in names:
                 raise Refusal(f"temperature: there is no body '{name}'; there are {', '.join(names)}")
-        n_node = mesh.doflocs.shape[1]
-        values = np.ones(n_node) if self.values is None else self.values
-        force = np.zeros((n_node, 3))
-        for name, (piece, material) in zip(names, materials_of(mesh, self.material), strict=True):
-            if self.bodies and name not in self.bodies:
+        change = np.zeros(mesh.doflocs.shape[1])
+        for name, piece in zip(names, pieces(mesh), strict=True):
+            if not self.bodies or name in self.bodies:
+                change[piece.node : piece.node + piece.mesh.doflocs.shape[1]] = 1.0
+        return change if self.values is None else change * self.values
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
+        """Force vector (3 n_node,) [N/K].
+
+        Raises  Refusal for a body that is not there, or where nothing expands"""
+        values = self.temperature(mesh)
+        force = np.zeros((len(values), 3))
+        for piece, material in materials_of(mesh, self.material):
+            if not values[piece.node : piece.node + piece.mesh.doflocs.shape[1]].any():
                 continue
             C, expansion = (
                 element_tensors(piece.mesh, material, tensor_name) for tensor_name in ("tensor", "expansion_tensor")
@@ -172,10 +175,10 @@ def temperature_at(path: Path, points: np.ndarray) -> np.ndarray:
     """Values (n,) at points (n, 3) [m] from a table with columns x, y, z [m] and value, linear between its rows; beyond
     them that of the nearest row.
 
-    Raises  Refusal for a file that is no such table
-    """
+    Raises  Refusal for a file that is no such table"""
     try:
-        table = np.loadtxt(path, delimiter=",", comments="#", skiprows=_header(path), ndmin=2)
+        lines = text_of(path).splitlines()
+        table = np.loadtxt(lines[_header(lines) :], delimiter=",", comments="#", ndmin=2)
     except (OSError, ValueError) as trouble:
         raise Refusal(f"the field '{path}' cannot be read ({trouble}): give lines x, y, z, value") from None
     if table.shape[1] != 4 or not np.isfinite(table).all():
@@ -187,12 +190,6 @@ def temperature_at(path: Path, points: np.ndarray) -> np.ndarray:
     return np.where(np.isnan(inside), nearest, inside)
 
 
-def _header(path: Path) -> int:
+def _header(lines: list[str]) -> int:
     """Lines before the first that is numbers: 1 for a line of names, else 0."""
-    with path.open(encoding="utf-8") as file:
-        first = file.readline().split(",")
-    try:
-        [float(word) for word in first]
-    except ValueError:
-        return 1
-    return 0
+    return int(numbers_of(lines[0].split(",")) is None)

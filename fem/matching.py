@@ -1,7 +1,5 @@
 """Nodes of one face that lie on the nodes of another."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy
 
@@ -20,8 +18,7 @@ def partners(points: np.ndarray, candidates: np.ndarray, label: str, length: flo
     points : (k, 3), candidates : (m, 3), m >= k [m]; label : the two faces, for the error
     length : reference of the relative tolerance, by default the length of the first face [m]
     Returns (k,) numbers of candidates, all different
-    Raises  Mismatch, naming the faces and the worst place, where a point has no partner
-    """
+    Raises  Mismatch, naming the faces and the worst place, where a point has no partner"""
     distance, partner = scipy.spatial.cKDTree(candidates).query(points)
     unmatched = distance > TOLERANCE * (_length(points) if length is None else length)
     if unmatched.any() or len(np.unique(partner)) < len(partner):
@@ -40,8 +37,7 @@ def facing_partners(
     """The candidate that lies over each point along its normal, and how far (k,) [m], negative below.
 
     points, normals : (k, 3); candidates : (m, 3); reach : farthest distance along the normal [m]
-    Returns None where a point has no partner of its own
-    """
+    Returns None where a point has no partner of its own"""
     _, partner = scipy.spatial.cKDTree(candidates).query(points)
     offset = candidates[partner] - points
     opening = np.einsum("kx,kx->k", offset, normals)

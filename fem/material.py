@@ -1,7 +1,5 @@
 """Linear elastic materials: isotropic, and orthotropic or anisotropic along axes of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,14 +15,13 @@ VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 class Material:
     """E : Young's modulus [Pa]; nu : Poisson's ratio, between -1 and 0.5; rho : density [kg/m3];
     expansion : coefficient of thermal expansion [1/K]
-    linear_reduced : whether its elements are linear hexahedra with reduced integration, see `elasticity`
-    """
+    elements : of 8-node hexahedra one of `elasticity.FORMULATIONS`, "" for elements of second order"""
 
     E: float
     nu: float
     rho: float
     expansion: float = 0.0
-    linear_reduced: bool = False
+    elements: str = ""
 
     def __post_init__(self) -> None:
         if not self.E > 0:
@@ -37,10 +34,7 @@ class Material:
     @property
     def lame(self) -> tuple[float, float]:
         """Lame's constants lambda, mu [Pa]."""
-        return (
-            self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu)),
-            self.E / (2 * (1 + self.nu)),
-        )
+        return (self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu)), self.E / (2 * (1 + self.nu)))
 
     def tensor(self, points: np.ndarray) -> np.ndarray:
         """Elasticity tensors (n, 3, 3, 3, 3) [Pa] at points (n, 3), all alike."""
@@ -104,9 +98,8 @@ class Orthotropic(_Turned):
     shear : G12, G13, G23 [Pa]; rho : [kg/m3]
     axes : (2, 3) directions of the first and second material axis, made orthogonal; the third follows by the right
         hand; or directions from place to place
-    expansion : along the three axes [1/K]
-    Source  Lekhnitskii, Theory of Elasticity of an Anisotropic Body, 1981, chapter 1
-    """
+    expansion : along the three axes [1/K]; elements : as of an isotropic one
+    Source  Lekhnitskii, Theory of Elasticity of an Anisotropic Body, 1981, chapter 1"""
 
     young: Sequence[float]
     poisson: Sequence[float]
@@ -114,6 +107,7 @@ class Orthotropic(_Turned):
     rho: float
     axes: Sequence[Sequence[float]] | Directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     expansion: Sequence[float] = (0.0, 0.0, 0.0)
+    elements: str = ""
 
     def __post_init__(self) -> None:
         if not (self.rho > 0 and min(self.young) > 0 and min(self.shear) > 0):
@@ -148,13 +142,13 @@ class Orthotropic(_Turned):
 class Anisotropic(_Turned):
     """A material without planes of symmetry.
 
-    D : (6, 6) its `stiffness` [Pa]; rho : [kg/m3]; axes, expansion : as of an orthotropic one
-    """
+    D : (6, 6) its `stiffness` [Pa]; rho : [kg/m3]; axes, expansion, elements : as of an orthotropic one"""
 
     D: np.ndarray
     rho: float
     axes: Sequence[Sequence[float]] | Directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     expansion: Sequence[float] = (0.0, 0.0, 0.0)
+    elements: str = ""
 
     def __post_init__(self) -> None:
         if not (self.rho > 0 and np.linalg.eigvalsh(self.D)[0] > 0):

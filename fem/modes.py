@@ -1,7 +1,5 @@
 """Natural modes of K phi = omega^2 M phi, real or Hermitian, and of a turning structure M q'' + G q' + K q = 0."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,8 +21,7 @@ class EigenOptions:
     dense_below : DOFs up to which all modes of dense matrices are found; beyond, the Lanczos iteration
     restarts : of the Lanczos iteration; a sound mesh needs some ten
     negative : squared frequency below zero, over the largest of a single DOF, that is no rounding any more
-    spanned : modes without Coriolis forces that span those with them; a system with fewer coordinates keeps them all
-    """
+    spanned : modes without Coriolis forces that span those with them; a system with fewer coordinates keeps them all"""
 
     dense_below: int = 400
     restarts: int = 100
@@ -56,8 +53,7 @@ def modes(
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its
         first large entry positive
     Raises  Refusal where n is not between 1 and N, or the iteration does not converge; StaticDivergence where a
-        squared frequency is negative beyond rounding; IndefiniteMass
-    """
+        squared frequency is negative beyond rounding; IndefiniteMass"""
     size = K.shape[0]
     if not 1 <= n <= size:
         raise Refusal(f"modes: {n} modes were asked of a system with {size} DOFs; ask for 1 to {size}")
@@ -89,7 +85,9 @@ def modes(
                 ) from None
         order = np.argsort(values)
         values, phi = values[order], phi[:, order]
-    return frequencies(values, K, M), phi * _signs(phi)
+    large = np.abs(phi) >= (1 - 1e-6) * np.abs(phi).max(axis=0)  # whatever the rounding
+    sign = np.sign(phi[large.argmax(axis=0), np.arange(phi.shape[1])].conj())  # the first of these gets positive
+    return frequencies(values, K, M), phi * sign
 
 
 def turning_frequencies(K: Any, M: Any, G: Any, n: int) -> np.ndarray:
@@ -99,8 +97,7 @@ def turning_frequencies(K: Any, M: Any, G: Any, n: int) -> np.ndarray:
     Of a wave of index j these are the motions that run with the rotation where j > 0; those against it belong to -j.
     The pencil is linearised as A y = omega B y, A = diag(K, M), B = [[-H, M], [M, 0]], H = iG, y = (q, omega q)
     Raises  Refusal where n is too large, StaticDivergence as `modes` does
-    Source  Meirovitch, Computational Methods in Structural Dynamics, 1980, chapter 5
-    """
+    Source  Meirovitch, Computational Methods in Structural Dynamics, 1980, chapter 5"""
     lowest, phi = modes(K, M, min(K.shape[0], max(EIGEN.spanned, 2 * n)))
     m = len(lowest)
     H = 1j * (phi.conj().T @ (G @ phi))
@@ -117,8 +114,7 @@ def turning_frequencies(K: Any, M: Any, G: Any, n: int) -> np.ndarray:
 def frequencies(values: np.ndarray, K: Any, M: Any) -> np.ndarray:
     """Frequencies (n,) [rad/s] of eigenvalues omega^2 of K, M; 0 where they are zero to rounding.
 
-    Raises  StaticDivergence where one is negative
-    """
+    Raises  StaticDivergence where one is negative"""
     if values.min() < -EIGEN.negative * stiffest(K, M):
         raise StaticDivergence(f"{UNSTABLE}, omega^2 = {values.min():.3g} rad2/s2: {CURE}")
     return np.sqrt(np.clip(values, 0, None))
@@ -161,9 +157,3 @@ def _factorise(K: Any, definite: bool = True) -> Factor:
     if not np.iscomplexobj(K):
         return factorise(K, definite)
     return _OfHermitian(factorise(block_array([[K.real, -K.imag], [K.imag, K.real]]), definite))
-
-
-def _signs(phi: np.ndarray) -> np.ndarray:
-    """Factor of modulus 1 per column: the first entry close to the largest becomes positive, whatever the rounding."""
-    large = np.abs(phi) >= (1 - 1e-6) * np.abs(phi).max(axis=0)
-    return np.sign(phi[large.argmax(axis=0), np.arange(phi.shape[1])].conj())

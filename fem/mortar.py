@@ -5,10 +5,7 @@ laid on the triangles of each cut. A flat facet is cut in its plane, which is ex
 its own reference coordinates, in which the cuts fill it without overlap.
 Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 193, 2004 (segments); Popp, Wohlmuth,
     Gee and Wall, SIAM Journal on Scientific Computing 34, 2012 (second order, dual functions); Cichosz and Bischoff,
-    Computer Methods in Applied Mechanics and Engineering 200, 2011 (dual functions on cut facets)
-"""
-
-from __future__ import annotations
+    Computer Methods in Applied Mechanics and Engineering 200, 2011 (dual functions on cut facets)"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -41,8 +38,7 @@ class MortarOptions:
     tied : part of it from which on a node is tied; less asks too much of the other face by extrapolation
     independent : least eigenvalue, of the largest possible 1, at which shape functions still differ on a cut facet
     rounding : gap that is rounding of node positions, over the length of the face
-    separated : mean gap of two tied faces, over the length of the first, from which on they do not touch
-    """
+    separated : mean gap of two tied faces, over the length of the first, from which on they do not touch"""
 
     reach: float = 0.1
     curved: float = 1e-9
@@ -66,8 +62,7 @@ MORTAR = MortarOptions()
 class Side:
     """A face in space: nodes (n_facet, k), points (n_facet, k, 3) [m], corners first, then mid-sides, then middle;
     centre, normal : (n_facet, 3), the normal outward; sign : (n_facet,) that makes dx/dxi cross dx/deta outward
-    turn : (3, 3) rotation about the origin that brought the mesh here; n_node : of the mesh
-    """
+    turn : (3, 3) rotation about the origin that brought the mesh here; n_node : of the mesh"""
 
     nodes: np.ndarray
     points: np.ndarray
@@ -126,8 +121,7 @@ class SharedSurface:
 
     first, second : (n,) facets; xi, eta : (2, n) places on them; weight : (n,) area [m2] on the first side
     normal : (n, 3) outward unit normal of the first side; gap : (n,) opening along it [m], negative where they overlap
-    cuts : (n_cut + 1,) where the points of each cut begin; covered : (n_facet,) part of each facet of the first side
-    """
+    cuts : (n_cut + 1,) where the points of each cut begin; covered : (n_facet,) part of each facet of the first side"""
 
     first: np.ndarray
     second: np.ndarray
@@ -149,8 +143,7 @@ def shared_surface(first_side: Side, second_side: Side, reach: float) -> SharedS
     """Gauss points of the surface on which two sides face each other.
 
     reach : farthest distance along the normal at which facets still meet [m]
-    Returns the points, none where the sides do not meet
-    """
+    Returns the points, none where the sides do not meet"""
     i, j = _candidates(first_side, second_side, reach)
     if not len(i):
         none, pairs = np.zeros(0), np.zeros((2, 0))
@@ -225,8 +218,7 @@ def coefficients(k: int) -> np.ndarray:
     """The matrix (k, k) that makes Bernstein coefficients of the values at the nodes of a facet of k nodes.
 
     On every cut of a facet Bernstein polynomials have a positive integral, which shape functions have not: that of the
-    corner of a six-node facet is zero. Those of first order are the shape functions
-    """
+    corner of a six-node facet is zero. Those of first order are the shape functions"""
     line = np.array([[1, 0, 0], [0, 1, 0], [-0.5, -0.5, 2]])  # both ends and the middle of an edge
     if k == 9:
         i, j = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (1, 2), (2, 1), (0, 2), (2, 2)]).T
@@ -243,8 +235,7 @@ def dual(side: Side, shared: SharedSurface) -> tuple[np.ndarray, np.ndarray]:
     Returns psi (k, n) [m2] and d (n_facet, k) [m2] with sum(psi_a u) = d_a times the Bernstein coefficient a of u, for
         any u that the facet can take; both are integrals over what is covered, and psi sums to the weights, so that
         constant tractions are carried exactly. Where a cut is so thin that shape functions look alike on it, this
-        holds for u that are linear in space, rigid motions among them
-    """
+        holds for u that are linear in space, rigid motions among them"""
     k = side.nodes.shape[1]
     to = coefficients(k)
     N = np.linalg.inv(to).T @ tabulate(k, shared.xi)[0]

@@ -6,10 +6,7 @@ constant pressure acts on both bodies as its consistent nodal forces. On a whole
 functions, on a whole six-node one the linear functions of its sides: they keep the first and second moments of the
 face. Where a facet is covered in part, or with vertices only, phi are the linear functions of its corners, which are
 positive wherever it is cut.
-Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 193, 2004
-"""
-
-from __future__ import annotations
+Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 193, 2004"""
 
 from collections.abc import Sequence
 
@@ -35,8 +32,7 @@ def mortar_halves(
 
     t1, components, vertices_only : as of `ContactFaces`
     reach : farthest distance along the normal at which the faces still meet [m]
-    Raises  Mismatch where they do not meet
-    """
+    Raises  Mismatch where they do not meet"""
     shared = shared_surface(first_side, second_side, reach)
     if not len(shared.weight):
         raise Mismatch(describe_separation(first_side, second_side, reach))
@@ -49,7 +45,7 @@ def mortar_halves(
     nodes = np.unique(np.concatenate(carriers))
     place = {int(node): at for at, node in enumerate(nodes)}
     area, gap = np.zeros((2, len(nodes)))
-    directions = np.zeros((len(nodes), 3, 3))
+    directions, middle = np.zeros((len(nodes), 3, 3)), np.zeros((len(nodes), 3))
     first: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     second: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for i, j, g in shared.each():
@@ -59,6 +55,7 @@ def mortar_halves(
         at = np.array([place[int(node)] for node in carriers[i]])
         np.add.at(area, at, phi.sum(axis=1))
         np.add.at(gap, at, phi @ shared.gap[g])
+        np.add.at(middle, at, phi @ (tabulate(len(first_side.nodes[i]), xi)[0].T @ first_side.points[i]))
         np.add.at(directions, at, np.einsum("ag,gcx->acx", phi, frames[g]))
         for parts, facet, xi, frame in (
             (first, first_side.nodes[i], shared.xi[:, g], frames[g][:, picked]),
@@ -88,9 +85,13 @@ def mortar_halves(
     at_points = np.array([[place[int(node)] for node in polygon] for polygon in polygons], dtype=int).reshape(-1, n)
     faces = position[at_points[carries[at_points].all(axis=1)]]
     all_nodes, first_place = np.unique(first_side.nodes.ravel(), return_index=True)
+    points = first_side.points.reshape(-1, 3)[first_place[np.searchsorted(all_nodes, nodes[carries])]]
+    # of a node whose facets are covered by less than half: the middle of what it carries, not beyond the second face
+    at_edge = ~np.isin(nodes[carries], first_side.nodes[shared.covered > 0.5])
+    points = np.where(at_edge[:, None], middle[carries] / area[:, None], points)
     interface = ContactInterface(
         components=tuple(components),
-        points=first_side.points.reshape(-1, 3)[first_place[np.searchsorted(all_nodes, nodes[carries])]],
+        points=points,
         frames=_mean_frames(directions),
         area=area,
         gap=gap,

@@ -1,10 +1,7 @@
 """Solutions by MUMPS on several MPI processes, of a PETSc that another Python on the machine has, such as Debian's.
 
 PETSc's binary packages belong to the system's Python, so that the factor lives in processes of that one. The matrix,
-the right-hand sides and the solutions go through files that all of them map.
-"""
-
-from __future__ import annotations
+the right-hand sides and the solutions go through files that all of them map."""
 
 import os
 import shlex
@@ -34,8 +31,7 @@ class Mumps:
     K : (n, n) symmetric. The environment's TRIBODYN_MPI is the command that starts the processes; one alone by default
     Raises  Refusal where PETSc cannot be started; ArithmeticError where a pivot is zero or negative; RuntimeError,
         as `solve`, where the processes end
-    Source  MUMPS: Amestoy, Duff, Koster, L'Excellent 2001, doi 10.1137/S0895479899358194
-    """
+    Source  MUMPS: Amestoy, Duff, Koster, L'Excellent 2001, doi 10.1137/S0895479899358194"""
 
     patience = 20.0  # seconds for the processes to end
 

@@ -1,9 +1,6 @@
 """One MPI process of a factorisation by MUMPS, run by a Python that has PETSc: see tribodyn.fem.mumps, which starts it.
 
-It stands alone: that Python needs numpy, mpi4py and petsc4py, and nothing of tribodyn.
-"""
-
-from __future__ import annotations
+It stands alone: that Python needs numpy, mpi4py and petsc4py, and nothing of tribodyn."""
 
 import glob
 import sys

@@ -1,7 +1,5 @@
 """From meshes to a full second-order system with its contacts: the chain that a scene runs for each structure."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -36,8 +34,7 @@ class Part:
     held_rows : (k, n_free) further prescribed motions, held_rows @ q = 0, for reduction.prescribed
     pairs : contact face -> its pairs in the interface; node_sets : as geometry.mesh.read gives them
     joints : joint -> its pairs
-    dependence : (n_dof, n_free) displacement of all DOFs where some depend on others, else None
-    """
+    dependence : (n_dof, n_free) displacement of all DOFs where some depend on others, else None"""
 
     system: SecondOrderSystem
     interface: ContactInterface
@@ -54,8 +51,7 @@ class Part:
     def dofs(self, group: str, axis: str) -> np.ndarray:
         """Places among the free DOFs (k,) of the displacements of a node set along "x", "y" or "z".
 
-        Raises  Refusal where the set is unknown or empty, or where one of them is clamped
-        """
+        Raises  Refusal where the set is unknown or empty, or where one of them is clamped"""
         group_dofs = find_group(self.node_sets, group) * 3 + AXES.index(axis)
         place = np.searchsorted(self.free, group_dofs)
         if not np.array_equal(self.free[np.minimum(place, len(self.free) - 1)], group_dofs):
@@ -109,8 +105,7 @@ def build(
     material : one, or subdomain name -> material; of an assembly one, or body name -> these
     springs : joints that give way, to the ground or between sets
     held_motions : prescribed, too; constraints : DOFs that depend on others; masses : on points or sets
-    Raises  Refusal where a name is unknown or a group is empty, one sentence
-    """
+    Raises  Refusal where a name is unknown or a group is empty, one sentence"""
     M, K = assemble(mesh, material)
     K = sum((spring.matrix(mesh, node_sets) for spring in springs), start=K)
     M = sum((mass.matrix(mesh, node_sets) for mass in masses), start=M)
@@ -161,8 +156,7 @@ def _on_free_dofs(part: Part, label: str, vector: np.ndarray) -> np.ndarray:
 def unbalanced_load(force: np.ndarray, part: Part, motions: np.ndarray) -> str:
     """A sentence on static loads that push rigid motions of a structure, with their resultant.
 
-    force : (n_free,) of all static loads [N]; motions : (n_free, r) the rigid motions that it pushes
-    """
+    force : (n_free,) of all static loads [N]; motions : (n_free, r) the rigid motions that it pushes"""
     motion_size = np.linalg.norm(part.field(motions), axis=(1, 2))
     moves = motion_size > 1e-6 * motion_size.max()
     names = [""]

@@ -3,10 +3,7 @@
 Stress and static displacement are iterated until they fit each other; the vibration about them is linear. The static
 displacement is not added to the geometry, so that rotations have to be small.
 In the turning frame a velocity v meets the Coriolis force -2 speed axis x v.
-Source  Cook, Malkus, Plesha and Witt, Concepts and Applications of Finite Element Analysis, 2002, chapter 18
-"""
-
-from __future__ import annotations
+Source  Cook, Malkus, Plesha and Witt, Concepts and Applications of Finite Element Analysis, 2002, chapter 18"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -63,8 +60,7 @@ def solve_prestress(
     start : (n_free,) displacement [m] whose stress is the first one; softening : `spin_softening` over the free DOFs
         [N/m], 0 where it does not spin; temperature : as for `geometric_stiffness`
     Raises  StaticDivergence where no equilibrium is found or an element turns by more than LARGE_ROTATION; and what
-        at_rest raises. Whether the equilibrium is stable is for `check_stability`
-    """
+        at_rest raises. Whether the equilibrium is stable is for `check_stability`"""
     soft, q = part.system.stiffness + softening, start
     for _ in range(PASSES):
         stress = geometric_stiffness(part.mesh, material, part.field(q), temperature)
@@ -110,8 +106,7 @@ def geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np
 
     mesh, material : as for fem.elasticity.assemble
     u : (n_node, 3) static displacement [m] whose stress sigma stiffens (tension) or softens (compression)
-    temperature : (n_node,) change of temperature [K] whose free expansion carries no stress
-    """
+    temperature : (n_node,) change of temperature [K] whose free expansion carries no stress"""
     blocks = []
     for piece, material_of_piece in materials_of(mesh, material):
         nodes = slice(piece.node, piece.node + piece.mesh.doflocs.shape[1])
@@ -142,8 +137,7 @@ def spin_softening(mass: Any, axis: Sequence[float], speed: float) -> csr_matrix
     """-speed^2 M P, P taking the part normal to the axis: the centrifugal force grows with the displacement.
 
     mass : (3 n_node, 3 n_node) of whole nodes [kg]; axis : (3,); speed : [rad/s]
-    Returns (3 n_node, 3 n_node) [N/m]
-    """
+    Returns (3 n_node, 3 n_node) [N/m]"""
     direction = unit(axis, "the axis of rotation")
     normal = np.eye(3) - np.outer(direction, direction)
     return csr_matrix(-(speed**2) * mass @ kron(identity(mass.shape[0] // 3), normal))
@@ -154,7 +148,6 @@ def coriolis(mass: Any, axis: Sequence[float], speed: float) -> csr_matrix:
 
     mass : (3 n_node, 3 n_node) of whole nodes [kg]; axis : (3,); speed : [rad/s]
     Returns (3 n_node, 3 n_node) [N s/m]
-    Source  Geradin and Rixen, Mechanical Vibrations, 2015, section 2.9
-    """
+    Source  Geradin and Rixen, Mechanical Vibrations, 2015, section 2.9"""
     a = unit(axis, "the axis of rotation")
     return csr_matrix(2 * speed * mass @ kron(identity(mass.shape[0] // 3), cross(a)))

@@ -1,7 +1,5 @@
 """Springs in one direction: from a node set to the ground, or across a joint to the matching nodes of another set."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,8 +22,7 @@ class Spring:
 
     On a face of some extent it also resists tilting: a rotational stiffness follows from where its shares sit.
     nodes : name of a face or node set; direction : (3,), need not be a unit vector
-    stiffness : of the whole joint, >= 0 [N/m]; opposite : name of the matching set across the joint, else the ground
-    """
+    stiffness : of the whole joint, >= 0 [N/m]; opposite : name of the matching set across the joint, else the ground"""
 
     nodes: str
     direction: Sequence[float]
@@ -39,8 +36,7 @@ class Spring:
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
         """Stiffness (3 n_node, 3 n_node) [N/m].
 
-        Raises  Refusal where a set is unknown or empty, or where the nodes across the joint do not match
-        """
+        Raises  Refusal where a set is unknown or empty, or where the nodes across the joint do not match"""
         elongation, share = self.elongation(mesh, node_sets)
         return csr_matrix(elongation.T @ elongation.multiply(self.stiffness * share[:, None]))
 
@@ -70,8 +66,7 @@ class Spring:
 class ElongationSpring:
     """A stiffness against one elongation, a sum of displacements of single nodes.
 
-    terms : (group of one node, axis 0..2, factor); stiffness : [N/m]
-    """
+    terms : (group of one node, axis 0..2, factor); stiffness : [N/m]"""
 
     terms: Sequence[tuple[str, int, float]]
     stiffness: float
@@ -99,8 +94,7 @@ def shares(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[n
 class Mass:
     """A lumped mass on a reference point of an assembly or on a node set, where it is shared like a stiffness.
 
-    at : name of the point or of the set; mass : [kg]; inertia : about x, y, z [kg m2], of a point only
-    """
+    at : name of the point or of the set; mass : [kg]; inertia : about x, y, z [kg m2], of a point only"""
 
     at: str
     mass: float
@@ -113,8 +107,7 @@ class Mass:
     def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
         """Mass (3 n_node, 3 n_node) [kg]; [kg m2] at the rotations of a point.
 
-        Raises  Refusal where the set is unknown or empty, or has an inertia
-        """
+        Raises  Refusal where the set is unknown or empty, or has an inertia"""
         diagonal = np.zeros((mesh.doflocs.shape[1], 3))
         points = mesh.points if isinstance(mesh, Assembly) else {}
         if self.at in points:

@@ -1,7 +1,5 @@
 """A part of the surface: its nodes, normals, tributary areas and polygons."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -23,8 +21,7 @@ OPPOSITE = np.array([2, 0, 1])  # corner of a six-node face opposite each of its
 class Surface:
     """nodes : (k,) mesh nodes, sorted; points : (k, 3) [m]; normals : (k, 3) outward unit vectors, averaged by area;
     area : (k,) tributary area [m2], sums to the area of the surface;
-    faces : (n_face, 4 or 3) corner-ordered polygons, as positions in `nodes`.
-    """
+    faces : (n_face, 4 or 3) corner-ordered polygons, as positions in `nodes`."""
 
     nodes: np.ndarray
     points: np.ndarray
@@ -40,8 +37,7 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     Tributary areas are the consistent integrals of the shape functions of the nodes kept: 1/36, 4/36, 16/36 of a flat
     nine-node face, 1/4 or 1/3 with vertices only. A six-node face has none at its corners and 1/3 at each mid-side
     node, which are its nodes here. All nodes keep the first and second moments of a flat face; vertices only do not.
-    Raises  Refusal where there are no facets, where they lie inside the body, or where an area is not positive
-    """
+    Raises  Refusal where there are no facets, where they lie inside the body, or where an area is not positive"""
     facets = np.asarray(facets, dtype=int)
     if len(facets) == 0:
         raise Refusal("a contact or load surface has no faces; check the geometry that defines it")
@@ -72,8 +68,7 @@ def side_functions(xi: np.ndarray) -> np.ndarray:
     """Functions (3, n) of the sides of a triangle at xi (2, n): linear, one in the middle of a side, zero in others.
 
     They are orthogonal and sum to one, so that their means keep the first and second moments of a flat triangle
-    Source  Crouzeix and Raviart, RAIRO 7, 1973
-    """
+    Source  Crouzeix and Raviart, RAIRO 7, 1973"""
     x, y = xi
     return np.stack([1 - 2 * y, 2 * (x + y) - 1, 1 - 2 * x])
 
@@ -82,8 +77,7 @@ def side_polygons(corners: np.ndarray, sides: np.ndarray) -> np.ndarray:
     """Triangles (k, 3) between the middles of sides: one in each facet, and what lies around each corner.
 
     corners, sides : (n_facet, 3) numbers, side j between the corners that are not OPPOSITE it
-    At the rim of the face the small triangles beyond the middles stay out
-    """
+    At the rim of the face the small triangles beyond the middles stay out"""
     triangles = [np.asarray(sides)]
     links_of: dict[int, list[tuple[int, int]]] = {}
     for of, middles in zip(corners.tolist(), sides.tolist(), strict=True):
@@ -141,8 +135,7 @@ def _facet_nodes(mesh: Any, facets: np.ndarray) -> np.ndarray:
 def face_integrals(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Integrals of N_a and of N_a times the outward normal over each facet.
 
-    Returns (n_facet, k) [m2] and (n_facet, k, 3) [m2]; k nodes of the facet, or its vertices
-    """
+    Returns (n_facet, k) [m2] and (n_facet, k, 3) [m2]; k nodes of the facet, or its vertices"""
     piece, facets = piece_of_facets(mesh, facets)
     mesh, nodes, points = piece.mesh, _facet_nodes(piece.mesh, facets), coordinates(piece.mesh)
     k, corners = nodes.shape[1], 4 if isinstance(mesh, MeshHex1) else 3

@@ -20,8 +20,7 @@ class SecondOrderSystem:
     outputs : name -> (n,) row that observes a displacement, output = row . q [m/m]
     gyroscopic : (n, n) antisymmetric (anti-Hermitian), the Coriolis matrix G of a turning frame, or None [N s/m]
     circulatory : (n, n) antisymmetric (anti-Hermitian) forces of a flow, by displacement, beside the stiffness, or
-        None [N/m]
-    """
+        None [N/m]"""
 
     mass: Any
     stiffness: Any

@@ -1,10 +1,7 @@
 """Asperities of a measured face: its summits, their curvature, density and heights; and what a random face would have.
 
 Two rough faces count as one: the sum of their heights against a plane, whose summits have the effective radius
-(Greenwood and Tripp 1970).
-"""
-
-from __future__ import annotations
+(Greenwood and Tripp 1970)."""
 
 from dataclasses import dataclass
 
@@ -23,8 +20,7 @@ class Moments:
 
     m0 : variance of the heights [m2];  m2 : of the slopes [-];  m4 : of the curvatures [1/m2]
     Source  McCool, Wear 107 (1986) 37; its summits where it is isotropic and Gaussian: Nayak, J. Lubr. Technol. 93
-        (1971) 398
-    """
+        (1971) 398"""
 
     m0: float
     m2: float
@@ -62,8 +58,7 @@ class Asperities:
 
     height : (n,) above the mean of the face [m];  curvature : (n,) mean of that along x and y, positive [1/m]
     area : searched for summits [m2];  moments : of the same face
-    repairs : one sentence for each thing that was changed in a map
-    """
+    repairs : one sentence for each thing that was changed in a map"""
 
     height: np.ndarray
     curvature: np.ndarray
@@ -91,8 +86,7 @@ class Asperities:
 
         The density is linear between the rows and keeps the number and the mean gap of the summits: each counts at
         the rows on its two sides, more at the nearer one.
-        Raises  Refusal: fewer than two rows, or all summits at one height
-        """
+        Raises  Refusal: fewer than two rows, or all summits at one height"""
         if rows < 2:
             raise Refusal(f"a table of {rows} rows holds no density of asperities: give 2 or more")
         gap = self.gap
@@ -115,8 +109,7 @@ def identify(
     second : in the coordinates of the first, already mirrored; both are centred and the smaller extent counts
     cutoff : wavelength [m] above which waves are no roughness and taken off; only the mean plane by default
     shortest : wavelength [m] below which waves are noise of the instrument and taken off (S-filter of ISO 25178-2)
-    Raises  Refusal: what surface.prepare refuses, heights that come in steps, too few summits
-    """
+    Raises  Refusal: what surface.prepare refuses, heights that come in steps, too few summits"""
     faces: list[HeightMap] = []
     repairs: list[str] = []
     for face in (first, second):
@@ -155,8 +148,7 @@ def summits(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     """Heights above the mean of the face [m] and curvatures [1/m] of the points above all eight neighbours, (n,) each.
 
     The curvature is the mean of the second differences along x and y. The rim holds no summit.
-    Raises  Refusal: holes, too few summits
-    """
+    Raises  Refusal: holes, too few summits"""
     z = surface.z
     if not np.isfinite(z).all():
         raise Refusal(f"{surface.name}: it has points without height: fill the holes before the search for summits")
@@ -182,8 +174,7 @@ def _highest_neighbour(z: np.ndarray) -> np.ndarray:
 def _refuse_steps(surface: HeightMap) -> None:
     """Raise Refusal where many summits are terraces, because an instrument gave its heights in steps.
 
-    To be asked before levelling, which tilts them. Plane land around a terrace is none.
-    """
+    To be asked before levelling, which tilts them. Plane land around a terrace is none."""
     z = np.where(np.isfinite(surface.z), surface.z, -np.inf)
     inner, highest, lowest = z[1:-1, 1:-1], _highest_neighbour(z), -_highest_neighbour(-z)
     single, shared = int((inner > highest).sum()), int(((inner == highest) & (inner > lowest)).sum())

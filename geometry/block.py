@@ -1,7 +1,5 @@
 """Rectangular block: the plainest body to build a structure from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -45,8 +43,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     """Write the mesh.
 
     Groups: volume "block"; surfaces "x_min", "x_max", "y_min", "y_max", "z_min", "z_max", and of a strip "pad_min"
-    below and "pad_max" above
-    """
+    below and "pad_max" above"""
     p = parameters
     across, up = blocks.towards_ends(0.0, p.width, p.n_width), blocks.towards_ends(0.0, p.height, p.n_height)
     padded = p.pad_end > p.pad_start

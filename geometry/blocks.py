@@ -2,10 +2,7 @@
 
 A block is a graded box in (u, v, w) with a mapping into space; blocks of a body that meet node to node are joined.
 Elements, sides and points are named, and the result is written by Gmsh with those names as physical groups.
-Positions along an edge are graded towards one end or both.
-"""
-
-from __future__ import annotations
+Positions along an edge are graded towards one end or both."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -31,8 +28,7 @@ class Block:
     u, v, w : vertex positions along the three axes, each increasing; second-order nodes lie half-way between them
     volume : name of the physical volume the cells belong to
     sides : which of SIDES are named, side -> name of the physical surface
-    mapping : (n, 3) positions in (u, v, w) -> (n, 3) positions in space [m]; None leaves them
-    """
+    mapping : (n, 3) positions in (u, v, w) -> (n, 3) positions in space [m]; None leaves them"""
 
     u: np.ndarray
     v: np.ndarray
@@ -50,8 +46,7 @@ class JoinedBlocks:
     cells : (m, 27) in the order of meshio
     volumes : name -> cell numbers
     surfaces : name -> (k, 9) nodes of its faces
-    points : name -> node numbers
-    """
+    points : name -> node numbers"""
 
     nodes: np.ndarray
     cells: np.ndarray
@@ -64,8 +59,7 @@ def body(blocks: Sequence[Block], points: Mapping[str, Sequence[float] | np.ndar
     """Join blocks where their nodes coincide, and name nodes by their place.
 
     points : name -> position (3,) or positions (k, 3) of nodes [m]
-    Raises Refusal: the blocks do not meet, a mapping folds cells, or no node lies at a named point
-    """
+    Raises Refusal: the blocks do not meet, a mapping folds cells, or no node lies at a named point"""
     nodes: list[np.ndarray] = []
     cells: list[np.ndarray] = []
     cell_volumes: list[str] = []
@@ -101,8 +95,7 @@ def write(path: str | Path, *bodies: JoinedBlocks) -> None:
     """Write bodies, which stay apart even where they touch, as one second-order Gmsh mesh.
 
     path : the .msh file. Equal names in several bodies make one physical group
-    Raises Refusal: one name is used for groups of different dimension
-    """
+    Raises Refusal: one name is used for groups of different dimension"""
     starts = np.cumsum([0] + [len(b.nodes) for b in bodies])
     cells = np.vstack([b.cells + start for b, start in zip(bodies, starts, strict=False)])
     cell_starts = np.cumsum([0] + [len(b.cells) for b in bodies])
@@ -222,8 +215,7 @@ def towards_ends(start: float, end: float, n_elements: int, grading: float = 1.0
     """Split a line symmetrically, element lengths in geometric progression from both ends to the middle.
 
     grading : length of a middle element over that of an end element; above 1 is finer towards the ends
-    Returns (n_elements + 1,) increasing positions [m], first and last exactly start and end
-    """
+    Returns (n_elements + 1,) increasing positions [m], first and last exactly start and end"""
     from_end = np.minimum(np.arange(n_elements), np.arange(n_elements)[::-1])
     return _positions(start, end, grading ** (from_end / max(from_end.max(), 1)))
 
@@ -232,8 +224,7 @@ def towards_start(start: float, end: float, n_elements: int, grading: float = 1.
     """Split a line, element lengths in geometric progression.
 
     grading : length of the last element over that of the first; above 1 is finer towards the start
-    Returns (n_elements + 1,) increasing positions [m], first and last exactly start and end
-    """
+    Returns (n_elements + 1,) increasing positions [m], first and last exactly start and end"""
     return _positions(start, end, grading ** (np.arange(n_elements) / max(n_elements - 1, 1)))
 
 

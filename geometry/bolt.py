@@ -1,7 +1,5 @@
 """Bolt with a hexagonal head and a smooth shank along -z, its head resting on the plane z = 0."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,8 +19,7 @@ class Parameters:
     seat_diameter : inside of the ring by which the head rests [m]
     grip : distance of the nut from the head [m]; nut_height : over which the shank holds the nut [m]
     core : where the square core of the shank ends, over its radius
-    n_around : elements around, a multiple of 12; n_grip, n_nut, n_end, n_head : along grip, nut, free end and head
-    """
+    n_around : elements around, a multiple of 12; n_grip, n_nut, n_end, n_head : along grip, nut, free end and head"""
 
     diameter: float = 7.9375e-3
     length: float = 38.1e-3

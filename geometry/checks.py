@@ -1,7 +1,5 @@
 """Limits of the parameters of parts; each failure is one sentence that names the key and the cure."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import fields
@@ -16,8 +14,7 @@ def numbers(parameters: Any, odd: Sequence[str] = (), /, **limits: float | tuple
     """Refuse parameters that are not what their defaults are: whole numbers from 1 to MOST, else numbers above zero.
 
     odd : node counts, which second-order elements make odd, 2 n + 1 for n elements
-    limits : least value of a whole number, least and largest of another one; None where the part itself refuses
-    """
+    limits : least value of a whole number, least and largest of another one; None where the part itself refuses"""
     for item in fields(parameters):
         name, value = item.name, getattr(parameters, item.name)
         least: Any = limits.get(name, 3 if name in odd else 1)

@@ -1,7 +1,5 @@
 """The one door to Gmsh: a quiet session that always ends."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,8 +20,7 @@ def session() -> Iterator[Any]:
     """Run Gmsh quietly and without the user's own settings; finalise it whatever happens.
 
     Yields the gmsh module, with an empty model
-    Raises GmshUnavailable: the package or one of its system libraries is missing
-    """
+    Raises GmshUnavailable: the package or one of its system libraries is missing"""
     try:
         import gmsh
     except (ImportError, OSError) as error:  # its shared library is opened with ctypes: OSError
@@ -47,8 +44,7 @@ def session() -> Iterator[Any]:
 def save(gmsh: Any, path: str | Path) -> None:
     """Write the current mesh as binary MSH 4.1, elements of physical groups only.
 
-    Raises  OSError where the file does not come to its end, which Gmsh itself does not report
-    """
+    Raises  OSError where the file does not come to its end, which Gmsh itself does not report"""
     gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
     gmsh.option.setNumber("Mesh.Binary", 1)
     gmsh.option.setNumber("Mesh.SaveAll", 0)

@@ -1,10 +1,7 @@
 """Measured height maps: level, mirror and sample them at contact nodes; the gap between two of them.
 
 Coordinates are those of the contact patch seen along the normal of body 1. A map of body 2 is seen along the
-normal of body 2, so it must be mirrored once before it faces body 1.
-"""
-
-from __future__ import annotations
+normal of body 2, so it must be mirrored once before it faces body 1."""
 
 from dataclasses import dataclass, replace
 from math import ceil
@@ -21,8 +18,7 @@ class HeightMap:
 
     x : (nx,) equally spaced, growing [m];  y : (ny,) [m]
     z : (nx, ny) heights along the outward normal of the face [m], NaN where not measured
-    name : how messages call it
-    """
+    name : how messages call it"""
 
     x: np.ndarray
     y: np.ndarray
@@ -82,8 +78,7 @@ def onto_nodes(surface: HeightMap, nodes: np.ndarray, cells_across: int = 8) -> 
     cells_across : sampling cells across the distance of neighbouring nodes, at least
     Returns (n,) heights [m]; weighted by tributary area their mean is the mean height of the patch
     Raises  Refusal: nodes off the map, holes, nodes on a line
-    Source  Tamatam 2021, 5.4.2: down-sampling by elemental area; here a point belongs to its nearest node
-    """
+    Source  Tamatam 2021, 5.4.2: down-sampling by elemental area; here a point belongs to its nearest node"""
     nodes = np.asarray(nodes, float).reshape(-1, 2)
     if not np.isfinite(surface.z).all():
         raise Refusal(f"{surface.name}: it has points without height: fill the holes before it meets the nodes")
@@ -122,8 +117,7 @@ def facing_gap(heights_1: np.ndarray, heights_2: np.ndarray, mating_height: floa
     heights_1, heights_2 : (n,) heights of body 1 and of body 2 at the pairs, each along its own outward normal [m]
     mating_height : how far the bodies are pushed on from their first touch [m]; negative leaves them apart
     Returns (n,) gap [m], negative where they interfere; its smallest value is -mating_height
-    Source  Tamatam 2021, 5.5: simulations 1, 2, 3 are mating heights 0, +3 and -3 um
-    """
+    Source  Tamatam 2021, 5.5: simulations 1, 2, 3 are mating heights 0, +3 and -3 um"""
     together = np.asarray(heights_1, float) + np.asarray(heights_2, float)
     if not np.isfinite(together).all():
         raise Refusal("a contact node has no height: fill the holes of both height maps first")
@@ -144,8 +138,7 @@ def synthetic_pair(
 
     size : sides in x and y [m];  spacing : of the grid [m]
     ridge : height of the ridges over the middle [m]
-    waviness, roughness : root mean square of random waves about 1 mm and about 50 um long [m]
-    """
+    waviness, roughness : root mean square of random waves about 1 mm and about 50 um long [m]"""
     for name, value in (("size", min(size)), ("spacing", spacing)):
         if not value > 0:
             raise Refusal(f"{name} of the synthetic pair must be positive")

@@ -2,10 +2,7 @@
 
 Text:    x y z on each line (any order, a point may be missing), or a matrix of heights, one profile along x per line
 SDF:     ISO 25178-71, see read_sdf
-others:  .sur .plu .plux .al3d .x3p .vk4 .opd ... through the package surfalize (GPL-3), if it is installed
-"""
-
-from __future__ import annotations
+others:  .sur .plu .plux .al3d .x3p .vk4 .opd ... through the package surfalize (GPL-3), if it is installed"""
 
 import re
 import struct
@@ -16,6 +13,7 @@ import numpy as np
 from tribodyn.extras import package
 from tribodyn.geometry.height_map import HeightMap
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import text_of
 
 TEXT_ENDINGS = (".txt", ".xyz", ".csv", ".asc", ".dat", ".tsv", ".prn")
 """Endings read as text; others that are not SDF go to surfalize."""
@@ -28,18 +26,13 @@ Header = dict[str, float]
 
 
 def read(
-    path: str | Path,
-    *,
-    spacing: tuple[float, float] | None = None,
-    lateral_unit: float = 1.0,
-    height_unit: float = 1.0,
+    path: str | Path, *, spacing: tuple[float, float] | None = None, lateral_unit: float = 1.0, height_unit: float = 1.0
 ) -> HeightMap:
     """Read a height map in metres.
 
     spacing : steps along x and y of a matrix text, in lateral units; None for text with x y z
     lateral_unit, height_unit : metres per unit of a text, 1e-6 for micrometres; other formats know their units
-    Raises  Refusal: no such file, an empty one, not a regular grid, a reader that is not installed
-    """
+    Raises  Refusal: no such file, an empty one, not a regular grid, a reader that is not installed"""
     path = Path(path)
     if not path.is_file():
         raise Refusal(f"there is no height map {path}: check the name and the folder")
@@ -69,7 +62,7 @@ def read(
 
 def _numbers(path: Path) -> np.ndarray:
     """Rows of numbers; heads and comments before them are passed over; words for a missing height become NaN."""
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = text_of(path)
     # with semicolons between fields a comma is a decimal point
     text = text.replace(",", ".").replace(";", " ") if ";" in text else text.replace(",", " ")
     rows: list[list[float]] = []
@@ -143,8 +136,7 @@ def read_sdf(path: Path) -> HeightMap:
     in ISO, the largest in BCR. The first profile is at y = 0 in ISO; BCR leaves it open and is read as MountainsMap
     shows it, the first profile at the largest y.
 
-    Raises  Refusal: compressed data, a missing header line, a size that differs from the header
-    """
+    Raises  Refusal: compressed data, a missing header line, a size that differs from the header"""
     content = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     magic = MAGIC.match(content)
     if magic is None:

@@ -1,10 +1,7 @@
 """Check and repair measured height maps, and split them into waviness and roughness.
 
 `prepare` runs the steps in order: refuse what cannot be a machined face, take spikes out, close holes, level, filter.
-Each step that changes measured points reports it in a sentence.
-"""
-
-from __future__ import annotations
+Each step that changes measured points reports it in a sentence."""
 
 from dataclasses import dataclass, replace
 
@@ -32,8 +29,7 @@ class MapLimits:
         that smooth maps lose no crests
     spikes, holes : shares of the points beyond which a map is refused
     summits : below which there are no statistics of them
-    terraces : points with a highest neighbour as high, over summits, beyond which the heights come in steps
-    """
+    terraces : points with a highest neighbour as high, over summits, beyond which the heights come in steps"""
 
     largest: float = 1.0
     smallest: float = 1e-6
@@ -54,8 +50,7 @@ class PreparedMap:
     """A height map ready for contact.
 
     waviness, roughness : levelled parts; their sum is the levelled surface
-    repairs : one sentence for each thing that was changed
-    """
+    repairs : one sentence for each thing that was changed"""
 
     waviness: HeightMap
     roughness: HeightMap
@@ -67,8 +62,7 @@ def prepare(surface: HeightMap, cutoff: float, expected_size: tuple[float, float
 
     cutoff : wavelength that parts waviness from roughness [m]
     expected_size : sides of the face it should cover [m]
-    Raises  Refusal: what the steps refuse
-    """
+    Raises  Refusal: what the steps refuse"""
     levelled, repairs = repair(surface, expected_size)
     return PreparedMap(*split(levelled, cutoff), repairs)
 
@@ -84,8 +78,7 @@ def repair(surface: HeightMap, expected_size: tuple[float, float] | None = None)
 def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> None:
     """Raise Refusal for a map that cannot be a measured face in metres.
 
-    expected_size : sides it should cover [m]; up to five times as large is taken as a wider measurement
-    """
+    expected_size : sides it should cover [m]; up to five times as large is taken as a wider measurement"""
     name = surface.name
     if not np.isfinite(surface.z).any():
         raise Refusal(f"{name}: no point has a height: check the file and its missing-value code")
@@ -111,17 +104,19 @@ def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) 
 
 
 def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
-    """Turn spikes into holes: points far off the median of the 5 x 5 points around them.
+    """Turn spikes into holes: points far off the median of the 5 x 5 points around them, and off a fifth of these.
 
-    Returns the map with NaN at spikes, and a sentence on each change
-    """
+    A point of a wall, as at the rim of a worn place, is as high as others along the wall: it is no spike.
+    Returns the map with NaN at spikes, and a sentence on each change"""
     measured = np.isfinite(surface.z)
     nearest = scipy.ndimage.distance_transform_edt(~measured, return_distances=False, return_indices=True)
     closed = surface.z[tuple(nearest)]
     distance = np.abs(closed - scipy.ndimage.median_filter(closed, size=5, mode="nearest"))
     sigma = 1.4826 * np.median(distance[measured])
     low, high = np.percentile(level(surface).z[measured], (5, 95))
-    spikes = measured & (distance > LIMITS.spike * sigma) & (distance > 0.1 * (high - low))
+    least = np.maximum(LIMITS.spike * sigma, 0.1 * (high - low))
+    lower, higher = (scipy.ndimage.rank_filter(closed, rank, size=5, mode="mirror") for rank in (5, -6))
+    spikes = measured & (distance > least) & ((closed < lower - least) | (closed > higher + least))
     count = int(spikes.sum())
     if count == 0:
         return surface, []
@@ -138,8 +133,7 @@ def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
 def fill_holes(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     """Close holes with the surface that has no curvature of its own there (Laplace), bounded by its rim.
 
-    Returns the map without NaN, and a sentence on each change
-    """
+    Returns the map without NaN, and a sentence on each change"""
     holes = ~np.isfinite(surface.z)
     count = int(holes.sum())
     if count == 0:
@@ -183,8 +177,7 @@ def split(surface: HeightMap, cutoff: float) -> tuple[HeightMap, HeightMap]:
     Returns (waviness, roughness), their sum is the surface
     Raises  Refusal: holes, or a cut-off that the map cannot hold
     Source  ISO 16610-61 (areal Gaussian, separable), weights of ISO 16610-21 out to one cut-off; at the edges the local
-        linear fit with the same weights, which keeps planes (moment criterion of ISO 16610-28)
-    """
+        linear fit with the same weights, which keeps planes (moment criterion of ISO 16610-28)"""
     if not np.isfinite(surface.z).all():
         raise Refusal(f"{surface.name}: it has points without height: fill the holes before filtering")
     if not 2 * max(surface.spacing) <= cutoff <= min(surface.size):

@@ -1,7 +1,5 @@
 """One mesh of a file with its groups, its extent, volume and worst element; a node is a column of `mesh.doflocs`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -25,8 +23,7 @@ def read(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, Groups]:
     sizes : of the elements of a CAD file, in its unit
     Returns mesh : skfem MeshHex2 or MeshTet2; surface groups are its boundaries, volume groups its subdomains;
         node_sets : every group of any dimension, name -> node numbers, edge, face and middle nodes included
-    Raises Refusal: no such file, one that is no mesh, a group outside the volume mesh, an inverted element
-    """
+    Raises Refusal: no such file, one that is no mesh, a group outside the volume mesh, an inverted element"""
     mesh, node_sets, _ = read_with_notes(path, sizes)
     return mesh, node_sets
 
@@ -55,8 +52,7 @@ class Quality:
 
     scaled_jacobian : smallest over all elements and points; 1 is a box (or a regular tetrahedron), 0 is degenerate
     worst_element : the element where it is found
-    volume : volume of the mesh [m3]
-    """
+    volume : volume of the mesh [m3]"""
 
     scaled_jacobian: float
     worst_element: int
@@ -68,8 +64,7 @@ def quality(mesh: Any) -> Quality:
 
     mesh : skfem MeshHex2 or MeshTet2
     Raises Refusal: an element is inverted or degenerate somewhere
-    Source  scaled Jacobian: Knupp, 2000; for tetrahedra normalised to 1 for the regular one
-    """
+    Source  scaled Jacobian: Knupp, 2000; for tetrahedra normalised to 1 for the regular one"""
     points, weights = get_quadrature(mesh.elem.refdom, 5)
     at = np.hstack([mesh.elem.doflocs.T, points])
     jacobian = np.moveaxis(mesh.mapping().DF(at), (0, 1), (-2, -1))  # (element, point, 3, 3)
@@ -102,8 +97,7 @@ def quality(mesh: Any) -> Quality:
 class MeshFacts:
     """low, high : (3,) corners of the box around it [m]; volume [m3]; mass [kg], None without a density
     centre : (3,) of its mass, or of its volume without a density [m]
-    scaled_jacobian, worst_centre : of the worst element, see geometry.mesh.quality; (3,) [m]
-    """
+    scaled_jacobian, worst_centre : of the worst element, see geometry.mesh.quality; (3,) [m]"""
 
     low: np.ndarray
     high: np.ndarray
@@ -117,8 +111,7 @@ class MeshFacts:
 def facts(mesh: Any, density: np.ndarray | None = None) -> MeshFacts:
     """Measure a mesh. mesh : skfem MeshHex2 or MeshTet2; density : (n_element,) [kg/m3]
 
-    Raises  Refusal: an element is inverted or degenerate
-    """
+    Raises  Refusal: an element is inverted or degenerate"""
     worst_quality = quality(mesh)
     X, w = get_quadrature(mesh.elem.refdom, 5)
     mapping = mesh.mapping()

@@ -2,10 +2,7 @@
 
 A node beyond the corners lies at the mean of the corners that support it: two for an edge, four for a face, eight
 for the middle. From that follow reference coordinates, and from two lists of reference coordinates follows the
-permutation between any two programs.
-"""
-
-from __future__ import annotations
+permutation between any two programs."""
 
 import numpy as np
 
@@ -41,8 +38,7 @@ def permutation(source: np.ndarray, target: np.ndarray) -> np.ndarray:
 
     source, target : (n, d) reference coordinates of the same nodes in two numberings, on the same reference element
     Returns (n,) so that source[result] equals target
-    Raises Refusal: the two do not list the same nodes
-    """
+    Raises Refusal: the two do not list the same nodes"""
     distance = np.abs(source[None, :, :] - target[:, None, :]).max(axis=2)
     order = distance.argmin(axis=1)
     if len(source) != len(target) or distance.min(axis=1).max() > 1e-9:

@@ -1,7 +1,5 @@
 """Hexagonal nut with a smooth bore along z, standing on the plane z = 0."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +15,7 @@ MESH = ("n_around", "n_height")  # numbers of elements
 class Parameters:
     """bore, flats, height : [m]; seat_diameter : inside of the ring by which it rests [m]
 
-    n_around : elements around, a multiple of 6; n_height : along the axis
-    """
+    n_around : elements around, a multiple of 6; n_height : along the axis"""
 
     bore: float = 7.9375e-3
     flats: float = 12.7e-3

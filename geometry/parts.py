@@ -4,10 +4,7 @@ A part is a file in this folder, or in the folder of a case, that defines `class
 units that validates itself) and `def build(parameters, path)` (writes a second-order .msh with physical groups). It may
 list in `MESH` which of its parameters are numbers of elements or nodes, so that its mesh can be made coarser to measure
 the mesh error. Nothing else lists it: the folders of the cases are searched by file, no case is imported before a scene
-names its part.
-"""
-
-from __future__ import annotations
+names its part."""
 
 import ast
 import importlib
@@ -48,8 +45,7 @@ def load(name: str) -> ModuleType:
 
     name : its file name without .py, or the path of a user's file, which ends with .py
     Returns the module, with `Parameters` and `build`
-    Raises Refusal: there is no such part
-    """
+    Raises Refusal: there is no such part"""
     if name.endswith(".py"):
         return declarations.run_file(Path(name), "part", ("build", "Parameters"))
     module = file_of(name).relative_to(_PACKAGE).with_suffix("")

@@ -1,7 +1,5 @@
 """Move, turn and scale a mesh; extract one volume of a mesh; measure the overlap of two bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -39,8 +37,7 @@ def extract_volume(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) 
 
     Returns mesh and node_sets as geometry.mesh.read gives them, of the groups that reach into the volume; a surface
         group inside the mesh becomes a face of it
-    Raises  Refusal where there is no such volume
-    """
+    Raises  Refusal where there is no such volume"""
     volumes = mesh.subdomains or {}
     if volume not in volumes:
         raise Refusal(f"the mesh has no volume '{volume}'; it has {', '.join(sorted(volumes)) or 'none'}")
@@ -74,8 +71,7 @@ def extract_volume(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) 
 def overlap(first: Any, second: Any) -> tuple[float, np.ndarray] | None:
     """Share of the elements of one mesh whose middles lie in the other one, and the mean of their places (3,) [m].
 
-    one, other : skfem MeshHex2 or MeshTet2; None where less than SHARE of them do
-    """
+    one, other : skfem MeshHex2 or MeshTet2; None where less than SHARE of them do"""
     middles = _middles(first)
     picked = middles[np.unique(np.linspace(0, len(middles) - 1, MAX_SAMPLES).astype(int))]
     corners = second.doflocs[:, np.unique(second.t)]
@@ -114,8 +110,7 @@ def _triangles(mesh: Any) -> np.ndarray:
 def _winding(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(k,) how often a surface (n, 3, 3) winds around points (k, 3): 1 inside, 0 outside.
 
-    Source  solid angle of a triangle: van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983
-    """
+    Source  solid angle of a triangle: van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983"""
     a, b, c = np.moveaxis(triangles[None] - points[:, None, None], 2, 0)
     la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
     triple = np.einsum("knx,knx->kn", a, np.cross(b, c))

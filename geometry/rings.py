@@ -1,10 +1,7 @@
 """Curves about an axis, and rings of cells between two of them: holes, shanks, washers, nuts and heads of bolts.
 
 A curve gives the points (n, 2) at fractions u of a turn; a ring is a block over (u, v, z) with v from 0 on its inner
-curve to 1 on its outer one.
-"""
-
-from __future__ import annotations
+curve to 1 on its outer one."""
 
 from collections.abc import Callable, Mapping
 
@@ -61,8 +58,7 @@ def ring(
 ) -> Block:
     """Cells between two curves: so many around and across, and between the heights z (k,) [m].
 
-    sides : "v-" is the inner one, "v+" the outer one, "w-" and "w+" the ends along z
-    """
+    sides : "v-" is the inner one, "v+" the outer one, "w-" and "w+" the ends along z"""
 
     def mapped(position: np.ndarray) -> np.ndarray:
         u, v, height = position.T

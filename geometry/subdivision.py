@@ -1,10 +1,7 @@
 """Cut every element of a mesh into eight; the shape and the groups stay the same.
 
 A piece lies in its parent as a piece of the parent's own reference cell, so that curved elements keep their shape: the
-refined mesh bounds the same body to rounding.
-"""
-
-from __future__ import annotations
+refined mesh bounds the same body to rounding."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -24,8 +21,7 @@ def subdivide(mesh: Any, node_sets: Mapping[str, np.ndarray], times: int = 1) ->
 
     mesh : skfem MeshHex2 or MeshTet2; node_sets : name -> node numbers
     Returns mesh, boundaries and subdomains likewise refined, and the node sets: a new node belongs to a set where the
-        edge, face or element that it lies on did, with all its nodes
-    """
+        edge, face or element that it lies on did, with all its nodes"""
     for _ in range(times):
         mesh, node_sets = _once(mesh, node_sets)
     return mesh, dict(node_sets)
@@ -34,15 +30,14 @@ def subdivide(mesh: Any, node_sets: Mapping[str, np.ndarray], times: int = 1) ->
 def first_order(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[Any, Groups]:
     """A mesh of hexahedra with straight edges as one of 8-node ones (MeshHex1); a corner keeps its number.
 
-    Raises  Refusal, which names the body, for tetrahedra or curved elements
-    """
+    Raises  Refusal, which names the body, for tetrahedra or curved elements"""
     if not isinstance(mesh, MeshHex2):
-        raise Refusal(f"elements = \"linear_reduced\" needs hexahedra, and body '{name}' has tetrahedra")
+        raise Refusal(f"linear elements need hexahedra, and body '{name}' has tetrahedra: elements = \"quadratic\"")
     n, points = mesh.nvertices, np.asarray(mesh.doflocs)
     middle = points[:, mesh.edges].mean(axis=1)
     off = np.abs(points[:, mesh.dofs.edge_dofs[0]] - middle).max(axis=0)
     if (off > 1e-6 * np.linalg.norm(np.ptp(points[:, mesh.edges], axis=1), axis=0)).any():
-        raise Refusal(f"elements = \"linear_reduced\" needs elements of first order, and body '{name}' has curved ones")
+        raise Refusal(f"linear elements need straight edges, '{name}' has curved ones: elements = \"quadratic\"")
     plain: Any = MeshHex(points[:, :n].copy(), mesh.t, sort_t=False)
     plain = plain.with_boundaries(mesh.boundaries or {}).with_subdomains(mesh.subdomains or {})
     return plain, {key: np.asarray(of)[np.asarray(of) < n] for key, of in node_sets.items()}

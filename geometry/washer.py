@@ -1,7 +1,5 @@
 """Flat round washer about the z axis, lying on the plane z = 0."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -16,6 +16,7 @@ import numpy as np
 from tribodyn.hbm.contact.contact_law import STICKS, ContactCycle
 from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.fatigue import StressField, StressPlace
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.compliance_point import CompliancePoint
@@ -36,8 +37,7 @@ class State:
     x : (n_pair, n_component, n_coeff) relative displacement [m]
     cycle : contact forces, their derivative and status
     g : (n_contact, n_coeff) departure from stuck and closed [N]
-    residual : (n_contact, n_coeff) R(x) [m]
-    """
+    residual : (n_contact, n_coeff) R(x) [m]"""
 
     omega: float
     x: np.ndarray
@@ -64,6 +64,7 @@ class HarmonicBalance:
     remainder : approximation of the residual flexibility; None where its factor serves, or there is none
     recalled : products with the residual flexibility that the followed curve has computed; None for a single solution
     at_speed : the problem of the same contact at other speeds of rotation [Hz], where a mission asks for them
+    places : of the part, whose stress is among the outputs; stress : of the whole part; none where it is not asked for
     """
 
     model: ReducedModel
@@ -78,6 +79,8 @@ class HarmonicBalance:
     remainder: Remainder = None
     recalled: list[np.ndarray] | None = None
     at_speed: Mapping[float, HarmonicBalance] = field(default_factory=dict)
+    places: tuple[StressPlace, ...] = ()
+    stress: StressField | None = None
 
     @classmethod
     def of(
@@ -96,8 +99,7 @@ class HarmonicBalance:
         memory : zeros by default: the contact is closed without shear, and a pair that never slips keeps the shear that
             the loads put on it
         previous : a balance whose cached linear side is reused if it matches but for the amplitudes of the loads
-        Raises  Refusal where joints, loads or frequency do not fit the model
-        """
+        Raises  Refusal where joints, loads or frequency do not fit the model"""
         if not 0 < omega_max < np.inf:
             raise Refusal(f"the highest frequency is {omega_max} rad/s: give a finite one above zero")
         contact = JointSet.of(model, joints)
@@ -223,15 +225,12 @@ class HarmonicBalance:
     def gap_response(self, state: State, opening: np.ndarray) -> np.ndarray:
         """First-order change of x (n_pair, n_component, n_coeff) when each gap opens by (n_pair,) [m].
 
-        A gap acts as a static shift of the normal displacement: f_c(x; gap + d) = f_c(x - d e_n; gap).
-        """
+        A gap acts as a static shift of the normal displacement: f_c(x; gap + d) = f_c(x - d e_n; gap)."""
         if not self.basis.has_static:
             return np.zeros_like(state.x)
         n_coeff = self.basis.n_coeff
         column = self.contact.components.index("n") * n_coeff
-        jac = state.cycle.jacobian
-        assert jac is not None
-        g_slope = (jac[:, :, column] * opening[:, None]).reshape(-1, n_coeff)
+        g_slope = (state.cycle.slope[:, :, column] * opening[:, None]).reshape(-1, n_coeff)
         change, _, _ = self.linearise(state).solve(self.at(state.omega).apply(g_slope), 1e-6)
         return change.reshape(state.x.shape)
 
@@ -245,8 +244,7 @@ class HarmonicBalance:
 
         The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling. A pair
         that sticks throughout, or lifts without slip, is elastic too: what is left of its work is rounding and would be
-        taken for slow wear.
-        """
+        taken for slow wear."""
         t = self.contact.tangential
         force, x = state.cycle.force[:, t], state.x[:, t]
         work = self.basis.work_per_cycle(force, x).sum(axis=1)

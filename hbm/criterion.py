@@ -1,7 +1,5 @@
 """When a balance is solved well enough: its relative residual, and the one that the contact forces need."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -16,10 +14,12 @@ from tribodyn.hbm.linearisation import Linearisation
 @dataclass(frozen=True)
 class CriterionRules:
     """force_accuracy : of the contact forces, required where these stretch their springs far less than x is large
-    least_tolerance : residual over displacement that rounding permits
-    """
+    vibration_accuracy : residual over the vibration, required where the static displacement is far larger: a resonance
+        of 0.01 % damping amplifies it by 5000
+    least_tolerance : residual over displacement that rounding permits"""
 
     force_accuracy: float = 1e-4
+    vibration_accuracy: float = 1e-6
     least_tolerance: float = 1e-12
 
 
@@ -49,8 +49,7 @@ Evaluated = TypeVar("Evaluated", bound=Evaluation)
 class Balance(Protocol[Frequency, Evaluated]):
     """What Newton's method solves: R(x) = 0 at a frequency, or at one for each of several duties.
 
-    reference_stiffness : (n_contact,) stuck springs that the departure g is measured from [N/m]
-    """
+    reference_stiffness : (n_contact,) stuck springs that the departure g is measured from [N/m]"""
 
     @property
     def reference_stiffness(self) -> np.ndarray: ...
@@ -69,8 +68,7 @@ class NewtonOptions:
     tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction
     krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
     least_motion : take the shortest of all directions that solve the linear problem, by its dense matrix: a body that
-        slips on all its faces can be at rest in many places
-    """
+        slips on all its faces can be at rest in many places"""
 
     tolerance: float = 1e-8
     max_steps: int = 40
@@ -97,9 +95,20 @@ def required_residual(
     x_lin: np.ndarray,
     options: NewtonOptions,
 ) -> float:
-    """The relative residual to reach: the tolerance, or less where contact forces need it and rounding permits."""
+    """The relative residual to reach: the tolerance, or less where contact forces or the vibration need it and rounding
+    permits."""
     by_forces = CRITERION.force_accuracy * spring_stretch(balance, state, x_lin)
-    return min(options.tolerance, max(by_forces, CRITERION.least_tolerance))
+    needed = min(by_forces, required_by_vibration(state, x_lin))
+    return min(options.tolerance, max(needed, CRITERION.least_tolerance))
+
+
+def required_by_vibration(state: Evaluation, x_lin: np.ndarray) -> float:
+    """The relative residual that the vibration under its loads needs, where the static displacement is far larger."""
+    linear, size = (euclidean_norm(values[..., values.shape[-1] % 2 :]) for values in (x_lin, state.x))
+    if linear == 0.0:
+        return np.inf
+    scale = max(euclidean_norm(state.x), euclidean_norm(x_lin))
+    return CRITERION.vibration_accuracy * max(size, linear) / scale
 
 
 def spring_stretch(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> float:

@@ -16,8 +16,7 @@ class Excitation:
     """Periodic loads on a system, as complex amplitudes F_h of F(t) = Re sum_h F_h exp(i h w t).
 
     loads : (harmonic, name of a load of the system) -> complex amplitude [N]; harmonic 0 is the static load
-    base : (n_pair * n_component, n_coeff) prescribed motion of body 2 at the contact [m], or None for a fixed ground
-    """
+    base : (n_pair * n_component, n_coeff) prescribed motion of body 2 at the contact [m], or None for a fixed ground"""
 
     loads: Mapping[tuple[int, str], complex] = field(default_factory=dict)
     base: np.ndarray | None = None

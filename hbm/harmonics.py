@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -17,8 +17,7 @@ class HarmonicBasis:
     harmonics : kept harmonics, any strictly increasing set; x_0 is there only where 0 is among them
     n_samples : equidistant time samples of one period; more than twice the highest harmonic, so that none is aliased
     transitions : contact forces are taken at the samples ("sampled"), or the instants of stick, slip, contact and
-        separation are located and the forces between them integrated in closed form ("located")
-    """
+        separation are located and the forces between them integrated in closed form ("located")"""
 
     harmonics: tuple[int, ...]
     n_samples: int = 128
@@ -150,10 +149,53 @@ class HarmonicBasis:
         """Work of a force over one period, integral of f dx.
 
         force, displacement : (..., n_coeff) [N], [m]
-        Returns (...) [J] = sum_h pi h (f_a x_b - f_b x_a)
-        """
+        Returns (...) [J] = sum_h pi h (f_a x_b - f_b x_a)"""
         s = int(self.has_static)
         h = np.asarray(self.dynamic)
         fa, fb = force[..., s::2], force[..., s + 1 :: 2]
         xa, xb = displacement[..., s::2], displacement[..., s + 1 :: 2]
         return np.pi * np.sum(h * (fa * xb - fb * xa), axis=-1)
+
+
+def amplitude(coefficients: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
+    """Vibration amplitude of Fourier coefficients (..., n_coeff): half the range of the cycle (...) [same unit]."""
+    fine = _fine(harmonics)
+    if len(fine.dynamic) == 1:
+        return np.asarray(np.sqrt(np.sum(coefficients[..., int(fine.has_static) :] ** 2, axis=-1)))
+    return np.asarray(np.sum(coefficients * amplitude_slope(coefficients, harmonics), axis=-1))
+
+
+def amplitude_slope(coefficients: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
+    """Derivative (..., n_coeff) of `amplitude` by the coefficients: an extreme does not change with its instant."""
+    fine = _fine(harmonics)
+    if len(fine.dynamic) == 1:
+        vibration = np.where(fine.order > 0, coefficients, 0.0)
+        size = np.linalg.norm(vibration, axis=-1, keepdims=True)
+        return np.divide(vibration, size, out=np.zeros_like(vibration), where=size > 0)
+    highest, lowest = (fine.functions(_angle_of_maximum(sign * coefficients, fine)) for sign in (1.0, -1.0))
+    return np.asarray((highest - lowest) / 2)
+
+
+@lru_cache(maxsize=32)
+def _fine(harmonics: tuple[int, ...]) -> HarmonicBasis:
+    # samples of a cycle per highest harmonic, between which its extremes are located
+    return HarmonicBasis(harmonics, 32 * harmonics[-1])
+
+
+def _angle_of_maximum(coefficients: np.ndarray, fine: HarmonicBasis) -> np.ndarray:
+    """w t (...) of the maximum of a cycle [rad]: the best sample after a Newton step from each, then located."""
+    derivatives = [coefficients, coefficients @ fine.rate, coefficients @ fine.rate @ fine.rate]
+    reach = np.pi / fine.n_samples
+
+    def newton_step(slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+        step = np.divide(-slope, curvature, out=np.zeros_like(slope), where=curvature < 0)
+        return np.clip(step, -reach, reach)
+
+    value, slope, curvature = (fine.to_time(c) for c in derivatives)
+    step = newton_step(slope, curvature)
+    best = np.argmax(value + step * (slope + step * curvature / 2), axis=-1)
+    angle = fine.angle[best] + np.take_along_axis(step, best[..., None], axis=-1)[..., 0]
+    for _ in range(3):
+        functions = fine.functions(angle)
+        angle = angle + newton_step(*(np.sum(c * functions, axis=-1) for c in derivatives[1:]))
+    return np.asarray(angle)

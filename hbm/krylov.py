@@ -1,7 +1,5 @@
 """GMRES for Newton directions: short, matrix-free, deterministic."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numba
@@ -22,8 +20,7 @@ def gmres(
     product : A times a vector (n,)
     precondition : an approximate inverse of A, applied from the right; it may be an iteration of its own
     Returns x, products spent, relative residual reached: infinite where a product is no number
-    Source  Saad 1993, doi 10.1137/0914028
-    """
+    Source  Saad 1993, doi 10.1137/0914028"""
     beta = float(np.linalg.norm(b))
     if beta == 0.0:
         return np.zeros_like(b), 0, 0.0
@@ -62,8 +59,7 @@ def _next(w, v, column, cs, sn, rhs):
     """Vector k of the space, v[k], from the product w of the one before, orthogonalised twice.
 
     Fills the column (k,) of the Hessenberg matrix, turned upper triangular, and turns the right-hand side with it
-    Returns its diagonal, and the size of w outside of the space
-    """
+    Returns its diagonal, and the size of w outside of the space"""
     k = len(column)
     column[:] = np.dot(v[:k], w)
     w = w - np.dot(column, v[:k])

@@ -1,7 +1,5 @@
 """The Jacobian of a harmonic balance, and how Newton's directions are solved for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 
@@ -23,8 +21,7 @@ Remainder = (
 class Linearisation:
     """I - G dg/dx, with dg/dx block diagonal over pairs and zero where a pair stays stuck and closed.
 
-    active : pairs with a derivative; rows : their contact rows
-    """
+    active : pairs with a derivative; rows : their contact rows"""
 
     def __init__(
         self, point: LinearSide, stiffness: np.ndarray, x: np.ndarray, cycle: ContactCycle, remainder: Remainder = None
@@ -107,8 +104,7 @@ class Linearisation:
     def coarse(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """U (n_active_rows, r) and A, I - A U^T D U (r n_coeff, r n_coeff), where G ~ U A U^T; None where r = 0.
 
-        With D = dg/dx the inverse of I - U A U^T D is I + U (I - A U^T D U)^-1 A U^T D (Woodbury).
-        """
+        With D = dg/dx the inverse of I - U A U^T D is I + U (I - A U^T D U)^-1 A U^T D (Woodbury)."""
         u, a = self._point.coarse_part(self.rows)
         r, m = u.shape[1], self._shape[1]
         if r == 0:
@@ -128,8 +124,7 @@ class Linearisation:
     def solve(self, rhs: np.ndarray, tolerance: float, max_products: int = 200) -> tuple[np.ndarray, int, float]:
         """Solve (I - G dg/dx) d = rhs for rhs (n_contact, n_coeff).
 
-        Returns d, products spent, relative residual reached
-        """
+        Returns d, products spent, relative residual reached"""
         if len(self.active) == 0:
             return rhs.copy(), 0, 0.0
         shape = (len(self.rows), self._shape[1])
@@ -171,8 +166,7 @@ class Linearisation:
     def dense(self) -> np.ndarray:
         """The Jacobian as a matrix (n_contact * n_coeff, same); for checks and as fallback.
 
-        G couples no harmonics, and a sine is a cosine turned: one product for each active row finds all its columns.
-        """
+        G couples no harmonics, and a sine is a cosine turned: one product for each active row finds all its columns."""
         n, m = self._shape
         full = np.eye(n * m)
         if len(self.active) == 0:

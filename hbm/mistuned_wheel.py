@@ -1,10 +1,7 @@
 """Blades that differ: the balance of a whole wheel with contact on every blade, at the cost of its reduced sector.
 
 Sectors differ in stiffness on a few shapes (`hbm.linear.mistuned_compliance`) and in any parameter of their contacts.
-Rows of the contact and outputs "<name>@<sector>" are those of the whole wheel, sector by sector.
-"""
-
-from __future__ import annotations
+Rows of the contact and outputs "<name>@<sector>" are those of the whole wheel, sector by sector."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -52,8 +49,7 @@ class MistunedWheel:
     """Sectors nominal, ready to be made different.
 
     wave : balance of one sector under a travelling wave, whose model has the outputs `ports`, see
-        `reduction.nominal_modes.with_ports`
-    """
+        `reduction.nominal_modes.with_ports`"""
 
     wave: HarmonicBalance
     ports: tuple[str, ...]
@@ -100,8 +96,7 @@ class MistunedWheel:
     def balance(self, deviation: np.ndarray, change: Change | None = None) -> HarmonicBalance:
         """The wheel with relative deviations (N,) of stiffness, and contacts that are the sector's or changed ones.
 
-        Raises  Refusal for deviations that cannot be
-        """
+        Raises  Refusal for deviations that cannot be"""
         sector_balance = self.wave
         # to a balance it is what a ContactCompliance is; what needs matrices of a harmonic is refused by the model
         compliance = cast(ContactCompliance, MistunedCompliance(self.nominal, sector_balance.basis, deviation))
@@ -130,8 +125,7 @@ class MistunedWheel:
         """Waves of the wheel's motion: complex amplitudes (n,) of the coordinates of every index, by harmonic [m].
 
         balance : of this wheel; displacement, force : of its contacts (n_contact, n_coeff) [m], [N]; omega : [rad/s]
-        Sector n moves by the sum over the indices j of exp(-i 2 pi j n / N) times what wave j does
-        """
+        Sector n moves by the sum over the indices j of exp(-i 2 pi j n / N) times what wave j does"""
         a, basis, k = self.nominal, balance.basis, balance.reference_stiffness
         compliance = cast(MistunedCompliance, balance.compliance)
         pushed = np.zeros((len(basis.harmonics), a.n_sectors, a.n_port), complex)
@@ -165,8 +159,7 @@ class MistunedWheel:
     ) -> np.ndarray:
         """Displacement of every DOF of the full sector, of all sectors (N, n_full, n_coeff), each in its own frame [m].
 
-        reduced : that the wave is made of, the ports among its outputs; the others as `coordinates`
-        """
+        reduced : that the wave is made of, the ports among its outputs; the others as `coordinates`"""
         waves = self.coordinates(balance, displacement, force, omega)
         all_waves = travelling_wave(reduced, 1)  # whose harmonic j is the wave of index j
         amplitudes = [

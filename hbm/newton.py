@@ -1,7 +1,5 @@
 """Newton-Krylov for the balance: inexact directions, a line search, a direct fallback, and an outcome."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar, cast
@@ -65,8 +63,7 @@ class Solved(Generic[Solvable]):
 
     outcome : CONVERGED, or what went wrong
     steps, products : Newton steps and Krylov products spent
-    history : relative residual after each step, the start first
-    """
+    history : relative residual after each step, the start first"""
 
     state: Solvable
     outcome: Outcome[SolveEnd]
@@ -94,8 +91,7 @@ def solve(
     Returns where Newton ended; its state is the best met, also where it did not converge. Where a contact barely
     touches while it swings far, a residual small beside x is not small beside the stretch of its springs: Newton then
     continues until it is, as far as rounding lets it
-    Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
-    """
+    Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2"""
     options = options or NewtonOptions()
     if isinstance(balance, HarmonicBalance) and isinstance(omega, float):
         model = balance.model
@@ -111,8 +107,7 @@ def _solve_with_remainder(
 
     It is known of forces that were asked for before, and bounded by the largest share left out of what the forces
     differ from these: where the bound is small enough, nothing is asked for. Too many corrections, each smaller by
-    about what the modes leave out, give way to Newton's method on all
-    """
+    about what the modes leave out, give way to Newton's method on all"""
     steps, products, is_solved = 0, 0, False
     x_lin = balance.x_lin(omega)
     history: tuple[float, ...] = ()
@@ -147,6 +142,7 @@ def _solve(
 ) -> Solved[Evaluated]:
     """The same with Newton's method alone, from a state evaluated with its derivative."""
     x_lin = balance.x_lin(omega)
+    x_lin = x_lin if x_lin.any() else state.x  # without any load the start gives the scale
     error = relative_residual(state, x_lin)
     history = [error]
     forcing = 1e-3
@@ -214,8 +210,7 @@ def _search(
 ) -> tuple[Evaluated, float]:
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
 
-    Source  parabola through |R|^2, its slope and the last trial, Kelley 1995, 8.3.1
-    """
+    Source  parabola through |R|^2, its slope and the last trial, Kelley 1995, 8.3.1"""
     best, best_error = state, error
     length = 1.0
     while length > RULES.shortest:
@@ -237,8 +232,7 @@ def _search(
 def _unheld(balance: Balance[Frequency, Evaluated], state: Evaluated) -> str:
     """What a mean motion that nothing resists does, as where all pairs of a loose body slip; empty where there is none.
 
-    By the columns of the dense Jacobian for harmonic 0, empty too where that is too large
-    """
+    By the columns of the dense Jacobian for harmonic 0, empty too where that is too large"""
     if not isinstance(balance, HarmonicBalance) or not isinstance(state, State):
         return ""
     if not balance.basis.has_static or balance.n_unknown > RULES.most_dense:
@@ -265,8 +259,7 @@ def solve_from_rest(
     """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
 
     static : the solution without vibration load, searched where it is left out
-    The ramp halves its step where Newton fails. Products and steps of the whole way are counted in the Solution.
-    """
+    The ramp halves its step where Newton fails. Products and steps of the whole way are counted in the Solution."""
     first = solve(balance, omega, balance.stuck(omega), options)
     if first.converged:
         return first
@@ -305,8 +298,7 @@ def lead(level: float, goal: float, solve: Callable[[float, float], bool], first
     solve : whether there is a solution at its first argument beside the one at its second, the level reached so far;
         it keeps what it finds
     first : step
-    Source  Allgower and Georg 1990, chapter 1
-    """
+    Source  Allgower and Georg 1990, chapter 1"""
     stride = first
     while level != goal and stride > STRIDES.shortest:
         target = min(level + stride, goal) if goal > level else max(level - stride, goal)

@@ -2,10 +2,7 @@
 
 Each member carries the beginning of the sentence that a user reads.
 
-What decides asks for the member; the sentence is made from it and is never read back.
-"""
-
-from __future__ import annotations
+What decides asks for the member; the sentence is made from it and is never read back."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -50,8 +47,6 @@ class SolveEnd(End):
     AT_FOLD = "the curve turns back at a fold,"
     INTEGRATION_FAILED = "time integration failed:"
     NOT_PERIODIC = "not periodic after"
-    LEAVES_BRANCH = "no motion stays on the branch within"
-    STAYS_ON_BRANCH = "the motion stays on the branch"
 
 
 CONVERGED: Final = SolveEnd.CONVERGED.say()

@@ -3,8 +3,7 @@
 A quantity is a file `hbm/quantities/<name>.py` that ends with `QUANTITY = ...`, one of the five classes below. Which
 class says what the number belongs to: a solved cycle, a worn contact, a response curve, a fold of it or a nonlinear
 mode. No other file names a quantity: summary, JSON, text, report, errors, columns of studies and derivatives are loops
-over them.
-"""
+over them."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from tribodyn import declarations
-from tribodyn.hbm.quantity_sources import EndOfLife, MotionInTime, Slopes, SolvedCurve, SolvedCycle, WornContact
+from tribodyn.hbm.quantity_sources import MotionInTime, Slopes, SolvedCurve, SolvedCycle, WornContact
 from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 __all__ = [
     "CurveQuantity",
     "CycleQuantity",
-    "EndOfLife",
     "ErrorKind",
     "ModeQuantity",
     "MotionInTime",
@@ -41,6 +39,7 @@ __all__ = [
     "WornContact",
     "load",
     "names_with_error",
+    "of_wear_with_error",
     "quantities_of",
     "quantity_named",
     "with_error",
@@ -63,15 +62,16 @@ class StatedQuantity:
     """What every quantity declares; `name` is that of its file.
 
     title : for axes and headings; unit : SI, "cycles", or empty
-    by_joint : whether each named contact has its own; relative : whether its changes count over its value
+    by_joint, by_place : whether each named contact, or each place of the part, has its own
+    relative : whether its changes count over its value
     error : how its error is found; rank : place in tables, ascending
-    headline : whether the short summary gives it; digits : significant ones of a value whose error is not known
-    """
+    headline : whether the short summary gives it; digits : significant ones of a value whose error is not known"""
 
     title: str
     unit: str
     value: Callable[[Any], float | None]
     by_joint: bool = False
+    by_place: bool = False
     relative: bool = True
     error: ErrorKind = ErrorKind.NONE
     rank: int = 99
@@ -93,12 +93,13 @@ class CycleQuantity(StatedQuantity):
     slopes : SolvedCycle -> Slopes, for exact derivatives; in_time : MotionInTime -> the number along it, and the least
         one that a difference counts over
     at_rest : whether it has a value without vibration
-    """
+    where : SolvedCycle -> node or name of the place of the part whose number it is, None for a number of no place"""
 
     value: Callable[[SolvedCycle], float | None]
     slopes: Callable[[SolvedCycle], Slopes] | None = None
     in_time: Callable[[MotionInTime], tuple[float, float]] | None = None
     at_rest: bool = False
+    where: Callable[[SolvedCycle], int | str] | None = None
 
 
 @dataclass(frozen=True)
@@ -108,14 +109,12 @@ class WearQuantity(StatedQuantity):
     value : WornContact -> number, None where there is none
     grows : whether it has a value at every row of the history, so that it is drawn against the cycles
     remark : WornContact -> what a reader should know of the value, such as where a life ends
-    at_end_of_life : EndOfLife -> its value there; tangent : EndOfLife -> (n,) derivatives of that
-    """
+    applies : WornContact -> whether its scene gives rise to the number; None: every one that wears"""
 
     value: Callable[[WornContact], float | None]
     grows: bool = False
     remark: Callable[[WornContact], str] | None = None
-    at_end_of_life: Callable[[EndOfLife], float] | None = None
-    tangent: Callable[[EndOfLife], np.ndarray] | None = None
+    applies: Callable[[WornContact], bool] | None = None
 
 
 @dataclass(frozen=True)
@@ -129,8 +128,7 @@ class CurveQuantity(StatedQuantity):
 class FoldQuantity(StatedQuantity):
     """A number of a fold of a response curve.
 
-    value : frequency of the fold [rad/s] -> number; slope : the same -> derivative of the number by that frequency
-    """
+    value : frequency of the fold [rad/s] -> number; slope : the same -> derivative of the number by that frequency"""
 
     value: Callable[[float], float]
     slope: Callable[[float], float] | None = None
@@ -140,8 +138,7 @@ class FoldQuantity(StatedQuantity):
 class ModeQuantity(StatedQuantity):
     """A number of a nonlinear mode.
 
-    value : ModePoint -> number; tangent : (ModePoint, change of the unknowns of a mode) -> change of the number
-    """
+    value : ModePoint -> number; tangent : (ModePoint, change of the unknowns of a mode) -> change of the number"""
 
     value: Callable[[ModePoint], float]
     tangent: Callable[[ModePoint, np.ndarray], float] | None = None
@@ -196,9 +193,14 @@ def with_error(kind: type[Kinds]) -> tuple[Kinds, ...]:
     return tuple(q for q in quantities_of(kind) if q.error is not ErrorKind.NONE)
 
 
-def names_with_error() -> tuple[str, ...]:
-    """Names of all quantities whose errors are stated, those of a cycle first."""
-    return tuple(q.name for kind in (CycleQuantity, WearQuantity) for q in with_error(kind))
+def of_wear_with_error(worn: WornContact | None) -> tuple[WearQuantity, ...]:
+    """The quantities of a whole wear that its scene gives rise to, and whose errors are stated."""
+    return tuple(q for q in with_error(WearQuantity) if q.applies is None or (worn is not None and q.applies(worn)))
+
+
+def names_with_error(*kinds: type[StatedQuantity]) -> tuple[str, ...]:
+    """Names of the quantities of some kinds, or of all, whose errors are stated, those of a cycle first."""
+    return tuple(q.name for kind in kinds or (CycleQuantity, WearQuantity) for q in with_error(kind))
 
 
 def quantity_named(name: str) -> StatedQuantity:

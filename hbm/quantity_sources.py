@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribodyn.hbm.continuation.branch import Branch, amplitude
-from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.fatigue import PlaceFatigue, StressOverCycle, StressPlace
+from tribodyn.hbm.harmonics import HarmonicBasis, amplitude
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, events
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ Pairs = slice | np.ndarray
 
 @dataclass(frozen=True)
 class SolvedCycle:
-    """One vibration cycle: fresh from a balance, or as a result holds it; what a result does not hold is None.
+    """One vibration cycle: fresh from a balance, or as a result holds it; what a result lacks is None or empty.
 
     omega : [rad/s]; basis : its harmonics; output : row of the observed output in `response` (n_output, n_coeff) [m]
     amplitude : of that output [m]; preload : mean normal force of the contact [N]
@@ -30,7 +31,7 @@ class SolvedCycle:
     displacement, force : (n_pair, n_component, n_coeff) [m], [N]; components : of the contact, such as t1, t2, n
     joints : name -> its pairs; pairs : that the cycle is asked of, those of one joint or all
     driven : lowest harmonic that is driven; wear_coefficient : (n_pair,) [m3/J]
-    """
+    places : of the part whose stress is asked for, all or one; whole : computes the stress of all nodes"""
 
     omega: float
     basis: HarmonicBasis
@@ -40,14 +41,16 @@ class SolvedCycle:
     preload: float | None = None
     energy: np.ndarray | None = None
     normal_force: np.ndarray | None = None
-    displacement: np.ndarray | None = None
-    force: np.ndarray | None = None
+    displacement: np.ndarray = field(default_factory=lambda: np.empty((0, 0, 0)))
+    force: np.ndarray = field(default_factory=lambda: np.empty((0, 0, 0)))
     components: tuple[str, ...] = ()
-    joints: Mapping[str, Pairs] | None = None
+    joints: Mapping[str, Pairs] = field(default_factory=dict)
     pairs: Pairs = field(default_factory=lambda: slice(None))
     joint: str = ""
     driven: int | None = None
     wear_coefficient: np.ndarray | None = None
+    places: tuple[StressPlace, ...] = ()
+    whole: Callable[[], StressOverCycle] | None = None
 
     @classmethod
     def of(
@@ -57,42 +60,54 @@ class SolvedCycle:
         contact, basis, response = balance.contact, balance.basis, balance.outputs(state)
         row = balance.compliance.output_names.index(output)
         loaded = [h for h, _ in balance.excitation.loads if h in basis.dynamic] or [basis.dynamic[0]]
-        rate = np.zeros(contact.n_pair) if wear else None
-        for joint in contact.joints if wear else ():
-            assert wear is not None
-            assert rate is not None
-            rate[joint.rows] = wear.get(joint.name, 0.0)
+        rate, stress = None, balance.stress
+        if wear:
+            rate = np.zeros(contact.n_pair)
+            for joint in contact.joints:
+                rate[joint.rows] = wear.get(joint.name, 0.0)
         return cls(
-            state.omega, basis, response, float(amplitude(response[row])), row, balance.preload(state),
+            state.omega, basis, response, float(amplitude(response[row], basis.harmonics)), row, balance.preload(state),
             balance.energy(state), balance.normal_force(state), state.x, state.cycle.force, contact.components,
             {joint.name: joint.rows for joint in contact.joints}, driven=min(loaded), wear_coefficient=rate,
+            places=balance.places, whole=None if stress is None else cache(lambda: stress.of_state(balance, state)),
         )  # fmt: skip
 
     @classmethod
-    def at_row(cls, history: WearHistory, row: int, basis: HarmonicBasis, joints: Mapping[str, slice]) -> SolvedCycle:
+    def at_row(
+        cls,
+        history: WearHistory,
+        row: int,
+        basis: HarmonicBasis,
+        joints: Mapping[str, slice],
+        places: tuple[StressPlace, ...] = (),
+    ) -> SolvedCycle:
         """The cycle of a row of a wear history; its displacement and force are left out."""
         in_time = history.in_time[row]
-        height = float(amplitude(history.response[row, 0]) if in_time else history.amplitude[row])
+        height = float(amplitude(history.response[row, 0], basis.harmonics) if in_time else history.amplitude[row])
         return cls(
             float(history.omega[row]), basis, history.response[row], height, 0, float(history.preload[row]),
-            history.energy[row], history.normal_force[row], joints=joints,
+            history.energy[row], history.normal_force[row], joints=joints, places=places,
         )  # fmt: skip
 
     @classmethod
-    def at_point(cls, branch: Branch, point: int, basis: HarmonicBasis) -> SolvedCycle:
+    def at_point(
+        cls, branch: Branch, point: int, basis: HarmonicBasis, places: tuple[StressPlace, ...] = ()
+    ) -> SolvedCycle:
         """The cycle of a point of a response curve, of its first output."""
         height = float(branch.amplitude(branch.output_names[0])[point])
-        return cls(float(branch.omega[point]), basis, branch.response[point], height)
+        return cls(float(branch.omega[point]), basis, branch.response[point], height, places=places)
 
     def of_joint(self, name: str) -> SolvedCycle:
         """The same cycle, asked of one joint alone."""
-        assert self.joints is not None
         return replace(self, pairs=self.joints[name], joint=name)
+
+    def of_place(self, name: str) -> SolvedCycle:
+        """The same cycle, asked of one place alone."""
+        return replace(self, places=tuple(place for place in self.places if place.name == name))
 
     @cached_property
     def mask(self) -> np.ndarray:
         """(n_pair, 1, 1) 1 for the pairs that the cycle is asked of, else 0."""
-        assert self.displacement is not None
         mask = np.zeros((len(self.displacement), 1, 1))
         mask[self.pairs] = 1.0
         return mask
@@ -104,8 +119,7 @@ class Slopes:
 
     by_x, by_force : (n_pair, n_component, n_coeff) by displacement and by contact force, the others fixed
     by_response : (n_output, n_coeff); None where it does not depend on one of these
-    by_omega : by the frequency [rad/s]
-    """
+    by_omega : by the frequency [rad/s]"""
 
     by_x: np.ndarray | None = None
     by_force: np.ndarray | None = None
@@ -118,8 +132,7 @@ class MotionInTime:
     """The motion that integration in time came to.
 
     means : over its periods; sectors : of the wheel that it spans, 1 for a part
-    energy : (n_pair,) friction work per period of one sector [J]; least_energy : below which work is rounding [J]
-    """
+    energy : (n_pair,) friction work per period of one sector [J]; least_energy : below which work is rounding [J]"""
 
     means: MeanMotion
     sectors: int
@@ -136,7 +149,7 @@ class WornContact:
     life_share : of the first preload, where a life ends; any_joint : whether it ends with the first joint that is lost
     share_of_body_1 : of the depth, that is worn off body 1
     row : of the history, whose state is asked for; None for the end of the run
-    """
+    places : of the part whose stress is asked for; shares : of the cycles, of the duties of the mission"""
 
     history: WearHistory
     area: np.ndarray
@@ -150,6 +163,8 @@ class WornContact:
     pairs: slice = field(default_factory=lambda: slice(None))
     joint: str = ""
     row: int | None = None
+    places: tuple[StressPlace, ...] = ()
+    shares: tuple[float, ...] = (1.0,)
 
     def of_joint(self, name: str) -> WornContact:
         """The same wear, asked of one joint alone."""
@@ -159,43 +174,43 @@ class WornContact:
     def depth(self) -> np.ndarray:
         """(n_pair,) total depth of the pairs that are asked for [m]."""
         history = self.history
-        depth = history.depth[-1] + history.worn[-1] if self.row is None else history.depth[self.row]
-        return np.asarray(depth)[self.pairs]
+        return np.asarray(history.depth[-1 if self.row is None else self.row])[self.pairs]
 
     @property
     def work(self) -> np.ndarray:
         """(n_step, n_pair) friction work of the steps, of the pairs that are asked for [J]."""
-        return np.asarray(self.history.work[: self.row, self.pairs])
+        return np.asarray(self.history.work[: -1 if self.row is None else self.row, self.pairs])
 
     @property
     def cycles(self) -> float:
         """Vibration cycles at the end."""
-        return float(self.history.cycles[-1] + self.history.cycles_in_step[-1])
+        return float(self.history.cycles[-1])
 
     @cached_property
     def events(self) -> tuple[np.ndarray, np.ndarray]:
         """Cycles (n_pair,) from which on a pair opens, and touches no more; see `hbm.wear.history.events`."""
         return events(self.history, self.components, self.gap, self.basis)
 
-
-@dataclass(frozen=True)
-class EndOfLife:
-    """Where a life ends and how that moves with n parameters; the slopes have them on their last axis.
-
-    life : [cycles]; by_life : (n,); depth, area : (n_pair,) [m], [m2]; by_depth, by_area : (n_pair, n)
-    """
-
-    life: float
-    by_life: np.ndarray
-    depth: np.ndarray
-    by_depth: np.ndarray
-    area: np.ndarray
-    by_area: np.ndarray
+    @cached_property
+    def fatigue(self) -> dict[str, PlaceFatigue]:
+        """Fatigue over the wear of the places whose strength is known, by name; motions are those of the balance."""
+        rows = slice(None if self.row is None else self.row + 1)
+        responses = self.history.response[:, None] if self.history.duty_response is None else self.history.duty_response
+        cycles, shares, fatigue = np.asarray(self.history.cycles[rows]), np.array(self.shares), {}
+        for place in self.places:
+            if place.strength is not None:
+                use = place.utilisation(place.stress(responses[rows], self.basis), self.basis)
+                fatigue[place.name] = PlaceFatigue(place.strength, cycles, use, shares)
+        return fatigue
 
 
 @dataclass(frozen=True)
 class SolvedCurve:
-    """A response curve; spread : (n_point,) range of amplitudes by the load path over its middle, None if unknown."""
+    """A response curve; spread : (n_point,) range of amplitudes by the load path over its middle, None if unknown.
+
+    basis : harmonics of its coefficients; places : of the part whose stress is asked for"""
 
     branch: Branch
     spread: np.ndarray | None = None
+    basis: HarmonicBasis | None = None
+    places: tuple[StressPlace, ...] = ()

@@ -1,7 +1,5 @@
 """The stuck springs of a balance, which the contact forces are measured from."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -37,8 +35,7 @@ def reference_springs(
     """Springs (n_pair, n_component) [N/m], those harder than `hard` times the body cut to `cut` times it.
 
     Where body and springs are both zero, as of a mass on a cubic spring, the reference is the inertia at omega_max. All
-    that of few contacts only (`most` unknowns): where many stick, all would depart from a reference not their own
-    """
+    that of few contacts only (`most` unknowns): where many stick, all would depart from a reference not their own"""
     if not 0 < springs.size * basis.n_coeff <= most_unknowns:
         return springs
     body = body_stiffness(model, basis)

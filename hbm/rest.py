@@ -3,10 +3,7 @@
 The static loads act on a contact whose friction is off; then friction is on and every slider stands where the contact
 stands, so that the preloaded state carries no shear. A law whose springs follow from its own numbers then has the
 tangent of this state for its stuck springs.
-Source  the order of loading of Porter and Brake, MSSP 192 (2023) 110210
-"""
-
-from __future__ import annotations
+Source  the order of loading of Porter and Brake, MSSP 192 (2023) 110210"""
 
 from dataclasses import replace
 
@@ -24,8 +21,7 @@ EXACT = 1e-11  # relative residual of the state at rest
 def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None = None) -> np.ndarray:
     """Static displacement x (n_pair, n_component) [m] under the static loads alone, friction off.
 
-    Raises  Refusal where the contact does not settle
-    """
+    Raises  Refusal where the contact does not settle"""
     if not balance.basis.has_static:
         raise Refusal("a preload without friction needs harmonic 0: keep it in harmonics.kept")
     reduced = balance if 1 not in balance.basis.harmonics else balance.with_harmonics((0, 1))
@@ -67,7 +63,6 @@ def tangents(balance: HarmonicBalance, x: np.ndarray) -> dict[str, np.ndarray]:
         return {}
     still = np.zeros((*x.shape, basis.n_coeff))
     still[:, :, 0] = x
-    jac = contact.cycle(still, basis, balance.memory).jacobian
-    assert jac is not None
+    jac = contact.cycle(still, basis, balance.memory).slope
     each = np.diagonal(jac, axis1=1, axis2=2).reshape(still.shape)[:, :, basis.harmonics.index(1)]
     return {joint.name: np.maximum(each[np.ix_(joint.rows, contact.columns(joint))], 0.0) for joint in soft_joints}

@@ -2,10 +2,7 @@
 
 The solver makes many small products; BLAS threads that wait for each other make them many times slower, and two pay
 nowhere that was measured. So each entry of the solver is `single`: BLAS has one thread in it, however it is called.
-`limited` asks for more: BLAS has them outside of the solver.
-"""
-
-from __future__ import annotations
+`limited` asks for more: BLAS has them outside of the solver."""
 
 import os
 from collections.abc import Callable, Iterator

@@ -8,15 +8,14 @@ machine does can only add to it.
 The roofline is what the matrix products of a curve would take at least: for each kind of product the larger of its
 bytes at the rate at which this core sums an array that fits no cache, and of its operations at the rate of large square
 products.
-Source  Williams, Waterman and Patterson, CACM 52(4) (2009) 65, doi 10.1145/1498765.1498785
-"""
+Source  Williams, Waterman and Patterson, CACM 52(4) (2009) 65, doi 10.1145/1498765.1498785"""
 
 from __future__ import annotations
 
 import cProfile
 import pstats
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
 
@@ -57,8 +56,7 @@ class Timing:
     max_difference : of the contact displacement, both refined to rounding, relative to its largest value
     contact, balance, direction : share of our time by routine; thesis_seconds : published, one core, or None
     work : matrix products of the curve by kind; products : share of our time that is in these
-    roofline : the seconds that `work` takes at least on this machine
-    """
+    roofline : the seconds that `work` takes at least on this machine"""
 
     harmonics: str
     points: int
@@ -118,8 +116,7 @@ class Machine:
 class Work:
     """Products of one kind with matrices of the compliance.
 
-    calls : over the curve; bytes : of the matrices that one call reads; flops : of one call, by bytes of a number
-    """
+    calls : over the curve; bytes : of the matrices that one call reads; flops : of one call, by bytes of a number"""
 
     name: str
     calls: int
@@ -269,8 +266,7 @@ def _refined(
 def _shares(stats: pstats.Stats) -> tuple[dict[str, float], dict[str, int]]:
     """Share of the profiled time by routine, named as in the thesis: contact, balance, direction of the Newton step.
 
-    Beside them the share and the calls of the matrix products, which are parts of balance and direction
-    """
+    Beside them the share and the calls of the matrix products, which are parts of balance and direction"""
     names = {("contact/joint.py", "cycle"): "contact", ("hbm/balance.py", "solve"): "direction"}
     names |= {("linear/compliance.py", of): of for of in ("apply", "product")}
     seconds, calls = dict.fromkeys(names.values(), 0.0), dict.fromkeys(names.values(), 0)
@@ -283,11 +279,6 @@ def _shares(stats: pstats.Stats) -> tuple[dict[str, float], dict[str, int]]:
     total = max(cumulative for *_, cumulative, _ in entries.values())
     shares = {name: value / total for name, value in seconds.items()}
     return shares | {"balance": 1.0 - shares["contact"] - shares["direction"]}, calls
-
-
-def as_records(rows: list[Timing]) -> list[dict[str, object]]:
-    """The rows for JSON."""
-    return [asdict(row) for row in rows]
 
 
 def _line(r: Timing) -> str:

@@ -1,7 +1,5 @@
 """Angle bracket with bolt holes, in tetrahedra: a leg that is clamped at its back, and one whose end rests on a pad."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,8 +23,7 @@ class Parameters:
     hole, holes : diameter of the holes through the standing leg, in a row up the middle, and their number
     sides : of a hole, straight, so that no element bends
     pad_length : of the pad below the end of the lying leg
-    n_length : elements along the lying leg, which sets the size of all
-    """
+    n_length : elements along the lying leg, which sets the size of all"""
 
     length: float = 0.1
     height: float = 0.06
@@ -52,8 +49,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     """Write the mesh.
 
     Groups: volume "bracket"; surfaces "back" (x = 0), "pad" (below the end), "top" (above the pad), "end" (x = length),
-    "side" (of the end, y = width)
-    """
+    "side" (of the end, y = width)"""
     p = parameters
     start = p.length - p.pad_length
     with session() as gmsh:

@@ -3,13 +3,10 @@
 A problem is a random elastic body on one to three contact pairs with two tangential and one normal component. The
 vibrating load is between a tenth of the static one and thirty times it. The curve round one of its resonances is
 followed by arc length upwards and downwards. Points are checked by a march of the friction law and a dense solve, which
-share nothing with the solver.
-"""
-
-from __future__ import annotations
+share nothing with the solver."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 from time import process_time
 
@@ -44,8 +41,7 @@ ENDS = ((FOLLOWED, 10), (REFUSED, 9), (WRONG, 7))  # with the widths of their co
 class Problem:
     """A random problem: its balance and the frequencies between which its curve is followed [rad/s].
 
-    load : vibrating over static load; harmonics : highest one kept
-    """
+    load : vibrating over static load; harmonics : highest one kept"""
 
     balance: HarmonicBalance
     low: float
@@ -66,8 +62,7 @@ class Curve:
     outcome : "followed", "refused" or "wrong"; reason : why, a sentence
     points, folds : of the way up; lifts : whether a pair separates on it; slips : whether one slips
     defect : largest of the independent residual over the displacement, at the points checked
-    seconds : of processor, both ways
-    """
+    seconds : of processor, both ways"""
 
     seed: int
     load: float
@@ -196,8 +191,7 @@ def checked(balance: HarmonicBalance, branch: Branch) -> float:
 def marched(balance: HarmonicBalance, x: np.ndarray, steps: int) -> np.ndarray:
     """Coefficients of the contact forces [N] of motions x (n_motion, n_contact, n_coeff) [m], step by step in time.
 
-    Each tangential spring has a slider between walls that the normal force moves; the second cycle repeats
-    """
+    Each tangential spring has a slider between walls that the normal force moves; the second cycle repeats"""
     basis, k = balance.basis, balance.contact.stiffness
     friction = balance.contact.number(Role.FRICTION)[:, None]
     angle = 2 * np.pi * np.arange(steps) / steps
@@ -221,8 +215,7 @@ def marched(balance: HarmonicBalance, x: np.ndarray, steps: int) -> np.ndarray:
 def defect(balance: HarmonicBalance, omega: float, x: np.ndarray, force: np.ndarray) -> float:
     """|x - displacement under the loads and the contact forces| / |x|, both (n_contact, n_coeff).
 
-    Every harmonic is one dense complex solve with the contact springs on both sides
-    """
+    Every harmonic is one dense complex solve with the contact springs on both sides"""
     basis, system = balance.basis, balance.model.system
     b, k = np.asarray(balance.model.interface.B), balance.contact.stiffness.reshape(-1, 1)
     push = basis.to_complex(k * x - force)
@@ -233,11 +226,6 @@ def defect(balance: HarmonicBalance, omega: float, x: np.ndarray, force: np.ndar
         dynamic = system.stiffness + b.T @ (k * b) + s * system.damping + s * s * system.mass
         back[:, position] = b @ np.linalg.solve(dynamic, load + b.T @ push[:, position])
     return float(np.linalg.norm(x - basis.to_real(back)) / np.linalg.norm(x))
-
-
-def as_records(rows: list[Curve]) -> list[dict[str, object]]:
-    """The rows for JSON."""
-    return [asdict(row) for row in rows]
 
 
 def as_text(rows: list[Curve]) -> str:

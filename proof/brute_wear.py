@@ -1,9 +1,6 @@
 """Lives of random scenes beside brute force: every block of cycles is integrated in time, no balance anywhere.
 
-The driver shares only the law of contact, Jenkins elements on a unilateral normal spring, which it states itself.
-"""
-
-from __future__ import annotations
+The driver shares only the law of contact, Jenkins elements on a unilateral normal spring, which it states itself."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,8 +10,8 @@ from tempfile import TemporaryDirectory
 import numba
 import numpy as np
 
-from proof import scoreboard
 from proof.time_limit import TimeUp, processor_seconds
+from proof.unseen_scenes import scoreboard
 from tests.helpers.verification_models import random_structure
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.errors import judgement
@@ -34,8 +31,7 @@ AREA = 5e-6  # [m2]
 class Brute:
     """A scene worn in time. cycles : None where its life does not end, for the reason given; first : preload [N]
 
-    opened : largest share of time that a pair is open; blocks : taken
-    """
+    opened : largest share of time that a pair is open; blocks : taken"""
 
     cycles: float | None
     reason: str
@@ -51,8 +47,7 @@ class Row:
     value, error, reason : what the verdict says of the life; stated : whether it states it
     brute : the finer of two lives in time; doubt : its difference from the other, relative
     preload : first one of `run` over that in time
-    followed : share of the cycles of `run` whose motion it followed in time
-    """
+    followed : share of the cycles of `run` whose motion it followed in time"""
 
     number: int
     value: float | None
@@ -143,8 +138,7 @@ def draw(number: int) -> Drawn:
 def _march(inverse, by_u, by_v, still, shaken, omega, k_t, k_n, mu, depth, u, v, slider, cycles, steps):  # type: ignore[no-untyped-def]
     """Mean work per cycle (n_pair,) [J], mean normal force [N] and share open (n_pair,); u, v, slider go on in place.
 
-    inverse : of the mass; by_u, by_v : it times stiffness and damping; still, shaken : it times the loads
-    """
+    inverse : of the mass; by_u, by_v : it times stiffness and damping; still, shaken : it times the loads"""
     n, n_pair = len(u), len(depth)
     work, opened, normal_sum = np.zeros(n_pair), np.zeros(n_pair), 0.0
     h = 2 * np.pi / (omega * steps)
@@ -189,8 +183,7 @@ def _stuck(scene: Drawn, still: np.ndarray) -> np.ndarray:
 def life(scene: Drawn, finer: int = 1) -> Brute:
     """Cycles until LIFE_SHARE of the first preload is left. finer : by how much blocks and time steps are smaller.
 
-    Depths go on by the rate of a block and of the one before (Adams and Bashforth's second order).
-    """
+    Depths go on by the rate of a block and of the one before (Adams and Bashforth's second order)."""
     n = len(scene.mass)
     still, shaken = np.zeros(n), np.zeros(n)
     still[[2, 5]], shaken[8] = scene.static / PAIRS, scene.shaken

@@ -1,10 +1,7 @@
 """Chattering: when pairs open and close within a cycle, how long they touch, how fast they meet.
 
 The normal approach of a pair is a trigonometric polynomial of its harmonics, so its openings and closings are the roots
-of that polynomial on the unit circle: found exactly, whatever the number of time samples.
-"""
-
-from __future__ import annotations
+of that polynomial on the unit circle: found exactly, whatever the number of time samples."""
 
 from dataclasses import dataclass
 
@@ -24,19 +21,13 @@ class Chatter:
     omega : [rad/s]
     touching : (n_pair,) share of the cycle in contact, 1 where the pair never opens and 0 where it never closes
     opening, closing : instants of separation and of impact [s], one array per pair, from 0 to the period
-    approach : approach velocity at each of the closings [m/s], one array per pair
-    """
+    approach : approach velocity at each of the closings [m/s], one array per pair"""
 
     omega: float
     touching: np.ndarray
     opening: tuple[np.ndarray, ...]
     closing: tuple[np.ndarray, ...]
     approach: tuple[np.ndarray, ...]
-
-    @property
-    def impacts(self) -> np.ndarray:
-        """(n_pair,) impacts per cycle."""
-        return np.array([len(instants) for instants in self.closing])
 
     @property
     def impact_velocity(self) -> np.ndarray:
@@ -52,8 +43,7 @@ class Chatter:
 def chatter(balance: HarmonicBalance, state: State) -> Chatter:
     """Chattering of a balance state.
 
-    Raises  ValueError where the law has no normal component
-    """
+    Raises  ValueError where the law has no normal component"""
     components = balance.contact.components
     if "n" not in components:
         raise ValueError("chattering needs a contact law with a normal component: take components with n")
@@ -77,8 +67,7 @@ def chatter(balance: HarmonicBalance, state: State) -> Chatter:
 def sign_changes(basis: HarmonicBasis, coefficients: np.ndarray, level: float = 0.0) -> np.ndarray:
     """Angles in [0, 2 pi), ascending, at which sum_h a_h cos h t + b_h sin h t passes a level; grazing is no passage.
 
-    coefficients : (n_coeff,)
-    """
+    coefficients : (n_coeff,)"""
     top = basis.harmonics[-1]
     amplitudes = basis.to_complex(coefficients)
     polynomial = np.zeros(2 * top + 1, complex)  # of z = exp(i t), times z^top

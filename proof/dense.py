@@ -2,10 +2,7 @@
 
 Unknowns are all reduced coordinates times all harmonic coefficients; each Newton step assembles the full Jacobian,
 contact tangent included, and factorises it.
-Source  Tamatam 2021, eq. 3.6-3.7, 3.23 and figure 7.3.
-"""
-
-from __future__ import annotations
+Source  Tamatam 2021, eq. 3.6-3.7, 3.23 and figure 7.3."""
 
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -108,8 +105,7 @@ class DenseBalance:
     def residual(self, linear: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, ContactCycle, np.ndarray]:
         """Contact displacement (n_pair, n_component, n_coeff) [m], its cycle, and the residual (n n_coeff,) [N].
 
-        linear : of `dynamic_stiffness`; q : (n n_coeff,) reduced coordinates [m]
-        """
+        linear : of `dynamic_stiffness`; q : (n n_coeff,) reduced coordinates [m]"""
         p = self.problem
         clock = perf_counter()
         x = (self._spread @ q).reshape(p.contact.n_pair, -1, p.basis.n_coeff)
@@ -123,8 +119,7 @@ class DenseBalance:
     def jacobian(self, linear: np.ndarray, cycle: ContactCycle) -> np.ndarray:
         """(n n_coeff, n n_coeff) derivative of the residual."""
         clock = perf_counter()
-        assert cycle.jacobian is not None
-        jacobian = linear + (self._spread.T @ _block_diagonal(cycle.jacobian) @ self._spread).toarray()
+        jacobian = linear + (self._spread.T @ _block_diagonal(cycle.slope) @ self._spread).toarray()
         self.profile.balance += perf_counter() - clock
         return jacobian
 

@@ -1,10 +1,7 @@
 """The modes of a part as functions of the stiffness of its joint springs and contact.
 
 The part of a scene is reduced once with the nodes of all its springs kept, so that another stiffness costs a dense
-eigenvalue problem: what a fit of joints to measured frequencies needs.
-"""
-
-from __future__ import annotations
+eigenvalue problem: what a fit of joints to measured frequencies needs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,8 +29,7 @@ class JointSprings:
     """The reduced part without springs, and what each spring adds per unit of its stiffness.
 
     springs : name in the scene -> (n, n) [-]; contact : (n_pair, n_component) stuck contact of the scene [N/m]
-    given : name -> stiffness in the scene [N/m]
-    """
+    given : name -> stiffness in the scene [N/m]"""
 
     model: ReducedModel
     springs: Mapping[str, np.ndarray]
@@ -64,8 +60,7 @@ def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None 
 
     probes : name -> group and axis, such as ("tip", "y"), of displacements that are observed beside the response;
         those of the scene by default
-    Raises  ValueError for a scene without springs
-    """
+    Raises  ValueError for a scene without springs"""
     scene = file.mesh_scene
     if not scene.springs:
         raise Refusal(f"{file.name} has no springs whose stiffness could change: add a table such as [springs.seat]")

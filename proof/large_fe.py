@@ -1,16 +1,13 @@
 """How the cost of a reduction grows with the mesh: the product in four ways, and plain statements of the same library.
 
 Everything is measured in a process of its own, so that its peak memory is its own; seconds are processor seconds of one
-thread.
-"""
-
-from __future__ import annotations
+thread."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -49,7 +46,7 @@ WAYS = ("product", "by hand")
 WAYS_OF_SIZE = dict.fromkeys(("1M", "36k-cubes", "140k-cubes", "1M-cubes"), ("flexibility",))
 STAGES = {  # function of a reduction -> what its seconds are told as
     "factorise": "factor", "fixed_interface_modes": "modes", "constraint_modes": "constraint modes",
-    "_congruent": "projection", "_ritz": "static shapes",
+    "_congruent": "projection", "with_static_shapes": "static shapes",
 }  # fmt: skip
 MODES = 15
 
@@ -59,8 +56,7 @@ class FeCost:
     """One size of the mesh, by one way.
 
     way : of WAYS or PRODUCTS; dofs, masters; seconds : stage -> processor seconds; peak_bytes : memory
-    first_hz : lowest frequency of the reduced model without contact, nan where none was made
-    """
+    first_hz : lowest frequency of the reduced model without contact, nan where none was made"""
 
     way: str
     dofs: int
@@ -74,8 +70,7 @@ def run(sizes: Sequence[str], say: Callable[[str], None], ways: Sequence[str] = 
     """Measure sizes by name, each way in a process of its own; an assembly by the ways of WAYS.
 
     ways : those that fit the size by default
-    Raises  ValueError for a size or a way that is not known
-    """
+    Raises  ValueError for a size or a way that is not known"""
     ways_by_name = dict.fromkeys([*PRODUCTS, *WAYS])
     for way in ways:
         if way not in ways_by_name:
@@ -95,10 +90,8 @@ def run(sizes: Sequence[str], say: Callable[[str], None], ways: Sequence[str] = 
 def measure(size: tuple[int, ...], way: str, n_patch: int = 13) -> FeCost:
     """One size of the beam by one way, on one thread."""
     changes = [
-        f"geometry.n_length={size[0]}",
-        f"geometry.n_height={size[1]}",
-        f"geometry.n_patch={(*size, n_patch)[2]}",
-    ]
+        f"geometry.n_length={size[0]}", f"geometry.n_height={size[1]}", f"geometry.n_patch={(*size, n_patch)[2]}",
+    ]  # fmt: skip
     changes += ["geometry.length_grading=1", "geometry.grading=1"] if len(size) > 2 else []
     changes += [f"reduction.modes={MODES}", *PRODUCTS.get(way, ())]
     return _measured(lambda folder: scene_file.read("beam_thesis", changes), way)
@@ -220,11 +213,6 @@ def _by_hand(part: Part, clock: _Clock) -> FeCost:
     clock("projection")
     assert stiffness.shape == (len(m) + MODES,) * 2
     return FeCost("by hand", part.system.n_dof, len(m), clock.seconds, memory.peak())
-
-
-def as_records(rows: Sequence[FeCost]) -> list[dict[str, Any]]:
-    """The rows for JSON."""
-    return [asdict(row) for row in rows]
 
 
 def as_text(rows: Sequence[FeCost]) -> str:

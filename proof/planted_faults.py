@@ -3,10 +3,7 @@
 The list is planted_faults.toml beside this file. A process loads program and tests once (`planting`) and plants each
 fault in a forked child of its own: there the tests of its room run, those by hand and those named after its file first,
 until the first fails or their processor seconds are spent. Where none fails, every so many of the quick cells of
-`extremes` are judged. Small reference runs of the product measure what a fault changes (`reference_runs`).
-"""
-
-from __future__ import annotations
+`extremes` are judged. Small reference runs of the product measure what a fault changes (`reference_runs`)."""
 
 import ast
 import json
@@ -45,8 +42,7 @@ class Fault:
     def faulty(self, tree: Path) -> ast.Module:
         """The syntax tree of the file with the fault.
 
-        Raises  ValueError where the fault has no place or changes nothing
-        """
+        Raises  ValueError where the fault has no place or changes nothing"""
         source = (tree / self.file).read_text(encoding="utf-8")
         try:
             module = rewritten(source, self.function, Rule.parse(self.rule))
@@ -70,8 +66,7 @@ class Detection:
     """test : the first that fails, "" where none does; cell : of extremes that is wrong, "" where none is or none was
     judged, because a test fails already.
 
-    change : largest relative one of a number of the reference runs; number : which; seconds : of the processor
-    """
+    change : largest relative one of a number of the reference runs; number : which; seconds : of the processor"""
 
     file: str
     effect: str
@@ -98,8 +93,7 @@ def run(tree: Path, folder: Path, report: Callable[[str], None], seconds: float 
     """Plant every fault in turn; those that `folder` already has are skipped.
 
     tree : root of a clone; folder : of the rows; seconds : of the processor for the tests of a fault
-    Raises  ValueError where the tree is no clone or a fault has no place; RuntimeError: a planting process failed
-    """
+    Raises  ValueError where the tree is no clone or a fault has no place; RuntimeError: a planting process failed"""
     planned, _ = faults()
     if not (tree / "tests").is_dir():
         raise Refusal(f"{tree} holds no tests: plant faults from a clone of the repository")

@@ -1,10 +1,7 @@
 """Plant faults in the functions of a running process that has loaded program and tests once.
 
 Each fault is planted in a forked child, so that it ends with it: the code objects of the file's functions are replaced
-by those of the changed syntax tree. Compiled functions run uncompiled for that (NUMBA_DISABLE_JIT).
-"""
-
-from __future__ import annotations
+by those of the changed syntax tree. Compiled functions run uncompiled for that (NUMBA_DISABLE_JIT)."""
 
 import functools
 import gc
@@ -25,7 +22,8 @@ import numba
 import numpy as np
 import pytest
 
-from proof import extremes, planted_faults, reference_runs
+from proof import planted_faults, reference_runs
+from proof.hard_settings import extremes
 from proof.planted_faults import Detection, Fault, Room
 
 Send = Callable[[Any], None]
@@ -73,8 +71,7 @@ def detect(
     """What detects a fault, and what it changes in the reference runs; reference : their numbers without it.
 
     sound : tests that have failed with some fault, and whether they pass without one; is extended
-    Raises  ValueError where the fault cannot be planted
-    """
+    Raises  ValueError where the fault cannot be planted"""
     if not in_child(partial(_send_planted, fault, tree), seconds):
         raise ValueError(f"{fault.file}: {fault.effect}: this cannot be planted, see what is printed")
     start = os.times()
@@ -97,15 +94,12 @@ class FirstFailure:
     def __init__(self, send: Send):
         self._send = send
 
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+    def pytest_runtest_logreport(self, report: pytest.TestReport | pytest.CollectReport) -> None:
         """Called by pytest."""
         if report.failed:
             self._send(report.nodeid)
 
-    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Called by pytest."""
-        if report.failed:
-            self._send(report.nodeid)
+    pytest_collectreport = pytest_runtest_logreport
 
 
 def _failing_test(fault: Fault, tree: Path, tests: Sequence[str], seconds: float, sound: dict[str, bool]) -> str:
@@ -200,8 +194,7 @@ def plant(fault: Fault, tree: Path) -> None:
     """Give the functions and constants of a loaded module those of the file with the fault.
 
     The caches of the process are cleared: they were filled without the fault.
-    Raises  ValueError where the fault has no place, or changes no function or constant
-    """
+    Raises  ValueError where the fault has no place, or changes no function or constant"""
     faulty = fault.faulty(tree)
     name = "tribodyn." + fault.file.removesuffix(".py").replace("/", ".")
     module = importlib.import_module(name)

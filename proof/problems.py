@@ -1,7 +1,5 @@
 """What proofs take beyond a run: the problem of a scene, its cycles, curves and wear."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +9,6 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.time import verify as hbm_verify
-from tribodyn.hbm.time.stepper import Options as TimeOptions
-from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import impact
@@ -25,14 +20,12 @@ from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.wheels import wheel_model as wheels
 
 
 def cycle_at(file: SceneFile, balance: HarmonicBalance, frequency: float) -> State:
     """The vibration cycle at a frequency [Hz], where need be along the curve of solutions over the load.
 
-    Raises  SolveFailed
-    """
+    Raises  SolveFailed"""
     options = newton.NewtonOptions(tolerance=file.scene.solver.tolerance)
     solution = arc_length.solve_along_load(balance, 2 * np.pi * frequency, options)
     if not solution.converged:
@@ -62,14 +55,6 @@ def follow_arc_length(file: SceneFile, balance: HarmonicBalance) -> Branch:
     return arc_length.follow(balance, low, high, options)
 
 
-def follow_adaptive(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Branch:
-    """The response over a range [Hz], as dense as the tolerance of the curve between its points asks.
-
-    Raises  SolveFailed where it does not come to the end of the range
-    """
-    return wheels.follow(balance, frequency, tolerance)
-
-
 def linear_references(balance: HarmonicBalance, low: float, high: float, output: str = OUTPUT) -> References:
     """Amplitudes of an output with the contact absent and with it stuck, from one frequency to another [Hz]."""
     return references.linear_references(balance, output, 2 * np.pi * low, 2 * np.pi * high)
@@ -84,8 +69,7 @@ def delta_max(file: SceneFile, balance: HarmonicBalance) -> float:
 def wear(file: SceneFile, balance: HarmonicBalance) -> WearHistory:
     """Wear a problem as the scene's [wear] says, to its end; `WearHistory.end` says why it ended.
 
-    Raises  ValueError for a scene without [wear] or without what its steps are measured by
-    """
+    Raises  ValueError for a scene without [wear] or without what its steps are measured by"""
     table = file.scene.wear
     if table is None:
         raise Refusal(f"{file.name} has no [wear]: say how it wears")
@@ -99,14 +83,6 @@ def impact_work(balance: HarmonicBalance, state: State) -> np.ndarray:
     """(n_pair,) work of impacts at the contact per cycle [J]."""
     n = balance.contact.n_pair
     return impact.impact_work(Exposure(balance, state, np.ones(n), {}, np.zeros(n), 0.0))
-
-
-def verify_in_time(balance: HarmonicBalance, state: State, options: TimeOptions) -> Verification:
-    """Direct time integration from a solved state to the periodic motion nearby, beside the state.
-
-    Raises  IntegrationFailed
-    """
-    return hbm_verify.verify(balance, state, options)
 
 
 def contact_patch(balance: HarmonicBalance) -> Patch:

@@ -3,16 +3,14 @@
 It is not exact: 2.6 times the elements along every edge show 62 % of an error of first order and 85 % of one of second.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 
 from proof.time_limit import TimeUp, processor_seconds
 from tribodyn.hbm import threads
-from tribodyn.hbm.quantity import WearQuantity, names_with_error, with_error
+from tribodyn.hbm.quantity import names_with_error, of_wear_with_error
 from tribodyn.refusal import Refusal, SolverFailure
-from tribodyn.workflows.errors import operating_states, refine, wear_values
+from tribodyn.workflows.errors import operating_states, refine
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -26,8 +24,7 @@ class Finer:
     """How much finer a reference is than the scene.
 
     elements : along every edge; of a scene that was refined to an error bound fewer suffice
-    modes : retained ones, or their cutoff; harmonics : beyond the highest, `lowest` at the least; steps : of wear
-    """
+    modes : retained ones, or their cutoff; harmonics : beyond the highest, `lowest` at the least; steps : of wear"""
 
     elements: float = 2.6
     refined_elements: float = 1.75
@@ -44,8 +41,7 @@ def solved(file: SceneFile, seconds: float, elements: float = FINER.elements) ->
     """What the finer scene answers, and MEASURED or why something is missing.
 
     Its peak is found by the search that wear runs begin with, which needs no points of a response. Without wear first;
-    then with wear, in as many seconds again
-    """
+    then with wear, in as many seconds again"""
     fine = finer(file, elements)
     values: Values = dict.fromkeys(names_with_error())
     kind = "its reference"
@@ -56,10 +52,10 @@ def solved(file: SceneFile, seconds: float, elements: float = FINER.elements) ->
         if fine.scene.wears:
             kind = "measured, the reference of its wear"
             with processor_seconds(seconds), threads.limited(1):
-                worn = wear_values.worn_by(fine, model)
+                worn = operating_states.worn_by(fine, model)
             if worn.history.ended.failed:
                 raise SolverFailure(str(worn.history.end))
-            values |= {quantity.name: quantity.value(worn) for quantity in with_error(WearQuantity)}
+            values |= {quantity.name: quantity.value(worn) for quantity in of_wear_with_error(worn)}
     except TimeUp:
         return values, f"{kind} is too expensive"
     except (Refusal, SolverFailure) as refusal:
@@ -73,6 +69,6 @@ def finer(file: SceneFile, elements: float = FINER.elements) -> SceneFile:
         file = refine.mesh(file, elements)[0]
     file = refine.modes(file, FINER.modes) or file
     top = max(max(file.scene.harmonics.kept) + FINER.harmonics, FINER.lowest)
-    file = refine.wear(refine.harmonics(file, top), FINER.steps)
+    file = refine.wear(refine.harmonics(file, range(top + 1)), FINER.steps)
     tolerance, samples = 0.1 * file.scene.solver.tolerance, 2 * file.scene.harmonics.samples
     return file.changed(f"solver.tolerance={tolerance!r}", f"harmonics.samples={samples}")

@@ -1,7 +1,5 @@
 """Small reference runs of the whole product: what a fault in the sources changes in them is its effect on a result."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -11,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from proof.extremes_models import Body, lattice, rigid
+from proof.hard_settings.extremes_models import Body, lattice, rigid
 from tests.helpers.stability_in_time import stability_in_time
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
@@ -33,8 +31,8 @@ from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.linear_damping import modal_damping
-from tribodyn.workflows.errors.extrapolation import limit_of
 from tribodyn.workflows.errors.judgement import with_verdict
+from tribodyn.workflows.errors.ladders import limit_of
 from tribodyn.workflows.run import modelling, pipeline, references
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file

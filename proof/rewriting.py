@@ -3,8 +3,7 @@
 A rule is two pieces of Python around an arrow. A capital letter is a placeholder: it stands for any expression, and the
 same letter for equal ones. All else is compared node by node. Spaces, comments, line breaks and the names that
 placeholders stand for do not matter, so that a rule finds its place after most renamings. A pattern must match once, or
-as often as the rule says in front: ``2 of 3: A - B -> A + B`` changes the second of three places.
-"""
+as often as the rule says in front: ``2 of 3: A - B -> A + B`` changes the second of three places."""
 
 from __future__ import annotations
 
@@ -44,8 +43,7 @@ def rewritten(source: str, place: str, rule: Rule) -> ast.Module:
     """The tree of a module in which the rule has replaced the one node of a function that matches.
 
     place : name of the function, `Class.method` for a method, "" for the statements of the module outside functions
-    Raises  ValueError where the module has no such function, or the pattern does not match as often as the rule says
-    """
+    Raises  ValueError where the module has no such function, or the pattern does not match as often as the rule says"""
     module = ast.parse(source)
     nodes = list(_nodes(module, place))
     matches = [(node, bindings) for node in nodes if (bindings := match(rule.pattern, node)) is not None]

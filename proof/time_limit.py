@@ -31,8 +31,7 @@ def processor_seconds(limit: float) -> Iterator[None]:
     TimeUp comes again a moment later where the body goes on: Python drops what is raised while it frees an object or
     in a callback, and a library may catch whatever comes.
     Raises  TimeUp, also at once where `limit` is not above 0, and in place of what a library makes of it: ctypes tells
-        an exception in the conversion of an argument as an error of the argument
-    """
+        an exception in the conversion of an argument as an error of the argument"""
     if limit <= 0:
         raise TimeUp(f"{limit:g} s are left")
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):

@@ -1,10 +1,8 @@
 """What wear steps cost and how far they are off: both rules, against finer steps."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from time import process_time
 
 import matplotlib as mpl
@@ -47,8 +45,7 @@ class WearStepRow:
     seconds : of one processor
     rule, step : "thesis" with the largest depth of a step over delta_max, or "error_controlled" with its tolerance
     depth_m : largest total depth when LIFE_SHARE of the preload is left; depth_error, life_error : relative
-    roughness : largest second difference of the depth along the patch, over the depth
-    """
+    roughness : largest second difference of the depth along the patch, over the depth"""
 
     rule: str
     step: float
@@ -68,8 +65,7 @@ class WearStepTable:
     """Rows with their reference, which two finer runs of the error-controlled rule extrapolate.
 
     depth_uncertainty, life_uncertainty : relative difference of the reference to the finest run
-    published : beside the scene, by the step
-    """
+    published : beside the scene, by the step"""
 
     scene: str
     rows: tuple[WearStepRow, ...]
@@ -82,8 +78,7 @@ class WearStepTable:
 def compare(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] = ()) -> WearStepTable:
     """Table 4.2 of the thesis with life added, the error-controlled rule beside it.
 
-    Raises  ValueError for a scene without wear
-    """
+    Raises  ValueError for a scene without wear"""
     file = scene_file.read(scene, overrides)
     if file.scene.wear is None:
         raise Refusal(f"scene {file.name} has no [wear]: there is no wear step to trade")
@@ -150,8 +145,7 @@ def _depth_at_life(worn: WearHistory, life: float | None) -> float:
 def roughness(points: np.ndarray, depth: np.ndarray) -> float:
     """Largest second difference of a depth map between grid neighbours, over its largest depth.
 
-    points : (n_pair, 3) positions on a structured, possibly graded grid [m]; depth : (n_pair,) [m]
-    """
+    points : (n_pair, 3) positions on a structured, possibly graded grid [m]; depth : (n_pair,) [m]"""
     spread = np.argsort(np.ptp(points, axis=0))[-2:]
     worst = 0.0
     for direction, across in (spread, spread[::-1]):
@@ -167,11 +161,6 @@ def roughness(points: np.ndarray, depth: np.ndarray) -> float:
             straight = w[:-2] + share * (w[2:] - w[:-2])
             worst = max(worst, float(np.abs(w[1:-1] - straight).max()))
     return worst / float(depth.max()) if depth.max() > 0 else 0.0
-
-
-def as_records(table: WearStepTable) -> list[dict[str, object]]:
-    """The rows for JSON."""
-    return [asdict(row) for row in table.rows]
 
 
 def picture(table: WearStepTable) -> Figure:

@@ -1,13 +1,7 @@
 """What the words of `prove` share beyond those of the command `tribodyn`."""
 
-from __future__ import annotations
-
 import sys
-from typing import Annotated
 
-from cyclopts import Parameter
-
-Changes = Annotated[tuple[str, ...], Parameter(name="--change", negative=(), consume_multiple=False)]
 PICTURE = (".png", ".pdf", ".svg")
 
 

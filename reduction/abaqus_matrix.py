@@ -1,10 +1,7 @@
 """Abaqus global matrices in text: *MATRIX GENERATE with *MATRIX OUTPUT.
 
 Two layouts, by their columns: node, dof, node, dof, value (FORMAT=MATRIX INPUT and LABELS) and row, column, value with
-rows from 1 (FORMAT=COORDINATE). Nodes that Abaqus makes itself have negative numbers.
-"""
-
-from __future__ import annotations
+rows from 1 (FORMAT=COORDINATE). Nodes that Abaqus makes itself have negative numbers."""
 
 from pathlib import Path
 
@@ -12,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import numbers_of, text_of
 
 Labels = tuple[tuple[int, int], ...]
 """(node, component 1..6) of each row of a matrix."""
@@ -21,20 +19,15 @@ def looks_like(lines: list[str]) -> bool:
     """Whether the first line of data holds three or five numbers."""
     for line in lines:
         if line.strip() and not line.lstrip().startswith("*"):
-            words = line.replace(",", " ").split()
-            try:
-                return len([float(word) for word in words]) in (3, 5)
-            except ValueError:
-                return False
+            return len(numbers_of(line.replace(",", " ").split()) or ()) in (3, 5)
     return False
 
 
 def read(path: Path) -> tuple[sp.csr_matrix, Labels | None]:
     """Read a matrix and the labels of its rows (None in the layout without labels).
 
-    A single triangle is mirrored. raises Refusal where lines are not numbers or indices not whole.
-    """
-    text = path.read_text(encoding="ascii", errors="replace").replace(",", " ")
+    A single triangle is mirrored. raises Refusal where lines are not numbers or indices not whole."""
+    text = text_of(path).replace(",", " ")
     rows = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("*")]
     try:
         table = np.loadtxt(rows, ndmin=2)

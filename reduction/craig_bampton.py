@@ -3,14 +3,13 @@
 Source  Craig and Bampton, AIAA Journal 6(7), 1968; Tamatam 2021, appendix A, whose equation numbers stand as comments
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix
+import scipy.linalg as sla
+from scipy.sparse import csc_matrix, csr_matrix, hstack
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.constraints import partition
@@ -31,20 +30,23 @@ def craig_bampton(
     cutoff: float | None = None,
     extra_masters: Sequence[int] | np.ndarray = (),
     solver: str | None = None,
-    attached: Sequence[str] = (),
+    held_rows: np.ndarray | None = None,
 ) -> ReducedModel:
-    """Reduce a full system to its contact DOFs, accessory DOFs and fixed-interface modes.
+    """Reduce a full system to its contact DOFs, accessory DOFs, fixed-interface modes and static shapes.
 
     system : sparse, n_full DOFs; interface : B over the same DOFs
     n_modes : fixed-interface modes kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     extra_masters : DOFs of the system to keep besides those of the contact and of point loads and outputs
     solver : see fem.factor
-    attached : loads whose static response with the masters held joins the modes, so that statics under them are exact
-    Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
+    held_rows : (k, n_full) motions that are to be held afterwards, see `reduction.prescribed.hold`
+    The static response, masters held, to every load, to a unit force at every output and to the force of every held
+    row, and to the inertia of these responses, joins the modes, as far as these lack it: displacements of outputs are
+    exact at rest, whatever the contact does, and right to second order in the square of the frequency beside it
+    Returns the model; coordinates are the masters in ascending order, then the modes, then the static shapes; loads and
+        outputs are projected.
         its origin is a `ReductionBasis`
     Raises  Refusal where n_modes and cutoff are both or neither given, too many modes are asked, or a body can move
-        rigidly with its masters held
-    """
+        rigidly with its masters held"""
     K, M = csr_matrix(system.stiffness), csr_matrix(system.mass)
     s, m = partition(system.n_dof, master_dofs(system, interface, extra_masters), "master")
     if not len(s):
@@ -52,13 +54,19 @@ def craig_bampton(
     K_ss, M_ss = K[s][:, s], M[s][:, s]
     factor = factorise(K_ss, solver=solver)
     omega, phi, omitted = fixed_interface_modes(K_ss, M_ss, factor, n_modes, cutoff)
-    omega, phi = with_static_shapes([system.loads[name][s] for name in attached], K_ss, M_ss, factor, omega, phi)
+    n_modes = len(omega)
+    rows = () if held_rows is None else held_rows
+    forces = [v[s] for v in (*system.loads.values(), *system.outputs.values(), *rows) if v[s].any()]
+    static = [factor.solve(force) for force in forces]
+    inertia = [M_ss @ (shape - phi @ (phi.T @ (M_ss @ shape))) for shape in static]
+    columns = [csc_matrix(force[:, None]) for force in (*forces, *inertia)]
+    phi, squares = with_static_shapes(omega, phi, columns, factor, M_ss)
 
     n_m = len(m)
-    basis = np.zeros((system.n_dof, n_m + len(omega)))
+    basis = np.zeros((system.n_dof, n_m + len(squares)))
     basis[m, np.arange(n_m)] = 1.0  # A.5
     basis[s, n_m:] = phi
-    stiffness = np.diag(np.concatenate([np.zeros(n_m), omega**2]))
+    stiffness = np.diag(np.concatenate([np.zeros(n_m), squares]))
     K_sm, K_ms, K_mm = csc_matrix(K[s][:, m]), K[m][:, s], K[m][:, m]
     for block in _blocks(n_m):
         psi = constraint_modes(factor, K_sm[:, block])
@@ -66,7 +74,7 @@ def craig_bampton(
         stiffness[:n_m, block] = K_mm[:, block] + K_ms @ psi  # A.7
     stiffness = _symmetric(stiffness)
     mass = _congruent(basis, M)  # A.6
-    mass[n_m:, n_m:] = np.eye(len(omega))
+    mass[n_m:, n_m:] = np.eye(len(squares))
     turning = None
     if system.gyroscopic is not None:
         turning = _congruent(basis, system.gyroscopic, -1.0)
@@ -79,7 +87,7 @@ def craig_bampton(
         {name: basis.T @ row for name, row in system.outputs.items()},
         turning,
     )
-    origin = ReductionBasis(basis, m, len(omega), factor.name, omitted / (2 * np.pi))
+    origin = ReductionBasis(basis, m, n_modes, factor.name, omitted / (2 * np.pi))
     model = ReducedModel(reduced, replace(interface, B=np.asarray(interface.B @ basis)), origin)
     try:
         frequency, _ = linear_modes(model, None, min(LIMITS.reported_modes, reduced.n_dof))
@@ -114,8 +122,7 @@ def fixed_interface_modes(
         cutoff is beyond what the mesh resolves, more modes than half of the slaves, or has too many modes. How
         many there will be is foretold as for a bar in bending, whose number of modes rises as the root of frequency;
         elsewhere it rises faster, and they are counted where there would be too many if it rose as that of a plate, as
-        frequency
-    """
+        frequency"""
     n_slave = K_ss.shape[0]
     if (n_modes is None) == (cutoff is None):
         raise Refusal("Craig-Bampton: give the number of modes or the cutoff frequency, one of the two")
@@ -149,35 +156,44 @@ def fixed_interface_modes(
 
 
 def with_static_shapes(
-    forces: Sequence[np.ndarray], K_ss: Any, M_ss: Any, factor: Factor, omega: np.ndarray, phi: np.ndarray
+    omega: np.ndarray, phi: np.ndarray, forces: Sequence[csc_matrix], factor: Factor, M: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Modes joined by the static shapes of forces (n_slave,) on the slaves, by the method of Rayleigh and Ritz.
+    """Modes joined by the static shapes of forces, as far as they lack these, by the method of Rayleigh and Ritz.
 
-    K_ss, M_ss : (n_slave, n_slave) [N/m], [kg]; factor : of K_ss; omega (k,) [rad/s], phi (n_slave, k) : the modes
-    Returns omega (k + j,) [rad/s], ascending, and phi (n_slave, k + j) of unit modal mass, orthogonal in mass and
-        stiffness; j <= number of forces, as a shape that the modes hold already adds nothing
-    """
-    for force in forces:
-        if not force.any():
-            continue
-        shape = factor.solve(force)
-        size = np.sqrt(shape @ (M_ss @ shape))
-        for _ in range(2):
-            shape = shape - phi @ (phi.T @ (M_ss @ shape))
-        norm = np.sqrt(shape @ (M_ss @ shape))
-        if norm <= 1e-9 * size:  # the modes hold it already
-            continue
-        phi = np.column_stack([phi, shape / norm])
-        coupling = phi.T @ (K_ss @ phi)
-        squares, turn = np.linalg.eigh((coupling + coupling.T) / 2)
-        omega, phi = np.sqrt(squares), phi @ turn
-    return omega, phi
+    omega (k,) [rad/s], phi (n_full, k) : modes of K, M; forces : each (n_full, j), those of zero add nothing
+    factor : of K; K itself is not asked for: K times a static shape is its force, and times a mode M phi omega^2
+    Returns shapes (n_full, n) of unit modal mass, orthogonal in mass and stiffness, and squares of frequencies (n,)
+        ascending: the modes come first"""
+    pushed = csc_matrix(hstack([csc_matrix((len(phi), 0)), *(force for force in forces if abs(force).max() > 0)]))
+    if not pushed.shape[1]:
+        return phi, omega**2
+    k, n, step = len(omega), len(omega) + pushed.shape[1], LIMITS.static_at_once
+    shapes = np.empty((len(phi), n), order="F")
+    shapes[:, :k] = phi
+    weighted, energy = M @ phi, np.empty(n - k)
+    with threadpool_limits(1):
+        for at in range(0, n - k, step):
+            forces_at_once = pushed[:, at : at + step].toarray(order="F")
+            static = factor.solve(forces_at_once)
+            energy[at : at + step] = np.einsum("ij,ij->j", forces_at_once, static)
+            for _ in range(2):
+                static -= phi @ (weighted.T @ static)
+            shapes[:, k + at : k + at + step] = static
+    lacking, scale = shapes[:, k:], np.sqrt(energy)
+    inertia = np.concatenate([lacking.T @ (M @ lacking[:, at : at + step]) for at in range(0, n - k, step)], axis=1)
+    size, turn = sla.eigh(_symmetric(pushed.T @ lacking) / np.outer(scale, scale))
+    independent = size > LIMITS.dependent
+    basis = turn[:, independent] / np.sqrt(size[independent]) / scale[:, None]  # of unit energy
+    nu, y = sla.eigh(_symmetric(basis.T @ inertia @ basis))
+    nu, turned = nu[::-1], basis @ (y / np.sqrt(nu))[:, ::-1]
+    for at in range(0, len(shapes), LIMITS.turned_at_once):  # in place: they are the largest array but the factor
+        lacking[at : at + LIMITS.turned_at_once, : len(nu)] = lacking[at : at + LIMITS.turned_at_once] @ turned
+    return shapes[:, : k + len(nu)], np.concatenate([omega**2, 1.0 / nu])
 
 
 def _congruent(basis: np.ndarray, matrix: Any, sign: float = 1.0) -> np.ndarray:
     """basis^T A basis (k, k) of a sparse A (n, n) with A^T = sign A, block by block: no second array as large as the
-    basis.
-    """
+    basis."""
     product = np.empty((basis.shape[1],) * 2)
     for block in _blocks(basis.shape[1]):
         product[: block.stop, block] = basis[:, : block.stop].T @ (matrix @ basis[:, block])

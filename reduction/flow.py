@@ -9,8 +9,7 @@ as a flow solver gives them. The coefficients hold at w_j. In time they are forc
 real circulant matrices: what is even in j is a symmetric stiffness Re c and damping Im c / w, what is odd a skew one,
 circulatory Im c and gyroscopic Re c / w.
 Source  influence coefficients: Hanamura, Tanaka and Yamaguchi 1980; eigenvalues by nodal diameter: Whitehead 1966,
-Crawley 1988 (AGARD-AG-298, chapter 19); the matrices in time are ours
-"""
+Crawley 1988 (AGARD-AG-298, chapter 19); the matrices in time are ours"""
 
 from __future__ import annotations
 
@@ -30,8 +29,7 @@ class Flow:
     """Influence coefficients of a family of modes.
 
     influence : distance k of the blade that moves, positive on the left -> c_k, dimensionless
-    mode : number of the family, from 0, among the modes of the stuck wheel at each index
-    """
+    mode : number of the family, from 0, among the modes of the stuck wheel at each index"""
 
     influence: Mapping[int, complex] = field(default_factory=dict)
     mode: int = 0
@@ -71,8 +69,7 @@ def aeroelastic(wave: WaveModel, springs: np.ndarray, flow: Flow, n_modes: int =
     """Eigenvalue lambda [1/s] of the family's wave with the stuck wheel in the flow, for every index from -N/2 + 1.
 
     wave : with its damping and Coriolis forces, without the flow; few : modes of each index that take part
-    The frequency is Im lambda > 0: the wave of index j runs with the rotation for j > 0. Re lambda > 0 is flutter
-    """
+    The frequency is Im lambda > 0: the wave of index j runs with the rotation for j > 0. Re lambda > 0 is flutter"""
     n, flown = wave.n_sectors, with_flow(wave, springs, flow)
     eigenvalues = {}
     for index in range(-((n - 1) // 2), n // 2 + 1):

@@ -24,10 +24,7 @@ hbm.wear.wear_loop. The names of `import tribodyn` are a
 shorter way to the same; a scene with [model] does the same without Python.
 
 Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,
-ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or "z".
-"""
-
-from __future__ import annotations
+ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or "z"."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -63,8 +60,7 @@ class ForeignMatrices:
 
     mass, stiffness, damping : (n, n) symmetric csr [kg], [N/m], [N s/m]; damping None where there is none
     labels : (node, component 1..6) of each DOF, or None where the files carry none
-    notes : what was changed on reading, one sentence each
-    """
+    notes : what was changed on reading, one sentence each"""
 
     mass: sp.csr_matrix
     stiffness: sp.csr_matrix
@@ -133,8 +129,7 @@ class ForeignMatrices:
         t1 : with `normal`, (3,) direction whose part along the face is t1; the axis least along the normal if not given
         signs : without `normal`, +1 or -1 per component: -1 where body 1 closes the gap against the DOF's direction
         gap : opening before loading [m], one for all or (n_pair,)
-        points : (n_pair, 3) positions for pictures [m]; all at the origin where unknown
-        """
+        points : (n_pair, 3) positions for pictures [m]; all at the origin where unknown"""
         modelled = checked_components(components)
         width = len(modelled) if normal is None else 3
         first = self._table(body1, width, "body1")
@@ -173,8 +168,7 @@ class ForeignMatrices:
 
         rows : (n_pair * n_component, n) array or sparse matrix, pair by pair, in each the components in order
         components : subset of t1, t2, n in this order; n counts as positive where it closes
-        area, gap, points : as in `contact`
-        """
+        area, gap, points : as in `contact`"""
         modelled = checked_components(components)
         motion = sp.csr_matrix(np.atleast_2d(rows) if not sp.issparse(rows) else rows, dtype=float)
         if motion.shape[1] != self.n_dof or motion.shape[0] % len(modelled) or not motion.shape[0]:
@@ -210,8 +204,7 @@ def from_arrays(mass: Any, stiffness: Any, damping: Any = None, labels: Labels |
 
     mass, stiffness, damping : (n, n) symmetric [kg], [N/m], [N s/m]; damping None or zero where there is none, and a
         stiffness of zero for what its contacts alone hold
-    Raises  Refusal: not square, not symmetric, not finite, sizes that differ
-    """
+    Raises  Refusal: not square, not symmetric, not finite, sizes that differ"""
     inputs = {"mass": mass, "stiffness": stiffness, "damping": damping}
     matrices = {part: matrix_files.real(value, f"{part} matrix") for part, value in inputs.items() if value is not None}
     return _checked(matrices, labels, floats=True)
@@ -235,8 +228,7 @@ def read_matrices(
     mapping : ANSYS .mapping file that labels the rows
     names : other variable names, such as {"mass": "Mred"}
     scale : factor on all matrices to reach SI; 1e3 for N-mm-t-s (rotations then count in units of 1000 rad)
-    Raises  Refusal: not square, not symmetric, sizes that differ, a missing file or variable
-    """
+    Raises  Refusal: not square, not symmetric, sizes that differ, a missing file or variable"""
     unknown = sorted(set(names or {}) - set(NAMES))
     if unknown:
         raise Refusal(f"names has the key {unknown[0]}: the keys are mass, stiffness and damping")
@@ -280,8 +272,7 @@ def read_matrices(
 def _checked(matrices: dict[str, sp.csr_matrix], rows: Labels | None, floats: bool = False) -> ForeignMatrices:
     """The matrices of one structure, each symmetric and all of one size; a damping of zero is none.
 
-    floats : whether a stiffness of zero is meant, as of a mass that only its contacts hold
-    """
+    floats : whether a stiffness of zero is meant, as of a mass that only its contacts hold"""
     checked = {
         part: symmetric(matrix, f"{part} matrix", zero=floats and part == "stiffness")
         for part, matrix in matrices.items()

@@ -1,7 +1,5 @@
 """A contact of foreign matrices: components, signs and frames as a user gives them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Harwell-Boeing matrices, as ANSYS writes them with HBMAT (ASCII), and the mapping file beside them."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -9,6 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import text_of
 
 COMPONENT_NAMES = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 """ANSYS names of the degrees of freedom 1 to 6."""
@@ -27,9 +26,8 @@ def read(path: Path) -> sp.csr_matrix:
     """Read an assembled real matrix; symmetric storage (RSA) is mirrored.
 
     Raises  Refusal: complex, pattern or unassembled matrices, a truncated file
-    Source  Duff, Grimes and Lewis, Users' guide for the Harwell-Boeing sparse matrix collection, 1992
-    """
-    lines = path.read_text(encoding="ascii", errors="replace").splitlines()
+    Source  Duff, Grimes and Lewis, Users' guide for the Harwell-Boeing sparse matrix collection, 1992"""
+    lines = text_of(path).splitlines()
     if not looks_like(lines):
         raise Refusal(f"{path.name} has no Harwell-Boeing header: export it with HBMAT in ASCII form")
     try:
@@ -75,12 +73,11 @@ def read_mapping(path: Path) -> tuple[tuple[int, int], ...]:
     """(node, component 1..6) of each equation, from the .mapping file that HBMAT writes on request.
 
     A list of one's own in its form, equation, node and component (UX or 1), is taken too.
-    Raises  Refusal: no such file, no mapping file
-    """
+    Raises  Refusal: no such file, no mapping file"""
     if not path.is_file():
         raise Refusal(f"there is no mapping file {path}: check the name and the folder")
     rows: dict[int, tuple[int, int]] = {}
-    for line in path.read_text(encoding="ascii", errors="replace").splitlines():
+    for line in text_of(path).splitlines():
         words = line.split()
         if len(words) == 3 and words[0].isdigit() and words[1].isdigit():
             name = COMPONENT_NAMES[int(words[2]) - 1] if words[2] in "123456" else words[2].upper()
@@ -105,8 +102,7 @@ def _formats(line: str, path: Path) -> list[tuple[int, int]]:
 def _fields(lines: list[str], layout: tuple[int, int], size: int) -> list[str]:
     """The words of a block, by blanks where that gives the right number, else by width.
 
-    Fortran may leave no blank between fields; and some writers, scipy's among them, break the width they announce.
-    """
+    Fortran may leave no blank between fields; and some writers, scipy's among them, break the width they announce."""
     words = " ".join(lines).split()
     if len(words) == size:
         return words

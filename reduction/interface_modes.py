@@ -5,10 +5,7 @@ the other masters become static shapes of those, and modes with those held; it i
 boundary block. With all modes kept both are a change of variables and lose nothing. Contact forces act through the
 modes, so that the contact is too stiff for displacements they lack. Modes of the free boundary serve best: with those
 of the stuck one, which rest where the contact is stiff, the beam scene needs ten times as many (measured).
-Source  SCC: Castanier, Tan and Pierre, AIAA Journal 39(6), 2001; SCCe as in Tamatam 2021, appendix A
-"""
-
-from __future__ import annotations
+Source  SCC: Castanier, Tan and Pierre, AIAA Journal 39(6), 2001; SCCe as in Tamatam 2021, appendix A"""
 
 from dataclasses import replace
 
@@ -33,8 +30,7 @@ def interface_modes(
     Returns the model in coordinates: kept masters in ascending order, interface modes, static shapes, fixed-interface
         modes
     Raises  Refusal for a model that differs from harmonic to harmonic, DOFs that are no masters, too many modes, or
-        a boundary that can move rigidly with the kept DOFs held
-    """
+        a boundary that can move rigidly with the kept DOFs held"""
     if not model.has_one_system:
         raise Refusal("interface modes need a model that is the same for all harmonics: leave interface_modes out")
     masters = model.origin.masters
@@ -83,8 +79,7 @@ def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _lacking(phi: np.ndarray, shapes: np.ndarray, mass: np.ndarray) -> np.ndarray:
     """What of some shapes no combination of modes is, as independent columns.
 
-    phi : (n, n_modes) modes, orthonormal in the mass; shapes : (n, k)
-    """
+    phi : (n, n_modes) modes, orthonormal in the mass; shapes : (n, k)"""
     remainder = shapes - phi @ (phi.T @ mass @ shapes)
     remainder -= phi @ (phi.T @ mass @ remainder)
     directions, size, _ = np.linalg.svd(remainder, full_matrices=False)

@@ -1,7 +1,5 @@
 """Limits of the reductions: what is small, what is many, and how much is worked on at once."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 
@@ -9,7 +7,7 @@ from dataclasses import dataclass
 class ReductionLimits:
     """Counts where there is no unit; none of them changes a result beyond what its line says.
 
-    point_load : DOFs of a load or output above which it is distributed: projected, but it makes no masters
+    point_load : DOFs of a load or output above which it makes no masters, but static shapes
     reported_modes : natural frequencies that a model reports
     solved_at_once, static_at_once : right-hand sides of constraint modes and of static shapes; memory only
     turned_at_once : rows of the shapes that are turned in place; memory only
@@ -26,8 +24,7 @@ class ReductionLimits:
     rounding : of the rows of a contact map
     nearly_free : share of the contact springs in the second set of nominal modes: a contact that slips is nearly free
     static_frequency : frequency, over the highest wanted one, that is given to shapes which stand for all static ones
-    negligible : compliance of such a shape, over the largest, that is left out
-    """
+    negligible : compliance of such a shape, over the largest, that is left out"""
 
     point_load: int = 30
     reported_modes: int = 10

@@ -21,8 +21,7 @@ def linear_modes(
     """The n lowest modes of a reduced model or of a part, free or with contact springs.
 
     stiffness : (n_pair, n_component) [N/m], None for the free state
-    Returns frequency (n,) [Hz], mass-normalised shapes (n_dof, n)
-    """
+    Returns frequency (n,) [Hz], mass-normalised shapes (n_dof, n)"""
     K = model.system.stiffness
     K = K if stiffness is None else stuck_stiffness(K, model.interface.B, stiffness)
     omega, shapes = modes(K, model.system.mass, n)

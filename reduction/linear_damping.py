@@ -1,7 +1,5 @@
 """Linear damping of a reduced system."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -17,8 +15,7 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
 
     C = M Phi diag(2 zeta omega) Phi^H M over all modes of the dense system without contact
     Returns C (n, n) [N s/m]
-    Raises  Refusal for a ratio below 0
-    """
+    Raises  Refusal for a ratio below 0"""
     if not ratio >= 0:
         raise Refusal(f"damping: ratio = {ratio}: give a part of critical damping of 0 or more, such as 0.01")
     values, phi = eigh(system.stiffness, system.mass)
@@ -33,8 +30,7 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
 def modal_damping_towards(system: SecondOrderSystem, ratio: float) -> Callable[[np.ndarray], np.ndarray]:
     """What makes dC of any dK (n, n), for a system whose C is that of `modal_damping`.
 
-    C M^-1 C = 4 zeta^2 K, so that dC M^-1 C + C M^-1 dC = 4 zeta^2 dK, in which every pair of modes is by itself
-    """
+    C M^-1 C = 4 zeta^2 K, so that dC M^-1 C + C M^-1 dC = 4 zeta^2 dK, in which every pair of modes is by itself"""
     values, phi = eigh(system.damping, system.mass)
     weighted, sums = system.mass @ phi, values[:, None] + values
     resisted = sums > len(values) * np.finfo(float).eps * sums.max()
@@ -45,8 +41,7 @@ def modal_damping_towards(system: SecondOrderSystem, ratio: float) -> Callable[[
 def rayleigh(system: SecondOrderSystem, alpha: float, beta: float) -> np.ndarray:
     """C = alpha M + beta K (n, n) [N s/m]; alpha [1/s], beta [s].
 
-    Raises  Refusal for a negative coefficient
-    """
+    Raises  Refusal for a negative coefficient"""
     if not (alpha >= 0 and beta >= 0):
         raise Refusal(f"damping: alpha = {alpha} and beta = {beta} must not be negative")
     return alpha * system.mass + beta * system.stiffness
@@ -57,8 +52,7 @@ def rayleigh_of_ratios(
 ) -> tuple[float, float]:
     """alpha [1/s] and beta [s] that give two modes of a system their damping ratios, zeta = alpha / 2 w + beta w / 2.
 
-    Raises  Refusal where there are no such modes, one does not vibrate, or a coefficient would be negative
-    """
+    Raises  Refusal where there are no such modes, one does not vibrate, or a coefficient would be negative"""
     if max(modes) >= len(system.mass):
         raise Refusal(f"damping.modes: there is no mode {max(modes)}, the system has {len(system.mass)}")
     squares = eigh(system.stiffness, system.mass, eigvals_only=True, subset_by_index=(0, max(modes)))[list(modes)]

@@ -1,7 +1,5 @@
 """Checks of foreign matrices: symmetry, and what they state about their structure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +16,7 @@ class MatrixFacts:
 
     frequency : (n,) [Hz] of its lowest modes, those of rigid bodies first, which are n_rigid
     mass : [kg] moved along each of x, y, z along which it is free; empty where it is held or the rows have no labels
-    remarks : doubts, one sentence each
-    """
+    remarks : doubts, one sentence each"""
 
     frequency: np.ndarray
     n_rigid: int
@@ -40,8 +37,7 @@ class MatrixFacts:
 def matrix_facts(stiffness: sp.csr_matrix, mass_matrix: sp.csr_matrix, labels: Labels | None) -> MatrixFacts:
     """Modes, mass and doubts of a structure, without damping, loads and contacts.
 
-    Raises  Refusal where the matrices have no modes, as where the mass matrix is not positive definite
-    """
+    Raises  Refusal where the matrices have no modes, as where the mass matrix is not positive definite"""
     K, M = stiffness, mass_matrix
     frequency = modes(K, M, min(12, stiffness.shape[0]))[0] / (2 * np.pi)
     n_rigid = int((frequency < 1e-3 * frequency[-1]).sum())
@@ -67,8 +63,7 @@ def matrix_facts(stiffness: sp.csr_matrix, mass_matrix: sp.csr_matrix, labels: L
 def symmetric(matrix: sp.csr_matrix, name: str, rounding: float = 1e-8, zero: bool = False) -> sp.csr_matrix:
     """The matrix, made exactly symmetric, or a Refusal that shows the worst entry.
 
-    rounding : largest asymmetry, over the largest entry, that is rounding of the file
-    """
+    rounding : largest asymmetry, over the largest entry, that is rounding of the file"""
     if matrix.shape[0] != matrix.shape[1]:
         raise Refusal(f"the {name} is {matrix.shape[0]} x {matrix.shape[1]}: it must be square")
     largest = abs(matrix).max()

@@ -1,8 +1,7 @@
 """One matrix out of a file that another program wrote: the format is recognised by content."""
 
-from __future__ import annotations
-
 import contextlib
+import io
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -15,9 +14,11 @@ import scipy.io
 import scipy.sparse as sp
 from scipy.io.matlab import MatReadError
 
+from tribodyn.hdf5_file import opened_hdf5
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, nastran_matrix
 from tribodyn.reduction.abaqus_matrix import Labels
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import open_text, text_of
 
 MATRIX_MARKET = "%%MatrixMarket"
 NUMBERS = b"0123456789+-.eE \t\r\nnNaAiIfFtTyY"  # what numbers are written with, nan and infinity too
@@ -32,7 +33,7 @@ def variables(path: Path) -> list[str]:
                 return [] if "format" in archive.files else sorted(archive.files)
         if path.suffix.lower() == ".mat":
             if h5py.is_hdf5(path):
-                with h5py.File(path, "r") as archive:
+                with opened_hdf5(path) as archive:
                     return sorted(name for name in archive if not name.startswith("#"))
             return sorted(name for name, _, _ in _whosmat(path))
         if path.suffix.lower() == ".op4":
@@ -48,8 +49,7 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
     path : .npz (numpy or scipy.sparse), .mat (also version 7.3), Nastran .op4 or DMIG, Matrix Market, Harwell-Boeing,
         Abaqus text
     variable : its name in a container
-    Raises  Refusal: no such file or variable, an unknown format, complex or non-finite entries
-    """
+    Raises  Refusal: no such file or variable, an unknown format, complex or non-finite entries"""
     suffixes = variables(path)
     labels = None
     if variable is not None and suffixes and variable not in suffixes:
@@ -118,7 +118,7 @@ def _whosmat(path: Path) -> Any:
 def _from_mat(path: Path, variable: str) -> Any:
     if not h5py.is_hdf5(path):
         return scipy.io.loadmat(path, variable_names=[variable])[variable]
-    with h5py.File(path, "r") as archive:
+    with opened_hdf5(path) as archive:
         item = archive[variable]
         if isinstance(item, h5py.Group):  # sparse in version 7.3: compressed columns, rows counted from 0
             columns = np.asarray(item["jc"])
@@ -130,7 +130,7 @@ def _from_mat(path: Path, variable: str) -> Any:
 
 
 def _from_text(path: Path) -> tuple[Any, Labels | None]:
-    with path.open(encoding="ascii", errors="replace") as stream:
+    with open_text(path) as stream:
         head = [line for _, line in zip(range(50), stream, strict=False)]
     if head and head[0].startswith(MATRIX_MARKET):
         return _from_matrix_market(path), None
@@ -147,20 +147,20 @@ def _from_matrix_market(path: Path) -> Any:
     """A Matrix Market file by scipy's reader, which takes 1.0D3 for 1.0: no such number, no other count than announced.
 
     Raises  Refusal: complex or pattern matrices, a file that is not what it announces
-    Source  Boisvert, Pozo and Remington, The Matrix Market exchange formats, NISTIR 5935, 1996
-    """
+    Source  Boisvert, Pozo and Remington, The Matrix Market exchange formats, NISTIR 5935, 1996"""
+    content = text_of(path).encode()
     try:
-        n_row, _, entries, kind, field, symmetry = scipy.io.mminfo(path)
+        n_row, _, entries, kind, field, symmetry = scipy.io.mminfo(io.BytesIO(content))
         if field not in ("real", "double", "integer", "unsigned-integer") or symmetry == "hermitian":
             raise Refusal(f"{path.name} holds a {field} {symmetry} matrix: real numbers are needed")
-        body = _after_sizes(path.read_bytes())
+        body = _after_sizes(content)
         if kind == "array" and symmetry != "general":
             entries = n_row * (n_row + (1 if symmetry == "symmetric" else -1)) // 2
         if body.translate(None, NUMBERS):
             raise Refusal("its numbers are not written as 1.0E+03")
         if sum(1 for line in body.splitlines() if line.strip()) != entries:
             raise Refusal(f"it has not the {entries} entries that it announces")
-        return scipy.io.mmread(path)
+        return scipy.io.mmread(io.BytesIO(content))
     except (ValueError, OverflowError) as problem:
         if str(problem).startswith(path.name):
             raise

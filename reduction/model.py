@@ -7,8 +7,7 @@
 | `reduction.prescribed.PrescribedModel`     | harmonic 0 sees a system with coordinates held              |
 | `reduction.residual_flexibility.FlexibleModel` | its coordinates leave out part of the contact flexibility |
 | `reduction.wave_model.WaveModel`           | each harmonic sees the system of a harmonic index of a wheel |
-| `reduction.speed_line.SpeedLineModel`      | such a wave whose speed goes with the frequency             |
-"""
+| `reduction.speed_line.SpeedLineModel`      | such a wave whose speed goes with the frequency             |"""
 
 from __future__ import annotations
 
@@ -58,8 +57,7 @@ class ReductionBasis(Origin):
     n_modes : number of the other coordinates
     factorisation : name of the sparse solver
     first_omitted_frequency : of the fixed-interface modes, inf where all are retained [Hz]
-    n_interface_modes, interface_omitted_frequency : modes of the boundary, 0 without, and the first omitted one [Hz]
-    """
+    n_interface_modes, interface_omitted_frequency : modes of the boundary, 0 without, and the first omitted one [Hz]"""
 
     basis: np.ndarray
     master_dofs: np.ndarray
@@ -94,8 +92,7 @@ class ReducedModel:
     system : dense, n coordinates; contact and accessory DOFs first, then modal coordinates
     interface : in reduced coordinates, B is dense (n_pair * n_component, n)
     origin : where the coordinates come from; joints : joint -> its pairs
-    free_frequency : (n_mode,) lowest natural frequencies with contacts open [Hz]; none where they are not known
-    """
+    free_frequency : (n_mode,) lowest natural frequencies with contacts open [Hz]; none where they are not known"""
 
     system: SecondOrderSystem
     interface: ContactInterface

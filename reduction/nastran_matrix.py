@@ -1,11 +1,9 @@
 """Nastran matrices: OUTPUT4 files (.op4), in ASCII and binary, and DMIG entries of bulk data and punch files.
 
 An OUTPUT4 file holds several named matrices, column by column: a run of rows for each column, or strings of rows where
-it is sparse. A DMIG entry labels its rows by grid point and component; scalar points have component 0.
-"""
+it is sparse. A DMIG entry labels its rows by grid point and component; scalar points have component 0."""
 
-from __future__ import annotations
-
+import codecs
 import re
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -18,6 +16,7 @@ from tribodyn.geometry.sources.nastran_cards import cards_of, lines_of
 from tribodyn.reduction.abaqus_matrix import Labels
 from tribodyn.reduction.harwell_boeing import number
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import open_text
 
 DECKS = (".pch", ".bdf", ".nas", ".dat", ".dmig")
 
@@ -29,9 +28,8 @@ def read_op4(path: Path) -> dict[str, sp.csr_matrix]:
     """All matrices of an OUTPUT4 file by name, real or complex, in the order of the file.
 
     Raises  Refusal for a file that is not one, or ends early
-    Source  MSC Nastran, DMAP Programmer's Guide, module OUTPUT4, remarks on the formats of its files
-    """
-    data = path.read_bytes()
+    Source  MSC Nastran, DMAP Programmer's Guide, module OUTPUT4, remarks on the formats of its files"""
+    data = path.read_bytes().removeprefix(codecs.BOM_UTF8)
     order = {b"\x18\0\0\0": "<", b"\x30\0\0\0": "<", b"\0\0\0\x18": ">", b"\0\0\0\x30": ">"}.get(data[:4])
     matrices = {}
     try:
@@ -147,8 +145,7 @@ def _string(first: int, row: int | None = None) -> tuple[int, int]:
 def write_op4(path: Path, matrices: Mapping[str, np.ndarray]) -> None:
     """Write dense matrices (m, n), real or complex, as a binary OUTPUT4 file in double precision, bit for bit.
 
-    Raises  Refusal for a name that Nastran does not take
-    """
+    Raises  Refusal for a name that Nastran does not take"""
     with path.open("wb") as file:
 
         def record(words: list[int], body: bytes) -> None:
@@ -171,7 +168,7 @@ def write_op4(path: Path, matrices: Mapping[str, np.ndarray]) -> None:
 
 def holds_dmig(path: Path) -> bool:
     """Whether a text has DMIG entries: near its beginning, or anywhere where its ending is that of bulk data."""
-    with path.open(encoding="ascii", errors="replace") as stream:
+    with open_text(path) as stream:
         text = path.suffix.lower() in DECKS
         return any(line[:4].upper() == "DMIG" for k, line in enumerate(stream) if text or k < 50)
 
@@ -180,8 +177,7 @@ def read_dmig(path: Path) -> dict[str, Callable[[], tuple[sp.csr_matrix, Labels]
     """The matrices of DMIG entries by name, each with what reads it: matrix and (grid, component) of its rows.
 
     Raises  Refusal: an entry that contradicts itself; what reads one also for rectangular and complex matrices
-    Source  MSC Nastran, Quick Reference Guide, bulk data entry DMIG
-    """
+    Source  MSC Nastran, Quick Reference Guide, bulk data entry DMIG"""
     heads: dict[str, list[str]] = {}
     columns: dict[str, list[list[str]]] = {}
     for card, fields in cards_of(lines_of(path)):

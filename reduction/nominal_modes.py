@@ -7,8 +7,6 @@ Phi spans everything.
 Source  nominal modes: Yang and Griffin 2001, A reduced-order model of mistuning using a subset of nominal system modes
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -41,8 +39,7 @@ def nominal_shapes(
 
     springs : (n_pair, n_component) of closed, stuck contacts [N/m]; stiffness : (n, n) the part K that deviates [N/m]
     families : modes of every nodal diameter; loads : those whose static shapes are added, of every nodal diameter
-    left_out : strain energy of a shape beside the others, over the largest, below which it is one of them
-    """
+    left_out : strain energy of a shape beside the others, over the largest, below which it is one of them"""
     sector, columns = reduced.sector, []
     for index in range(sector.n_sectors // 2 + 1):
         system, B = wave_system(sector, index)

@@ -9,8 +9,6 @@ system in which X_k is cut off, and the height is a static load on the rest,
 so that every system stays symmetric and a height is an amplitude like a force is; F_k follows from the contact force.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Self
@@ -34,8 +32,7 @@ class StaticReaction:
     name : of the load whose static amplitude is the height
     dofs : (k,) coordinates of the reduced model, each displaced by the height
     psi : (n, k) static shapes of unit displacements of each; stiffness : (k, k) psi^T K psi [N/m]
-    support : (k,) springs in the model that act about the prescribed position [N/m]
-    """
+    support : (k,) springs in the model that act about the prescribed position [N/m]"""
 
     name: str
     dofs: np.ndarray
@@ -49,8 +46,7 @@ class StaticReaction:
 
         height : [m]; contact_force : (n_pair, n_component) static part of the contact force [N]
         loads : other static loads by name [N]
-        Source  Tamatam 2021, eq. 5.4a after eq. 5.4b is solved for X_u
-        """
+        Source  Tamatam 2021, eq. 5.4a after eq. 5.4b is solved for X_u"""
         load = -np.asarray(self.model.interface.B).T @ np.ravel(contact_force)
         for name, value in (loads or {}).items():
             load = load + value * self.model.system.loads[name]
@@ -61,8 +57,7 @@ class StaticReaction:
 class PrescribedModel(ReducedModel):
     """A model with a prescribed static displacement.
 
-    static : the system of harmonic 0; reaction : gives the force that holds the displacement
-    """
+    static : the system of harmonic 0; reaction : gives the force that holds the displacement"""
 
     static: SecondOrderSystem = field(kw_only=True)
     reaction: StaticReaction = field(kw_only=True)
@@ -91,8 +86,7 @@ def prescribe(model: ReducedModel, dofs: np.ndarray, name: str, support: np.ndar
         harmonics and carry no force at that position [N/m]
     Returns the model, whose harmonic 0 sees another system
     Raises  Refusal where a coordinate belongs to the contact, where the name is taken, or where the part can still
-        move rigidly
-    """
+        move rigidly"""
     system, B = model.system, np.asarray(model.interface.B)
     free, fixed = partition(system.n_dof, dofs, "prescribed displacement")
     if len(fixed) == 0:
@@ -148,8 +142,7 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     rows : (k, n_full), such as `Part.held_rows`; none leaves the model as it is
     Returns the model in coordinates p, q = N p with N an orthonormal basis of what is allowed; they are no longer the
         displacements of single DOFs, but the contact map, loads, outputs and the way back know that
-    Raises  Refusal for a model without a full field, or one whose harmonics see different systems
-    """
+    Raises  Refusal for a model without a full field, or one whose harmonics see different systems"""
     if len(rows) == 0:
         return model
     if not isinstance(model.origin, ReductionBasis) or not model.has_one_system:

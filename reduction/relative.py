@@ -3,10 +3,7 @@
 The displacement of a body-1 node is replaced by the relative displacement of its pair, u_1 = R^T x + u_2 in the frame R
 of the pair, so that the contact map picks coordinates and the nodes of body 2 may become slaves. Nothing is lost: it is
 a change of variables. Fixed-interface modes are then those of the bodies glued together at the pairs.
-Source  the relative displacement of a shroud in Tamatam 2021, section 3.2.2, for any pair of bodies
-"""
-
-from __future__ import annotations
+Source  the relative displacement of a shroud in Tamatam 2021, section 3.2.2, for any pair of bodies"""
 
 from dataclasses import replace
 
@@ -26,8 +23,7 @@ def relative(
     system : sparse, n DOFs; interface : all three components, B over the same DOFs
     Returns the system and interface in the new coordinates, and T (n, n) with q = T q_new; feed the reduced basis
         through T to get back to the full field
-    Raises  Refusal where a component is missing, or where a body-1 DOF is held or shared by two pairs
-    """
+    Raises  Refusal where a component is missing, or where a body-1 DOF is held or shared by two pairs"""
     averaged, interface = interface, interface.nodes or interface
     n, n_pair = system.n_dof, interface.n_pair
     B = csr_matrix(interface.B)
@@ -48,8 +44,7 @@ def relative(
 def body_1_dofs(interface: ContactInterface) -> np.ndarray:
     """DOFs (n_pair, 3) of the body-1 nodes along x, y, z: the columns of B that hold the frames themselves.
 
-    Raises  Refusal where one is not among the DOFs of the system, or the contact has not all three components
-    """
+    Raises  Refusal where one is not among the DOFs of the system, or the contact has not all three components"""
     if interface.components != COMPONENTS:
         raise Refusal(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
     interface = interface.nodes or interface

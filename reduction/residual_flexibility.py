@@ -16,10 +16,7 @@ one solution by the sparse factor of K_s. So statics under any contact force are
 the factor does. R vanishes at loads and outputs, whose static shapes V holds.
 
 Source  residual flexibility of free-interface modes: MacNeal 1971, doi 10.1016/0045-7949(71)90031-9; Rubin 1975,
-    doi 10.2514/3.60497. Clusters of tractions in place of more modes, and contact springs in K_s, are ours.
-"""
-
-from __future__ import annotations
+    doi 10.2514/3.60497. Clusters of tractions in place of more modes, and contact springs in K_s, are ours."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -27,15 +24,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.linalg as sla
-from scipy.sparse import csc_matrix, csr_matrix, hstack
-from threadpoolctl import threadpool_limits
+from scipy.sparse import csc_matrix, csr_matrix
 
 from tribodyn.fem.factor import Factor, factorise, solve_selected
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.reduction.craig_bampton import fixed_interface_modes
+from tribodyn.reduction.craig_bampton import fixed_interface_modes, with_static_shapes
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
 from tribodyn.reduction.model import ReducedModel, ReductionBasis
@@ -48,8 +43,7 @@ class ResidualFlexibility:
 
     stiffness : (n_contact,) contact springs that are part of K_s [N/m]; free : (n_full, n_full) K without them, sparse
     B : (n_contact, n_full) sparse contact map; shapes : (n_full, n) V; squares : (n,) Lambda [rad2/s2]
-    mass : (n_full, n_full); solver : see fem.factor
-    """
+    mass : (n_full, n_full); solver : see fem.factor"""
 
     stiffness: np.ndarray
     free: Any
@@ -89,8 +83,7 @@ class ResidualFlexibility:
     def recalled(self, force: np.ndarray, cache: Sequence[np.ndarray]) -> np.ndarray:
         """R times the part of forces f (n_contact, k) that it is known of.
 
-        asked : none, or one pair (2, n_contact, j): orthonormal k^-1/2 f of forces that R was asked for, and R f
-        """
+        asked : none, or one pair (2, n_contact, j): orthonormal k^-1/2 f of forces that R was asked for, and R f"""
         basis, displacement = cache[0] if cache else np.zeros((2, len(force), 0))
         product: np.ndarray = displacement @ (basis.T @ self.lacking(force))
         return product
@@ -136,8 +129,7 @@ class ResidualFlexibility:
         """Error of the contact compliance at a frequency [rad/s], over the static one, by the mass that R leaves out.
 
         The first term that is neglected, omega^2 B K_s^-1 M u less its part in V, u the field left out, under two
-        smooth and two rough contact forces
-        """
+        smooth and two rough contact forces"""
         root = np.sqrt(self.stiffness)[:, None]
         rough = np.random.default_rng(0).standard_normal((len(root), 2))
         smooth = self.apply(root**2 * rough)
@@ -190,8 +182,7 @@ def residual_flexibility(
         kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     clusters : of pairs, whose tractions give Ritz vectors; solver : see fem.factor
     Returns the model; its coordinates are modal, mass = 1; the first omitted frequency is that of the stuck modes
-    Raises  SingularStiffness where the structure can move rigidly with all contacts stuck
-    """
+    Raises  SingularStiffness where the structure can move rigidly with all contacts stuck"""
     k = np.ravel(np.asarray(stiffness, float))
     K = system.stiffness
     K_s = stuck_stiffness(K, interface.B, k)
@@ -199,10 +190,9 @@ def residual_flexibility(
     factor = factorise(K_s, solver=solver, selected_rows=np.unique(csr_matrix(interface.B).indices))
     omega, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
     del K_s
-    forces = [np.asarray(v, float) for v in (*system.loads.values(), *system.outputs.values())]
-    tractions = B.T @ clustered(interface, k, clusters)
-    pushed = csc_matrix(hstack([*(csc_matrix(f[:, None]) for f in forces if f.any()), tractions]))
-    V, squares = _ritz(omega, phi, pushed, factor, M)
+    forces = [csc_matrix(v[:, None], dtype=float) for v in (*system.loads.values(), *system.outputs.values())]
+    tractions = csc_matrix(B.T @ clustered(interface, k, clusters))
+    V, squares = with_static_shapes(omega, phi, [*forces, tractions], factor, M)
     at_contact = np.asarray(B @ V)
     free = np.diag(squares) - at_contact.T @ (k[:, None] * at_contact)
     reduced = SecondOrderSystem(
@@ -227,8 +217,7 @@ def residual_flexibility(
 def clustered(interface: ContactInterface, weight: np.ndarray, clusters: int) -> csr_matrix:
     """Unit tractions (n_contact, n) on clusters of near pairs, a column for every component that a cluster has.
 
-    weight : (n_contact,) share of each row in the traction of its cluster, such as the contact springs
-    """
+    weight : (n_contact,) share of each row in the traction of its cluster, such as the contact springs"""
     n_comp = len(interface.components)
     label = _bisected(interface.points, clusters)
     column = (label[:, None] * n_comp + np.arange(n_comp)).ravel()
@@ -250,38 +239,3 @@ def _bisected(points: np.ndarray, clusters: int) -> np.ndarray:
     for i, members in enumerate(parts):
         label[members] = i
     return label
-
-
-def _ritz(
-    omega: np.ndarray, phi: np.ndarray, forces: csc_matrix, factor: Factor, M: Any
-) -> tuple[np.ndarray, np.ndarray]:
-    """Ritz vectors (n_full, n) of unit modal mass and squared frequencies (n,) of modes and of statics under forces.
-
-    omega (k,), phi (n_full, k) : modes of K_s, M; forces : (n_full, j); factor : of K_s
-    K_s times a static shape is its force, and times a mode M phi omega^2: K_s itself is not asked for
-    """
-    k, n, step = len(omega), len(omega) + forces.shape[1], LIMITS.static_at_once
-    shapes = np.empty((len(phi), n), order="F")
-    shapes[:, :k] = phi
-    with threadpool_limits(1):
-        for at in range(0, n - k, step):
-            block = forces[:, at : at + step].toarray(order="F")
-            shapes[:, k + at : k + at + step] = factor.solve(block)
-    energy = np.diag(np.concatenate([omega**2, np.zeros(n - k)]))
-    energy[k:] = forces.T @ shapes
-    energy[:k, k:] = energy[k:, :k].T
-    inertia = np.concatenate(
-        [shapes.T @ (M @ shapes[:, at : at + step]) for at in range(0, n, step)],
-        axis=1,
-    )
-    scale = np.sqrt(np.diag(energy))
-    size, turn = sla.eigh(0.5 * (energy + energy.T) / np.outer(scale, scale))
-    independent = size > LIMITS.dependent * size[-1]
-    basis = turn[:, independent] / np.sqrt(size[independent]) / scale[:, None]  # of unit energy
-    inertia = basis.T @ inertia @ basis
-    nu, y = sla.eigh(0.5 * (inertia + inertia.T))
-    nu, y = nu[::-1], y[:, ::-1]
-    turned = basis @ (y / np.sqrt(nu))
-    for at in range(0, len(shapes), LIMITS.turned_at_once):  # in place: they are the largest array but the factor
-        shapes[at : at + LIMITS.turned_at_once, : len(nu)] = shapes[at : at + LIMITS.turned_at_once] @ turned
-    return shapes[:, : len(nu)], 1.0 / nu

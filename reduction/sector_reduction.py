@@ -5,10 +5,7 @@ indices: the phase constraints act on the small system. Where neighbours touch n
 the sector, the contact then becomes a coordinate of its own, the relative displacement of neighbours (3.18), so that
 its map is [I 0] for every index. With contacts inside the sector or of meshes that do not match, the masters stay the
 coordinates, and the contact has a map of its own for every index (3.17).
-Source  Tamatam 2021, eq. 3.12 to 3.22
-"""
-
-from __future__ import annotations
+Source  Tamatam 2021, eq. 3.12 to 3.22"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,8 +27,7 @@ from tribodyn.refusal import Refusal
 @dataclass(frozen=True)
 class ReducedSector:
     """sector : dense, in reduced coordinates; origin : these coordinates among the DOFs of the full sector;
-    accuracy : as `ReducedModel.accuracy`.
-    """
+    accuracy : as `ReducedModel.accuracy`."""
 
     sector: Sector
     origin: ReductionBasis
@@ -43,16 +39,13 @@ class ReducedSector:
         return ReducedModel(self.sector.system, self.sector.interface, self.origin, self.sector.joints)
 
 
-def reduce_sector(
-    sector: Sector, n_modes: int | None = None, cutoff: float | None = None, attached: Sequence[str] = ()
-) -> ReducedSector:
-    """Reduce a full sector; n_modes or cutoff [Hz], and attached loads, as in `craig_bampton`.
+def reduce_sector(sector: Sector, n_modes: int | None = None, cutoff: float | None = None) -> ReducedSector:
+    """Reduce a full sector; n_modes or cutoff [Hz] as in `craig_bampton`.
 
-    Raises  Refusal as `craig_bampton` does
-    """
+    Raises  Refusal as `craig_bampton` does"""
     both_faces = replace(sector.interface, B=vstack([sector.interface.B, sector.left_map], format="csr"))
     seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
-    model = craig_bampton(sector.system, both_faces, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
+    model = craig_bampton(sector.system, both_faces, n_modes, cutoff, extra_masters=seams.tolist())
     assert isinstance(model.origin, ReductionBasis)
     return in_coordinates(sector, model.system, model.origin)
 
@@ -82,8 +75,7 @@ def nodal_diameters(
     diameters : harmonic indices; 0 to N/2 differ, and where Coriolis forces act those of waves that run against the
         rotation too, -1 to -N/2; stiffness : (n_pair, n_component) of closed, stuck contacts [N/m],
         None for open ones
-    Returns (n_diameter, n_modes)
-    """
+    Returns (n_diameter, n_modes)"""
     frequencies = []
     for index in diameters:
         system, B = wave_system(sector, index)
@@ -119,8 +111,7 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     x : (n_c,) relative displacement of neighbours; y : accessories, then the rest. With S the seam map, a = exp(i phi),
     B_r, B_l the halves of the contact behind S and N a basis of what moves no right face,
     q = S (B_r^H (x + a B_l N y) + N y), so that B_r z - a B_l z = x whatever y is
-    Raises  Refusal where a right contact face is not made of masters, or shares nodes with a left one or a seam
-    """
+    Raises  Refusal where a right contact face is not made of masters, or shares nodes with a left one or a seam"""
     S = seam_map(sector, index)
     right, left_rows = sector.interface.B @ S, sector.left_map @ S
     faces = np.flatnonzero(np.abs(right).max(axis=0))
@@ -150,8 +141,7 @@ def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, n_
     Statics are exact, and what is left out of the motion of the contact falls with the fourth power of the frequency
     over that of the first mode left out
     Raises  LinAlgError where the system can move with its contact stuck, or is unstable then
-    Source  method of Rayleigh and Ritz; the shapes are those of `reduction.residual_flexibility`
-    """
+    Source  method of Rayleigh and Ritz; the shapes are those of `reduction.residual_flexibility`"""
     K = stuck_stiffness(system.stiffness, B, springs)
     K = (K + K.conj().T) / 2
     n, n_modes = len(K), LIMITS.ritz_modes if n_modes is None else n_modes

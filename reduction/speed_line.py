@@ -2,8 +2,7 @@
 
 Mass and Coriolis matrix over the speed are the same at all speeds and spin softening goes with the square of it, so
 that what is interpolated, in polynomials of the squared speed, is the stress of the contact as it settles alone.
-Source  method of Rayleigh and Ritz; Lagrange
-"""
+Source  method of Rayleigh and Ritz; Lagrange"""
 
 from __future__ import annotations
 
@@ -24,14 +23,11 @@ from tribodyn.reduction.sector_reduction import ReducedSector, in_coordinates, r
 from tribodyn.reduction.wave_model import IndexSystem, WaveIndices, WaveModel, wave_model
 
 
-def reduce_alike(
-    sectors: Sequence[Sector], n_modes: int | None, cutoff: float | None, attached: Sequence[str] = ()
-) -> ReducedSector:
+def reduce_alike(sectors: Sequence[Sector], n_modes: int | None, cutoff: float | None) -> ReducedSector:
     """The first of sectors of one mesh that differ in stiffness, as `reduce_sector`, in coordinates of them all.
 
-    Masters stay; all fixed-interface modes, and what the constraint modes differ by, share one basis of the rest
-    """
-    reduced = [reduce_sector(sector, n_modes, cutoff, attached) for sector in sectors]
+    Masters stay; all fixed-interface modes, static shapes, and what the constraint modes differ by share one basis"""
+    reduced = [reduce_sector(sector, n_modes, cutoff) for sector in sectors]
     first, bases = reduced[0], [sector.origin.basis for sector in reduced]
     m, energy = len(first.origin.masters), np.diag(first.sector.system.stiffness)
     columns = [
@@ -69,8 +65,7 @@ class SpeedLine:
     reduced : at the first of `speeds` [Hz], above 0, in coordinates for all; stiffness : (n, n) there, at each
     load : name of the one that goes with the square of the speed, which stands for `nominal` [Hz]
     springs : (n_pair, n_component) contact springs [N/m]
-    damping : makes that of the systems at `speeds`
-    """
+    damping : makes that of the systems at `speeds`"""
 
     reduced: ReducedSector
     stiffness: tuple[np.ndarray, ...]
@@ -147,8 +142,7 @@ class SpeedLine:
     def error(self, speed: float, exact: np.ndarray, n_modes: int = 6) -> float:
         """Largest relative error of the lowest frequencies of the stuck wave that interpolation makes at a speed.
 
-        exact : (n, n) stiffness at this speed
-        """
+        exact : (n, n) stiffness at this speed"""
 
         def wave(stiffness: np.ndarray) -> tuple[SecondOrderSystem, np.ndarray]:
             sector = self.reduced.sector
@@ -165,8 +159,7 @@ class SpeedLine:
 class SpeedLineModel(WaveModel):
     """The wave at one speed of a line, which knows the models of the others.
 
-    line_error : largest relative error of the lowest stuck frequencies that interpolation causes
-    """
+    line_error : largest relative error of the lowest stuck frequencies that interpolation causes"""
 
     line: SpeedLine = field(kw_only=True)
     line_error: float = field(kw_only=True)
@@ -211,8 +204,7 @@ def _summed(weights: Sequence[float], systems: Sequence[SecondOrderSystem]) -> d
 class AtSpeed:
     """System, contact map and way back of each harmonic index at one speed [Hz].
 
-    of : computes the system at this speed from the systems at all speeds of the line, see `SpeedLine.between`
-    """
+    of : computes the system at this speed from the systems at all speeds of the line, see `SpeedLine.between`"""
 
     line: SpeedLine
     of: Callable[[Sequence[SecondOrderSystem], float], SecondOrderSystem]

@@ -3,10 +3,7 @@
 Time integration needs the real model. A wave of engine order EO repeats itself after n = N / gcd(N, EO) sectors, so
 that n sectors closed to a ring are enough. Only the harmonic indices (nodal diameters) 0, g, 2 g, ... occur in this
 ring, g = gcd(N, EO). Its coordinates are the modes of these indices without contact: a complex mode gives a cosine
-and a sine. Each index is decomposed by itself, so that no matrix of the size of the wheel is ever decomposed.
-"""
-
-from __future__ import annotations
+and a sine. Each index is decomposed by itself, so that no matrix of the size of the wheel is ever decomposed."""
 
 from dataclasses import replace
 
@@ -73,8 +70,7 @@ def _modes(
 
     B : (n_contact, n) contact map
     Returns squared frequencies (m,) [rad2/s2], mode shapes at the ports (n_port, m), and the modal matrices (m, m) of
-        damping, Coriolis and circulatory forces, which are zero for the shapes that replace modes
-    """
+        damping, Coriolis and circulatory forces, which are zero for the shapes that replace modes"""
     lam, phi = sla.eigh(np.asarray(system.stiffness), np.asarray(system.mass))
     loads = [np.conj(load)[None] for load in system.loads.values()]
     outputs = [np.asarray(row)[None] for row in system.outputs.values()]

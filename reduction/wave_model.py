@@ -1,7 +1,5 @@
 """Models of a wheel: travelling waves by harmonic index, or all sectors at once; see `sector_reduction`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import gcd
@@ -30,8 +28,7 @@ class WaveModel(ReducedModel):
     """One sector under a travelling wave: harmonic h sees the index h EO modulo N.
 
     `system` and `interface` are those of harmonic 1; matrices are complex Hermitian, real for the indices 0 and N/2
-    reduced : the sector; index_of : small system, contact map and way back of every harmonic index
-    """
+    reduced : the sector; index_of : small system, contact map and way back of every harmonic index"""
 
     reduced: ReducedSector = field(kw_only=True)
     engine_order: int = field(kw_only=True)
@@ -135,8 +132,7 @@ def travelling_wave(reduced: ReducedSector, engine_order: int, springs: np.ndarr
 
     springs : (n_pair, n_component) contact springs [N/m]. If given, more than `LIMITS.many_coordinates` coordinates are
         replaced by those of `stuck_ritz`
-    Its coordinates, but for those of `stuck_ritz`, are the relative displacements, then accessories, then the rest
-    """
+    Its coordinates, but for those of `stuck_ritz`, are the relative displacements, then accessories, then the rest"""
     model = wave_model(reduced, engine_order, WaveIndices(reduced, springs))
     system = model.system
     try:
@@ -146,13 +142,14 @@ def travelling_wave(reduced: ReducedSector, engine_order: int, springs: np.ndarr
     return replace(model, free_frequency=omega / (2 * np.pi))
 
 
-def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
-    """All sectors at once, real and with contacts between all neighbours; stiffness as in `assemble_wheel`.
+def wheel_model(
+    reduced: ReducedSector, stiffness: Sequence[float] | None = None, elastic: np.ndarray | None = None
+) -> ReducedModel:
+    """All sectors at once, real and with contacts between all neighbours; stiffness, elastic as in `assemble_wheel`.
 
     Loads and outputs are named "<name>@<sector>". Sector n moves by
-    reduced.origin.basis @ (fem.cyclic_symmetry.sector_maps(reduced.sector)[n] @ q) in its own frame
-    """
-    system, interface = cyclic_symmetry.assemble_wheel(reduced.sector, stiffness)
+    reduced.origin.basis @ (fem.cyclic_symmetry.sector_maps(reduced.sector)[n] @ q) in its own frame"""
+    system, interface = cyclic_symmetry.assemble_wheel(reduced.sector, stiffness, elastic)
     return ReducedModel(system, interface, joints=reduced.sector.joints)
 
 

@@ -2,10 +2,7 @@
 
 Two processes share the tests by file, so that what a module sets up is set up once. A long file that began last would
 keep one of them busy while the other waits. Of the others, what is wrong in a kernel is told by its own test, not by a
-run of a scene minutes later; what starts processes comes last.
-"""
-
-from __future__ import annotations
+run of a scene minutes later; what starts processes comes last."""
 
 import os
 from pathlib import Path

@@ -27,6 +27,7 @@ scene = {
         "harmonic": {"shake": {"group": "upper.z_max", "direction": "x", "value": "60 N"}},
     },
     "response": {"frequency": ["3 kHz", "8 kHz"], "points": 80},
+    "harmonics": {"kept": [0, 1, 2, 3]},
     "reduction": {"modes": 4},
     "damping": {"modal": "1 %"},
     "verdict": {"enabled": False},

@@ -1,14 +1,10 @@
 """Decks of Abaqus and CalculiX: nodes, elements, parts and instances, sets and surfaces.
 
 Elements of every formulation (reduced, hybrid, incompatible modes) are read as geometry and computed here as second
-order. The cards on materials, constraints and loads are read in `abaqus_cards`. Whatever is not used is named.
-"""
-
-from __future__ import annotations
+order. The cards on materials, constraints and loads are read in `abaqus_cards`. Whatever is not used is named."""
 
 import math
 import re
-from collections import Counter
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, fields
@@ -18,8 +14,10 @@ from typing import Any
 import numpy as np
 
 from tribodyn.geometry.placement import rotation
+from tribodyn.geometry.sources.abaqus_grammar import ANY, PLACED, TABLE
+from tribodyn.geometry.sources.card_table import SkippedCards
 from tribodyn.geometry.sources.directions import System, orthogonal
-from tribodyn.geometry.sources.keywords import Card, cards
+from tribodyn.geometry.sources.keywords import WITH_INPUT, Card, cards
 from tribodyn.refusal import Refusal
 
 # first letters and number of nodes of a solid -> meshio's kind
@@ -55,8 +53,8 @@ class Scope:
     """What a part, an instance or the assembly holds. Sets and surfaces are kept by their names in capitals.
 
     nsets, elsets : name -> its items as written: labels, or names of other sets, perhaps with "instance." before them
-    surfaces : name -> (kind, items); names : capitals -> as written
-    """
+    surfaces : name -> (kind, items); names : capitals -> as written; unsorted : sets in the order of the deck
+    cards : that name nodes or faces of this scope"""
 
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
@@ -69,6 +67,8 @@ class Scope:
     springs: list[Card] = field(default_factory=list)
     orientations: dict[str, Card] = field(default_factory=dict)
     distributions: dict[str, Card] = field(default_factory=dict)
+    unsorted: set[str] = field(default_factory=set)
+    cards: list[Card] = field(default_factory=list)
     system: System | None = None
 
     def name(self, text: str) -> str:
@@ -80,13 +80,15 @@ class Scope:
 
 @dataclass
 class DeckAssembly:
-    """All scopes of a deck: instances by name (one "" for a deck without parts), and the assembly above them."""
+    """All scopes of a deck: instances by name (one "" for a deck without parts), and the assembly above them.
+
+    cards : others than those of the mesh, and the instance in which each stands"""
 
     instances: dict[str, Scope]
     moves: dict[str, tuple[np.ndarray, np.ndarray]]
     top: Scope
-    cards: list[Card]
-    ignored: Counter[str]
+    cards: list[tuple[Card, str]]
+    skipped: SkippedCards
 
     def scope(self, instance: str) -> Scope:
         """The scope of an instance, "" for the assembly."""
@@ -118,6 +120,14 @@ class DeckAssembly:
             ]
         raise KeyError(item)
 
+    def ordered_nodes(self, item: str) -> list[Node]:
+        """Nodes of an item, each once: of an unsorted set in the order of the deck, else by instance and label."""
+        members = list(dict.fromkeys(self.nodes(item)))
+        instance, name = self.split(item, "")
+        rank = {name: k for k, name in enumerate(self.instances)}
+        is_unsorted = name.upper() in self.scope(instance).unsorted
+        return members if is_unsorted else sorted(members, key=lambda node: (rank.get(node[0], -1), node[1]))
+
     def elements(self, item: str, instance: str = "", depth: int = 0) -> list[Node]:
         """Elements of an item likewise."""
         instance, item = self.split(item, instance)
@@ -133,9 +143,16 @@ class DeckAssembly:
 def load(path: Path) -> DeckAssembly:
     """Sort the cards of a deck into parts, instances and the rest. Raises Refusal on what cannot be read."""
     parts: dict[str, Scope] = {}
-    assembly = DeckAssembly({}, {}, Scope(), [], Counter())
+    assembly = DeckAssembly({}, {}, Scope(), [], SkippedCards(TABLE, "*"))
     scope, flat = assembly.top, True
     for card in cards(path):
+        assembly.skipped.check_parameters(card.name, card.options)
+        if "INPUT" in card.options and card.name in TABLE.reads - {*WITH_INPUT}:
+            raise Refusal(f"{card.where} has its data in another file by INPUT, not read here: write them in the deck")
+        names = TABLE.fields.get(card.name, ANY)
+        for line in card.data if not names.endswith(ANY) else ():
+            if len(line) > names.count(",") + 1:
+                assembly.skipped.check_fields(card.name, line)
         if card.name == "PART":
             flat = False
             scope = parts[card.option("NAME").upper()] = Scope()
@@ -145,8 +162,11 @@ def load(path: Path) -> DeckAssembly:
             scope = assembly.top
         elif card.name in MESH_CARDS:
             MESH_CARDS[card.name](card, scope)
+        elif card.name in PLACED and scope is not assembly.top:
+            scope.cards.append(card)
         else:
-            assembly.cards.append(card)
+            assembly.cards.append((card, ""))
+    assembly.cards[:0] = [(card, name) for name, scope in assembly.instances.items() for card in scope.cards]
     if flat and not assembly.instances:
         return assembly
     if not assembly.instances:
@@ -181,13 +201,15 @@ def _instance(card: Card, parts: dict[str, Scope], assembly: DeckAssembly) -> Sc
 
 
 def _surface(card: Card, scope: Scope) -> None:
-    kind = card.option("TYPE").upper() or "ELEMENT"
+    kind = card.option("COMBINE", "TYPE").upper() or "ELEMENT"
     items = [(line[0], line[1].upper() if len(line) > 1 else "") for line in card.data]
     scope.surfaces[scope.name(card.option("NAME"))] = (kind, items)
 
 
 def _mass(card: Card, scope: Scope) -> None:
-    scope.masses.append((card.option("ELSET"), card.number(card.data[0][0]) if card.data else 0.0))
+    if not card.data:
+        raise Refusal(f"{card.where} has no mass: write it below")
+    scope.masses.append((card.option("ELSET"), card.number(card.data[0][0])))
 
 
 def _system(card: Card, scope: Scope) -> None:
@@ -246,16 +268,29 @@ def solid_node_count(kind: str) -> int | None:
     return int(number[1]) if number and int(number[1]) in SOLIDS else None
 
 
+def formulation(kind: str) -> str:
+    """How a type of 8-node hexahedron is computed: reduced (C3D8R), with incompatible modes (C3D8I), or in full."""
+    letters = _SOLID.sub("", kind)
+    return "linear_reduced" if "R" in letters else "linear_incompatible" if "I" in letters else "linear_full"
+
+
 def _set(card: Card, scope: Scope) -> None:
     key = scope.name(card.option(card.name))
     target = (scope.nsets if card.name == "NSET" else scope.elsets).setdefault(key, [])
     prefix = f"{card.option('INSTANCE')}." if card.option("INSTANCE") else ""
     if card.name == "NSET" and card.option("ELSET"):
         target.append(prefix + card.option("ELSET"))
+    if "UNSORTED" in card.options:
+        scope.unsorted.add(key)
     for line in card.data:
         if "GENERATE" in card.options:
-            first, last, *step = [card.integer(text) for text in line if text]
-            target += [f"{prefix}{label}" for label in range(first, last + 1, step[0] if step else 1)]
+            numbers = [card.integer(text) for text in line if text] or [0]
+            first, last, step = numbers if len(numbers) == 3 else (numbers[0], numbers[-1], 1)
+            if len(numbers) > 3 or last < first or step < 1 or (last - first) // step > 1e7:
+                raise Refusal(
+                    f"{card.where} generates labels from {first} to {last} by {step}: count up, to 1e7 labels"
+                )
+            target += [f"{prefix}{label}" for label in range(first, last + 1, step)]
         else:
             target += [prefix + text for text in line if text]
 

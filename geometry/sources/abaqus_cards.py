@@ -1,36 +1,20 @@
 """Constraints, springs, masses, loads and supports of a deck of Abaqus or CalculiX."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tribodyn.geometry.sources import abaqus, deck
+from tribodyn.geometry.sources.abaqus_grammar import DIRECTED, FIRST, NAMED_SUPPORTS, TABLE as TABLE
 from tribodyn.geometry.sources.abaqus_materials import MaterialCards
-from tribodyn.geometry.sources.abaqus_places import TABLE as TABLE
 from tribodyn.geometry.sources.abaqus_sets import raw_of
 from tribodyn.geometry.sources.keywords import Card
 from tribodyn.geometry.sources.raw_mesh import RawMesh
 from tribodyn.refusal import Refusal
-
-# named supports -> axes that they hold
-NAMED_SUPPORTS = {
-    "ENCASTRE": (0, 1, 2, 3, 4, 5),
-    "PINNED": (0, 1, 2),
-    "XSYMM": (0, 4, 5),
-    "YSYMM": (1, 3, 5),
-    "ZSYMM": (2, 3, 4),
-    "XASYMM": (1, 2, 3),
-    "YASYMM": (0, 2, 4),
-    "ZASYMM": (0, 1, 5),
-}
-# read first, as the points that they name are known by these names then, and tables of materials need temperatures
-FIRST = {"COUPLING", "KINEMATIC", "DISTRIBUTING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "RIGID BODY",
-         "INITIAL CONDITIONS", "SURFACE INTERACTION", "CHANGE FRICTION", "FRICTION"}  # fmt: skip
 
 
 def read(path: Path) -> RawMesh:
@@ -40,8 +24,8 @@ def read(path: Path) -> RawMesh:
     if not raw.cells:
         return raw
     reader = _Cards(assembly, raw, row, number)
-    for card in sorted(assembly.cards, key=lambda card: card.name not in FIRST):  # the order is kept beyond that
-        reader.take(card)
+    for card, instance in sorted(assembly.cards, key=lambda item: item[0].name not in FIRST):  # order kept beyond that
+        reader.take(card, instance)
     return reader.finished()
 
 
@@ -54,18 +38,21 @@ class _Cards(MaterialCards):
     couplings: list[deck.Coupling] = field(default_factory=list)
     equations: list[deck.DeckEquation] = field(default_factory=list)
     forces: list[deck.Force] = field(default_factory=list)
-    pressures: list[deck.FacePressure] = field(default_factory=list)
+    pressures: dict[str, list[deck.FacePressure]] = field(default_factory=dict)
+    step_of: dict[Any, int] = field(default_factory=dict)  # of a load, or of the last card of a name with OP=NEW
     supports: list[deck.Support] = field(default_factory=list)
     unused: list[str] = field(default_factory=list)
     springs: list[deck.DeckSpring] = field(default_factory=list)
     steps: int = 0
-    frictions: dict[str, float] = field(default_factory=dict)  # of surface interactions
-    interaction: str = ""
     coupling: Card | None = None
 
-    def take(self, card: Card) -> None:
+    def take(self, card: Card, instance: str) -> None:
         """Use a card, or count it among those that are not used or refused."""
-        if card.name in TABLE.reads:
+        self.instance = instance
+        self.is_turned = bool(instance) and not np.allclose(self.assembly.moves[instance][0], np.eye(3))
+        if self.is_turned and card.name in DIRECTED:
+            self._refused(card, "in an instance that is turned")
+        elif card.name in TABLE.reads:
             getattr(self, "_" + card.name.lower().replace(" ", "_"))(card)
         else:
             self.skipped.skip(card.name)
@@ -87,9 +74,6 @@ class _Cards(MaterialCards):
             )
 
     def _equation(self, card: Card) -> None:
-        if "REMOVE" in card.options:
-            self._refused(card, "REMOVE")
-            return
         lines = iter(card.data)
         for line in lines:
             count, fields = card.integer(line[0]), [text for text in line[1:] if text]
@@ -102,12 +86,17 @@ class _Cards(MaterialCards):
                 (fields[i], card.integer(fields[i + 1]) - 1, card.number(fields[i + 2])) for i in range(0, 3 * count, 3)
             ]
             members = [self._rows(place, card) for place, _, _ in terms]
-            for i in range(max(map(len, members))):
-                node_rows = [rows[min(i, len(rows) - 1)] for rows in members]
+            counts = sorted({len(rows) for rows in members} | {len(members[0])})
+            if len(set(counts) - {1}) > 1 or (counts != [1] and len(members[0]) == 1):
+                raise Refusal(
+                    f"{card.where} pairs sets of {' and '.join(map(str, counts))} nodes: give them equally many"
+                )
+            for i in range(len(members[0])):
+                node_rows = [rows[i % len(rows)] for rows in members]
                 self.equations.append(
                     deck.DeckEquation(
                         tuple(
-                            (self._node(r), axis, value) for r, (_, axis, value) in zip(node_rows, terms, strict=True)
+                            (*self._dof(r, axis), value) for r, (_, axis, value) in zip(node_rows, terms, strict=True)
                         )
                     )
                 )
@@ -116,12 +105,6 @@ class _Cards(MaterialCards):
         self.coupling = card
 
     def _kinematic(self, card: Card) -> None:
-        self._couple("kinematic", card)
-
-    def _distributing(self, card: Card) -> None:
-        self._couple("distributing", card)
-
-    def _couple(self, kind: str, card: Card) -> None:
         head, self.coupling = self.coupling, None
         if head is None:
             raise Refusal(f"{card.where} needs a *COUPLING before it: add its head")
@@ -129,12 +112,14 @@ class _Cards(MaterialCards):
         self.couplings.append(
             deck.Coupling(
                 head.option("CONSTRAINTNAME") or f"coupling{len(self.couplings) + 1}",
-                kind,
+                card.name.lower(),
                 self._reference(head.option("REFNODE"), head),
                 self._place(head.option("SURFACE"), head, face=True),
                 tuple(axes) or (0, 1, 2, 3, 4, 5),
             )
         )
+
+    _distributing = _kinematic
 
     def _distributing_coupling(self, card: Card) -> None:
         nodes = [self._node(row) for line in card.data for row in self._rows(line[0], card)]
@@ -162,23 +147,42 @@ class _Cards(MaterialCards):
             self.couplings.append(deck.Coupling(name, "kinematic", point, self._place(line[0], card), axes))
 
     def _rigid_body(self, card: Card) -> None:
-        face = card.option("NSET", "TIENSET", "PINNSET")
-        if not face or card.option("ELSET") or card.option("ROTNODE"):
-            self._refused(card, "ROT NODE" if card.option("ROTNODE") else "ELSET")
-            return
         point = self._reference(card.option("REFNODE"), card)
-        name = f"rigid{len(self.couplings) + 1}"
-        self.couplings.append(deck.Coupling(name, "kinematic", point, self._place(face, card)))
+        of_point = self._rows(card.option("REFNODE"), card)[0]
+        if card.option("ROTNODE"):
+            self.rotations[self._rows(card.option("ROTNODE"), card)[0]] = of_point
+        sets = [card.options[key] for key in ("NSET", "TIENSET", "PINNSET") if key in card.options]
+        rows = {row for text in sets for row in self._rows(text, card)} - {of_point}
+        if not (rows or "ELSET" in card.options) or not self.solid[list(rows)].all():
+            self._refused(card, "of nodes that belong to no solid")
+        elif rows:
+            name = f"rigid{len(self.couplings) + 1}"
+            self.nodes[name] = np.array(sorted(rows))
+            face = self._place(sets[0], card) if len(sets) == 1 else name
+            self.couplings.append(deck.Coupling(name, "kinematic", point, face))
 
     # loads and supports
+
+    def _act(self, card: Card, entries: list[Any], item: Any) -> None:
+        """Add a load or support; with OP=NEW the first of a step ends those of earlier steps, else its like there."""
+        key = (card.name, item) if isinstance(item, deck.Support) else (card.name, replace(item, value=0.0))
+        if card.option("OP").upper() == "NEW" and self.step_of.get(card.name, 0) < self.steps:
+            entries.clear()
+            self.step_of[card.name] = self.steps
+        elif self.step_of.get(key, self.steps) < self.steps:
+            entries[:] = [other for other in entries if (card.name, replace(other, value=0.0)) != key]
+        self.step_of[key] = self.steps
+        entries.append(item)
 
     def _cload(self, card: Card) -> None:
         for line in card.data:
             if len(line) < 3:
                 raise Refusal(f"{card.where} needs node, direction and value: complete the line")
-            axis = card.integer(line[1]) - 1
+            places, first = self._places(line[0], card)
+            axis = card.integer(line[1]) - 1 + first
             if 0 <= axis <= 5:
-                self.forces.append(deck.Force(self._place(line[0], card), axis, card.number(line[2])))
+                for place in places:
+                    self._act(card, self.forces, deck.Force(place, axis, card.number(line[2])))
             else:
                 self._refused(card, f"direction {line[1]}")
 
@@ -188,24 +192,32 @@ class _Cards(MaterialCards):
             kind = (line[1] if len(line) > 1 else "").upper()
             value = card.number(line[3]) if len(line) > 3 and kind not in NAMED_SUPPORTS else 0.0
             axes = NAMED_SUPPORTS.get(kind) or tuple(_axes(card, line[1:3]))
+            if not kind:
+                raise Refusal(f"{card.where} names no direction of '{line[0]}': complete the line")
+            if self.is_turned and not {0, 1, 2} <= set(axes):
+                self._refused(card, "in an instance that is turned")
             rows = self._rows(line[0], card)
             if len(rows) == 1 and self.solid[rows[0]] and line[0].rpartition(".")[2].isdigit():
                 single.setdefault((axes, value), []).append(rows[0])
             else:
-                self._support(self._place(line[0], card), axes, value)
+                places, first = self._places(line[0], card)
+                for place in places:
+                    self._support(card, place, tuple(axis + first for axis in axes), value)
         for (axes, value), members in single.items():  # together: what lies between them is held too
             name = f"support {len(self.supports) + 1}"
             self.nodes[name] = np.unique(members)
-            self._support(name, axes, value)
+            self._support(card, name, axes, value)
 
-    def _support(self, place: str, axes: tuple[int, ...], value: float) -> None:
+    def _support(self, card: Card, place: str, axes: tuple[int, ...], value: float) -> None:
         turns = place in self.references.values()
-        self.supports += [deck.Support(place, axis, value) for axis in axes if axis < 3 or turns]
+        for axis in (axis for axis in axes if axis < 3 or turns):
+            self._act(card, self.supports, deck.Support(place, axis, value))
 
     def _dsload(self, card: Card) -> None:
         for line in card.data:
             if len(line) > 2 and line[1].upper() == "P":
-                self.pressures.append(deck.FacePressure(self._place(line[0], card, face=True), card.number(line[2])))
+                pressure = deck.FacePressure(self._place(line[0], card, face=True), card.number(line[2]))
+                self._act(card, self.pressures.setdefault(card.name, []), pressure)
             else:
                 self._refused(card, line[1].upper() if len(line) > 1 else "")
 
@@ -215,11 +227,12 @@ class _Cards(MaterialCards):
             if not (face[:1] == "P" and face[1:].isdigit()):
                 self._refused(card, face or "without a kind")
                 continue
-            name = f"pressed {len(self.pressures) + 1}"
+            name = f"pressed {len(self.faces) + 1}"
             corners = self._faces_of(line[0], int(face[1:]), card)
             if corners:
                 self.faces[name] = corners
-                self.pressures.append(deck.FacePressure(name, card.number(line[2])))
+                pressure = deck.FacePressure(name, card.number(line[2]))
+                self._act(card, self.pressures.setdefault(card.name, []), pressure)
 
     def _step(self, card: Card) -> None:
         self.steps += 1
@@ -231,26 +244,6 @@ class _Cards(MaterialCards):
                 slave, master = (self._place(name, card, face=True) for name in line)
                 friction = self.frictions.get(card.option("INTERACTION").upper())
                 self.contacts.append(deck.DeckTie(" on ".join(line), slave, master, friction=friction))
-
-    def _surface_interaction(self, card: Card) -> None:
-        self.interaction = card.option("NAME").upper()
-
-    _change_friction = _surface_interaction  # has no name: what a step changes is not taken
-
-    def _friction(self, card: Card) -> None:
-        """The coefficient of an interaction where it is one for all; other kinds of friction are not taken."""
-        other = {"ANISOTROPIC", "EXPONENTIALDECAY", "DEPENDENCIES", "USER", "ROUGH"} & card.options.keys()
-        if self.interaction and len(card.data) == 1 and not other:
-            self.frictions[self.interaction] = card.number(card.data[0][0])
-
-    def _initial_conditions(self, card: Card) -> None:
-        if card.option("TYPE").upper() == "TEMPERATURE":
-            self.skipped.ignored["*INITIAL CONDITIONS, TEMPERATURE"] += 1
-            for line in (line for line in card.data if len(line) > 1):
-                with suppress(Refusal):  # of nodes that the deck has not: no table is taken at a temperature then
-                    self.warm[self._rows(line[0], card)] = card.number(line[1])
-        else:
-            self._refused(card, card.option("TYPE").upper())
 
     # the end
 
@@ -265,7 +258,7 @@ class _Cards(MaterialCards):
             tuple(self.equations),
             tuple(self._springs()),
             tuple(self.forces),
-            tuple(self.pressures),
+            tuple(pressure for pressures in self.pressures.values() for pressure in pressures),
             tuple(self.supports),
             tuple(self._masses()),
         )
@@ -276,9 +269,10 @@ class _Cards(MaterialCards):
         for name, rows in named.items():
             if len(rows) == 1 and not solid[rows[0]]:
                 points.setdefault(name, self.raw.points[rows[0]])
-        nodes = {name: rows for name, rows in named.items() if name not in points}
-        unused = list(self.unused)
-        unused += self.skipped.unused()
+        used = np.array(list(self.references), dtype=int)  # points, which have no part in a group of solids
+        nodes = {name: rows[~np.isin(rows, used) | solid[rows]] for name, rows in named.items() if name not in points}
+        nodes = {name: rows for name, rows in nodes.items() if len(rows)}
+        unused = [*self.unused, *self.skipped.unused()]
         notes = [f"the loads and supports of {self.steps} steps are taken together"] if self.steps > 1 else []
         return replace(
             self.raw,
@@ -294,8 +288,8 @@ class _Cards(MaterialCards):
     def _springs(self) -> Iterator[deck.DeckSpring]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
             for card in scope.springs:
-                if not card.data or {"NONLINEAR", "ORIENTATION"} & set(card.options):
-                    self._refused(card, ", ".join({"NONLINEAR", "ORIENTATION"} & set(card.options)) or "no stiffness")
+                if not card.data:
+                    self._refused(card, "no stiffness")
                     continue
                 axes = [card.integer(text) - 1 for line in card.data[:-1] for text in line if text]
                 for where, label in self.assembly.elements(card.option("ELSET"), instance):
@@ -309,7 +303,7 @@ class _Cards(MaterialCards):
                         ]
                     else:
                         terms = [(r, axis, s) for r, axis, s in zip(rows, axes, (1.0, -1.0), strict=False)]
-                    terms_of_nodes = tuple((self._node(r), axis, float(factor)) for r, axis, factor in terms if factor)
+                    terms_of_nodes = tuple((*self._dof(r, axis), float(factor)) for r, axis, factor in terms if factor)
                     yield deck.DeckSpring(terms_of_nodes, card.number(card.data[-1][0]))
 
     def _masses(self) -> Iterator[deck.PointMass]:
@@ -325,4 +319,6 @@ def _axes(card: Card, fields: list[str]) -> range:
     numbers = [card.integer(text) for text in fields if text]
     if not numbers:
         return range(0)
-    return range(numbers[0] - 1, min(numbers[-1] if len(numbers) > 1 else numbers[0], 6))
+    if not 1 <= numbers[0] <= numbers[-1]:
+        raise Refusal(f"{card.where} names the directions {numbers[0]} to {numbers[-1]}: count up from 1")
+    return range(numbers[0] - 1, min(numbers[-1], 6))

@@ -1,8 +1,7 @@
 """Materials of an Abaqus or CalculiX deck: constants, and the directions of the bodies made of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,11 +18,12 @@ class MaterialCards(DeckPlaces):
     """Cards of materials and sections.
 
     materials : name in capitals -> material; material : name of the one whose cards follow
-    warm : (n_point,) initial temperature of each point, NaN where none is given
-    """
+    warm : (n_point,) initial temperature of each point, NaN where none is given"""
 
     materials: dict[str, deck.DeckMaterial] = field(default_factory=dict)
     material: str = ""
+    frictions: dict[str, float] = field(default_factory=dict)  # of surface interactions
+    interaction: str = ""
     warm: np.ndarray = field(default_factory=lambda: np.empty(0))  # initial temperature of each point
 
     def __post_init__(self) -> None:
@@ -46,14 +46,13 @@ class MaterialCards(DeckPlaces):
             self._give(card, engineering=engineering_constants(values))
         elif kind.startswith("ANISO") and (values := self._row(card, 21, 3)):
             self._give(card, stiffness=anisotropic(values))
-        else:
+        elif kind.startswith(("ISO", "ENGINEERING", "ORTHO", "ANISO")):
             self._refused(card, kind)
 
     def _row(self, card: Card, count: int, lines: int) -> list[float]:
         """So many constants, each row on so many lines with its temperature behind it; none where they are not there.
 
-        Several rows are taken at the initial temperature, and refused where that is not one for all
-        """
+        Several rows are taken at the initial temperature, and refused where that is not one for all"""
         rows = [[card.number(text) for line in card.data[i : i + lines] for text in line]
                 for i in range(0, len(card.data), lines)]  # fmt: skip
         if not rows or len(rows[0]) < count:
@@ -64,6 +63,7 @@ class MaterialCards(DeckPlaces):
         if len(at) < len(rows) or not (np.diff(at) > 0).all() or np.ptp(warm) != 0:
             self._refused(card, "at several temperatures")
             return rows[0][:count]
+        self._give(card, tabulated=(*self.materials[self.material].tabulated, f"*{card.name}"))
         return [float(np.interp(warm[0], at, column)) for column in list(zip(*rows, strict=False))[:count]]
 
     def _density(self, card: Card) -> None:
@@ -71,15 +71,31 @@ class MaterialCards(DeckPlaces):
             self._give(card, density=values[0])
 
     def _expansion(self, card: Card) -> None:
-        if card.option("TYPE").upper() in ("", "ISO") and (values := self._row(card, 1, 1)):
+        if values := self._row(card, 1, 1):
             self._give(card, expansion=values[0])
-        else:
-            self._refused(card, card.option("TYPE").upper())
 
     def _give(self, card: Card, **values: object) -> None:
         if self.material not in self.materials:
             raise Refusal(f"{card.where} stands before any *MATERIAL: move it below its material")
         self.materials[self.material] = replace(self.materials[self.material], **values)  # type: ignore[arg-type]
+
+    def _surface_interaction(self, card: Card) -> None:
+        self.interaction = card.option("NAME").upper()
+
+    _change_friction = _surface_interaction  # has no name: what a step changes is not taken
+
+    def _friction(self, card: Card) -> None:
+        """The coefficient of an interaction where it is one for all; other kinds of friction are not taken."""
+        other = {"ANISOTROPIC", "EXPONENTIALDECAY", "DEPENDENCIES", "USER", "ROUGH"} & card.options.keys()
+        if self.interaction and len(card.data) == 1 and not other:
+            self.frictions[self.interaction] = card.number(card.data[0][0])
+
+    def _initial_conditions(self, card: Card) -> None:
+        if card.option("TYPE").upper() == "TEMPERATURE":
+            self.skipped.ignored["*INITIAL CONDITIONS, TEMPERATURE"] += 1
+            for line in (line for line in card.data if len(line) > 1):
+                with suppress(Refusal):  # of nodes that the deck has not: no table is taken at a temperature then
+                    self.warm[self._rows(line[0], card)] = card.number(line[1])
 
     def _with_groups(self) -> Iterator[deck.DeckMaterial]:
         groups: dict[str, dict[str, Directions | None]] = {}
@@ -87,7 +103,6 @@ class MaterialCards(DeckPlaces):
             for card in scope.sections:
                 elset, material = card.option("ELSET"), card.option("MATERIAL")
                 if "COMPOSITE" in card.options:
-                    self._refused(card, "COMPOSITE")
                     continue
                 if material.upper() not in self.materials:
                     raise Refusal(
@@ -112,7 +127,6 @@ class MaterialCards(DeckPlaces):
         if card is None:
             raise Refusal(f"{section.where} names the orientation '{name}', which the deck has not: add it")
         if card.option("DEFINITION").upper() not in ("", "COORDINATES") or not card.data:
-            self._refused(card, card.option("DEFINITION").upper())
             return None
         turn, shift = self.assembly.moves.get(instance, (np.eye(3), np.zeros(3)))
         local = np.eye(3)
@@ -136,7 +150,6 @@ class MaterialCards(DeckPlaces):
             other_axis = np.eye(3)[np.abs(pole).argmin()]
             system = replace(System.of_points(kind.lower(), points[0], points[1], points[0] + other_axis), turn=local)
         else:
-            self._refused(card, kind)
             return None
         return system.transformed(turn, shift)
 

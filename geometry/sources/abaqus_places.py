@@ -1,14 +1,11 @@
 """Names of an Abaqus or CalculiX deck as groups of its mesh: faces, node sets, single nodes and reference points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from tribodyn.geometry.sources.abaqus import DeckAssembly, Node
 from tribodyn.geometry.sources.abaqus_sets import chosen_elements
-from tribodyn.geometry.sources.card_table import CardTable, SkippedCards
 from tribodyn.geometry.sources.keywords import Card
 from tribodyn.geometry.sources.raw_mesh import RawMesh
 from tribodyn.refusal import Refusal
@@ -21,7 +18,8 @@ class DeckPlaces:
     row : node -> row of the points of `raw`; number : element -> its number
     nodes, faces : groups that are made for cards; references : row of a reference point -> its name
     solid : (n_point,) whether a point belongs to a solid element
-    """
+    instance, is_turned : in which the card stands that is read, and whether it is turned
+    rotations : row of a node whose displacements are rotations -> the row of the point that they turn"""
 
     assembly: DeckAssembly
     raw: RawMesh
@@ -30,10 +28,13 @@ class DeckPlaces:
     nodes: dict[str, np.ndarray] = field(default_factory=dict)
     faces: dict[str, list[np.ndarray]] = field(default_factory=dict)
     references: dict[int, str] = field(default_factory=dict)
-    skipped: SkippedCards = field(default_factory=lambda: SkippedCards(TABLE, "*"))
+    rotations: dict[int, int] = field(default_factory=dict)
     solid: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool))
+    instance: str = ""
+    is_turned: bool = False
 
     def __post_init__(self) -> None:
+        self.skipped = self.assembly.skipped
         self.solid = np.zeros(len(self.raw.points), dtype=bool)
         for block in self.raw.cells:
             self.solid[block.nodes] = True
@@ -46,14 +47,34 @@ class DeckPlaces:
         """Refuse a card, or one form of it."""
         self.skipped.refuse(f"*{card.name}{form and ', '}{form}")
 
+    def _qualified(self, text: str) -> str:
+        """A name with the instance in which the card stands."""
+        instance, name = self.assembly.split(text, self.instance)
+        return f"{instance}.{name}" if instance else name
+
     def _rows(self, text: str, card: Card) -> list[int]:
+        """Points of a node or a set in its order."""
         try:
-            members = self.assembly.nodes(text)
-            return sorted(self.row[node] for node in members)
+            rows = [self.row[node] for node in self.assembly.ordered_nodes(self._qualified(text))]
         except KeyError:
             raise Refusal(
                 f"{card.where} names '{text}', which is no node and no set of the deck: correct the name or add the set"
             ) from None
+        if not rows:
+            raise Refusal(f"{card.where} names the set '{text}', which is empty: fill it, or take the line out")
+        return rows
+
+    def _dof(self, row: int, axis: int) -> tuple[str, int]:
+        """Group and axis of a displacement of one node, or of the rotation that it stands for."""
+        return self._node(self.rotations.get(row, row)), axis + 3 * (row in self.rotations)
+
+    def _places(self, text: str, card: Card) -> tuple[list[str], int]:
+        """Groups of the nodes of a set: its nodes of solids together, its points each by itself; and the first axis."""
+        rows = self._rows(text, card)
+        if len(rows) == 1 and rows[0] in self.rotations:
+            return [self._node(self.rotations[rows[0]])], 3
+        points = [row for row in rows if not self.solid[row]] if len(rows) > 1 else []
+        return [*([self._place(text, card)] if len(points) < len(rows) else []), *map(self._node, points)], 0
 
     def _node(self, row: int) -> str:
         """Group of one node."""
@@ -69,6 +90,7 @@ class DeckPlaces:
 
     def _place(self, text: str, card: Card, face: bool = False) -> str:
         """Name of the group that a card means: a face, a node set, or a group of one node that is made for it."""
+        text = self._qualified(text)
         names = [*self.raw.faces, *self.raw.nodes] if face else [*self.raw.nodes, *self.raw.faces]
         for name in names:
             if name.upper() == text.upper():
@@ -86,7 +108,7 @@ class DeckPlaces:
 
     def _has(self, text: str) -> bool:
         try:
-            return bool(self.assembly.nodes(text))
+            return bool(self.assembly.nodes(self._qualified(text)))
         except KeyError:
             return False
 
@@ -94,13 +116,16 @@ class DeckPlaces:
         rows = self._rows(text, card)
         if len(rows) != 1:
             raise Refusal(f"{card.where} needs one reference node, '{text}' has {len(rows)}: name one node")
-        name = self.references.get(rows[0]) or (f"node {text}" if text.replace(".", "").isdigit() else text)
+        text = self._qualified(text)
+        name = self.references.get(rows[0]) or (
+            f"node {text}" if text.rpartition(".")[2].isdigit() else text  # as the label of a node is written
+        )
         self.references[rows[0]] = name
         return name
 
     def _faces_of(self, text: str, face: int, card: Card) -> list[np.ndarray]:
         try:
-            element_keys = self.assembly.elements(text)
+            element_keys = self.assembly.elements(self._qualified(text))
         except KeyError:
             element_keys = []
         solids = np.array([self.number[key] for key in element_keys if key in self.number], dtype=int)
@@ -109,28 +134,3 @@ class DeckPlaces:
         if not face_corners:
             self._refused(card, f"on '{text}', which is no solid element")
         return face_corners
-
-
-TABLE: CardTable = CardTable(
-    read="""NODE, ELEMENT, NSET, ELSET, SURFACE, SOLID SECTION, PART, END PART, INSTANCE, END INSTANCE, ASSEMBLY,
-        END ASSEMBLY, INCLUDE, SYSTEM, ORIENTATION, DISTRIBUTION, MATERIAL, ELASTIC, DENSITY, EXPANSION, MASS, SPRING,
-        TIE, EQUATION, COUPLING, KINEMATIC, DISTRIBUTING, KINEMATIC COUPLING, DISTRIBUTING COUPLING, RIGID BODY, CLOAD,
-        BOUNDARY, DSLOAD, DLOAD, INITIAL CONDITIONS, STEP, CONTACT PAIR, SURFACE INTERACTION, CHANGE FRICTION,
-        FRICTION""",
-    silent="""HEADING, PREPRINT, RESTART, OUTPUT, NODE OUTPUT, ELEMENT OUTPUT, CONTACT OUTPUT, ENERGY OUTPUT,
-        NODE PRINT, NODE FILE, EL PRINT, EL FILE, CONTACT PRINT, CONTACT FILE, END STEP, MONITOR, PRINT, ENERGY PRINT,
-        SECTION PRINT, FILE FORMAT""",
-    harmless={
-        "the step is the scene's": """STATIC, FREQUENCY, DYNAMIC, BUCKLE, VISCO, STEADY STATE DYNAMICS, MODAL DYNAMIC,
-            RANDOM RESPONSE, RESPONSE SPECTRUM, COMPLEX FREQUENCY, HEAT TRANSFER, SUBSTRUCTURE GENERATE,
-            SUBSTRUCTURE MATRIX OUTPUT, SUBSTRUCTURE LOAD CASE, RETAINED NODAL DOFS, SELECT EIGENMODES, AMPLITUDE,
-            MATRIX GENERATE, MATRIX OUTPUT, CONTROLS, SOLUTION TECHNIQUE, TIME POINTS, SECTION CONTROLS,
-            HOURGLASS STIFFNESS, DISTRIBUTION TABLE, PHYSICAL CONSTANTS, USER OUTPUT, FILTER, NORMAL""",
-        "damping is the scene's": "DAMPING, MODAL DAMPING, GLOBAL DAMPING, DAMPING CONTROLS",
-        "bodies are elastic": "PLASTIC, CREEP, CYCLIC HARDENING, RATE DEPENDENT, CONDUCTIVITY, SPECIFIC HEAT",
-        "contact is the scene's": """SURFACE BEHAVIOR, CONTACT, CONTACT INCLUSIONS,
-            CONTACT EXCLUSIONS, CONTACT PROPERTY ASSIGNMENT, CONTACT CONTROLS, CONTACT CONTROLS ASSIGNMENT,
-            CONTACT FORMULATION, CONTACT INITIALIZATION ASSIGNMENT, CONTACT INITIALIZATION DATA, CONTACT DAMPING,
-            CLEARANCE, GAP CONDUCTANCE, SURFACE PROPERTY ASSIGNMENT""",
-    },
-)

@@ -1,7 +1,5 @@
 """Sets and surfaces of an Abaqus or CalculiX deck as groups of its mesh."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +14,7 @@ from tribodyn.geometry.sources.abaqus import (
     DeckAssembly,
     Node,
     Scope,
+    formulation,
     solid_node_count,
 )
 from tribodyn.geometry.sources.raw_mesh import NOTHING, VOLUMES, Cells, RawMesh
@@ -25,8 +24,7 @@ from tribodyn.refusal import Refusal
 def raw_of(assembly: DeckAssembly) -> tuple[RawMesh, dict[Node, int], dict[Node, int]]:
     """Mesh, sets and surfaces of a deck, lengths as in the file, the row of each node and the number of each solid.
 
-    Raises  Refusal: an element that names a node that is not there
-    """
+    Raises  Refusal: an element that names a node that is not there"""
     scopes = {**assembly.instances, "": assembly.top}
     row: dict[Node, int] = {}
     points: list[np.ndarray] = []
@@ -37,7 +35,7 @@ def raw_of(assembly: DeckAssembly) -> tuple[RawMesh, dict[Node, int], dict[Node,
             row |= {(name, label): start + i for i, label in enumerate(scope.nodes)}
             points.append(np.array(list(scope.nodes.values())) @ turn.T + shift)
     number: dict[Node, int] = {}
-    by_kind: dict[str, list[tuple[Node, list[int]]]] = {}
+    by_kind: dict[str, list[tuple[Node, list[int], str]]] = {}
     other: Counter[str] = Counter()
     for name, scope in scopes.items():
         for label, (kind, nodes) in scope.elements.items():
@@ -47,7 +45,7 @@ def raw_of(assembly: DeckAssembly) -> tuple[RawMesh, dict[Node, int], dict[Node,
                 continue
             try:
                 by_kind.setdefault(SOLIDS[count], []).append(
-                    ((name, label), [row[name, node] for node in nodes[:count]])
+                    ((name, label), [row[name, node] for node in nodes[:count]], formulation(kind))
                 )
             except KeyError as missing:
                 raise Refusal(
@@ -56,10 +54,11 @@ def raw_of(assembly: DeckAssembly) -> tuple[RawMesh, dict[Node, int], dict[Node,
                 ) from None
     blocks = []
     for kind, elements in by_kind.items():
-        number |= {key: len(number) + i for i, (key, _) in enumerate(elements)}
-        table = np.array([members for _, members in elements])
+        number |= {key: len(number) + i for i, (key, *_) in enumerate(elements)}
+        table = np.array([members for _, members, _ in elements])
         table = table[:, HEXAHEDRON_27] if kind == "hexahedron27" else table
-        blocks.append(Cells(kind, table, np.array([key[1] for key, _ in elements])))
+        forms = [form for *_, form in elements] if kind == "hexahedron" else ()
+        blocks.append(Cells(kind, table, np.array([key[1] for key, *_ in elements]), forms))
     if not blocks:
         return NOTHING, row, number
     refused = {
@@ -109,7 +108,7 @@ class _Sets:
                 self._elset(before + scope.names[key], self._try(self.assembly.elements, key, instance, "element set"))
             for key in scope.nsets:
                 self._nset(before + scope.names[key], self._try(self.assembly.nodes, key, instance, "node set"))
-            for key, (kind, items) in scope.surfaces.items():
+            for key, (kind, items) in sorted(scope.surfaces.items(), key=lambda surface: surface[1][0] == "UNION"):
                 self._surface(before + scope.names[key], kind, items, instance)
 
     def _try(self, resolve: Callable[[str, str], list[Node]], key: str, instance: str, label: str) -> list[Node]:
@@ -137,10 +136,18 @@ class _Sets:
             members = [node for item, _ in items for node in self._try(self.assembly.nodes, item, instance, "surface")]
             self._nset(name, members)
             return
-        if kind != "ELEMENT":
-            self.unused.append(f"surface '{name}' of type {kind}")
-            return
         corners: list[np.ndarray] = []
+        if kind == "UNION":
+            before = f"{instance}." if instance else ""
+            for item in (item for pair in items for item in pair if item):
+                united = next((key for key in (*self.faces, *self.nodes) if key.upper() == (before + item).upper()), "")
+                if united in self.faces:
+                    corners += self.faces[united]
+                elif united:
+                    self.nodes[name] = np.union1d(self.nodes.get(name, self.nodes[united]), self.nodes[united])
+                else:
+                    self.unused.append(f"surface '{item}' of the union '{name}', which the deck has not")
+            items = []
         for item, face in items:
             members = self._try(self.assembly.elements, item, instance, f"surface '{name}'")
             numbers = np.array([self.number[key] for key in members if key in self.number], dtype=int)

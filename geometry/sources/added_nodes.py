@@ -3,10 +3,7 @@
 A deck that joins or holds a face by equations names the nodes it has. Where a face is computed with more of them, those
 between would stay free. An added node of the surface gets an equation where all nodes between which it lies have one
 of the same axes and factors, and where each further displacement is of the same node in all of them, or of nodes
-between which another added one lies: then the equation is the mean of theirs.
-"""
-
-from __future__ import annotations
+between which another added one lies: then the equation is the mean of theirs."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping

@@ -1,19 +1,18 @@
 """ANSYS archives (.cdb): nodes, elements, components, materials, local systems, supports, forces, equations.
 
-Bricks with nodes that coincide are the tetrahedra, prisms and pyramids that they stand for.
-"""
+Bricks with nodes that coincide are the tetrahedra, prisms and pyramids that they stand for."""
 
-from __future__ import annotations
-
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from tribodyn import text_file
 from tribodyn.geometry.sources import deck
 from tribodyn.geometry.sources.ansys_mesh import ArchiveMesh, euler_axes
-from tribodyn.geometry.sources.card_table import CardTable, SkippedCards, words
+from tribodyn.geometry.sources.card_table import CardTable, SkippedCards, fields_of, words
 from tribodyn.geometry.sources.directions import ElementAxes, System
 from tribodyn.geometry.sources.raw_mesh import LabelledMesh, RawMesh, Terms
 from tribodyn.refusal import Refusal
@@ -26,7 +25,7 @@ _PAIRS = ("XY", "XZ", "YZ")
 
 def read(path: Path) -> RawMesh:
     """Read an archive. Raises Refusal: one sentence that names the block and the cure."""
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    lines = [line.text for line in text_file.lines_of(path)]
     return _Archive(path, lines, LabelledMesh(SkippedCards(TABLE))).read_all()
 
 
@@ -37,8 +36,7 @@ class _Archive(ArchiveMesh):
     i : the next line; types, options : of elements, by the number of their kind; constants : of materials by name
     systems : local ones; of_solids : volume group -> its material and local system; node_axes : node -> its axes
     equations : by number, and the number of the last; alike : set of CP -> its first node
-    loads : on nodes, along axes that may be turned
-    """
+    loads : on nodes, along axes that may be turned"""
 
     constants: dict[int, dict[str, float]] = field(default_factory=dict)
     systems: dict[int, System] = field(default_factory=dict)
@@ -50,18 +48,21 @@ class _Archive(ArchiveMesh):
     def read_all(self) -> RawMesh:
         """The mesh with everything that the commands give."""
         while self.i < len(self.lines):
-            words = [word.strip() for word in self.lines[self.i].split(",")]
+            words = [word.strip() for word in self.lines[self.i].split("!")[0].split(",")]
             name = words[0].upper()
             self.i += 1
             if name in READ:
+                self.mesh.skipped.check_fields(name, words[1:])
                 try:
-                    READ[name](self, words + [""] * 12)
+                    READ[name](self, words + [""] * 20)
                 except ValueError as trouble:
                     raise Refusal(
                         str(trouble)
                         if str(self.path) in str(trouble)
                         else f"'{self.path}' has a broken {name} at line {self.i}: {trouble}: write it again"
                     ) from None
+            elif name in ALWAYS and NOTHING.fullmatch(",".join(words[1:])):
+                continue
             elif (name[:1].isalpha() and "=" not in name) or name.startswith(("/INPUT", "*")):
                 self.mesh.skipped.skip(name)
         for material, system in self.of_solids.values():
@@ -137,6 +138,8 @@ class _Archive(ArchiveMesh):
                 self.mesh.skipped.refuse("LOCAL, an elliptic system")
         else:
             self._system(int(words[1]), words[2], words[3:6], words[6:9])
+            if any(value not in (0.0, 1.0) for value in _floats(words[9:11])):
+                self.mesh.skipped.refuse("LOCAL, an elliptic system")
 
     def _system(self, number: int, kind: str, origin: list[str], angles: list[str]) -> None:
         kind_number = int(kind or 0)
@@ -148,27 +151,34 @@ class _Archive(ArchiveMesh):
     # supports, loads, equations
 
     def d(self, words: list[str]) -> None:
-        """A support of a node, of a component or of all nodes."""
-        label = words[2].upper()
-        axes = tuple(range(6)) if label == "ALL" else (_AXES[label],) if label in _AXES else ()
-        members = self._members(words[1])
-        if not axes or not members:
-            self.mesh.skipped.refuse(f"D, {label if members else words[1]}")
-        for node in members:
+        """Supports of nodes along up to six directions."""
+        labels = [label.upper() for label in (words[2], *words[7:12]) if label]
+        unknown = [label for label in labels if label not in (*_AXES, "ALL")]
+        axes = range(6) if "ALL" in labels else [_AXES[label] for label in labels if label in _AXES]
+        for node in self._nodes(words, unknown):
             self.mesh.hold(node, axes, float(words[3] or 0))
 
     def f(self, words: list[str]) -> None:
-        """A force or a moment on a node, of a component or of all nodes."""
+        """A force or a moment on nodes."""
         label = words[2].upper()
-        members = self._members(words[1])
-        if label not in _FORCES or not members:
-            self.mesh.skipped.refuse(f"F, {label if members else words[1]}")
-        self.loads += [(node, _FORCES[label], float(words[3] or 0)) for node in members if label in _FORCES]
+        nodes = self._nodes(words, [] if label in _FORCES else [label])
+        self.loads += [(node, _FORCES[label], float(words[3] or 0)) for node in nodes if label in _FORCES]
 
-    def _members(self, text: str) -> list[int]:
-        if text.upper() == "ALL":
-            return list(self.mesh.points)
-        return [int(text)] if text.isdigit() else self.mesh.node_sets.get(text, [])
+    def _nodes(self, words: list[str], unknown: list[str]) -> list[int]:
+        """Nodes of a support or force: ALL, a component, or a node and those up to NEND in steps of NINC."""
+        text, last, step = words[1].upper(), words[5], int(words[6] or 1)
+        if text == "ALL":
+            nodes = list(self.mesh.points)
+        elif text.isdigit():
+            nodes = [
+                n for n in range(int(text), int(last or text) + 1, abs(step) or 1) if n in self.mesh.points or not last
+            ]
+        else:
+            nodes = self.mesh.node_sets.get(words[1], [])
+        if unknown or not nodes or float(words[4] or 0):
+            wrong = unknown[0] if unknown else f"{words[4]}, an imaginary part" if nodes else words[1]
+            self.mesh.skipped.refuse(f"{words[0].upper()}, {wrong}")
+        return nodes
 
     def ce(self, words: list[str]) -> None:
         """An equation, or more terms of it."""
@@ -216,7 +226,8 @@ READ: dict[str, Callable[[_Archive, list[str]], None]] = {
     "EBLOCK": _Archive.eblock,
     "CMBLOCK": _Archive.cmblock,
     "ET": _Archive.et,
-    **dict.fromkeys(("KEYOPT", "KEYOP"), _Archive.keyopt),
+    "ETBLOCK": _Archive.etblock,
+    **dict.fromkeys(("KEYOPT", "KEYOP", "KEYO"), _Archive.keyopt),
     **dict.fromkeys(("MP", "MPDATA"), _Archive.mp),
     "CSYS": _Archive.csys,
     "LOCAL": _Archive.local,
@@ -225,18 +236,32 @@ READ: dict[str, Callable[[_Archive, list[str]], None]] = {
     "CE": _Archive.ce,
     "CP": _Archive.cp,
 }
+FIELDS = fields_of("""NBLOCK: (NUMFIELD), (Solkey), (NDMAX), NDSEL; N: NODE, X, Y, Z, THXY, THYZ, THZX;
+    EBLOCK: (NUM_NODES), Solkey, (NDMAX), (Count); CMBLOCK: Cname, Entity, NUMITEMS, , , , (KOPT);
+    ET: ITYPE, Ename, KOP1, KOP2, KOP3, KOP4, KOP5, KOP6, (INOPR); ETBLOCK: NUM, (MAXNUM);
+    KEYOPT KEYOP KEYO: ITYPE, KNUM, VALUE; MP: Lab, MAT, C0, C1, C2, C3, C4;
+    MPDATA: (version), (count), Lab, MAT, (STLOC), C1, C2, C3, C4, C5, C6; CSYS: KCN;
+    LOCAL: KCN, KCS, XC, YC, ZC, THXY, THYZ, THZX, PAR1, PAR2;
+    D: NODE, Lab, VALUE, VALUE2, NEND, NINC, Lab2, Lab3, Lab4, Lab5, Lab6; F: NODE, Lab, VALUE, VALUE2, NEND, NINC;
+    CE: NEQN, CONST, NODE1, Lab1, C1, NODE2, Lab2, C2, NODE3, Lab3, C3; CP: NSET, Lab, NODE1, ...""")
+ALWAYS = words("ACEL, OMEGA, DOMEGA, CGLOC, CGOMEGA, DCGOMG, IRLF, KUSE, BFUNIF, EN, *IF")  # what archives always have
+NOTHING = re.compile(r"[0.E+ ,-]*|TEMP,_TINY|R5.5,ATTR,-1,?|_CDRDOFF,EQ,1,THEN", re.IGNORECASE)  # what these then say
 TABLE = CardTable(
     read=", ".join(READ),
-    silent="""FINISH, NUMOFF, DOF, MPTEMP, EXTOPT, ETBLOCK, SHPP, *IF, *ENDIF, *SET, *GET, *ELSE, ERESX, MAT, TYPE,
+    fields=FIELDS,
+    silent="""FINISH, NUMOFF, DOF, MPTEMP, EXTOPT, SHPP, *ENDIF, *SET, *DIM,
+        *GET, *ELSE, CSCIR, ERESX, MAT, TYPE,
         REAL, SECNUM, ESYS, ALLSEL, TREF, TOFFST""",
     harmless={
-        "the step is the scene's": """ANTYPE, MODOPT, MXPAND, NSUBST, TIME, OUTRES, OUTPR, KBC, AUTOTS, DELTIM, EQSLV,
+        "the step is the scene's": """MODCONTROL, QRDOPT, DMPOPT, TIMINT,
+            ANTYPE, MODOPT, MXPAND, NSUBST, TIME, OUTRES, OUTPR, KBC, AUTOTS, DELTIM, EQSLV,
             NLGEOM, LUMPM, PSTRES, SSTIF, NROPT, HARFRQ, HROPT, HROUT, TRNOPT, TINTP, CNVTOL, PRED, LNSRCH, NEQIT, NCNV,
             SOLVE, SAVE, RESUME, RESCONTROL, TUNIF, CUTCONTROL, OPNCONTROL, SOLCONTROL, MONITOR, LSWRITE, ADAPT""",
         "damping is the scene's": """ALPHAD, BETAD, DMPRAT, DMPSTR, MDAMP, MP ALPD, MP BETD, MP DMPR, MP DMPS, MP DAMP,
             MP SDMP""",
         "contact is the scene's": "MP MU",
-        "bodies are elastic": """MP KXX, MP KYY, MP KZZ, MP C, MP HF, MP EMIS, MP REFT, MP ENTH, MP RSVX, MP RSVY,
+        "bodies are elastic": """STEF, THOPT, EMUNIT, CRPLIM,
+            MP KXX, MP KYY, MP KZZ, MP C, MP HF, MP EMIS, MP REFT, MP ENTH, MP RSVX, MP RSVY,
             MP RSVZ, MP PERX, MP MURX, MP SONC, MP VISC""",
         "real constants and sections of what is no solid": "R, RLBLOCK, RMODIF, SECTYPE, SECDATA, SECBLOCK, SECCONTROL",
     },

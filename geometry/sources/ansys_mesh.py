@@ -1,13 +1,12 @@
 """The mesh of an ANSYS archive: nodes, elements and components, in blocks of fixed width or by commands.
 
-Bricks with nodes that coincide are the tetrahedra, prisms and pyramids that they stand for.
-"""
-
-from __future__ import annotations
+Bricks with nodes that coincide are the tetrahedra, prisms and pyramids that they stand for."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -20,9 +19,10 @@ from tribodyn.refusal import Refusal
 class ArchiveMesh:
     """Blocks and commands of an archive that make its mesh.
 
-    i : the next line; types, options : of elements, by the number of their kind
-    of_solids : volume group -> its material and local system; node_axes : node -> its axes
-    """
+    i : the next line
+    types : number of an element type -> ANSYS's element, such as 186; options : of it, by the number of the KEYOPT
+    of_solids : volume group -> number of its material, of its local system
+    node_axes : node -> its axes (3, 3), where they are turned"""
 
     path: Path
     lines: list[str]
@@ -34,108 +34,126 @@ class ArchiveMesh:
     node_axes: dict[int, np.ndarray] = field(default_factory=dict)
 
     def nblock(self, words: list[str]) -> None:
-        """Nodes, and where they are turned their angles."""
-        width, count, wide = self._widths()
-        while self.i < len(self.lines) and not self.lines[self.i].lstrip().startswith(("N,", "-1")):
-            line = self.lines[self.i]
-            try:
-                starts = range(width * count, len(line.rstrip()), wide)
-                self._node(int(line[:width]), [float(line[k : k + wide].strip() or 0) for k in starts])
-            except ValueError:
-                raise Refusal(
-                    f"'{self.path}' has a broken node at line {self.i + 1}: '{line.strip()[:40]}': write it again"
-                ) from None
-            self.i += 1
-        if self.i == len(self.lines):
-            raise Refusal(f"'{self.path}' ends inside its nodes (NBLOCK): the file is cut off")
-        self.i += 1
+        """Nodes: a number, integers of the solid model, x, y, z and the angles of turned axes."""
+        for row in self._rows("NBLOCK", words[4]):
+            self._node(int(row[0]), [value for value in row if isinstance(value, float)])
 
     def n(self, words: list[str]) -> None:
-        """A node by a command of its own."""
+        """A node by a command; the end of a block of nodes is one without a number."""
         if words[1].isdigit():
             self._node(int(words[1]), [float(word or 0) for word in words[2:8]])
 
     def _node(self, label: int, values: list[float]) -> None:
         x, y, z, *angles = (values + [0.0] * 6)[:6]
-        self.mesh.points[label] = [x, y, z]
+        self.mesh.point(label, [x, y, z])
         if any(angles):
             self.node_axes[label] = euler_axes(angles)
 
     def eblock(self, words: list[str]) -> None:
-        """Elements."""
+        """Elements: eleven numbers, the ninth how many nodes follow; what has no room goes on in the next line."""
         if words[2].upper() != "SOLID":
             self.mesh.skipped.refuse(f"EBLOCK, {words[2]}")
             return
-        width, _, _ = self._widths()
-        while self.i < len(self.lines) and self.lines[self.i].strip() != "-1":
-            head = self._numbers(width)
-            if len(head) < 11:
-                raise Refusal(f"'{self.path}' has a broken element at line {self.i}: the file is cut off")
-            nodes, count = head[11:], head[8]
-            while len(nodes) < count and self.i < len(self.lines):
-                nodes += self._numbers(width)
-            kind = self.types.get(head[1], head[1])
-            if head[1] in self.types and kind not in SOLID_TYPES:
-                self._no_solid(head[1], kind)
+        rows = (list(map(int, row)) for row in self._rows("EBLOCK"))
+        for row in rows:
+            while len(row) < 11 or len(row) < 11 + row[8]:
+                row += next(rows, []) or self._end("EBLOCK")
+            material, number, _, _, system, death, _, _, count, _, label, *nodes = row
+            kind = self.types.get(number, number)
+            if kind not in SOLID_TYPES:
+                self._no_solid(number, kind)
                 continue
-            if kind in LAYERED and self.options.get(head[1], {}).get(3) == "1":
+            if kind in LAYERED and self.options.get(number, {}).get(3) == "1":
                 self.mesh.skipped.refuse(f"layered elements of type {kind}")
+            if death:
+                self.mesh.skipped.refuse("EBLOCK, elements that are dead")
             shape, members = _solid(nodes[:count])
-            name = f"material {head[0]}" + (f" in system {head[4]}" if head[4] else "")
-            self.of_solids[name] = head[0], head[4]
-            self.mesh.solid(shape, head[10], members, name)
-        if self.i == len(self.lines):
-            raise Refusal(f"'{self.path}' ends inside its elements (EBLOCK): the file is cut off")
-        self.i += 1
+            if kind == 185:
+                technology = self.options.get(number, {}).get(2, "0")
+                self.mesh.formulations[label] = SOLID185.get(technology, "linear_incompatible")
+            name = f"material {material}" + (f" in system {system}" if system else "")
+            self.of_solids[name] = material, system
+            self.mesh.solid(shape, label, members, name)
 
     def _no_solid(self, number: int, kind: int) -> None:
-        """An element that is none of a solid: of no effect here, or refused."""
+        """An element of another kind: named as of no effect here, or refused."""
         options = self.options.get(number, {})
         glued = any(options.get(key) in values for key, values in BONDED.items())
         if kind in HARMLESS_TYPES or (kind in CONTACT_TYPES and not glued):
             self.mesh.skipped.ignored[f"elements of type {kind}"] += 1
         else:
-            self.mesh.skipped.refuse(f"elements of type {kind}{', bonded' if glued else ''}")
+            unknown = "" if number in self.types else ", which no ET names"
+            self.mesh.skipped.refuse(f"elements of type {kind}{', bonded' if glued else unknown}")
 
     def cmblock(self, words: list[str]) -> None:
-        """A component; a negative number ends a range."""
-        width, _, _ = self._widths()
+        """A component: numbers of nodes or elements; a negative one ends a range."""
+        columns, count = self._columns(), int(words[3])
         items: list[int] = []
-        while len(items) < int(words[3].split()[0]):
-            if self.i == len(self.lines):
-                raise Refusal(f"'{self.path}' ends inside a component (CMBLOCK): the file is cut off")
-            items += self._numbers(width)
+        while len(items) < count:
+            items += map(int, self._row("CMBLOCK", columns))
         members: list[int] = []
         for item in items:
             members += [item] if item > 0 else range(members[-1] + 1, -item + 1)
         (self.mesh.node_sets if words[2].upper().startswith("NODE") else self.mesh.volumes)[words[1]] = members
 
-    def _widths(self) -> tuple[int, int, int]:
-        """Width of an integer, integers on a line, width of a number, from a line such as (3i9,6e21.13e3)."""
-        line = self.lines[self.i].strip() if self.i < len(self.lines) else ""
-        layout = re.match(r"\((\d+)[iI](\d+)(?:,\s*\d+[eE](\d+))?", line)
-        if layout is None:
-            raise Refusal(f"'{self.path}' has a block with the format '{line}': expected one as (3i9,6e21.13e3)")
-        self.i += 1
-        return int(layout[2]), int(layout[1]), int(layout[3] or 0)
-
-    def _numbers(self, width: int) -> list[int]:
-        """Whole numbers of the next line."""
-        line = self.lines[self.i].rstrip()
-        self.i += 1
-        try:
-            return [int(line[k : k + width]) for k in range(0, len(line), width)]
-        except ValueError:
-            raise Refusal(f"'{self.path}' has a broken element at line {self.i}: the file is cut off") from None
+    def etblock(self, words: list[str]) -> None:
+        """Element types: their number, ANSYS's element and its options."""
+        for number, kind, *options in self._rows("ETBLOCK", words[1]):
+            self.et(["", f"{number}", f"{kind}"])
+            self.options[int(number)] = {key: f"{value}" for key, value in enumerate(options, 1) if value}
 
     def et(self, words: list[str]) -> None:
-        """Kind of elements of a number."""
+        """An element type: its number, ANSYS's element and options."""
         self.types[int(words[1])] = int(re.sub(r"\D", "", words[2]) or 0)
         self.options[int(words[1])] = {key: word for key, word in enumerate(words[3:9], 1) if word}
 
     def keyopt(self, words: list[str]) -> None:
-        """An option of such a kind."""
+        """An option of an element type."""
         self.options.setdefault(int(words[1]), {})[int(words[2])] = words[3]
+
+    def _rows(self, block: str, count: str = "") -> Iterator[list[float]]:
+        """The lines of a block as numbers; it ends with -1 or, of nodes, a command N.
+
+        count : how many lines the block says it has, "" where it does not say"""
+        columns, start = self._columns(), self.i
+        while not self.lines[self.i : self.i + 1] or not self.lines[self.i].lstrip().startswith(("-1", "N,")):
+            yield self._row(block, columns)
+        if count.isdigit() and int(count) != self.i - start:
+            raise Refusal(f"{block} of '{self.path}' has {self.i - start} lines of {count}: write the file again")
+        self.i += 1
+
+    def _row(self, block: str, columns: list[tuple[int, int, type]]) -> list[float]:
+        """The numbers of the next line, integers and reals as its columns are; blanks are zeros."""
+        if self.i == len(self.lines):
+            self._end(block)
+        line = self.lines[self.i].rstrip()
+        self.i += 1
+        try:
+            if not line or len(line) > columns[-1][1]:
+                raise ValueError("empty or too long")
+            return [number(line[start:end].strip() or 0) for start, end, number in columns if start < len(line)]
+        except ValueError:
+            raise Refusal(
+                f"'{self.path}' has a broken {block} at line {self.i}: '{line.strip()[:40]}': write it again"
+            ) from None
+
+    def _end(self, block: str) -> NoReturn:
+        raise Refusal(f"'{self.path}' ends inside a block ({block}): the file is cut off")
+
+    def _columns(self) -> list[tuple[int, int, type]]:
+        """Start, end and kind of the columns of a block, from a line such as (1i7,2i9,6e21.13e3)."""
+        line = "".join(self.lines[self.i : self.i + 1]).strip()
+        fields = re.findall(r"(\d*)([a-zA-Z])(\d+)(?:\.\d+(?:[eE]\d+)?)?(?=[,)])", line)
+        kinds = {"i": int, "a": int, "e": float, "g": float, "f": float}
+        columns: list[tuple[int, int, type]] = []
+        for repeat, kind, width in fields:
+            for _ in range(int(repeat or 1) if kind.lower() in kinds else 0):
+                start = columns[-1][1] if columns else 0
+                columns.append((start, start + int(width), kinds[kind.lower()]))
+        if not columns or line.count(",") + 1 != len(fields):
+            raise Refusal(f"'{self.path}' has a block with the format '{line}': expected one as (3i9,6e21.13e3)")
+        self.i += 1
+        return columns
 
 
 # equal corners of a brick I..P -> (kind, its corners, its edge nodes) among the twenty nodes
@@ -146,6 +164,7 @@ _BRICK = ("hexahedron", list(range(8)), list(range(8, 20)))
 _SECOND = {"tetra": "tetra10", "wedge": "wedge15", "pyramid": "pyramid13", "hexahedron": "hexahedron20"}
 SOLID_TYPES = {5, 45, 62, 64, 65, 69, 70, 72, 73, 87, 90, 92, 95, 96, 147, 148, 168, 185, 186, 187, 225, 226, 227}
 SOLID_TYPES |= {278, 279, 285, 291}
+SOLID185 = {"0": "linear_bbar", "1": "linear_reduced"}  # by its option 2; others are enhanced strains
 HARMLESS_TYPES = {154: "they carry loads", 169: "contact", 170: "contact", 200: "they only mesh"}
 CONTACT_TYPES = range(171, 179)
 LAYERED = (185, 186)  # by their option 3

@@ -1,21 +1,16 @@
 """Shapes of CAD programs (STEP, IGES, BREP) -> tetrahedra of second order.
 
 Solids become bodies under the names that the STEP file gives them. Faces are groups "face N" by their number in the CAD
-file. Solids that touch stay apart, each with its own mesh, so that a contact can lie between them.
-"""
-
-from __future__ import annotations
+file. Solids that touch stay apart, each with its own mesh, so that a contact can lie between them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.geometry.sources import msh
-from tribodyn.geometry.sources.raw_mesh import RawMesh
 from tribodyn.refusal import Refusal
 
 ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
@@ -28,8 +23,7 @@ class Sizes:
     bodies : name of a solid -> size; faces : number of a face -> size there
     only : name of the one solid that is meshed, None for all
     along : elements on the longest edge of the box where no size is asked for
-    around : elements around a full turn of a curved face, down to the least size over `finest`
-    """
+    around : elements around a full turn of a curved face, down to the least size over `finest`"""
 
     everywhere: float | None = None
     bodies: Mapping[str, float] = field(default_factory=dict)
@@ -40,18 +34,19 @@ class Sizes:
     finest: int = 4
 
 
-def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
-    """Mesh a CAD file. Lengths keep the unit of the file: Gmsh does not convert them.
+def content(path: str, **sizes: Any) -> dict[str, Any]:
+    """Mesh a CAD file; see `msh.of_session`. Lengths keep the unit of the file: Gmsh does not convert them.
 
-    Raises  Refusal: a file that cannot be read, has no solid or cannot be meshed, a size for what is not there
-    """
+    sizes : the fields of `Sizes`, its numbers of faces as texts
+    Raises  Refusal: a file that cannot be read, has no solid or cannot be meshed, a size for what is not there"""
+    faces = {int(number): size for number, size in sizes.pop("faces", {}).items()}
     with session() as gmsh:
         shapes = _solids(gmsh, path)
-        return _meshed(gmsh, path, shapes, sizes or Sizes())
+        return _meshed(gmsh, path, shapes, Sizes(**sizes, faces=faces))
 
 
-def default_size(path: Path) -> float:
-    """Size of the elements where none is asked for, in the unit of the file; raises Refusal as `read` does."""
+def default_size(path: str) -> float:
+    """Size of the elements where none is asked for, in the unit of the file; raises Refusal as `content` does."""
     with session() as gmsh:
         _solids(gmsh, path)
         return _default_size(gmsh.model, Sizes())
@@ -62,12 +57,12 @@ def _default_size(model: Any, sizes: Sizes) -> float:
     return float(np.ptp(box, axis=0).max()) / sizes.elements_per_edge
 
 
-def _solids(gmsh: Any, path: Path) -> dict[str, int]:
+def _solids(gmsh: Any, path: str) -> dict[str, int]:
     """Import the solids of a file: name -> tag."""
     gmsh.option.setString("Geometry.OCCTargetUnit", "")
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
     try:
-        gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
+        gmsh.model.occ.importShapes(path, highestDimOnly=True)
         gmsh.model.occ.synchronize()
     except Exception as problem:
         raise Refusal(f"CAD file '{path}' cannot be read ({one_line(problem)}): export it again as STEP") from None
@@ -82,7 +77,7 @@ def _solids(gmsh: Any, path: Path) -> dict[str, int]:
     return names
 
 
-def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> RawMesh:
+def _meshed(gmsh: Any, path: str, shapes: Mapping[str, int], sizes: Sizes) -> dict[str, Any]:
     model = gmsh.model
     faces = {tag for _, tag in model.getEntities(2)}
     for kind, size_table, existing in (("solid", sizes.bodies, shapes), ("face", sizes.faces, faces)):
@@ -134,9 +129,8 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         ) from None
     for name, tag in shapes.items():
         model.addPhysicalGroup(3, [tag], name=name)
-    raw = msh.from_gmsh(gmsh)
     note = f"meshed with elements of {everywhere:.4g} in the unit of the file, tetrahedra of second order"
-    return replace(raw, notes=(note,))
+    return msh.of_session(gmsh) | {"notes": [note]}
 
 
 def one_line(problem: Exception) -> str:

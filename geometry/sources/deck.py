@@ -2,8 +2,7 @@
 
 Every place is the name of a group of the source: a node set, a surface or a reference point. Where a card names a bare
 node number, the source gets a node set "node N". Values are in SI units: a file in millimetres is taken to count in N,
-mm, t and s, as decks do.
-"""
+mm, t and s, as decks do."""
 
 from __future__ import annotations
 
@@ -20,8 +19,8 @@ class DeckMaterial:
     """young, poisson : isotropic, [Pa] and [-], or None; density [kg/m3], expansion [1/K] : None where not given;
     engineering : (E1, E2, E3, nu12, nu13, nu23, G12, G13, G23) of an orthotropic one, or None;
     stiffness : (6, 6) of an anisotropic one, stresses 11, 22, 33, 23, 13, 12, or None;
-    groups : volume groups made of it; directions : of these, those whose axes are not x, y, z -> its axes
-    """
+    tabulated : cards that give constants at several temperatures, of which those at the initial one are taken
+    groups : volume groups made of it; directions : of these, those whose axes are not x, y, z -> its axes"""
 
     name: str
     young: float | None = None
@@ -30,6 +29,7 @@ class DeckMaterial:
     expansion: float | None = None
     engineering: tuple[float, ...] | None = None
     stiffness: tuple[tuple[float, ...], ...] | None = None
+    tabulated: tuple[str, ...] = ()
     groups: tuple[str, ...] = ()
     directions: Mapping[str, Directions] = field(default_factory=dict)
 
@@ -38,8 +38,7 @@ class DeckMaterial:
 class DeckTie:
     """Two faces glued, or that may touch, as the deck calls them.
 
-    tolerance : of glued ones [m]; friction : of ones that may touch; None where the deck leaves it
-    """
+    tolerance : of glued ones [m]; friction : of ones that may touch; None where the deck leaves it"""
 
     name: str
     slave: str
@@ -52,8 +51,7 @@ class DeckTie:
 class Coupling:
     """A face carried by a point: kind "kinematic" (rigid) or "distributing" (mean motion, loads shared).
 
-    point : name of the reference point; axes : those coupled, 0, 1, 2 displacements along x, y, z, 3, 4, 5 rotations
-    """
+    point : name of the reference point; axes : those coupled, 0, 1, 2 displacements along x, y, z, 3, 4, 5 rotations"""
 
     name: str
     kind: str
@@ -73,8 +71,7 @@ class DeckEquation:
 class DeckSpring:
     """A stiffness [N/m] against the elongation sum of factor * displacement; terms as of an equation.
 
-    Rotations are counted with a length of 1 m; a spring of rotations alone has [N m]
-    """
+    Rotations are counted with a length of 1 m; a spring of rotations alone has [N m]"""
 
     terms: tuple[tuple[str, int, float], ...]
     stiffness: float
@@ -101,8 +98,7 @@ class FacePressure:
 class Support:
     """A displacement [m] (axis 0..2) or rotation [rad] (axis 3..5) that is given, 0 for held.
 
-    system : along whose directions, None for x, y, z
-    """
+    system : along whose directions, None for x, y, z"""
 
     group: str
     axis: int
@@ -127,8 +123,7 @@ class PointMass:
 def stiffness(upper: list[float], order: Sequence[int]) -> tuple[tuple[float, ...], ...]:
     """(6, 6) of an anisotropic material from the 21 values of its upper triangle, row by row.
 
-    order : position in the file of each of our stresses 11, 22, 33, 23, 13, 12
-    """
+    order : position in the file of each of our stresses 11, 22, 33, 23, 13, 12"""
     full = np.zeros((6, 6))
     full[np.triu_indices(6)] = upper
     full += np.triu(full, 1).T

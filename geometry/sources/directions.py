@@ -28,8 +28,7 @@ class Directions(Protocol):
 def orthogonal(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """(..., 3, 3) rows: along the first vector, in the plane of both, and normal to it.
 
-    Raises  Refusal where the two are parallel
-    """
+    Raises  Refusal where the two are parallel"""
     third = np.cross(first, second)
     size = np.linalg.norm(third, axis=-1)
     if not (size > 1e-9 * np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)).all():
@@ -45,8 +44,7 @@ class System:
     axes : (3, 3) rows x, y, z of its own; angles count from x towards y, the axis of a cylinder and the pole are z
     kind : "rectangular"; "cylindrical": radial, tangential, axial; "spherical": radial, tangential about the pole,
         along the meridian; "nastran spherical": radial, along the meridian away from the pole, tangential
-    turn : (3, 3) rows that the local directions are turned to, seen in themselves
-    """
+    turn : (3, 3) rows that the local directions are turned to, seen in themselves"""
 
     kind: str
     origin: np.ndarray
@@ -72,8 +70,7 @@ class System:
         """Points (n, 3) of coordinates (n, 3): x, y, z; r, angle, z; or r and two angles, all in degrees.
 
         The angles of "spherical" are the longitude and the latitude, those of "nastran spherical" the angle from the
-        pole and the longitude.
-        """
+        pole and the longitude."""
         local = np.array(coordinates, dtype=float)
         if self.kind != "rectangular":
             r, a, b = local[:, 0], np.radians(local[:, 1]), np.radians(local[:, 2])
@@ -109,8 +106,7 @@ class System:
 class ElementAxes:
     """Directions that a file lists by element or node; the nearest centre counts, or the mean of equally near ones.
 
-    centres : (n, 3); rows : (n, 3, 3)
-    """
+    centres : (n, 3); rows : (n, 3, 3)"""
 
     centres: np.ndarray
     rows: np.ndarray

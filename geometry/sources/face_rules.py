@@ -1,9 +1,6 @@
 """Select faces of a body by rule: within a box, nearest to a point, by their normal, by their numbers in a CAD file.
 
-Only facets of the boundary are selected.
-"""
-
-from __future__ import annotations
+Only facets of the boundary are selected."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,8 +18,7 @@ class FacetRule:
     """Which facets of the boundary belong to a face: those that satisfy all that is given.
 
     box : two corners [m], within which all corners of a facet lie; nearest : (3,) point [m] whose nearest smooth face
-    is taken; normal : (3,) along which the facets look to `within` [rad]; numbers : of faces of a CAD file
-    """
+    is taken; normal : (3,) along which the facets look to `within` [rad]; numbers : of faces of a CAD file"""
 
     box: tuple[Sequence[float], Sequence[float]] | None = None
     nearest: Sequence[float] | None = None
@@ -67,8 +63,7 @@ def add_faces(
 ) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh and its node sets with a face for each rule.
 
-    Raises  Refusal, naming the face, where it picks nothing or has the name of a group that is there
-    """
+    Raises  Refusal, naming the face, where it picks nothing or has the name of a group that is there"""
     boundaries, sets = dict(mesh.boundaries or {}), dict(node_sets)
     for name, rule in rules.items():
         if name in sets or name in boundaries:
@@ -116,8 +111,7 @@ def by_number(mesh: Any, numbers: Sequence[int]) -> np.ndarray:
 def nearest(mesh: Any, point: Sequence[float], *among: np.ndarray) -> np.ndarray:
     """The smooth face nearest to a point [m]: its nearest facet and all that go on from it without an edge.
 
-    among : sets of facets that the nearest one belongs to
-    """
+    among : sets of facets that the nearest one belongs to"""
     facets, _, normal = outline(mesh)
     edges = mesh.f2e[:, facets]
     owner: dict[int, list[int]] = {}

@@ -1,20 +1,21 @@
 """Any file that holds a mesh or a shape -> its bodies, in metres.
 
-The kind of a file is recognised by its ending; each reader gives a `RawMesh`, and everything after that is common.
-"""
-
-from __future__ import annotations
+The kind of a file is recognised by its ending, an ANSYS archive under .dat or .inp by its commands; each reader gives a
+`RawMesh`, and everything after that is common."""
 
 import importlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry.sources import cad, solid_body
+from tribodyn import text_file
+from tribodyn.consent import require_consent
+from tribodyn.geometry.sources import cad, foreign_process, solid_body
 from tribodyn.geometry.sources.deck import Deck, in_si
-from tribodyn.geometry.sources.raw_mesh import COMMON_NAMES, VOLUMES, RawMesh
+from tribodyn.geometry.sources.raw_mesh import COMMON_NAMES, VOLUMES, Cells, RawMesh
 from tribodyn.geometry.sources.solid_body import SolidBody
 from tribodyn.refusal import Refusal
 
@@ -33,7 +34,10 @@ READERS = {
     **dict.fromkeys(cad.ENDINGS, "cad"),
     ".geo": "drawing",
 }
+FOREIGN = ("msh", "meshio_files", "cad", "drawing")  # modules that call parsers of other projects, in a child process
 ENDINGS = tuple(READERS)
+DISPLACED = "supports with a displacement"
+APDL = re.compile(r"(?im)^\s*(/(batch|prep7|com|nopr|title|units)\b|(nblock|eblock|et),)")  # what ANSYS writes
 
 
 @dataclass(frozen=True)
@@ -46,8 +50,8 @@ class Source:
     notes : sentences on conversions of the file; order_notes : on elements of first order, raised to second order
     unused : clauses that name unused content
     refused : name -> clause; content that is not read but would change stiffness, mass, support or load
-    counts : group of nodes -> body -> how many of its nodes the file lists there, before edge nodes were added
-    """
+    formulations : body of 8-node hexahedra whose file names it -> how it computes them, see `fem.elasticity`
+    counts : group of nodes -> body -> how many of its nodes the file lists there, before edge nodes were added"""
 
     bodies: Mapping[str, SolidBody]
     deck: Deck
@@ -57,6 +61,7 @@ class Source:
     unused: tuple[str, ...] = ()
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
+    formulations: Mapping[str, str] = field(default_factory=dict)
 
 
 def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> Source:
@@ -64,8 +69,7 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
 
     path : its ending determines the format; unit : of length in the file, "m", "mm", "in", ...
     sizes : of the elements of a CAD file, in its unit
-    Raises  Refusal: one sentence that names the file and the cure
-    """
+    Raises  Refusal: one sentence that names the file and the cure"""
     raw = read_raw(path, unit, sizes)
     parts = solid_body.bodies(raw)
     built = {name: solid_body.build(raw, elements) for name, elements in parts.items()}
@@ -74,8 +78,12 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
         for group, rows in raw.nodes.items()
     }
     unused = (*raw.unused, *missing_groups(raw, built))
-    remarks = conversion_notes(raw, built), order_notes(raw)
-    return Source(built, raw.deck, raw.points_of_reference, *remarks, unused, counts, raw.refused)
+    forms, mixed = formulations(raw, parts)
+    remarks = (*conversion_notes(raw, built), *mixed), order_notes(raw)
+    refused = dict(raw.refused)
+    if displaced := sum(support.value != 0 for support in raw.deck.supports):
+        refused[DISPLACED] = f"{displaced} of its {DISPLACED}, which a scene gives as [prescribed.NAME]"
+    return Source(built, raw.deck, raw.points_of_reference, *remarks, unused, counts, refused, forms)
 
 
 def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> RawMesh:
@@ -94,20 +102,46 @@ def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) 
     if sizes is not None and ending not in cad.ENDINGS:
         raise Refusal(f"mesh file '{path}' is meshed already: element sizes are for CAD files")
     try:
-        raw = _reader(ending)(file) if sizes is None else cad.read(file, sizes)
+        is_archive = ending in (".dat", ".inp") and APDL.search(text_file.open_text(file).read(10_000))
+        raw = _raw(file, "ansys" if is_archive else READERS[ending], sizes)
     except (IndexError, KeyError) as problem:
         where = f"near {problem.args[0]!r}" if isinstance(problem, KeyError) else "in the middle of a line"
         raise Refusal(f"mesh file '{path}' cannot be read {where}: it is cut off or broken, write it again") from None
     if not raw.cells:
         raise Refusal(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
+    used = np.concatenate([block.nodes.ravel() for block in raw.cells])
+    if used.min() < 0 or used.max() >= len(raw.points) or not np.isfinite(raw.points).all():
+        raise Refusal(f"mesh file '{path}' has elements or nodes without a place: it is broken, write it again")
+    _refuse_duplicates(raw, path)
     return in_metres(raw, *UNITS[unit])
 
 
-def _reader(ending: str) -> Callable[[Path], RawMesh]:
-    """The function that reads files of an ending; `read` of its module."""
-    module = importlib.import_module(f"tribodyn.geometry.sources.{READERS[ending]}")
-    function: Callable[[Path], RawMesh] = module.read
-    return function
+def _refuse_duplicates(raw: RawMesh, path: str | Path) -> None:
+    """Raise Refusal, which names two elements of the same corners: mass and stiffness would count twice."""
+    for n_corner in sorted({VOLUMES[cells.kind][0].corners for cells in raw.cells}):
+        blocks = [cells for cells in raw.cells if VOLUMES[cells.kind][0].corners == n_corner]
+        corners = np.sort(np.vstack([cells.nodes[:, :n_corner] for cells in blocks]), axis=1)
+        order = np.lexsort(corners.T)
+        equal = np.flatnonzero((corners[order[1:]] == corners[order[:-1]]).all(axis=1))
+        if len(equal):
+            labels = np.concatenate([cells.labels for cells in blocks])[order[[equal[0], equal[0] + 1]]]
+            raise Refusal(
+                f"{len(equal)} elements of mesh file '{path}' have the same corners as another, such as "
+                f"{labels.min()} and {labels.max()}: take one of each two out, mass and stiffness would count twice"
+            )
+
+
+def _raw(file: Path, reader: str, sizes: cad.Sizes | None) -> RawMesh:
+    """What the module of a reader makes of a file."""
+    if reader not in FOREIGN:
+        raw: RawMesh = importlib.import_module(f"tribodyn.geometry.sources.{reader}").read(file)
+        return raw
+    if is_script := reader == "drawing":
+        require_consent(file)
+    options = {} if sizes is None else asdict(sizes)
+    fields = foreign_process.call(reader, "content", file, is_script, **options)
+    cells, skins = [Cells(*block) for block in fields.pop("cells")], frozenset(fields.pop("skins", ()))
+    return RawMesh(cells=cells, skins=skins, **fields)
 
 
 def in_metres(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
@@ -117,6 +151,20 @@ def in_metres(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
     points = {name: metre * point for name, point in raw.points_of_reference.items()}
     scaled_deck = in_si(raw.deck, metre, newton)
     return replace(raw, points=metre * raw.points, points_of_reference=points, deck=scaled_deck)
+
+
+def formulations(raw: RawMesh, parts: Mapping[str, np.ndarray]) -> tuple[dict[str, str], list[str]]:
+    """The formulation of each body of 8-node hexahedra alone: that of most of its elements; notes where they differ."""
+    of_element = np.array([form for cells in raw.cells for form in cells.formulations or [""] * len(cells.nodes)])
+    names = {name: np.unique(of_element[elements], return_counts=True) for name, elements in parts.items()}
+    chosen = {name: str(forms[counts.argmax()]) for name, (forms, counts) in names.items() if "" not in forms}
+    notes = [
+        f"{counts.sum() - counts.max()} of {counts.sum()} hexahedra of {name} have another formulation than the most: "
+        f"all are computed as {chosen[name]}"
+        for name, (_, counts) in names.items()
+        if name in chosen and len(counts) > 1
+    ]
+    return chosen, notes
 
 
 def missing_groups(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:

@@ -1,7 +1,5 @@
 """Elements with all nodes of second order, and how they are cut into tetrahedra."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,8 +21,7 @@ _REFERENCE_CORNERS = {
 class Full:
     """Elements of one solid with all second-order nodes: corners, edges, quadrilateral faces, middle of a hexahedron.
 
-    rows : (n, k) rows of the file's points, -1 for a node that the file has not; points : (n, k, 3)
-    """
+    rows : (n, k) rows of the file's points, -1 for a node that the file has not; points : (n, k, 3)"""
 
     solid: Solid
     rows: np.ndarray
@@ -40,8 +37,7 @@ def supports(solid: Solid) -> list[tuple[int, ...]]:
 def full(cells: Cells, points: np.ndarray) -> Full:
     """Complete the nodes of elements; what is added does not change their shape.
 
-    Source  serendipity shape functions at the middle of a face: corners -1/4, edges 1/2; of a hexahedron: -1/4, 1/4
-    """
+    Source  serendipity shape functions at the middle of a face: corners -1/4, edges 1/2; of a hexahedron: -1/4, 1/4"""
     solid, has_edges, has_quads, has_middle = VOLUMES[cells.kind]
     n, n_corner, n_edge = len(cells.nodes), solid.corners, len(solid.edges)
     roles = supports(solid)
@@ -104,7 +100,9 @@ def tetrahedra(elements: Full) -> Pieces:
         return uncut(elements)
     corner_rows = elements.rows[:, : solid.corners]
     lowest = corner_rows.argmin(axis=1)
-    mirrored = _volume(elements.points[:, : solid.corners], solid).sum() < 0  # as VTK's prisms are
+    step = [1, 2, 3] if solid.corners in (4, 6) else [1, 3, 4]  # edges at the first corner
+    edges = elements.points[:, step] - elements.points[:, :1]
+    mirrored = np.linalg.det(edges).sum() < 0  # as VTK's prisms are
     place = {frozenset(support): i for i, support in enumerate(supports(solid))}
     parents, locals_ = [], []
     for apex in range(solid.corners):
@@ -149,9 +147,3 @@ def _ten_nodes(solid: Solid, corners: tuple[int, ...], place: dict[frozenset[int
             on = next(place[frozenset(quad)] for quad in (*solid.quads, tuple(range(8))) if ends <= set(quad))
         middles.append(on)
     return np.array([*corners, *middles])
-
-
-def _volume(corners: np.ndarray, solid: Solid) -> np.ndarray:
-    """Signed volume (n,) of the parallelepiped at the first corner, whose sign is the orientation of the numbering."""
-    step = {4: [1, 2, 3], 6: [1, 2, 3]}.get(solid.corners, [1, 3, 4])
-    return np.asarray(np.linalg.det(corners[:, step] - corners[:, :1]))

@@ -1,12 +1,16 @@
 """The text of an Abaqus or CalculiX deck as a list of cards."""
 
-from __future__ import annotations
-
+import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import Line, lines_of, numbers_of
+
+WITH_INPUT = ("INCLUDE", "NODE", "ELEMENT", "EQUATION", "DISTRIBUTION", "INITIAL CONDITIONS")
+_QUOTED_COMMA = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')  # commas between names, not within quotes
 
 
 @dataclass(frozen=True)
@@ -14,8 +18,7 @@ class Card:
     """One keyword with its data.
 
     name : in capitals, without the star; options : key in capitals -> value, "" for a flag
-    data : the data lines, split at commas; file, line : where it stands
-    """
+    data : the data lines, split at commas; file, line : where it stands"""
 
     name: str
     options: dict[str, str]
@@ -33,10 +36,10 @@ class Card:
 
     def number(self, text: str) -> float:
         """A number as decks write it, 0 where it is left out."""
-        try:
-            return float(text.upper().replace("D", "E") or 0.0)
-        except ValueError:
-            raise Refusal(f"{self.where} expects a number, got '{text}': correct the line") from None
+        (value,) = numbers_of([text.upper().replace("D", "E") or "0"]) or [math.nan]
+        if not math.isfinite(value):
+            raise Refusal(f"{self.where} expects a number, got '{text}': correct the line")
+        return value
 
     def integer(self, text: str) -> int:
         """A whole number."""
@@ -51,46 +54,58 @@ class Card:
         return f"card *{self.name} at line {self.line} of '{self.file}'"
 
 
-def cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[Card]:
+def cards(path: Path) -> Iterator[Card]:
     """All cards of a deck in order; the cards of an included file stand in place of its *INCLUDE.
 
-    within : files that include this one
-    Raises  Refusal: an included file that is not there, or data before the first card
-    """
-    if path.resolve() in within:
-        raise Refusal(f"deck '{path}' includes itself: take the *INCLUDE out")
+    Raises  Refusal: an included file that is not there, or data before the first card"""
     card: Card | None = None
-    pending = ""
-    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
-        text = line.strip()
-        if not text or text.startswith("**"):
-            continue
-        if text.startswith("*") or pending:
-            pending += text
-            if pending.endswith(","):
+    for line in lines_of(path, "**", _continues, _included_name):
+        text = line.text.strip()
+        if text.startswith("*"):
+            following = _card(text, line)
+            if following.name == "INCLUDE":  # its lines may be data of the card before
+                if not following.option("INPUT"):
+                    raise Refusal(f"{following.where} names no file: give INPUT")
                 continue
             if card is not None:
                 yield card
-            card, pending = _card(pending, path, number), ""
-            if card.name == "INCLUDE":
-                other = path.parent / card.option("INPUT").strip("\"'")
-                if not other.is_file():
-                    raise Refusal(f"{card.where} names the file '{other.name}', which does not exist: put it there")
-                yield from cards(other, (*within, path.resolve()))
-                card = None
+            card = following
         elif card is None:
-            raise Refusal(f"deck '{path}' has data at line {number} before any card: it is no deck of Abaqus")
+            raise Refusal(f"deck '{path}' has data at line {line.number} before any card: it is no deck of Abaqus")
         else:
-            card.data.append([field.strip() for field in text.rstrip(",").split(",")])
+            card.data.append(_fields(text.rstrip(",")))
     if card is not None:
         yield card
 
 
-def _card(text: str, path: Path, line: int) -> Card:
-    name, *options_text = text[1:].split(",")
+def _card(text: str, line: Line) -> Card:
+    name, *options_text = _QUOTED_COMMA.split(text[1:])
     options = {}
     for item in options_text:
         key, _, value = item.partition("=")
         if key.strip():
-            options["".join(key.upper().split())] = value.strip().strip('"')
-    return Card(" ".join(name.upper().split()), options, [], path.name, line)
+            options["".join(key.upper().split())] = _unquoted(value)
+    return Card(" ".join(name.upper().split()), options, [], line.file.name, line.number)
+
+
+def _fields(text: str) -> list[str]:
+    """The fields of a data line."""
+    return [_unquoted(field) for field in (_QUOTED_COMMA.split(text) if '"' in text else text.split(","))]
+
+
+def _unquoted(text: str) -> str:
+    """A name without quotes; of one that is a number they tell it from a label."""
+    name = text.strip()
+    return name if name.strip('"').isdigit() else name.replace('"', "")
+
+
+def _continues(line: str) -> bool:
+    """Whether a line with a keyword goes on in the next."""
+    return line.lstrip()[:1] == "*" and line.rstrip()[-1:] == ","
+
+
+def _included_name(line: str) -> str:
+    """File of an *INCLUDE, or with the data of another card."""
+    if line.lstrip()[:1] == "*" and (card := _card(line.strip(), Line(line, Path(), 0))).name in WITH_INPUT:
+        return card.option("INPUT").strip("'")
+    return ""

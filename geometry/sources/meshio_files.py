@@ -1,34 +1,38 @@
 """Mesh files that meshio reads: VTK and MED."""
 
-from __future__ import annotations
-
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from tribodyn.geometry.sources.raw_mesh import SURFACES, VOLUMES, Cells, RawMesh
+from tribodyn.geometry.sources.raw_mesh import SURFACES, VOLUMES
 from tribodyn.refusal import Refusal
 
-MOST_VALUES = 100  # an array of integers with more different values is a number, not a group
 
-
-def read(path: Path) -> RawMesh:
-    """Read a mesh file; meshio knows its format by the ending. Raises Refusal: it cannot be read."""
+def content(path: str) -> dict[str, Any]:
+    """The fields of the RawMesh of a file; meshio knows its format by the ending. Raises Refusal: it cannot be read."""
     import meshio  # 85 modules, of which few scenes need one
     from meshio._mesh import topological_dimension
 
     topological_dimension.update({kind: 3 for kind in VOLUMES})  # meshio 5.3.5 forgets wedge15 and pyramid13
     try:
+        if path.endswith(".med"):
+            from tribodyn.hdf5_file import opened_hdf5
+
+            with opened_hdf5(Path(path)):  # refuses one that names other files
+                pass
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             file = meshio.read(path)
+    except Refusal:
+        raise
     except (Exception, SystemExit) as problem:  # the readers raise what they meet, and where none fits meshio exits
         message = "" if isinstance(problem, SystemExit) else " ".join(str(problem).split())
         reason = f" ({message})" if message else ""
         raise Refusal(f"mesh file '{path}' cannot be read{reason}: write it as a Gmsh file, MSH 4.1") from None
     names: dict[int, list[str]] = getattr(file, "cell_tags", None) or {}
-    cells: list[Cells] = []
+    cells: list[tuple[str, np.ndarray, np.ndarray]] = []
     faces: dict[str, list[np.ndarray]] = {}
     unused: list[str] = []
     start = 0
@@ -37,7 +41,7 @@ def read(path: Path) -> RawMesh:
         nodes = np.asarray(block.data, dtype=int)
         solid = block.type in VOLUMES
         if solid:
-            cells.append(Cells(block.type, nodes, np.arange(start + 1, start + 1 + len(nodes))))
+            cells.append((block.type, nodes, np.arange(start + 1, start + 1 + len(nodes))))
         elif block.type not in SURFACES:
             unused.append(f"{len(nodes)} elements of kind {block.type}")
             continue
@@ -45,7 +49,7 @@ def read(path: Path) -> RawMesh:
             values = np.asarray(arrays[i])
             if values.ndim != 1 or not np.issubdtype(values.dtype, np.integer):
                 continue
-            if len(np.unique(values)) > MOST_VALUES:
+            if len(np.unique(values)) > 100:  # a number of each element, not a group
                 continue
             for value in np.unique(values).tolist():
                 members = np.flatnonzero(values == value)
@@ -70,4 +74,5 @@ def read(path: Path) -> RawMesh:
     points = np.asarray(file.points, dtype=float)
     labels = np.arange(1, len(points) + 1)
     of_nodes = {name: rows.astype(int) for name, rows in of_nodes.items()}
-    return RawMesh(points, labels, cells, volumes, faces, of_nodes, skins=frozenset(of_nodes), unused=unused)
+    groups = {"volumes": volumes, "faces": faces, "nodes": of_nodes, "skins": list(of_nodes)}
+    return {"points": points, "labels": labels, "cells": cells, **groups, "unused": unused}

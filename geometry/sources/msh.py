@@ -1,7 +1,5 @@
 """Gmsh's own files, MSH 2.2 and 4.1, text or binary, with what else Gmsh has put in where all is saved."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -9,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from tribodyn.geometry.gmsh_session import session
-from tribodyn.geometry.sources.raw_mesh import SURFACES, Cells, RawMesh
 from tribodyn.refusal import Refusal
 
 _ORDER_19 = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]
@@ -37,22 +34,22 @@ _KINDS: dict[int, tuple[str, list[int] | None]] = {
 _KIND_OF_GROUP = ("point", "curve", "surface", "volume")
 
 
-def read(path: Path) -> RawMesh:
-    """Let Gmsh read one of its files. Raises Refusal: it is none, or broken."""
-    _check(path)
+def content(path: str) -> dict[str, Any]:
+    """Let Gmsh read one of its files; see `of_session`. Raises Refusal: it is none, or broken."""
+    _check(Path(path))
     with session() as gmsh:
         try:
-            gmsh.merge(str(path))
+            gmsh.merge(path)
         except Exception as problem:
             raise Refusal(_cannot(path, str(problem))) from None
-        return from_gmsh(gmsh)
+        return of_session(gmsh)
 
 
-def from_gmsh(gmsh: Any) -> RawMesh:
-    """The mesh that a Gmsh session holds; if some volumes belong to groups, all others are left out.
+def of_session(gmsh: Any) -> dict[str, Any]:
+    """The mesh that a Gmsh session holds, as the fields of a RawMesh; volumes that no group has, where others are in
+    one, are left out.
 
-    A surface with elements that no group has is one itself, "face N" by its number in Gmsh or in the CAD model.
-    """
+    A surface with elements that no group has is one itself, "face N" by its number in Gmsh or in the CAD model."""
     model = gmsh.model
     labels, coordinates, _ = model.mesh.getNodes()
     order = np.argsort(labels)
@@ -74,6 +71,9 @@ def from_gmsh(gmsh: Any) -> RawMesh:
             blocks_of_entity.append((name, nodes if order is None else nodes[:, order], numbers.astype(int)))
         return blocks_of_entity
 
+    def corners(kind: str, nodes: np.ndarray, _: np.ndarray) -> np.ndarray:
+        return nodes[:, : 3 if kind.startswith("triangle") else 4]
+
     groups = model.getPhysicalGroups()
     filled = [tag for _, tag in model.getEntities(3) if len(model.mesh.getElements(3, tag)[0])]
     grouped = {int(tag) for d, g in groups if d == 3 for tag in model.getEntitiesForPhysicalGroup(3, g)}
@@ -82,7 +82,7 @@ def from_gmsh(gmsh: Any) -> RawMesh:
     cells, numbers_of, start = [], {}, 0
     for tag in used:
         blocks = elements((3, tag))
-        cells += [Cells(*block) for block in blocks]
+        cells += blocks
         count = sum(len(nodes) for _, nodes, _ in blocks)
         numbers_of[tag] = np.arange(start, start + count)
         start += count
@@ -97,26 +97,30 @@ def from_gmsh(gmsh: Any) -> RawMesh:
             if members:
                 volumes[name] = np.sort(np.concatenate(members))
         elif dimension == 2:
-            faces[name] = [nodes[:, : SURFACES[kind]] for tag in entities for kind, nodes, _ in elements((2, tag))]
+            faces[name] = [corners(*block) for tag in entities for block in elements((2, tag))]
         else:
             nodes_of[name] = np.unique(rows(model.mesh.getNodesForPhysicalGroup(dimension, number)[0]))
     named = {int(tag) for d, g in groups if d == 2 for tag in model.getEntitiesForPhysicalGroup(2, g)}
     for tag in (tag for _, tag in model.getEntities(2) if tag not in named):
-        if parts := [nodes[:, : SURFACES[kind]] for kind, nodes, _ in elements((2, tag))]:
+        if parts := [corners(*block) for block in elements((2, tag))]:
             faces[f"face {tag}"] = parts
-    return RawMesh(points, labels, cells, volumes, faces, nodes_of, unused=unused)
+    groups_of = {"volumes": volumes, "faces": faces, "nodes": nodes_of}
+    return {"points": points, "labels": labels, "cells": cells, **groups_of, "unused": unused}
 
 
 def _check(path: Path) -> None:
-    """Refuse another file, and one that stops inside a section: Gmsh itself would read on in silence."""
+    """Refuse a file that Gmsh would take for a script, and one that stops inside a section: it reads on in silence.
+
+    Gmsh takes what does not begin with the name of a section, to the letter, for a script in its language, and runs it.
+    """
     text = path.read_bytes()
-    if not any(line.strip() == b"$MeshFormat" for line in text[:4096].split(b"\n")[:-1]):
+    if not re.match(rb"\$MeshFormat[ \t]*\r?\n", text):
         raise Refusal(_cannot(path, "it does not begin with $MeshFormat"))
     for section in re.findall(rb"(?m)^\$(?!End)([A-Za-z]{5,})\s*$", text):  # binary numbers may look like a shorter one
         if b"$End" + section not in text:
             raise Refusal(_cannot(path, f"it ends inside ${section.decode()}, so it is not complete"))
 
 
-def _cannot(path: Path, cause: str) -> str:
+def _cannot(path: str | Path, cause: str) -> str:
     reason = " ".join(cause.split())
     return f"mesh file '{path}' cannot be read{f' ({reason})' if reason else ''}: write it as a Gmsh file, MSH 4.1"

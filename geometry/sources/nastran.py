@@ -1,9 +1,6 @@
 """Nastran bulk data: grid points, systems, solids, materials, sets, supports, loads, equations, rigid elements.
 
-Free, small and large fields. meshio reads neither sets nor what is fixed, and loses second-order solids.
-"""
-
-from __future__ import annotations
+Free, small and large fields. meshio reads neither sets nor what is fixed, and loses second-order solids."""
 
 import re
 from collections.abc import Callable
@@ -13,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.geometry.sources import deck
-from tribodyn.geometry.sources.card_table import CardTable, SkippedCards
+from tribodyn.geometry.sources.card_table import CardTable, SkippedCards, fields_of
 from tribodyn.geometry.sources.directions import System
 from tribodyn.geometry.sources.nastran_cards import (
     ReferenceCards,
@@ -48,6 +45,11 @@ def read(path: Path) -> RawMesh:
     parameters = [line.strip() for line in lines[:start] if line.strip().upper().startswith("PARAM")]
     cards = list(cards_of([*parameters, *lines[start:]]))
     reader = _Bulk(path, LabelledMesh(SkippedCards(TABLE)), selected_sets(control) if start else None)
+    defined: dict[tuple[str, str], list[str]] = {}
+    for name, fields in cards:
+        reader.mesh.skipped.check_fields(name, fields)
+        if name in SPACES and defined.setdefault((SPACES[name], fields[0]), fields) != fields:
+            raise Refusal(f"'{path}' has a second {name} {fields[0]}, which differs from the first: take one out")
     reader.common = next((fields for name, fields in cards if name == "GRDSET"), reader.common)
     for name, fields in cards:
         if name in FIRST:
@@ -65,8 +67,7 @@ class _Bulk(ReferenceCards):
     """Reads the cards of a file one after the other.
 
     chosen : kind of set -> numbers that the case control selects, None where there is no case control
-    grids, systems, springs, scales : cards that others refer to, by their number; weight : PARAM WTMASS
-    """
+    grids, systems, springs, scales : cards that others refer to, by their number; weight : PARAM WTMASS"""
 
     sets: dict[int, list[int]] = field(default_factory=dict)
     properties: dict[int, tuple[int, int]] = field(default_factory=dict)
@@ -78,7 +79,7 @@ class _Bulk(ReferenceCards):
     def grid(self, card: str, fields: list[str]) -> None:
         """A grid point, the system of its displacements, and its permanent supports."""
         label = to_int(fields[0], card)
-        self.mesh.points[label] = self.place(label).tolist()
+        self.mesh.point(label, self.place(label).tolist())
         if (frame := self.system(fields[5])) is not None:
             self.mesh.frames[label] = frame
         self.mesh.hold(label, to_axes(fields[6], card))
@@ -89,13 +90,12 @@ class _Bulk(ReferenceCards):
         low, high, order = SOLIDS[card]
         if len(nodes) < CORNERS[card]:
             raise Refusal(f"{card} {fields[0]} of '{self.path}' has {len(nodes)} nodes: the file is cut off or broken")
+        if len(nodes) not in (CORNERS[card], len(order)):
+            self.mesh.skipped.refuse(f"{card} with some of its edge nodes")
         quadratic = len(nodes) >= len(order)
         ordered = [nodes[i] for i in order] if quadratic else nodes[: CORNERS[card]]
         self.mesh.solid(
-            high if quadratic else low,
-            to_int(fields[0], card),
-            ordered,
-            f"PSOLID {to_int(fields[1], card)}",
+            high if quadratic else low, to_int(fields[0], card), ordered, f"PSOLID {to_int(fields[1], card)}"
         )
 
     def psolid(self, card: str, fields: list[str]) -> None:
@@ -169,6 +169,8 @@ class _Bulk(ReferenceCards):
         """An equation between displacements."""
         if self.selected("MPC", fields[0]):
             starts = [8 * line + at for line in range(len(fields) // 8) for at in (1, 4)]
+            if any(fields[k] for k in range(7, len(fields)) if k % 8 in (0, 7)):
+                self.mesh.skipped.refuse("MPC with terms in the first or last field of a line")
             terms = [fields[start : start + 3] for start in starts if fields[start]]
             self.mesh.equations.append([(to_int(g, card), to_axes(c, card)[0], to_float(a, card)) for g, c, a in terms])
 
@@ -208,6 +210,8 @@ class _Bulk(ReferenceCards):
         inertia = [to_float(text, card) for text in fields[8:14]]
         if any(to_float(text, card) for text in fields[4:7]) or any(inertia[k] for k in (1, 3, 4)):
             self.mesh.skipped.refuse("CONM2, an offset or products of inertia")
+        if any(inertia) and fields[2] not in ("", "0"):
+            self.mesh.skipped.refuse("CONM2, inertia along a system")
         about = inertia[0], inertia[2], inertia[5]
         self.mesh.masses.append(deck.PointMass(self.mesh.at(to_int(fields[1], card)), to_float(fields[3], card), about))
 
@@ -261,9 +265,27 @@ READ: dict[str, Taking] = {
     "RBE3": _Bulk.rbe3,
     "CONM2": _Bulk.conm2,
 }
+# cards whose number no other of them, nor of the same space, may have
+SPACES = {name: name for name in ("GRID", "PSOLID", "SET1", "CONM2", "RBE2", "RBE3", "CELAS1", "CELAS2")}
+SPACES |= {name: name[:3] for name in ("MAT1", "MAT9", "MAT11")} | {
+    f"CORD{k}{of}": "CORD" for k in "12" for of in "RCS"
+}
+FIELDS = fields_of("""GRID: ID, CP, X1, X2, X3, CD, PS; GRDSET: , CP, , , , CD, PS;
+    CTETRA CPYRAM CPENTA CHEXA: EID, PID, G1, ...; PSOLID: PID, MID, CORDM, (IN), (STRESS), (ISOP), FCTN;
+    MAT1: MID, E, G, NU, RHO, A, (TREF), (GE), (ST), (SC), (SS), (MCSID); MAT9: MID, G11, ...;
+    MAT11: MID, E1, E2, E3, NU12, NU13, NU23, G12, G13, G23, RHO, A1, A2, A3, (TREF), (GE); PARAM: N, V1;
+    SPC: SID, G1, C1, D1, G2, C2, D2; SPC1: SID, C, G1, ...; FORCE MOMENT: SID, G, CID, F, N1, N2, N3;
+    LOAD: SID, S, S1, L1, ...; SPCADD MPCADD SET1: SID, S1, ...; MPC: SID, G1, C1, A1, G2, C2, A2, , , G3, ...;
+    CELAS1: EID, PID, G1, C1, G2, C2; CELAS2: EID, K, G1, C1, G2, C2, (GE), (S);
+    PELAS: PID1, K1, (GE1), (S1), PID2, K2, (GE2), (S2);
+    CORD1R CORD1C CORD1S: CID1, G1, G2, G3, CID2, G4, G5, G6;
+    CORD2R CORD2C CORD2S: CID, RID, A1, A2, A3, B1, B2, B3, C1, C2, C3;
+    RBE2: EID, GN, CM, GM1, ...; RBE3: EID, , REFGRID, REFC, WT1, C1, G11, ...;
+    CONM2: EID, G, CID, M, X1, X2, X3, , I11, I21, I22, I31, I32, I33""")
 TABLE = CardTable(
     read=", ".join([*FIRST, *READ, "GRDSET, INCLUDE, PARAM WTMASS"]),
-    silent="ENDDATA, BEGIN, PLOTEL",
+    fields=FIELDS,
+    silent="PLOTEL",
     harmless={
         "the step is the scene's": """EIGR, EIGRL, EIGB, EIGC, EIGP, FREQ, FREQ1, FREQ2, FREQ3, FREQ4, FREQ5, TSTEP,
             TSTEPNL, NLPARM, NLSTEP, RLOAD1, RLOAD2, TLOAD1, TLOAD2, DLOAD, DAREA, DPHASE, DELAY, TABLED1, TABLED2,

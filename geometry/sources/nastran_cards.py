@@ -1,17 +1,18 @@
 """The text of Nastran files as cards with fields, and the cards that others refer to.
 
-These are grid points, systems, stiffnesses of springs and sums of sets.
-"""
+These are grid points, systems, stiffnesses of springs and sums of sets."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
+from tribodyn import text_file
 from tribodyn.geometry.sources.directions import System
 from tribodyn.geometry.sources.raw_mesh import LabelledMesh
 from tribodyn.refusal import Refusal
@@ -20,48 +21,88 @@ KINDS = {"R": "rectangular", "C": "cylindrical", "S": "nastran spherical"}
 _EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
 
-def lines_of(path: Path, within: tuple[Path, ...] = ()) -> Iterator[str]:
+def lines_of(path: Path) -> Iterator[str]:
     """Lines of a file without comments; the lines of an included file stand in place of its INCLUDE."""
-    if path.resolve() in within:
-        raise Refusal(f"'{path}' includes itself: take the INCLUDE out")
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        text = line.split("$")[0].rstrip()
-        if text.upper().startswith("INCLUDE"):
-            other = path.parent / text[7:].strip().strip("\"'")
-            if not other.is_file():
-                raise Refusal(f"INCLUDE of '{path}' names '{other.name}', which does not exist: put it there")
-            yield from lines_of(other, (*within, path.resolve()))
-        elif text:
+    for line in text_file.lines_of(path, "$", _continues, _included_name):
+        text = line.text.split("$")[0].rstrip()
+        if text and not _included_name(text):
             yield text
 
 
+def _continues(line: str) -> bool:
+    """Whether the name of an INCLUDE goes on in the next line: its quotes are not closed."""
+    return line.lstrip()[:7].upper() == "INCLUDE" and (line.count("'") == 1 or line.count('"') == 1)
+
+
+def _included_name(line: str) -> str:
+    text = line.split("$")[0].strip()
+    return text[7:].strip().strip("\"'") if text[:7].upper() == "INCLUDE" else ""
+
+
+@dataclass
+class BulkCard:
+    """A card, or a continuation whose card is not met yet.
+
+    name : in capitals, of a continuation what its card ends with; marker : what its own continuation begins with"""
+
+    name: str
+    fields: list[str]
+    marker: str
+
+    def extend(self, continuation: BulkCard) -> None:
+        """Go on with the fields of a continuation."""
+        self.fields, self.marker = self.fields + continuation.fields, continuation.marker
+
+
 def cards_of(lines: Iterable[str]) -> Iterator[tuple[str, list[str]]]:
-    """Name and fields of each card of the bulk data, continuation lines joined."""
-    name, fields = "", []
-    for line in lines:
-        head, line_fields = _fields(line)
-        if head in ("", "+", "*") or head[0] in "+*":
-            fields += line_fields
+    """Name and fields of each card, up to ENDDATA.
+
+    Continuations go by their markers, wherever they stand; where a line has none they belong to the line before.
+    Raises  Refusal: a continuation without a card"""
+    cards: list[BulkCard] = []
+    loose: dict[str, BulkCard] = {}
+    previous: BulkCard | None = None
+    items = [_line(line) for line in takewhile(lambda line: line[:7].upper() != "ENDDATA", lines)]
+    markers = {item.marker for item in items}
+    for item in items:
+        if item.name[:1] not in ("", "+", "*"):
+            previous = replace(item, name=item.name.rstrip("*").upper())
+            cards.append(previous)
             continue
-        if name:
-            yield name, fields + [""] * 8
-        name, fields = head.rstrip("*").upper(), line_fields
-    if name:
-        yield name, fields + [""] * 8
+        item.name = item.name.strip("+* ")
+        here = previous.marker if previous is not None else ""
+        if previous is not None and (item.name in ("", here) or (not here and item.name not in markers)):
+            previous.extend(item)
+        elif not item.name or item.name in loose:
+            raise Refusal(f"the continuation +{item.name} {item.fields[0]} stands twice or has no card: take it out")
+        else:
+            previous = loose[item.name] = item
+    for card in cards:
+        while card.marker in loose:
+            card.extend(loose.pop(card.marker))
+    if loose:
+        raise Refusal(f"no card ends with the marker of the continuation +{min(loose)}: correct one of the two")
+    return ((card.name, card.fields + [""] * 8) for card in cards)
 
 
-def _fields(line: str) -> tuple[str, list[str]]:
-    """Name and fields of a line: eight, or the four of a name with a star, in free and in fixed format."""
+def _line(line: str) -> BulkCard:
+    """A line of eight fields, or the four of a name with a star, in fixed format or between commas.
+
+    Between commas the tenth place is a marker where it begins with + or *; else a line may have any number of fields.
+    """
     if "," in line:
-        head, *items = [item.strip() for item in line.split(",")]
-        if "*" in head and any(item and item[0] not in "+*" for item in items[4:]):
+        name, *fields = [item.strip() for item in line.split(",")]
+        count = 4 if "*" in name else 8
+        marker = fields.pop() if len(fields) == count + 1 and fields[-1][:1] in ("+", "*", "") else ""
+        if count == 4 and any(fields[4:]):
             raise Refusal(f"the line '{line[:40]}' has more than the four fields of a star: take the star out")
-        count = 4 if "*" in head else 8
-        return head, (items + [""] * count)[:count]
-    line = line.expandtabs(8)
-    head = line[:8].strip()
-    width, count = (16, 4) if "*" in head else (8, 8)
-    return head, [line[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count)]
+        fields += [""] * (-len(fields) % count)
+    else:
+        line = line.expandtabs(8)
+        name, marker = line[:8].strip(), line[72:80].strip()
+        width, count = (16, 4) if "*" in name else (8, 8)
+        fields = [line[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count)]
+    return BulkCard(name, fields, marker.strip("+* "))
 
 
 def selected_sets(control: str) -> dict[str, set[int]]:
@@ -122,8 +163,7 @@ class ReferenceCards:
 
     chosen : kind of set -> numbers that the case control selects, None where there is no case control
     systems : cards of coordinate systems; built : those that are built; scales : of load sets
-    unselected : a clause for each set that is not in force; common : fields of GRDSET
-    """
+    unselected : a clause for each set that is not in force; common : fields of GRDSET"""
 
     path: Path
     mesh: LabelledMesh

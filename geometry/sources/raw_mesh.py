@@ -1,7 +1,6 @@
 """A mesh as it is in a file, before it becomes bodies: nodes, elements of any kind, groups. Every reader gives this.
 
-Corners, edges and faces of elements are in the node order of meshio, which is VTK's.
-"""
+Corners, edges and faces of elements are in the node order of meshio, which is VTK's."""
 
 from __future__ import annotations
 
@@ -22,11 +21,14 @@ Face = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Cells:
-    """Elements of one kind. kind : meshio's name; nodes : (n, k) rows of the points; labels : (n,) their numbers"""
+    """Elements of one kind. kind : meshio's name; nodes : (n, k) rows of the points; labels : (n,) their numbers
+
+    formulations : of each, where they have eight nodes and the file names it"""
 
     kind: str
     nodes: np.ndarray
     labels: np.ndarray
+    formulations: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,7 @@ class RawMesh:
     skins : names of node groups that may stand for a face
     points_of_reference : name -> (3,) points that belong to no element
     unused : one clause for each thing that was met and changes nothing here; notes : what a user should know
-    refused : name of a card or element -> clause, which would change stiffness, mass, support or load
-    """
+    refused : name of a card or element -> clause, which would change stiffness, mass, support or load"""
 
     points: np.ndarray
     labels: np.ndarray
@@ -71,12 +72,13 @@ class LabelledMesh:
     met : its cards that are not read; points : label -> (3,); solids : kind -> its elements, label and nodes by label
     volumes, node_sets : groups by label
     frames : label -> the directions along which displacements of that node count, x, y, z for others
-    held : (axis, value) -> nodes that are held there; equations, springs : terms, and a stiffness
-    """
+    formulations : label of an 8-node element -> its formulation, others have incompatible modes
+    held : (axis, value) -> nodes that are held there; equations, springs : terms, and a stiffness"""
 
     skipped: SkippedCards
     points: dict[int, list[float]] = field(default_factory=dict)
     solids: dict[str, list[tuple[int, list[int]]]] = field(default_factory=dict)
+    element_labels: set[int] = field(default_factory=set)
     volumes: dict[str, list[int]] = field(default_factory=dict)
     node_sets: dict[str, list[int]] = field(default_factory=dict)
     frames: dict[int, Directions] = field(default_factory=dict)
@@ -86,9 +88,18 @@ class LabelledMesh:
     forces: list[deck.Force] = field(default_factory=list)
     couplings: list[deck.Coupling] = field(default_factory=list)
     masses: list[deck.PointMass] = field(default_factory=list)
+    formulations: dict[int, str] = field(default_factory=dict)
+
+    def point(self, label: int, place: list[float]) -> None:
+        """A node; raises Refusal for a second one elsewhere."""
+        if self.points.setdefault(label, place) != place:
+            raise Refusal(f"two nodes have the number {label}, at different places: take one out")
 
     def solid(self, kind: str, label: int, nodes: list[int], group: str) -> None:
-        """An element and the volume group of its property."""
+        """An element and the volume group of its property; raises Refusal for a second one of its number."""
+        if label in self.element_labels:
+            raise Refusal(f"two elements have the number {label}: take one out")
+        self.element_labels.add(label)
         self.solids.setdefault(kind, []).append((label, nodes))
         self.volumes.setdefault(group, []).append(label)
 
@@ -152,8 +163,7 @@ class LabelledMesh:
     def raw(self, path: Path, materials: tuple[deck.DeckMaterial, ...]) -> RawMesh:
         """The mesh, with its materials and all else that was read.
 
-        Raises  Refusal: an element, or a constraint, that names a node that is not there
-        """
+        Raises  Refusal: an element, or a constraint, that names a node that is not there"""
         if not self.solids:
             return NOTHING
         labels_of_solids = {node for elements in self.solids.values() for _, nodes in elements for node in nodes}
@@ -180,7 +190,9 @@ class LabelledMesh:
                     f"'{path}' has an element with node {lost.args[0]}, which it has not: the file is cut off"
                 ) from None
             number |= {label: len(number) + i for i, (label, _) in enumerate(elements)}
-            cells.append(Cells(kind, table, np.array([label for label, _ in elements])))
+            labels_of_kind = [label for label, _ in elements]
+            forms = [self.formulations.get(label, "linear_incompatible") for label in labels_of_kind]
+            cells.append(Cells(kind, table, np.array(labels_of_kind), forms if kind == "hexahedron" else ()))
         solid = np.zeros(len(row), dtype=bool)
         for block in cells:
             solid[block.nodes] = True
@@ -250,9 +262,4 @@ VOLUMES: dict[str, tuple[Solid, bool, bool, bool]] = {
 }
 # kind -> its corners
 SURFACES = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
-COMMON_NAMES = {
-    "tetra": "tetrahedra",
-    "hexahedron": "hexahedra",
-    "wedge": "prisms",
-    "pyramid": "pyramids",
-}
+COMMON_NAMES = {"tetra": "tetrahedra", "hexahedron": "hexahedra", "wedge": "prisms", "pyramid": "pyramids"}

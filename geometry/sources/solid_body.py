@@ -4,10 +4,7 @@ Every element first gets all nodes that a full second-order element has: in its 
 middle. A mesh of hexahedra alone or tetrahedra alone stays as it is. Where kinds mix, each element is cut into
 tetrahedra that use these nodes and no others: the cuts of neighbours meet, because every quadrilateral is cut through
 its corner of the lowest number.
-Source  Dompierre, Labbe, Vallet, Camarero, How to subdivide pyramids, prisms and hexahedra into tetrahedra, 1999
-"""
-
-from __future__ import annotations
+Source  Dompierre, Labbe, Vallet, Camarero, How to subdivide pyramids, prisms and hexahedra into tetrahedra, 1999"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -33,8 +30,7 @@ class SolidBody:
     node_of : (n_point,) node that each point of the file is, -1 where it is none of this body
     cut : whether its elements were cut into tetrahedra because kinds mix
     unmatched : surface groups with faces that are not faces of the volume mesh; they become no boundaries
-    added : nodes (k,) that are not in the file, and the nodes (k, m) that each interpolates, by kind of place
-    """
+    added : nodes (k,) that are not in the file, and the nodes (k, m) that each interpolates, by kind of place"""
 
     mesh: Any
     node_sets: Groups
@@ -48,8 +44,7 @@ def bodies(raw: RawMesh) -> dict[str, np.ndarray]:
     """The bodies of a file and their elements: parts that share no node, named by the group that holds them.
 
     Parts that one group holds together, as four bolts, are one body; a part that several groups share out, as a blade
-    of two materials, bears their names joined by +.
-    """
+    of two materials, bears their names joined by +."""
     piece = _pieces(raw)
     n_piece = int(piece.max()) + 1
     size = np.bincount(piece)
@@ -144,8 +139,7 @@ def _chosen(raw: RawMesh, elements: np.ndarray | None) -> tuple[list[Cells], lis
 def _mesh(rows: np.ndarray, points: np.ndarray, hexahedra: bool, n_point: int) -> tuple[Any, np.ndarray]:
     """scikit-fem's mesh, and for each point of the file its node number or -1.
 
-    rows : (n, 27 or 10) points of the file, -1 where there is none, in the order of meshio; points : (n, k, 3)
-    """
+    rows : (n, 27 or 10) points of the file, -1 where there is none, in the order of meshio; points : (n, k, 3)"""
     first, second = (skfem.MeshHex1, skfem.MeshHex2) if hexahedra else (skfem.MeshTet1, skfem.MeshTet2)
     n_corner = first.elem.refdom.nnodes
     order = permutation(REFERENCE_POINTS["hexahedron27" if hexahedra else "tetra10"], second.elem().doflocs)
@@ -193,8 +187,7 @@ def _facets(mesh: Any, node_of: np.ndarray, parts: Iterable[np.ndarray]) -> np.n
 def _added(mesh: Any, fulls: Sequence[Full], pieces: Sequence[Pieces]) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     """The nodes that were added to the file, and the nodes that each interpolates.
 
-    These are the two ends of an edge, the corners and edges of a face, the whole hexahedron
-    """
+    These are the two ends of an edge, the corners and edges of a face, the whole hexahedron"""
     order = permutation(REFERENCE_POINTS["tetra10" if mesh.t.shape[0] == 4 else "hexahedron27"], mesh.elem().doflocs)
     start, tables = 0, []
     for elements, piece in zip(fulls, pieces, strict=True):

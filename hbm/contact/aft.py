@@ -1,7 +1,5 @@
 """Alternating frequency/time: march any contact law to its periodic cycle, with its derivatives."""
 
-from __future__ import annotations
-
 from types import ModuleType
 
 import numba
@@ -15,7 +13,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 
 PERIODIC_DRIFT = 1e-13  # of the memory over a cycle, relative to its largest size in the cycle: some hundred roundings
-FIRST_CYCLES = 4  # marched before Newton is tried on the memory; most memories repeat after two
+FIRST_CYCLES = 4  # marched before Newton is tried on the memory, a power of two; most memories repeat after two
 NEWTON_CYCLES = 30
 MAX_CYCLES = 500
 PLOT_SAMPLES = 1024  # that stand for located transitions where a force over time is asked for
@@ -35,8 +33,7 @@ def cycle(
 
     x : (n_pair, n_component, n_coeff) relative displacement [m]
     memory : (n_pair, n_state) memory at the start of the load path, zeros if None
-    Raises  Refusal where the basis has located transitions and the law has samples only
-    """
+    Raises  Refusal where the basis has located transitions and the law has samples only"""
     contact_law.require_order(law, parameters)
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
@@ -66,8 +63,7 @@ def march(
     memory : (n_pair, n_state) memory at the start of the first cycle
     Returns the cycle; its Jacobian is exact for the sampled cycle, away from transitions
     Raises  CycleNotPeriodic
-    Source  Cameron and Griffin 1989 (AFT); derivatives of the recursion as in Siewert et al. 2010
-    """
+    Source  Cameron and Griffin 1989 (AFT); derivatives of the recursion as in Siewert et al. 2010"""
     phi = basis.synthesis if jacobian else basis.synthesis[:, :0]
     force, jac, status = _periodic(law, basis.to_time(x), parameters, memory, phi, basis.analysis)
     return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
@@ -83,8 +79,7 @@ def history(
     """Periodic displacement and force over one period, for loops and checks.
 
     For a basis with located transitions the cycle is marched on at least PLOT_SAMPLES samples; every n-th is returned.
-    Returns (n_pair, n_component, n_samples) displacement [m] and force [N]
-    """
+    Returns (n_pair, n_component, n_samples) displacement [m] and force [N]"""
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
     stride = 1 if basis.transitions == "sampled" else -(-PLOT_SAMPLES // basis.n_samples)
@@ -99,8 +94,7 @@ def history(
 def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np.ndarray) -> np.ndarray | None:
     """Force at the samples of the periodic cycle where the memory repeats after a few cycles, None where it does not.
 
-    Without derivatives little is compiled; compiling more would take longer than the march.
-    """
+    Without derivatives little is compiled; compiling more would take longer than the march."""
     force, phi = np.zeros(samples.shape), np.zeros((samples.shape[2], 0))
     no_slope, none = np.zeros((0, samples.shape[1], 0)), np.zeros((memory.shape[1], 0))
     for i, s in enumerate(memory.copy()):
@@ -137,8 +131,7 @@ def _cycles(step, x, p, memory, phi, rows, force, jac, status):
 
     x, force : (n_pair, n_component, n_time); rows : (n_coeff, n_time) analysis of the basis; memory : at the start
     phi : (n_time, n_coeff) basis functions, no columns where no derivative is wanted
-    Returns the first pair whose memory does not repeat, -1 if all do
-    """
+    Returns the first pair whose memory does not repeat, -1 if all do"""
     n_pair, n_comp, n_time = x.shape
     n_state, m = memory.shape[1], n_comp * phi.shape[1]
     no_slope, no_force = np.zeros((0, n_comp, m + n_state)), np.zeros((n_comp, 0))
@@ -171,23 +164,22 @@ def _cycles(step, x, p, memory, phi, rows, force, jac, status):
 def _settle(step, x, p, phi, s, ds):
     """Memory s (n_state,) of one pair at the start of its periodic cycle, from that at the start of the load path.
 
-    A Jenkins slider settles in one cycle. Planar friction contracts slowly where it slips little, so after a few cycles
-    Newton's step for the period map, s = P(s), takes over. P never widens a distance, so its fixed points are a convex
-    set. One that is isolated is the only one, and one on the rim of the set that still contracts is where marching ends
-    too: these are taken. A pair that can just stick has a set shrunk to a point: P contracts with the square of the
-    distance, which Newton cuts by a third a step until rounding hides the contraction. Otherwise the answer depends on
-    the path, and the pair, which has come to stick, is marched on.
+    A Jenkins slider settles in one cycle. Planar friction contracts slowly where it slips little, so after a few
+    cycles, and after each doubling of them, Newton's step for the period map, s = P(s), takes over. P never widens a
+    distance, so its fixed points are a convex set. One that is isolated is the only one, and one on the rim of the set
+    that still contracts is where marching ends too: these are taken. A pair that can just stick has a set shrunk to a
+    point: P contracts with the square of the distance, which Newton cuts by a third a step until rounding hides the
+    contraction. Otherwise the answer depends on the path, and the pair, which has come to stick, is marched on.
 
     ds : (n_state, n_component * n_coeff) its derivative, filled where its cycle does not give it
-    Returns the cycles marched, 0 where ds is filled, -1 where the memory does not repeat
-    """
+    Returns the cycles marched, 0 where ds is filled, -1 where the memory does not repeat"""
     (n_state, m), n_comp = ds.shape, len(x)
     no_slope, no_force, none = np.zeros((0, n_comp, n_state)), np.zeros((n_comp, 0)), np.zeros((n_state, 0))
     shift, correction = np.zeros((n_state, 1)), np.zeros((n_state, 1))
     for count in range(1, MAX_CYCLES):
         if _turn(step, x, p, phi, s, none, no_slope, no_force)[1] <= PERIODIC_DRIFT:
             return count
-        if count != FIRST_CYCLES:
+        if count < FIRST_CYCLES or count & (count - 1):
             continue
         trial, firm, closing = s.copy(), s.copy(), False  # closing : a step before, at firm, was small and contracted
         for _ in range(NEWTON_CYCLES):
@@ -225,8 +217,7 @@ def _unit(n, m):
 def _undrifted(slopes, shift, out):
     """Fill out with (1 - M)^-1 moved, M the last columns of slopes; its columns are the first of moved.
 
-    Singular values of 1 - M are raised to LEAST_CONTRACTION. Returns the least of them
-    """
+    Singular values of 1 - M are raised to LEAST_CONTRACTION. Returns the least of them"""
     n = len(slopes)
     matrix = np.eye(n)
     for r in range(n):
@@ -252,8 +243,7 @@ def _turn(step, x, p, phi, s, ds, slope, force):
     ds : (n_state, n) its first columns those of the coefficients of x, those beyond carried along; or no columns
     slope : (n_time, n_component, n) derivative of the force, force : (n_component, n_time); filled where they have
         samples
-    Returns status bits and how far s is from where it began, over the largest |s| met
-    """
+    Returns status bits and how far s is from where it began, over the largest |s| met"""
     n_comp, n_state, n_column = len(x), len(s), ds.shape[1]
     n_coeff = phi.shape[1] if n_column > 0 else 0
     point, f, before = np.zeros(n_comp), np.zeros(n_comp), np.zeros((n_state, n_column))

@@ -1,9 +1,6 @@
 """One pair of asperities, elastic to yield and elastic-plastic beyond, and the pressure of many of them.
 
-Source  Hertz 1882; Ghaednia et al. 2019 in the form of Porter and Brake, MSSP 192 (2023) 110210; Brake 2015
-"""
-
-from __future__ import annotations
+Source  Hertz 1882; Ghaednia et al. 2019 in the form of Porter and Brake, MSSP 192 (2023) 110210; Brake 2015"""
 
 from dataclasses import dataclass
 

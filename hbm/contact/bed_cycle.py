@@ -1,8 +1,7 @@
 """The cycle of pairs of rough faces, each a bed of springs at its deepest approach.
 
 Springs are Jenkins elements. What does not depend on the cycle of the others is summed at once: a spring that sticks
-all through the cycle is linear, and all such springs of a pair are one.
-"""
+all through the cycle is linear, and all such springs of a pair are one."""
 
 from __future__ import annotations
 
@@ -27,8 +26,7 @@ class Bed:
     peak, angle : (n_pair,) deepest approach of the cycle [m] and where it is
     grows : (n_pair,) whether that is deeper than any approach before the cycle
     sliders : (n_pair, SPRINGS, n_component - 1) their memory [m]; ratio : (n_pair,) tangential over normal stiffness
-    friction : (n_pair,) coefficient
-    """
+    friction : (n_pair,) coefficient"""
 
     parameters: ContactParameters
     k: np.ndarray
@@ -70,8 +68,7 @@ class Bed:
     def at_rest(self, x: np.ndarray, basis: HarmonicBasis) -> tuple[np.ndarray, np.ndarray]:
         """(n_pair, SPRINGS) whether a spring sticks all through the cycle x, and whether it never touches.
 
-        Where all springs of a pair start from one slider, neither asks for the stiffness: one bound serves them all.
-        """
+        Where all springs of a pair start from one slider, neither asks for the stiffness: one bound serves them all."""
         samples = basis.to_time(x)
         n, t, start = samples[:, -1], samples[:, :-1], self.sliders[:, -1]
         mu, ratio = self.friction, self.ratio
@@ -93,8 +90,7 @@ def slider_positions(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the sliders of all springs over the periodic cycle x (n_pair, n_component, n_coeff), and their load.
 
-    Returns (n_pair, SPRINGS, n_component - 1, n_samples) [m], (n_pair, SPRINGS, n_samples) normal force [N]
-    """
+    Returns (n_pair, SPRINGS, n_component - 1, n_samples) [m], (n_pair, SPRINGS, n_samples) normal force [N]"""
     bed = Bed.of(x, parameters, friction, memory, basis, located=False)
     motion = basis.to_time(x)
     pressed = np.maximum(motion[:, None, -1] - bed.touch[:, :, None], 0.0)
@@ -111,8 +107,7 @@ def cycle(x, parameters, friction, memory, basis, jacobian, located: bool) -> Co
     """The bed at the deepest approach of the cycle and its past.
 
     Springs that stick all through it are one spring; the others go by the cycle of Jenkins elements.
-    x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start
-    """
+    x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start"""
     bed = Bed.of(x, parameters, friction, memory, basis, located)
     sticks, open_ = bed.at_rest(x, basis)
     force, slope = _stuck(bed, bed.k * sticks, x, basis, jacobian)
@@ -135,8 +130,7 @@ def _add_located(bed, active, x, basis, force, slope, by_deepest, status):
     """Add what active springs (n_pair, SPRINGS) do, their transitions located, to what the others do.
 
     force, by_deepest : (n_pair, n_component, n_coeff), its derivative along the deepest approach; slope : the
-        Jacobian, None where not asked for; status : (n_pair,)
-    """
+        Jacobian, None where not asked for; status : (n_pair,)"""
     n_pair, n_comp, n_coeff = x.shape
     pair, spring = np.nonzero(active)
     start = np.ascontiguousarray(bed.sliders[pair, spring])

@@ -3,10 +3,7 @@
 For a deepest approach u_m every asperity is a Hertzian contact, and their sum p(u; u_m) is convex. By the method of
 dimensionality reduction it is a bed of springs, N'' dg of them at each depth g: SPRINGS of them, dense just below u_m,
 where slip begins, tabulated over u_m.
-Source  Popov and Hess 2015; the bed of a whole rough face is ours
-"""
-
-from __future__ import annotations
+Source  Popov and Hess 2015; the bed of a whole rough face is ours"""
 
 import math
 from functools import lru_cache
@@ -66,8 +63,7 @@ def tabulate_bed(asperity: Asperity, flat: bytes, deepest: float) -> np.ndarray:
 def bed_springs(p: np.ndarray, deepest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Springs [N/m] and their approaches of touch [m], both (n_pair, SPRINGS), and d / d deepest of both.
 
-    p : packed rows; deepest : (n_pair,) [m]; nothing where it is not above zero
-    """
+    p : packed rows; deepest : (n_pair,) [m]; nothing where it is not above zero"""
     shape = (len(p), SPRINGS)
     k, g, dk, dg = (np.zeros(shape) for _ in range(4))
     _beds(p, deepest, k, g, dk, dg)

@@ -1,10 +1,7 @@
 """Compiled contact laws: their `step` as a function pointer, and kernels whose callees stand in other files.
 
 Kernels that take the pointer as an argument are compiled once for every law, and numba keeps them on disk. With the
-law itself as their argument they would be compiled anew for every law in every process, some seconds each.
-"""
-
-from __future__ import annotations
+law itself as their argument they would be compiled anew for every law in every process, some seconds each."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -38,8 +35,7 @@ def stamp_with(names: dict[str, Any], *modules: ModuleType) -> None:
     """Let numba compile the cached kernels of a file again after an edit of the modules that they call.
 
     numba takes what it keeps on disk for valid as long as the kernel's own file has not changed.
-    names : `globals()` at the end of the file
-    """
+    names : `globals()` at the end of the file"""
     digests = tuple(sha256(Path(str(module.__file__)).read_bytes()).digest() for module in modules)
     for kernel in names.values():
         cache_file = getattr(getattr(kernel, "_cache", None), "_cache_file", None)

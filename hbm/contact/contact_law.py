@@ -21,8 +21,7 @@ and any of these options:
 - `event_based_cycle(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples,
   faster than `hbm.contact.event_cycle` finds them from the steps
 - `SAMPLES_ONLY = True` : there is no event-based cycle, as the law is smooth or its step integrates along the path
-- `SIMPLER_LAW = "jenkins"` : a law with the same components and numbers, whose solution is a first guess for Newton
-"""
+- `SIMPLER_LAW = "jenkins"` : a law with the same components and numbers, whose solution is a first guess for Newton"""
 
 from __future__ import annotations
 
@@ -49,8 +48,7 @@ class ContactParameters:
     stiffness : (n_pair, n_component) contact springs [N/m], >= 0 and finite
     gap : (n_pair,) opening of the unloaded pair [m], wear adds to it, interference is negative
     numbers : of the law by name, each (n_pair,), in the units that the law declares
-    table : (k, m) of the law, None for none; tabulation : (n_pair, ...) values that the law has computed from it
-    """
+    table : (k, m) of the law, None for none; tabulation : (n_pair, ...) values that the law has computed from it"""
 
     components: tuple[str, ...]
     stiffness: np.ndarray
@@ -71,8 +69,7 @@ class ContactParameters:
     ) -> ContactParameters:
         """Parameters with scalars spread over all pairs; numbers : of the law, by name.
 
-        Raises  Refusal for values that no contact can have; a `Joint` checks the numbers of the law
-        """
+        Raises  Refusal for values that no contact can have; a `Joint` checks the numbers of the law"""
         k = np.atleast_2d(np.asarray(stiffness, float))
         if k.shape[1] != len(components):
             raise Refusal(f"contact stiffness has {k.shape[1]} columns for the components {components}")
@@ -127,12 +124,18 @@ class ContactCycle:
 
     force : (n_pair, n_component, n_coeff) Fourier coefficients of the contact force [N], work-conjugate to x
     jacobian : (n_pair, n_component * n_coeff, n_component * n_coeff) d force / d x [N/m], None if not requested
-    status : (n_pair,) bits of what happened in the cycle: STICKS | SLIPS | SEPARATES
-    """
+    status : (n_pair,) bits of what happened in the cycle: STICKS | SLIPS | SEPARATES"""
 
     force: np.ndarray
     jacobian: np.ndarray | None
     status: np.ndarray
+
+    @property
+    def slope(self) -> np.ndarray:
+        """The Jacobian, of a cycle that it was requested for."""
+        if self.jacobian is None:
+            raise RuntimeError("the cycle was evaluated without its Jacobian")
+        return self.jacobian
 
 
 KIND = PluginKind("contact law", "tribodyn.hbm.contact.laws", ("step", "n_state"))
@@ -155,14 +158,16 @@ def is_event_based(law: ModuleType) -> bool:
 
 def name_of(law: ModuleType) -> str:
     """Name of a law for sentences."""
-    assert law.__file__ is not None
-    return Path(law.__file__).stem
+    return _path(law).stem
+
+
+def _path(law: ModuleType) -> Path:
+    return Path(str(law.__file__))
 
 
 @cache
 def _number_names(law: ModuleType) -> tuple[str, ...]:
-    assert law.__file__ is not None
-    return tuple(number.name for number in declarations.read(Path(law.__file__)))
+    return tuple(number.name for number in declarations.read(_path(law)))
 
 
 def require_order(law: ModuleType, parameters: ContactParameters) -> None:
@@ -185,8 +190,7 @@ def require_components(name: str, components: tuple[str, ...]) -> None:
 def complete(name: str, parameters: ContactParameters) -> ContactParameters:
     """The parameters with all numbers of the law in their order, and what it computes from its table.
 
-    Raises  Refusal where the components, a number or the table are none of this law
-    """
+    Raises  Refusal where the components, a number or the table are none of this law"""
     require_components(name, parameters.components)
     values = declarations.complete(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
     n = parameters.n_pair

@@ -10,10 +10,7 @@ shorter than the distance of two nodes, some 0.1 rad of the highest harmonic, is
 
 Forces are continuous at transitions, so an instant that moves adds nothing to the Jacobian but where a slider that
 followed the motion of an open pair is caught: there the instant is the root of the normal force.
-Source  our own; the derivative at a transition as in Leine and Nijmeijer 2004, chapter 7 (saltation)
-"""
-
-from __future__ import annotations
+Source  our own; the derivative at a transition as in Leine and Nijmeijer 2004, chapter 7 (saltation)"""
 
 import math
 from types import ModuleType
@@ -138,8 +135,7 @@ def _jump(first, second, n_comp, n_state):
 def _bisect(step, x, p, hs, skip, low, high, s, low_answer, high_answer, ahead):
     """Bisect for the transition between low and high; their answers change with them.
 
-    Returns low and high; high is -1 where the law changes smoothly
-    """
+    Returns low and high; high is -1 where the law changes smoothly"""
     n_comp, n_state = x.shape[0], s.size
     size = _jump(low_answer, high_answer, n_comp, n_state)
     first, answer = low_answer.copy(), low_answer.copy()
@@ -162,8 +158,7 @@ def _bracket(step, x, p, hs, skip, low, high, s, before, after):
     """Angles before and after a transition; the latter is -1 where the law changes smoothly.
 
     s : memory at `low`; before, after : answers just after low and high. Where a limit is crossed, the step ahead
-    jumps early: there the step itself, from the memory at that angle, locates it to 1e-13 rad.
-    """
+    jumps early: there the step itself, from the memory at that angle, locates it to 1e-13 rad."""
     low_answer, high_answer, start = before.copy(), after.copy(), s.copy()
     size = _jump(before, after, x.shape[0], s.size)
     low, high = _bisect(step, x, p, hs, skip, low, high, s, low_answer, high_answer, True)
@@ -192,8 +187,7 @@ def _first_change(step, x, p, hs, skip, low, high, s, before, answer):
     """The first angle up to `high` at which a step along the tangent gives another answer; high where none does.
 
     Where the motion leaves a region for less than the time between two nodes and comes back, its tangent leaves it too.
-    Such steps are shortened until they show where, or lead past.
-    """
+    Such steps are shortened until they show where, or lead past."""
     angle, length = low, high - low
     while angle < high:
         length = min(length, high - angle)

@@ -12,10 +12,7 @@ second order, of first order for friction that lifts, where the sampled Jacobian
 test_contact_located). Cost, measured from H = 1 to 15: two to three times that of 128 samples where all slip, less
 where most pairs cannot. A response curve with lifting pairs took as long either way: Newton needed 15 % fewer steps.
 
-Source  Petrov and Ewins 2003 (friction element exact between transitions); moving walls and root isolation ours.
-"""
-
-from __future__ import annotations
+Source  Petrov and Ewins 2003 (friction element exact between transitions); moving walls and root isolation ours."""
 
 import math
 
@@ -53,8 +50,7 @@ def cycle(
     """The periodic cycle of a law of the Jenkins family.
 
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_tangential) slider positions at the start [m]
-    friction : (n_pair,) coefficient; normal_load : (n_pair,) constant, of a contact without the component n [N]
-    """
+    friction : (n_pair,) coefficient; normal_load : (n_pair,) constant, of a contact without the component n [N]"""
     n_pair, n_comp, n_coeff = x.shape
     skip = 0 if basis.has_static else 1  # inside, the constant is always there
     full = np.zeros((n_pair, n_comp, n_coeff + skip))
@@ -83,8 +79,7 @@ def _cycle(x, load, grid, normal, k, mu, memory, hs, skip, force, jac, status):
     """All pairs; what one pair needs is allocated once. m counts the constant, whether kept or not.
 
     knots, waves : angles, and cos n t and sin n t there; ends, segments : knots of start, stop and origin (-1: memory)
-        of each segment; its kind, w, and d w / d N at the origin over r
-    """
+        of each segment; its kind, w, and d w / d N at the origin over r"""
     n_pair, n_comp, m = x.shape
     top, room = hs[-1], 4 * hs[-1] + 16  # a polynomial has at most 2 H roots
     contact, cells, wall = np.empty(room), np.empty(3 * grid.shape[1] // 4), np.zeros(m)
@@ -195,8 +190,7 @@ def _pushed(w, origin, tilt, r, j, at, touching):
 def _segments(w, r, u, load, hs, touching, n_edge, at, wall, knots, waves, ends, segments):
     """Sticks and slips of the periodic cycle; returns their number.
 
-    A cycle maps w to a clamp of w, so one cycle, for which the ends of the intervals suffice, settles it.
-    """
+    A cycle maps w to a clamp of w, so one cycle, for which the ends of the intervals suffice, settles it."""
     for j in range(n_edge + 1):
         fill_wave(knots[j], waves[j])
         at[j, 0], at[j, 1] = values_on(u, hs, waves[j])

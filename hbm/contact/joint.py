@@ -1,8 +1,7 @@
 """Joints: contacts of a structure, each with its contact law and the parameters of that law.
 
 A reduced model has one contact interface. Its rows run pair by pair, component by component, and each joint covers some
-of the pairs. A joint whose law sees only some of the components has zero springs and no force in the others.
-"""
+of the pairs. A joint whose law sees only some of the components has zero springs and no force in the others."""
 
 from __future__ import annotations
 
@@ -28,8 +27,7 @@ class Joint:
 
     name : of the joint, unique in a balance; law : name of its contact law
     parameters : of its pairs, over the components that the law sees
-    pairs : slice or indices of its pairs among those of the contact interface; None for all of them
-    """
+    pairs : slice or indices of its pairs among those of the contact interface; None for all of them"""
 
     name: str
     law: str
@@ -80,8 +78,7 @@ class JointSet:
     """All joints of one contact interface; every pair belongs to exactly one of them.
 
     components : of the interface, in the order t1, t2, n; n_pair : its number of pairs
-    joints : with their pairs as indices
-    """
+    joints : with their pairs as indices"""
 
     components: tuple[str, ...]
     n_pair: int
@@ -92,8 +89,7 @@ class JointSet:
         """The joints of a model.
 
         Raises  Refusal where a pair belongs to no joint or to two, there is no such law, it does not serve the
-            components, or one of its numbers is missing, unknown or out of its limits
-        """
+            components, or one of its numbers is missing, unknown or out of its limits"""
         sequence = (joints,) if isinstance(joints, Joint) else tuple(joints)
         if not sequence:
             raise Refusal("a harmonic balance needs at least one joint")
@@ -132,29 +128,30 @@ class JointSet:
     def single(self, user: str) -> Joint:
         """The joint that is all of the contact; refuses several joints, or one that covers a part of it.
 
-        user : what needs it, for the sentence
-        """
+        user : what needs it, for the sentence"""
         if self._single is None:
             raise Refusal(f"{user} serves one joint that covers the whole contact: this one has several laws")
         return self._single
 
-    def merge(self, user: str) -> Joint:
-        """One joint that covers all pairs in their order; refuses joints of several laws, or of some components.
-
-        user : what needs it, for the sentence
-        """
-        if self._single is not None:
-            return self._single
+    @property
+    def has_one_law(self) -> bool:
+        """Whether one joint could cover all pairs, see `merge`."""
         first = self.joints[0]
-        has_one_law = all(
+        return self._single is not None or all(
             joint.law == first.law
             and joint.parameters.components == self.components
             and joint.parameters.tabulation is None
             and tuple(joint.parameters.numbers) == tuple(first.parameters.numbers)
             for joint in self.joints
         )
-        if not has_one_law:
+
+    def merge(self, user: str) -> Joint:
+        """One joint that covers all pairs in their order; refuses joints of several laws, or of some components.
+
+        user : what needs it, for the sentence"""
+        if self._single is not None or not self.has_one_law:
             return self.single(user)
+        first = self.joints[0]
 
         def values(name: str) -> np.ndarray:
             return self._gather(lambda joint: joint.parameters.numbers[name])
@@ -257,8 +254,7 @@ class JointSet:
         """Periodic contact cycle of all pairs, each by the law of its joint.
 
         x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start of the load path
-        Raises  Refusal where the basis has located transitions and a law does not locate them
-        """
+        Raises  Refusal where the basis has located transitions and a law does not locate them"""
         single = self._single
         if single is not None:
             return aft.cycle(single.module, x, single.parameters, basis, memory, jacobian)
@@ -280,8 +276,7 @@ class JointSet:
     def history(self, x: np.ndarray, basis: HarmonicBasis, memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Periodic displacement [m] and force [N] over one period, both (n_pair, n_component, n_samples).
 
-        Arguments as for `cycle`; see `hbm.contact.aft.history`
-        """
+        Arguments as for `cycle`; see `hbm.contact.aft.history`"""
         single = self._single
         if single is not None:
             return aft.history(single.module, x, single.parameters, basis, memory)

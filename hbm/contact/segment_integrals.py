@@ -1,9 +1,6 @@
 """Fourier coefficients of a contact force over sticks and slips, in closed form between transitions.
 
-Within a segment the force is in the span of the basis functions and 1, whose products are integrated exactly.
-"""
-
-from __future__ import annotations
+Within a segment the force is in the span of the basis functions and 1, whose products are integrated exactly."""
 
 import math
 
@@ -51,8 +48,7 @@ def _products(table, hs, out):
 def _add_short(factor, c, level, start, stop, hs, wave, force):
     """Add the Fourier coefficients of factor (c - level) over [start, stop], c a polynomial small beside its parts.
 
-    A stiff contact touches so shortly that its force is a 1e-8 of what its spring would bear over the whole cycle
-    """
+    A stiff contact touches so shortly that its force is a 1e-8 of what its spring would bear over the whole cycle"""
     half = 0.5 * (stop - start)
     for p in range(POINTS.size):
         fill_wave(start + half * (1.0 + POINTS[p]), wave)
@@ -68,8 +64,7 @@ def integrate(kt, mu, u, load, hs, knots, waves, ends, segments, n_segment, tabl
     """Coefficients of T, and their derivatives with respect to those of u over k_t and of N over mu.
 
     Integrals over what is short are differences of nearly equal numbers, and their products even more so: there the
-    force is integrated by Gauss's rule.
-    """
+    force is integrated by Gauss's rule."""
     m, by_u, by_load = u.size, slope[0], slope[1]
     is_stuck = n_segment == 1 and segments[0, 0] == STICK and knots[ends[0, 1]] - knots[ends[0, 0]] == TURN
     n_short = 0

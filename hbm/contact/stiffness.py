@@ -14,8 +14,7 @@ which extends the plane formulation and which we have not reproduced line by lin
    Soc. A 228 (1929) 377-420), one quarter by symmetry, extrapolated from two meshes. The square punch comes out within
    0.02 % of k_n = pi E* 0.36679 s, the electric capacity of a square plate of side s.
 
-No reference depth enters: displacements vanish far from the patch. An extruded plane solution has to choose one.
-"""
+No reference depth enters: displacements vanish far from the patch. An extruded plane solution has to choose one."""
 
 from __future__ import annotations
 
@@ -41,8 +40,7 @@ class ElasticPair(NamedTuple):
     """Young's moduli E1, E2 [Pa] and Poisson's ratios nu1, nu2 [-]; a rigid body has E = inf.
 
     Normal and tangential problems are taken as uncoupled: exact for equal bodies, otherwise Goodman's approximation (a
-    rigid disc bonded to a half-space of nu = 0.3 is 2.9 % stiffer against normal load than the frictionless one).
-    """
+    rigid disc bonded to a half-space of nu = 0.3 is 2.9 % stiffer against normal load than the frictionless one)."""
 
     E1: float
     nu1: float
@@ -98,8 +96,7 @@ def rectangular_punch(
     edge_radius : radius of the four edges [m], 0 for sharp ones
     load : normal load [N], needed where the edges are round because the contact grows onto them
     Raises  ValueError: an argument that cannot be, sides beyond LONGEST, or round edges without a load
-    Source  see the module; normal and shear problems uncoupled, see ElasticPair
-    """
+    Source  see the module; normal and shear problems uncoupled, see ElasticPair"""
     require_positive(a=a, b=b)
     if max(a, b) > LONGEST * min(a, b):
         raise Refusal(
@@ -121,8 +118,7 @@ def contact_sides(a: float, b: float, load: float, edge_radius: float, pair: Ela
     """Full sides [m] of the contact of a punch of flat sides a, b with round edges, each under load over the other.
 
     Against a three-dimensional unilateral solution the tangent stiffness of the grown area is 1 to 2 % high where the
-    contact has grown by a tenth of its side, 3 % high where by a third.
-    """
+    contact has grown by a tenth of its side, 3 % high where by a third."""
     sides = (a, b)
     for _ in range(100):
         previous = sides
@@ -140,8 +136,7 @@ def half_contact(flat: float, edge_radius: float, load: float, pair: ElasticPair
 
     flat : half-width a of the flat [m], 0 for a cylinder (Hertz); edge_radius : R [m], 0 for a sharp punch
     2 P R / (E* a^2) = (pi - 2 p0) / (2 sin^2 p0) - cot p0 with sin p0 = a/b, solved for psi = pi/2 - p0
-    Source  Ciavarella, Hills and Monno, Proc. IMechE C 212 (1998) 319-328; here 1/E* = sum (1 - nu^2)/E
-    """
+    Source  Ciavarella, Hills and Monno, Proc. IMechE C 212 (1998) 319-328; here 1/E* = sum (1 - nu^2)/E"""
     require_positive(load=load)
     if edge_radius == 0:
         return flat

@@ -1,10 +1,7 @@
 """Trigonometric polynomials: values, bounds and all roots over a period, for compiled kernels.
 
 A polynomial c has the coefficients [c_0, a_1, b_1, ...] of the harmonics hs; the constant is always there. A wave is
-cos n t and sin n t for n = 0, 1, ... at one angle.
-"""
-
-from __future__ import annotations
+cos n t and sin n t for n = 0, 1, ... at one angle."""
 
 import functools
 import math
@@ -88,8 +85,7 @@ def crossing(c, hs, bound, level, rising, start, stop, angle):
     """Angle in [left, right] where the polynomial, monotone there, crosses a level; Halley from a guess in a bracket.
 
     bound : of the curvature. An error e is at most (s^2 / 4 + H s / 6) e^3, s = bound / |slope|, after a step of
-        Halley's, so the last step need not be looked at
-    """
+        Halley's, so the last step need not be looked at"""
     if not start < angle < stop:
         angle = 0.5 * (start + stop)
     for _ in range(80):
@@ -120,8 +116,7 @@ def roots(c, hs, grid, cells, out, n):
     halved. The depth is limited: at 1e-9 rad only a double root is left, which changes nothing. So is the number of
     cells: a harmonic has at most two roots, and what is no number has none.
 
-    cells : (3 * n_cell,) to work on: values at the ends of the cells, values and slopes in their middle
-    """
+    cells : (3 * n_cell,) to work on: values at the ends of the cells, values and slopes in their middle"""
     bound = bounds(c, hs)[1]
     if not 0.0 < bound < math.inf:
         return n

@@ -1,10 +1,7 @@
 """Response curves: continuation methods, folds, resonance peaks, nonlinear modes; the choice of harmonics.
 
 A method is a module of `methods`, or a file of one's own, with `class Options` (its numbers) and
-`follow(balance, start, stop, options, on_point=None) -> Branch`.
-"""
-
-from __future__ import annotations
+`follow(balance, start, stop, options, on_point=None) -> Branch`."""
 
 from tribodyn.plugins import PluginKind
 

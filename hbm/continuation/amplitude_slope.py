@@ -8,7 +8,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.bordered import Direction
-from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.harmonics import amplitude, amplitude_slope
 from tribodyn.hbm.linearisation import Linearisation
 from tribodyn.hbm.newton import Solution
 
@@ -19,8 +19,7 @@ class AmplitudeSlope:
 
     height : of the output [m]
     distance : to the peak [rad/s], were the response that of one mode, y = R / (p - omega)
-    width : half width of the resonance at its peak, abs(p - omega) elsewhere [rad/s]
-    """
+    width : half width of the resonance at its peak, abs(p - omega) elsewhere [rad/s]"""
 
     solution: Solution
     omega: float
@@ -53,12 +52,13 @@ class AmplitudeSlope:
         dy = tangent.p * slope_y + balance.at(state.omega).outputs(linear.departure_slope(dx))
         row = balance.compliance.output_names.index(output)
         y = balance.outputs(state)[row]
-        dynamic = balance.basis.order > 0
-        product, steepness = y[dynamic] @ dy[row][dynamic], dy[row][dynamic] @ dy[row][dynamic]
+        turn, harmonics = dy[row][balance.basis.order > 0], balance.basis.harmonics
+        height, steepness = float(amplitude(y, harmonics)), turn @ turn
+        product = height * float(amplitude_slope(y, harmonics) @ dy[row])
         distance = product / steepness if steepness > 0 else 0.0
-        width = np.sqrt(y[dynamic] @ y[dynamic] / steepness) if steepness > 0 else state.omega
-        height, dx = float(amplitude(y)), dx.reshape(state.x.shape)
-        return cls(solution, state.omega, float(2 * product), height, float(distance), float(width), dx)
+        width = height / np.sqrt(steepness) if steepness > 0 else state.omega
+        move = dx.reshape(state.x.shape)
+        return cls(solution, state.omega, float(2 * product), height, float(distance), float(width), move)
 
     def predict(self, omega: float) -> np.ndarray:
         """x at a frequency, along the tangent."""
@@ -74,8 +74,7 @@ class AmplitudeSlope:
     def peak_before(self, other: AmplitudeSlope) -> float:
         """Frequency of the peak between two points from both of which the curve rises towards the other [rad/s].
 
-        By the Hermite cubic of 1 / height^2, which is a parabola for one mode
-        """
+        By the Hermite cubic of 1 / height^2, which is a parabola for one mode"""
         h, ratio = other.omega - self.omega, (self.height / other.height) ** 2
         a, b = -h * self.slope / self.height**2, -h * other.slope / other.height**2 * ratio
         square, cubic = 3 * (ratio - 1) - 2 * a - b, 3 * (a + b - 2 * (ratio - 1))
@@ -85,7 +84,6 @@ class AmplitudeSlope:
     def zero_with(self, other: AmplitudeSlope) -> float:
         """Where a straight line through the distances of two points vanishes [rad/s].
 
-        Distances of one mode lie on a line, slopes do not
-        """
+        Distances of one mode lie on a line, slopes do not"""
         fa, fb = self.distance, other.distance
         return (self.omega * fb - other.omega * fa) / (fb - fa) if fa != fb else 0.5 * (self.omega + other.omega)

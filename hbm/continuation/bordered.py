@@ -17,9 +17,10 @@ import scipy.linalg as sla
 
 from tribodyn.hbm.balance import State
 from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.criterion import relative_residual, required_by_vibration
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.linearisation import Linearisation
-from tribodyn.hbm.newton import NewtonOptions, Solution, relative_residual
+from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 from tribodyn.refusal import SolverFailure
 
@@ -78,8 +79,7 @@ def solve(
 
     slope : (n_contact, n_coeff) dR/dp; border : c, of any norm; rhs : r (n_contact, n_coeff) [m] and s
     Returns the direction and the products spent
-    Raises  BorderFailed
-    """
+    Raises  BorderFailed"""
     rows = linear.rows
     shape = (len(rows), slope.shape[1])
     bordering = np.append(slope[rows].ravel() * (metric.width / metric.length), 0.0)
@@ -168,18 +168,17 @@ def correct(
     """Newton for R(x, p) = 0 in the hyperplane of a start, normal to the border.
 
     Returns the solution, converged or not, and its value of the parameter
-    Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
-    """
+    Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2"""
     place = _Place.at(path, start.p, start.x)
     history = [place.error]
     forcing, products, outcome = 1e-2, 0, CONVERGED
-    while place.error > options.tolerance:
+    while place.error > (goal := min(options.tolerance, place.required)):
         steps = len(history) - 1
         if steps == options.max_steps:
             outcome = SolveEnd.STEPS_SPENT.say(f" {steps} steps: {place.error:.1e}")
             break
         balance, _ = path.place(place.value)
-        target = max(min(forcing, 0.1), 0.3 * options.tolerance / place.error, 1e-12)
+        target = max(min(forcing, 0.1), 0.3 * goal / place.error, 1e-12)
         slope = path.slope(place.value, place.state)
         try:
             linear = balance.linearise(place.state)
@@ -197,23 +196,27 @@ def correct(
             break
         forcing = 0.5 * (trial.error / place.error) ** 1.5
         place = trial
+    if place.error <= options.tolerance:  # as far as rounding lets it
+        outcome = CONVERGED
     return Solution(place.state, outcome, len(history) - 1, products, tuple(history)), place.value
 
 
 @dataclass(frozen=True)
 class _Place:
-    """One (x, p) of the Newton iteration with its relative residual."""
+    """One (x, p) of the Newton iteration with its relative residual, and that which the vibration needs."""
 
     value: float
     state: State
     error: float
+    required: float
 
     @classmethod
     def at(cls, path: Parameter, value: float, flat: np.ndarray) -> _Place:
         balance, omega = path.place(value)
         state = balance.evaluate(omega, balance.shaped(flat))
-        error = relative_residual(state, balance.x_lin(omega))
-        return cls(value, state, error if np.isfinite(error) else np.inf)
+        x_lin = balance.x_lin(omega)
+        error = relative_residual(state, x_lin)
+        return cls(value, state, error if np.isfinite(error) else np.inf, required_by_vibration(state, x_lin))
 
     def search(self, path: Parameter, direction: Direction) -> _Place:
         """Backtrack until the residual falls; the best trial where none falls enough, for the derivative has kinks."""

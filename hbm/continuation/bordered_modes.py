@@ -1,7 +1,5 @@
 """Modes of the stuck structure, and the bordered dynamic stiffness of one harmonic in them."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np
@@ -67,8 +65,7 @@ class StuckModes:
 
     lam : (n,) squared frequencies; static_lam : the same for static loads; U, O : (n_contact, n), (n_output, n) shapes
     damping, flow : (n, n) what multiplies the velocity, and circulatory forces or None
-    proportional : whether nothing couples the modes
-    """
+    proportional : whether nothing couples the modes"""
 
     def __init__(self, system: SecondOrderSystem, b: np.ndarray, k: np.ndarray, outputs: tuple[str, ...]):
         mass = np.asarray(system.mass)

@@ -9,8 +9,17 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.continuation.parameter import LOAD, Parameter
+from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
+
+STRESS, GAUGE = "stress ", "gauge "
+"""What the names of outputs begin with that are components of stress [Pa], and strains."""
+
+
+def unit_of(output: str) -> str:
+    """Unit of an observed output; empty for a strain."""
+    return "Pa" if output.startswith(STRESS) else "" if output.startswith(GAUGE) else "m"
 
 
 @dataclass(frozen=True)
@@ -19,7 +28,8 @@ class Branch:
 
     omega : (n_point,) excitation frequency [rad/s]
     output_names : names of the observed outputs
-    response : (n_point, n_output, n_coeff) Fourier coefficients of the outputs [m]
+    response : (n_point, n_output, n_coeff) Fourier coefficients of the outputs [m], or see `unit_of`
+    harmonics : that the coefficients have
     contact : (n_point, n_pair * n_component, n_coeff) relative displacement [m]
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
     outcome : for each point CONVERGED, BESIDE_PEAK (a solution), or what went wrong
@@ -27,8 +37,7 @@ class Branch:
     end : why and where the branch ends; its text is a sentence
     folds : indices of the points that are folds, where the branch turns back
     parameter_name : what was stepped; parameter : (n_point,) its values, the same as omega where it is the frequency
-    load_factor : (n_point,) on the vibrating loads, which a test under control finds, see `control`
-    """
+    load_factor : (n_point,) on the vibrating loads, which a test under control finds, see `control`"""
 
     omega: np.ndarray
     output_names: tuple[str, ...]
@@ -38,6 +47,7 @@ class Branch:
     outcome: tuple[Outcome[SolveEnd], ...]
     newton_steps: np.ndarray
     end: Outcome[BranchEnd]
+    harmonics: tuple[int, ...]
     folds: tuple[int, ...] = ()
     parameter_name: str = "frequency"
     parameter: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -63,9 +73,14 @@ class Branch:
         """(n_point,) excitation frequency [Hz]."""
         return self.omega / (2 * np.pi)
 
+    @property
+    def displacements(self) -> tuple[str, ...]:
+        """Names of the outputs that are displacements."""
+        return tuple(name for name in self.output_names if unit_of(name) == "m")
+
     def amplitude(self, output: str) -> np.ndarray:
-        """(n_point,) vibration amplitude of an output, see `amplitude` [m]."""
-        return amplitude(self.response[:, self.output_names.index(output)])
+        """(n_point,) vibration amplitude of an output, see `hbm.harmonics.amplitude` [m]."""
+        return amplitude(self.response[:, self.output_names.index(output)], self.harmonics)
 
     def fundamental(self, output: str) -> np.ndarray:
         """(n_point,) complex amplitude a_1 - i b_1 of an output [m]."""
@@ -84,15 +99,21 @@ class Branch:
         size = self.amplitude(output) / self.load_factor if self.controlled else self.amplitude(output)
         return np.where(self.converged, size, -1.0)
 
+    def highest(self, output: str) -> int:
+        """The point that head, errors, pictures, tables and studies speak of: the highest of an output, peak or not."""
+        return int(np.argmax(self.height(output)))
+
     def peak(self, output: str) -> int | None:
         """The highest point of an output, None where `no_peak` says why that is none."""
-        return None if self.no_peak(output) else int(np.argmax(self.height(output)))
+        return None if self.no_peak(output) else self.highest(output)
 
     def no_peak(self, output: str) -> str:
         """Why the highest point of an output is no peak: an end of the curve, or a higher one not solved; else ""."""
-        best = int(np.argmax(self.height(output)))
-        if best in (0, len(self.omega) - 1):
+        if self.highest(output) in (0, len(self.omega) - 1):
             return "the response is highest at an end of response.frequency, widen it"
+        for i in (self.highest(output) - 1, self.highest(output) + 1):
+            if not self.converged[i]:
+                return f"the response is highest beside {self.frequency[i]:.5g} Hz, where no solution was found"
         unsolved = [
             hertz for hertz, end in zip(self.frequency, self.outcome, strict=True) if end.kind is SolveEnd.BESIDE_PEAK
         ]
@@ -116,16 +137,6 @@ class Branch:
         return replace(self, **grown, outcome=outcome, folds=tuple(i + (i >= at) for i in self.folds))
 
 
-def amplitude(coefficients: np.ndarray) -> np.ndarray:
-    """Vibration amplitude of Fourier coefficients: square root of the sum over harmonics of a_h^2 + b_h^2.
-
-    coefficients : (..., n_coeff), [x_0, a_1, b_1, ...]; an even number of them is without x_0
-    Returns (...) [same unit]; for one harmonic it is the peak value, for several sqrt(2) times the r.m.s.
-    """
-    dynamic = coefficients[..., coefficients.shape[-1] % 2 :]
-    return np.sqrt(np.sum(dynamic**2, axis=-1))
-
-
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
     """One point of a branch; the fields are those of `Branch`, x (n_pair, n_component, n_coeff) [m]."""
@@ -147,8 +158,7 @@ class BranchBuilder:
     """Collects solutions into a Branch.
 
     parameter : what the continuation steps in
-    points : collected so far; value, x : of them; folds : indices of those that are folds
-    """
+    points : collected so far; value, x : of them; folds : indices of those that are folds"""
 
     def __init__(self, parameter: Parameter):
         self._parameter = parameter
@@ -171,6 +181,12 @@ class BranchBuilder:
         self.x.append(point.x)
         if fold:
             self.mark_fold()
+
+    @property
+    def stretch(self) -> int:
+        """The first point behind the last fold or unsolved point: those before it lie on another leg of the curve."""
+        unsolved = (i for i, p in enumerate(self.points[:-1]) if p.outcome.kind is not SolveEnd.CONVERGED)
+        return max((-1, *self.folds[-1:], *unsolved)) + 1
 
     def mark_fold(self) -> None:
         """Mark the last point as a fold."""
@@ -201,6 +217,7 @@ class BranchBuilder:
             outcome=tuple(p.outcome for p in points),
             newton_steps=np.array([p.steps for p in points]),
             end=end,
+            harmonics=balances[-1].basis.harmonics,
             folds=tuple(self.folds),
             parameter_name=self._parameter.name,
             parameter=np.array(self.value),

@@ -6,10 +6,7 @@ Phase resonance: while the amplitude goes from small to large, the frequency is 
 by a quarter of a cycle, as a phase-locked loop does; see `PhaseResonance`.
 Every point is returned as the constant force of its size has it: the phases are those of the loads as they stand.
 Source  phase resonance of nonlinear structures: Peter and Leine, MSSP 90 (2017) 139; constant response: Karaagacli and
-Ozguven, MSSP 146 (2021) 107023
-"""
-
-from __future__ import annotations
+Ozguven, MSSP 146 (2021) 107023"""
 
 from dataclasses import replace
 
@@ -29,8 +26,7 @@ def constant_response(balance: HarmonicBalance, output: str, amplitude: float) -
     """The balance of a test that keeps the fundamental amplitude [m] of an output; every continuation follows it.
 
     Its load factor multiplies the amplitude. What it finds is read by `driven`
-    Raises  ValueError where the loads are not of harmonic 1 alone
-    """
+    Raises  ValueError where the loads are not of harmonic 1 alone"""
     _require_one_force(balance)
     if not amplitude > 0:
         raise Refusal(f"the amplitude that is held must be above 0, not {amplitude:g} m")
@@ -55,8 +51,7 @@ class PhaseResonance(FreeVibration):
 
     zeta is the damping ratio by which the mode at rest takes the power of the force, F = 2 zeta w^2 a / (phi^H p).
     low, high : range [rad/s] of the mode at rest; of several the one that the loads move the output most in
-    Raises  ValueError where there is none, or loads act in other harmonics
-    """
+    Raises  ValueError where there is none, or loads act in other harmonics"""
 
     def __init__(self, balance: HarmonicBalance, low: float, high: float, output: str):
         _require_one_force(balance)
@@ -107,8 +102,7 @@ def phase_resonance(
     """The curve of resonances at which an output lags its force by a quarter of a cycle.
 
     low, high : range [rad/s] of the mode at rest; start, stop : fundamental amplitudes of the output [m], either order
-    Returns a Branch in the amplitude, whose load factors are the force levels
-    """
+    Returns a Branch in the amplitude, whose load factors are the force levels"""
     if not (start > 0 and stop > 0 and start != stop):
         raise Refusal(f"the amplitudes of a phase resonance must be > 0 and differ, not {start:g} and {stop:g}")
     problem = PhaseResonance(balance, low, high, output)
@@ -124,8 +118,9 @@ def phase_resonance(
         outcome=mode.outcome,
         newton_steps=mode.newton_steps,
         end=end,
+        harmonics=balance.basis.harmonics,
         parameter_name="amplitude m",
-        parameter=mode.amplitude,
+        parameter=mode.reference_amplitude,
     )
     force = [problem.driving(p.omega, p.zeta, p.a) for p, _, _ in solved]
     return _in_phase(balance, branch, np.array(force))

@@ -1,17 +1,18 @@
 """The peaks of a response curve, solved and made points of it: what is read from its highest point is the peak.
 
 Between two neighbours where the frequency rises or falls throughout, the peak is refined along the frequency; where the
-curve turns back beside it, along its arc length.
-"""
+curve turns back beside it, along its arc length."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import bordered, parameter
 from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
@@ -20,10 +21,13 @@ from tribodyn.hbm.continuation.curve_segment import CurvePoint, Segment
 from tribodyn.hbm.continuation.highest_peak import vertex
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.peak_refinement import NoPeak
-from tribodyn.hbm.continuation.resonance_peak import AtPeak
+from tribodyn.hbm.linear.resonances import narrow_resonances
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 from tribodyn.hbm.threads import single
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.continuation.resonance_peak import AtPeak
 
 
 @dataclass(frozen=True)
@@ -33,8 +37,7 @@ class CurvePeakRules:
     max_refined : maxima of a curve, the highest foreseen first
     trials : solves along the arc, after which the maximum is left as it is
     shortest : arc length between two points, of what they were apart at first, beside a kink where no slope vanishes
-    tangent : relative accuracy of tangents
-    """
+    tangent : relative accuracy of tangents"""
 
     max_refined: int = 3
     trials: int = 40
@@ -62,8 +65,8 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
 
     branch : over the frequency; site : of which output, and how exactly
     A maximum that no solve makes higher stays the point that it is, marked where the search for its peak has failed or
-    ended lower and that is foreseen higher than all that is solved
-    """
+    ended lower and that is foreseen higher than all that is solved"""
+    branch = _with_narrow_resonances(balance, branch, site)
     insertions: list[tuple[int, BranchPoint]] = []
     failed: list[_Candidate] = []
     heights = branch.amplitude(site.output)
@@ -86,9 +89,7 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
         if not inside or not point.amplitude > heights[i]:
             continue
         at = i + 1 if _lies_behind(branch, i, state.omega, state.flat) else i
-        energy = float(balance.energy(state).sum())
-        solved = BranchPoint(state.omega, state.x, state.omega, point.response, energy, CONVERGED, point.solves)
-        insertions.append((at, solved))
+        insertions.append((at, _branch_point(balance, state, point.solves)))
         highest = max(highest, point.amplitude)
     unsolved = {candidate.point for candidate in failed if max(candidate.height, heights[candidate.point]) >= highest}
     marked = (SolveEnd.BESIDE_PEAK.say() if i in unsolved else outcome for i, outcome in enumerate(branch.outcome))
@@ -96,6 +97,25 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
     for at, solved in sorted(insertions, key=lambda item: -item[0]):
         branch = branch.inserted(at, solved)
     return branch
+
+
+def _with_narrow_resonances(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch:
+    """The curve with points at linear resonances between which and its points nothing would tell of them."""
+    if branch.folds or len(np.unique(np.sign(np.diff(branch.omega)))) != 1:
+        return branch
+    for omega in narrow_resonances(balance, branch.omega):
+        at = int(np.flatnonzero((branch.omega[:-1] < omega) != (branch.omega[1:] < omega))[0])
+        share = (omega - branch.omega[at]) / (branch.omega[at + 1] - branch.omega[at])
+        guess = (1 - share) * branch.contact[at] + share * branch.contact[at + 1]
+        solution = newton.solve(balance, float(omega), balance.shaped(guess), site.newton)
+        if solution.converged:
+            branch = branch.inserted(at + 1, _branch_point(balance, solution.state, solution.steps))
+    return branch
+
+
+def _branch_point(balance: HarmonicBalance, state: State, steps: int) -> BranchPoint:
+    response, energy = balance.outputs(state), float(balance.energy(state).sum())
+    return BranchPoint(state.omega, state.x, state.omega, response, energy, CONVERGED, steps)
 
 
 def _candidates(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> list[_Candidate]:
@@ -108,7 +128,8 @@ def _candidates(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> list[
         predicted = vertex(omega[i - 1 : i + 2], height[i - 1 : i + 2])[1]
         low, high = sorted((float(omega[i - 1]), float(omega[i + 1])))
         turns = bool((omega[i] - omega[i - 1]) * (omega[i + 1] - omega[i]) <= 0)
-        candidates.append(_Candidate(predicted, i, low, high, turns))
+        beside_fold = i - 1 in branch.folds or i + 1 in branch.folds
+        candidates.append(_Candidate(predicted, i, low, high, turns or beside_fold))
     for i in map(int, np.flatnonzero((height[:-1] > 0) & (height[1:] > 0))):
         if i not in tops and i + 1 not in tops:
             predicted = _hidden(balance, branch, i, site)
@@ -121,8 +142,7 @@ def _candidates(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> list[
 def _hidden(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> float:
     """Height of a resonance between points i and i + 1, both of which lie on its flanks; 0 where there is none.
 
-    Two responses y = R / (p - omega) give p. A response that passes zero looks the same, but falls towards it.
-    """
+    Two responses y = R / (p - omega) give p. A response that passes zero looks the same, but falls towards it."""
     y = branch.response[i : i + 2, branch.output_names.index(site.output)]
     y = y[:, y.shape[1] % 2 :]
     strongest = 2 * int(np.argmax(np.sum(y[:, ::2] ** 2 + y[:, 1::2] ** 2, axis=0)))

@@ -40,8 +40,7 @@ class CurvePoint:
     """A point of the curve.
 
     place : (x, p); tangent : unit tangent, which points along the walk
-    solution : what was solved there, None once it is behind
-    """
+    solution : what was solved there, None once it is behind"""
 
     place: Direction
     tangent: Direction
@@ -57,6 +56,13 @@ class CurvePoint:
     def value(self) -> float:
         """The parameter."""
         return self.place.p
+
+    @property
+    def solved(self) -> Solution:
+        """The solution of a point that is not behind yet."""
+        if self.solution is None:
+            raise RuntimeError("the point lies behind: its solution is gone")
+        return self.solution
 
     def bare(self) -> CurvePoint:
         """The point without its solution, which is large."""
@@ -183,8 +189,7 @@ class Segment:
     def passes(self, path: Parameter, point: CurvePoint, sense: float, options: NewtonOptions) -> bool:
         """Whether the segment passes through a known point, in its sense (1) or against it (-1).
 
-        A close call is decided by solving in the hyperplane through the point, from the segment
-        """
+        A close call is decided by solving in the hyperplane through the point, from the segment"""
         if self.length == 0.0 or point is self.start or point is self.end or self.angle > RULES.kink_angle:
             return False
         metric = self.metric
@@ -205,8 +210,7 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
     """The point between the ends of a segment where the parameter turns back: the tangent's share in it is zero.
 
     tolerance : relative, on the parameter
-    Returns the fold, also where it is a kink with tangents of either sign beside it; None where a solve fails
-    """
+    Returns the fold, also where it is a kink with tangents of either sign beside it; None where a solve fails"""
     tight = replace(options, tolerance=max(RULES.fold_newton_share * options.tolerance, 1e-13))
     metric = segment.metric
     try:

@@ -41,8 +41,7 @@ class CurveStepper:
 
     first : the solution at `start`; the walk sets out in the direction of `stop`, or of the heading where one is given
     trouble : why the last step that failed did
-    segments : the curve behind, without its solutions
-    """
+    segments : the curve behind, without its solutions"""
 
     def __init__(
         self,
@@ -149,8 +148,7 @@ class CurveStepper:
         """The step, cut by points between where its ends leave a doubt; None where it leaves its branch.
 
         On a smooth curve the slant falls with the square of the length. At a kink it stays below half of the turn.
-        Across the gap between two branches that run side by side it grows as the length falls.
-        """
+        Across the gap between two branches that run side by side it grows as the length falls."""
         if halvings == 0 or not part.doubtful:
             return [part]
         if part.slant > 0.5 * curve_segment.RULES.kink_angle:
@@ -191,8 +189,7 @@ class CurveStepper:
         trial : a segment that ends on the leg behind the kink, if there is one
         The derivative ahead of the kink is that of its other side: along the null direction there, either way, the
         curve goes. A point is sought in the hyperplane that both legs cross in their sense, and none that lies on
-        the leg we came on.
-        """
+        the leg we came on."""
         start, metric = self._point, self._metric
         ahead = start.place + start.tangent * step
         for leg in self._legs(ahead) if trial is None else [trial.end.tangent]:
@@ -224,8 +221,7 @@ class CurveStepper:
     def _split(self, pieces: list[Segment], careful: bool) -> list[Segment] | None:
         """The step, cut at the folds of its pieces; None where one seems to hide two folds or its fold is not found.
 
-        Where not careful such a piece is taken as it is.
-        """
+        Where not careful such a piece is taken as it is."""
         start, parts = pieces[0].start, []
         for piece in pieces:
             if not piece.turns:
@@ -244,11 +240,10 @@ class CurveStepper:
 
     def _accept(self, segment: Segment, last: Segment, step: float) -> None:
         o = self._options
-        assert segment.end.solution is not None
         self.segments.append(segment.bare())
         self._metric = self._measure(segment.end.place.x)
         self._point = replace(segment.end, tangent=self._metric.unit(segment.end.tangent))
-        factor = 2.0 ** np.clip((o.newton_target - segment.end.solution.steps) / 2, -1, 2)
+        factor = 2.0 ** np.clip((o.newton_target - segment.end.solved.steps) / 2, -1, 2)
         if segment.angle > curve_segment.RULES.kink_angle:
             self._bend = None
         else:

@@ -1,19 +1,16 @@
 """Folds of a frequency response, followed while a second parameter changes: load, gap, stiffness, wear.
 
 The line of folds is followed by its own arc length on the surface of solutions, round the cusps where two folds meet;
-see `fold_surface`.
-"""
-
-from __future__ import annotations
+see `fold_surface`."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from tribodyn.hbm.continuation.bordered import Direction
-from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.continuation.fold_surface import FoldOptions, FoldPoint, NoFold, SolutionSurface
 from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 from tribodyn.refusal import Refusal
@@ -24,10 +21,10 @@ class FoldCurve:
     """A line of folds in the order it was followed.
 
     parameter_name : what was changed; parameter : (n_point,) its values; omega : (n_point,) of the folds [rad/s]
-    output_names; response : (n_point, n_output, n_coeff) [m]; contact : (n_point, n_contact, n_coeff) [m]
+    output_names; response : (n_point, n_output, n_coeff) of the `harmonics` [m]
+    contact : (n_point, n_contact, n_coeff) [m]
     cusps : indices of the points next to which the parameter turns back: two folds meet there and vanish
-    end : why and where it ends; its text is a sentence
-    """
+    end : why and where it ends; its text is a sentence"""
 
     parameter_name: str
     parameter: np.ndarray
@@ -35,30 +32,25 @@ class FoldCurve:
     output_names: tuple[str, ...]
     response: np.ndarray
     contact: np.ndarray
+    harmonics: tuple[int, ...]
     cusps: tuple[int, ...]
     end: Outcome[BranchEnd]
 
     def amplitude(self, output: str) -> np.ndarray:
         """(n_point,) vibration amplitude of an output at the folds [m]."""
-        return amplitude(self.response[:, self.output_names.index(output)])
+        return amplitude(self.response[:, self.output_names.index(output)], self.harmonics)
 
 
 @single
 def track_fold(
-    path: Parameter,
-    start: float,
-    stop: float,
-    omega: float,
-    x: np.ndarray,
-    options: FoldOptions | None = None,
+    path: Parameter, start: float, stop: float, omega: float, x: np.ndarray, options: FoldOptions | None = None
 ) -> FoldCurve:
     """Follow a fold of the frequency response from `start` of a parameter towards `stop`.
 
     path : the second parameter, such as `parameter.load(balance, omega)`; its own frequency is not used
     omega, x (n_pair, n_component, n_coeff) : the fold at `start`, or near it, as a Branch lists it [rad/s], [m]
     Returns the line of folds; it may turn back at a cusp and then ends where it passes `start` or `stop`
-    Raises  Refusal where there is no fold near the start
-    """
+    Raises  Refusal where there is no fold near the start"""
     options = options or FoldOptions()
     if path.omega is None:
         raise Refusal("a fold is followed against a second parameter, such as the load, not against the frequency")
@@ -111,6 +103,7 @@ def _fold_curve(path: Parameter, line: list[FoldPoint], end: Outcome[BranchEnd])
         balance.compliance.output_names,
         np.stack([path.make(point.value).outputs(point.solution.state) for point in line]),
         np.stack([point.solution.state.flat for point in line]),
+        balance.basis.harmonics,
         tuple(int(i) for i in np.flatnonzero(steps[1:] * steps[:-1] < 0) + 1),
         end,
     )

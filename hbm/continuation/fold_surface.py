@@ -7,8 +7,6 @@ the cusps where two folds meet. Where kinks of the law keep Newton from it, the 
 Source  minimally bordered systems, Griewank and Reddien 1984, Govaerts 2000; differences of the scalar by steps ours.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -37,8 +35,7 @@ class FoldOptions:
         where the errors of truncation and of the solves are alike
     accuracy : of tangents, relative; finer than `difference` needs by the factor that differencing loses
     residual : of the scalar at a fold; the frequency is off by its square, which is below Newton's tolerance
-    search_step, search_steps : arc length of the first step in the search for a fold, and steps either way
-    """
+    search_step, search_steps : arc length of the first step in the search for a fold, and steps either way"""
 
     step: float = 0.05
     max_step: float = 0.3
@@ -64,8 +61,7 @@ class FoldPoint:
     """A fold with the direction in which its line continues.
 
     value : of the parameter; solution : at the fold; response_tangent : unit tangent of the response curve
-    tangent, change : of (x, omega) and of the parameter along the line of folds, of unit length together
-    """
+    tangent, change : of (x, omega) and of the parameter along the line of folds, of unit length together"""
 
     value: float
     solution: Solution
@@ -101,8 +97,7 @@ class SolutionSurface:
         metric = self._metric(guess.x, self._path.make(value))
         response_tangent = self._null(self._response(value), guess, metric)
         point = self._searched(value, guess, response_tangent, metric)
-        solution, response_tangent = point.solution, point.tangent
-        assert solution is not None
+        solution, response_tangent = point.solved, point.tangent
         try:
             across = self._across(value, solution, response_tangent, metric)
             scalar, slopes = self._slopes(value, point.place, response_tangent, across, metric)
@@ -135,8 +130,7 @@ class SolutionSurface:
         chord = point.place - neighbour.place
         if value == neighbour.value or self._length(metric, chord, value - neighbour.value) > reach:
             raise NoFold(f"the next fold, at {self._path.say(value)}, lies on another line")
-        assert point.solution is not None
-        return self._unit(FoldPoint(value, point.solution, point.tangent, chord, value - neighbour.value), metric, 1.0)
+        return self._unit(FoldPoint(value, point.solved, point.tangent, chord, value - neighbour.value), metric, 1.0)
 
     def _newton_fold(self, value: float, guess: Direction, response_tangent: Direction) -> FoldPoint:
         """Newton for the fold near a guess (x, omega), normal to the line of folds; raises NoFold."""

@@ -6,10 +6,7 @@ The linear side is solved directly in all modes of the stuck structure, since th
 the border, the reference mode phi, keeps it regular in resonance, and what it needs to hold phi at the amplitude a is
 the residual that w and zeta bring to zero. A point is described by scaled coordinates: static displacement, vibration
 over amplitude, the logarithm of w, zeta, and the logarithm of a.
-Source  extended periodic motion concept: Krack 2015, Computers & Structures 154; the bordered elimination is ours
-"""
-
-from __future__ import annotations
+Source  extended periodic motion concept: Krack 2015, Computers & Structures 154; the bordered elimination is ours"""
 
 from dataclasses import dataclass
 
@@ -31,8 +28,7 @@ class ModePoint:
 
     coordinates : (n_contact * n_coeff + 3,) the same, scaled
     residual : (n_contact * n_coeff + 2,), scaled; eta : complex modal amplitudes (n, n_harmonic)
-    factors : the bordered dynamic stiffness of each harmonic, ready to be solved
-    """
+    factors : the bordered dynamic stiffness of each harmonic, ready to be solved"""
 
     coordinates: np.ndarray
     a: float
@@ -57,8 +53,7 @@ class FreeVibration:
     column, row : (n,) border of harmonic 1, what acts to hold the amplitude and what measures it
     sustained : 1 where zeta is that of the term added to the structure, 0 where it says how large a force drives it
     push : modal force of what acts, per unit of it
-    Raises  ValueError for what has no such mode
-    """
+    Raises  ValueError for what has no such mode"""
 
     def __init__(self, balance: HarmonicBalance, mode: int | None, output: str | None):
         model, self.balance, self.basis, self.mode = balance.model, balance, balance.basis, mode
@@ -135,8 +130,7 @@ class FreeVibration:
     def about_rest(self) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies (k,) [rad/s] and damping ratios of all small vibrations about the static equilibrium.
 
-        Coriolis and circulatory forces are left out, and so are motions as a rigid body.
-        """
+        Coriolis and circulatory forces are left out, and so are motions as a rigid body."""
         squares, shapes = self._still
         rate = np.real(np.einsum("ij,ij->j", shapes.conj(), self.modes[self.first].damping @ shapes))
         vibrates = squares > 1e-13 * squares[-1]
@@ -251,8 +245,7 @@ class FreeVibration:
         self, p: ModePoint, normal: np.ndarray, tolerance: float, max_products: int, distance: float = 0.0
     ) -> np.ndarray:
         """Newton direction for the coordinates to the hyperplane normal to `normal`, `along` of it away from p."""
-        jac = p.cycle.jacobian
-        assert jac is not None
+        jac = p.cycle.slope
         units = self._units(p.a)
         dynamic = np.where(self.basis.order == 0, 0.0, p.x.reshape(self._shape))
         by_omega, by_zeta, by_a = self._slopes(p)

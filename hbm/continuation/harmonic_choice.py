@@ -5,8 +5,7 @@ left out, sent through their compliance; one Newton step turns it into a change 
 harmonics included. The step is linear, so the change splits into one share for each harmonic left out: those with the
 largest shares are taken in, until what remains is below the tolerance; harmonics that turn out useless are dropped.
 Source  a posteriori estimate by one Newton step in the larger space, as in Urabe 1965 and Grolet and Thouverez 2012;
-the split by harmonic is ours.
-"""
+the split by harmonic is ours."""
 
 from __future__ import annotations
 
@@ -37,8 +36,7 @@ class ChoiceOptions:
     highest : highest harmonic that may be kept; the estimate looks at half as many again
     rounds : times the set may grow
     allowed_share : of the tolerance, that the harmonics left out may use: the estimate sees each on its own
-    useful_in_a_row : useful harmonics, the smallest first, after which no more are tried for dropping
-    """
+    useful_in_a_row : useful harmonics, the smallest first, after which no more are tried for dropping"""
 
     tolerance: float = 1e-2
     highest: int = 15
@@ -52,8 +50,7 @@ class ChoiceOptions:
 class EstimateRules:
     """linear_accuracy : of the linear solves behind an estimate, which is of first order itself
 
-    least_vibration : an output that vibrates less than this share of the largest is measured against that share
-    """
+    least_vibration : an output that vibrates less than this share of the largest is measured against that share"""
 
     linear_accuracy: float = 1e-3
     least_vibration: float = 1e-2
@@ -68,10 +65,18 @@ class Estimate:
 
     error : change of the response of the worst output, relative to its vibration
     shares : harmonic left out -> its own share in the change, in the same measure
-    """
+    x : (n_pair, n_component, n_coeff) the solution after the Newton step, with all harmonics [m]"""
 
     error: float
     shares: Mapping[int, float]
+    x: np.ndarray
+
+    def required(self, allowed: float, highest: int) -> dict[int, float]:
+        """The fewest harmonics up to `highest`, with their shares, that leave no more than `allowed` to the others."""
+        falling = sorted((h for h in self.shares if h <= highest), key=lambda h: -self.shares[h])
+        values = np.array([self.shares[h] for h in falling])
+        remaining = np.sqrt(np.cumsum(values[::-1] ** 2))[::-1]  # of this one and all smaller ones
+        return {h: self.shares[h] for h, residual in zip(falling, remaining, strict=True) if residual > allowed}
 
 
 @dataclass(frozen=True)
@@ -82,8 +87,7 @@ class HarmonicChoice:
     tolerance : that was asked for; omega : frequencies looked at [rad/s]
     history : sets tried in turn with their estimated errors
     balance : with the chosen harmonics; x : its solutions, one (n_pair, n_component, n_coeff) for each frequency [m]
-    outcome : sentence
-    """
+    outcome : sentence"""
 
     harmonics: tuple[int, ...]
     estimate: Estimate
@@ -106,8 +110,7 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
     balance : the problem; its own harmonics play no part beyond those that carry loads, its samples are kept
     omega : frequencies [rad/s]
     Returns the choice, also where the tolerance is not met with the harmonics allowed: `outcome` says so
-    Raises  NotSolved; ValueError where the samples are too few for the highest harmonic of the estimate
-    """
+    Raises  NotSolved; ValueError where the samples are too few for the highest harmonic of the estimate"""
     options = options or ChoiceOptions()
     wide = widened(balance, options.highest)
     loaded = {h for (h, _), value in balance.excitation.loads.items() if value != 0}
@@ -157,8 +160,7 @@ def widened(balance: HarmonicBalance, highest: int, error: float | None = None) 
 
     The linear side is kept as long as that of the balance: problems that differ in contact, wear or load share it
     error : of the compliance at the highest harmonic, None: as a run needs it. ROUGH does not serve to follow a
-        response: with 1e-6 a sweep of the beam jumped elsewhere
-    """
+        response: with 1e-6 a sweep of the beam jumped elsewhere"""
     top = highest + (highest + 1) // 2
     basis = replace(balance.basis, harmonics=tuple(range(top + 1)))
     excitation = balance.excitation
@@ -178,8 +180,7 @@ def estimate(
     """What the harmonics of a wide balance would change in a solution with some of them.
 
     wide : from `widened`; kept : harmonics of the solution x (n_pair, n_component, n_coeff) [m] at omega [rad/s]
-    split : whether the shares are wanted too, at the cost of one linear solve each
-    """
+    split : whether the shares are wanted too, at the cost of one linear solve each"""
     narrow = wide.with_harmonics(kept_harmonics)
     response = narrow.basis.transfer(narrow.outputs(narrow.evaluate(omega, x, jacobian=False)), wide.basis)
     state = wide.evaluate(omega, narrow.basis.transfer(x, wide.basis))
@@ -192,16 +193,16 @@ def estimate(
     def measure(change: np.ndarray) -> float:
         return float((np.linalg.norm(change, axis=1) / scale).max(initial=0.0))
 
-    def change(of: set[int]) -> np.ndarray:
-        rows = np.isin(wide.basis.order, list(of))
+    def change(of: list[int]) -> tuple[np.ndarray, np.ndarray]:
+        rows = np.isin(wide.basis.order, of)
         dx, _, _ = linear.solve(np.where(rows, -state.residual, 0.0), RULES.linear_accuracy)
-        return point.outputs(linear.departure_slope(dx)) + np.where(rows, direct, 0.0)
+        return dx, point.outputs(linear.departure_slope(dx)) + np.where(rows, direct, 0.0)
 
-    absent = set(wide.basis.harmonics) - set(kept_harmonics)
-    if not split:
-        return Estimate(measure(change(absent)), {})
-    changes = {h: change({h}) for h in sorted(absent)}
-    return Estimate(measure(np.sum(list(changes.values()), axis=0)), {h: measure(c) for h, c in changes.items()})
+    absent = [h for h in wide.basis.harmonics if h not in kept_harmonics]
+    steps = [change([h]) for h in absent] if split else [change(absent)]
+    dx, total = (np.sum(parts, axis=0) for parts in zip(*steps, strict=True))
+    shares = {h: measure(step[1]) for h, step in zip(absent, steps, strict=True)} if split else {}
+    return Estimate(measure(total), shares, state.x + dx.reshape(state.x.shape))
 
 
 @dataclass(frozen=True)
@@ -225,8 +226,7 @@ class _Trial:
     ) -> _Trial:
         """Solve and estimate, from the solutions of another set where there is one; raises NotSolved.
 
-        shrinking : only whether the tolerance is met matters, not the shares; ends at the first frequency where not
-        """
+        shrinking : only whether the tolerance is met matters, not the shares; ends at the first frequency where not"""
         narrow = wide.with_harmonics(kept_harmonics)
         solved, estimates = [], []
         content = np.zeros(len(kept_harmonics))
@@ -262,13 +262,8 @@ class _Trial:
         """Harmonics to take in: the fewest that leave the shares of the others below the tolerance everywhere."""
         largest_share: dict[int, float] = {}
         for estimate in self.estimates:
-            if estimate.error <= options.tolerance:
-                continue
-            allowed = sorted((h for h in estimate.shares if h <= options.highest), key=lambda h: -estimate.shares[h])
-            share_values = np.array([estimate.shares[h] for h in allowed])
-            remaining = np.sqrt(np.cumsum(share_values[::-1] ** 2))[::-1]  # of this one and all smaller ones
-            for h, residual in zip(allowed, remaining, strict=True):
-                if residual > options.allowed_share * options.tolerance:
-                    largest_share[h] = max(largest_share.get(h, 0.0), estimate.shares[h])
+            if estimate.error > options.tolerance:
+                required = estimate.required(options.allowed_share * options.tolerance, options.highest)
+                largest_share |= {h: max(largest_share.get(h, 0.0), share) for h, share in required.items()}
         first = sorted(largest_share, key=lambda h: -largest_share[h])
         return set(first[: max(2, len(self.harmonics))])  # a rough solution tells little about the rest

@@ -2,20 +2,23 @@
 
 Through three points around a maximum 1 / amplitude^2 is a parabola over the frequency where one resonance acts, since
 its amplitude is R / |p - omega| with a complex p. Its vertex foresees the peak; the peaks of other outputs are left out
-where they are foreseen lower by some times what the first was missed by.
-"""
+where they are foreseen lower by some times what the first was missed by."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.branch import Branch, amplitude
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
-from tribodyn.hbm.continuation.resonance_peak import AtPeak
+from tribodyn.hbm.harmonics import amplitude
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.continuation.resonance_peak import AtPeak
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,7 @@ def vertex(omega: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
 def candidates(omega: np.ndarray, heights: np.ndarray) -> list[tuple[int, int]]:
     """Points and outputs of the peaks that may be the highest, the highest foreseen first; at most RULES.max_refined.
 
-    omega : (n_point,) [rad/s]; heights : (n_point, n_output) [m]
-    """
+    omega : (n_point,) [rad/s]; heights : (n_point, n_output) [m]"""
     inner, peaks = heights[1:-1], []
     for i, output in np.argwhere((inner >= heights[:-2]) & (inner >= heights[2:]) & (inner > 0)):
         peaks.append((vertex(omega[i : i + 3], heights[i : i + 3, output])[1], int(i) + 1, int(output)))
@@ -69,9 +71,9 @@ def highest(
     """The highest peak of any of the outputs, and which of them; None where no candidate is found.
 
     branch : the response, points on both sides of its peaks; site : how a peak is searched, whatever its output
-    Solves are those of the whole search, points of the branch among them
-    """
-    heights = amplitude(branch.response[:, [branch.output_names.index(name) for name in outputs]])
+    Solves are those of the whole search, points of the branch among them"""
+    rows = [branch.output_names.index(name) for name in outputs]
+    heights = amplitude(branch.response[:, rows], branch.harmonics)
     best: OperatingPoint | None = None
     solves, doubt, row = len(heights), RULES.least_doubt, 0
     for point, output in candidates(branch.omega, heights):

@@ -5,10 +5,7 @@ needs to be added to sustain the motion: it is a limit cycle. The phase is fixed
 backbone. Whether a machine stays there is asked of time integration: the amplitude may turn back on the backbone, so
 that the slope of zeta does not tell it, and sliders that just reach their limit make a kink in what Hill's method
 linearises; in time they come to stand inside their limits.
-Source  Krack 2015, section 2 (a nonlinear mode with zero damping is a limit cycle)
-"""
-
-from __future__ import annotations
+Source  Krack 2015, section 2 (a nonlinear mode with zero damping is a limit cycle)"""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -18,6 +15,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.free_vibration import FreeVibration, ModePoint
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, newton_on, walk
+from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd
 from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.threads import single
@@ -33,12 +31,11 @@ INSIDE = 1e-4  # of a motion: growth is the same from 1e-6 to 1e-3, see docs/the
 class LimitCycle:
     """One limit cycle.
 
-    amplitude : of the output in the reference mode [m]; omega : [rad/s]
+    amplitude : of the output [m]; omega : [rad/s]
     response : (n_output, n_coeff) of the outputs [m]; state : of the balance without harmonic loads
     point : where it lies in the coordinates of its problem
     moved, growth : of `in_time`, None before: share by which the amplitude of the output changes there, and share per
-        period by which the motion beside it grows that does so fastest, below 0 where all die away
-    """
+        period by which the motion beside it grows that does so fastest, below 0 where all die away"""
 
     amplitude: float
     omega: float
@@ -71,8 +68,7 @@ def limit_cycles(
     """Limit cycles between two amplitudes [m] of an output, by rising amplitude, and why there may be others, or none.
 
     mode, output : as for `backbone`; the least damped mode by default
-    Raises  ValueError as `backbone` does
-    """
+    Raises  ValueError as `backbone` does"""
     options = options or BackboneOptions()
     if not 0 < start < stop:
         raise Refusal(f"limit cycles need two rising amplitudes above 0, not {start} and {stop}")
@@ -114,11 +110,12 @@ def _without_damping(problem: FreeVibration, guess: np.ndarray, options: Backbon
     point, outcome, _ = newton_on(problem, problem.evaluate(begin), normal, options.newton)
     if outcome != CONVERGED:
         return None
-    still = replace(problem.balance, load_factor=0.0)
+    still, response = replace(problem.balance, load_factor=0.0), problem.outputs(point)
+    names = still.compliance.output_names
     return LimitCycle(
-        amplitude=point.a * problem.per_amplitude,
+        amplitude=float(amplitude(response[names.index(problem.output)], problem.basis.harmonics)),
         omega=point.omega,
-        response=problem.outputs(point),
+        response=response,
         state=still.evaluate(point.omega, point.x),
         point=point,
     )

@@ -5,10 +5,7 @@
 is periodic for the pair (w, zeta) at which the added, mass-proportional term balances what the contact and C dissipate.
 The backbone is followed by its arc length, since with friction it may turn back in amplitude; see `free_vibration`
 for the equations and how they are solved.
-Source  Krack 2015, Computers & Structures 154
-"""
-
-from __future__ import annotations
+Source  Krack 2015, Computers & Structures 154"""
 
 from dataclasses import dataclass, field
 
@@ -16,6 +13,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.free_vibration import FreeVibration, ModePoint
+from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
@@ -34,8 +32,7 @@ class BackboneOptions:
         change by a few per cent where the amplitude changes by decades
     corner_step : share of the longest step below which any turn is taken as a corner of the curve
     misses : by how much a step may miss its prediction, over `between`: eight on a curve of constant curvature, four at
-        a kink in the middle
-    """
+        a kink in the middle"""
 
     n_points: int = 40
     between: float = 1e-3
@@ -55,7 +52,7 @@ class Backbone:
 
     number : of its reference mode, from 0; None for the least damped
     modal_amplitude : (n_point,) a of the mass-normalised reference mode [m kg^0.5]
-    amplitude : (n_point,) of the chosen output as the reference mode alone would move it [m]
+    reference_amplitude : (n_point,) of the chosen output as the reference mode alone would move it [m]
     output : the chosen one
     omega : (n_point,) natural frequency [rad/s]; damping : (n_point,) modal damping ratio, structure and contact
     order : (n_coeff,) harmonic of each coefficient
@@ -64,12 +61,11 @@ class Backbone:
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
     outcome : for each point CONVERGED, or what went wrong; newton_steps : (n_point,)
     reference_omega : of the mode at rest, stuck where the static load keeps the contact closed [rad/s]
-    end : why the backbone ends; its text is a sentence
-    """
+    end : why the backbone ends; its text is a sentence"""
 
     number: int | None
     modal_amplitude: np.ndarray
-    amplitude: np.ndarray
+    reference_amplitude: np.ndarray
     output: str
     omega: np.ndarray
     damping: np.ndarray
@@ -92,6 +88,11 @@ class Backbone:
     def frequency(self) -> np.ndarray:
         """(n_point,) natural frequency [Hz]."""
         return self.omega / (2 * np.pi)
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """(n_point,) vibration amplitude of the chosen output [m]."""
+        return amplitude(self.response[:, self.output_names.index(self.output)], tuple(np.unique(self.order).tolist()))
 
     @property
     def first_harmonic(self) -> np.ndarray:
@@ -125,8 +126,7 @@ def backbone(
     start, stop : amplitudes [m] of `output` (the first by default) in the reference mode; where `modal`, those of the
         mass-normalised mode itself [m kg^0.5]
     mode : number of the reference mode, from 0, among the modes about the static equilibrium; None for the least damped
-    Raises  ValueError for models whose harmonics see different systems, unknown outputs, no static equilibrium
-    """
+    Raises  ValueError for models whose harmonics see different systems, unknown outputs, no static equilibrium"""
     options = options or BackboneOptions()
     if not (start > 0 and stop > 0 and start != stop):
         raise Refusal(f"the amplitudes of a backbone must be > 0 and differ, not {start} and {stop}")
@@ -206,8 +206,7 @@ def _turned_back(
     """The point behind a corner at which the curve leaves by more than a right angle, `missed` where there is none.
 
     Where a pair begins to slip or to part, the other branch is that of the contact state just beyond: its straight line
-    is followed to as far behind the corner as `move` goes beyond it.
-    """
+    is followed to as far behind the corner as `move` goes beyond it."""
     overshoot = problem.evaluate(origin + move)
     jump = problem.correction(overshoot, normal, 1e-8, options.max_products, -2 * (normal @ move))
     trial = newton_on(problem, problem.evaluate(overshoot.coordinates + jump), normal, options)
@@ -247,7 +246,7 @@ def result(problem: FreeVibration, number: int | None, solved: list[_Solved], en
     return Backbone(
         number=number,
         modal_amplitude=np.array([p.a for p in points]),
-        amplitude=np.array([p.a for p in points]) * problem.per_amplitude,
+        reference_amplitude=np.array([p.a for p in points]) * problem.per_amplitude,
         output=problem.output,
         omega=np.array([p.omega for p in points]),
         damping=np.array([p.zeta for p in points]),

@@ -1,7 +1,5 @@
 """Conditions of a cycle: a frequency, the resonance peak, or a fixed ratio to the frequency of the peak."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -8,8 +8,8 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
@@ -18,8 +18,7 @@ from tribodyn.hbm.threads import single
 class OperatingPoint:
     """The solution of a vibration cycle.
 
-    amplitude : of the response output [m]; response : (n_output, n_coeff) [m]; solves : balance solves spent
-    """
+    amplitude : of the response output [m]; response : (n_output, n_coeff) [m]; solves : balance solves spent"""
 
     solution: Solution
     amplitude: float
@@ -31,7 +30,7 @@ class OperatingPoint:
         """A solution with the amplitude of an output."""
         response = balance.outputs(solution.state)
         row = balance.compliance.output_names.index(output)
-        return cls(solution, float(amplitude(response[row])), response, solves)
+        return cls(solution, float(amplitude(response[row], balance.basis.harmonics)), response, solves)
 
     @property
     def state(self) -> State:
@@ -43,8 +42,7 @@ class OperatingPoint:
 class FrequencyCorrection:
     """How far the frequency of a solved cycle is from that of its condition.
 
-    distance : [rad/s]; solves : spent; accuracy : that the frequency is needed with [rad/s]
-    """
+    distance : [rad/s]; solves : spent; accuracy : that the frequency is needed with [rad/s]"""
 
     distance: float
     solves: int
@@ -56,8 +54,7 @@ class DominantPeak:
     """Result of a search for a higher peak than the tracked one.
 
     point : the higher peak, None where the tracked one is the highest; solves : balance solves spent
-    nearness : height of the highest other maximum over that of a peak that dominates; 0 where there is none
-    """
+    nearness : height of the highest other maximum over that of a peak that dominates; 0 where there is none"""
 
     point: OperatingPoint | None = None
     solves: int = 0
@@ -81,8 +78,7 @@ class AtFrequency:
     def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Solve from a neighbouring x; `omega` is the neighbour's and ignored here.
 
-        Where the neighbour's branch has ended in a fold, the response jumps to the one that a rising load leads to.
-        """
+        Where the neighbour's branch has ended in a fold, the response jumps to the one that a rising load leads to."""
         solution, solves = newton.solve(balance, self.omega, x, self.newton), 1
         if not solution.converged:
             solution, solves = arc_length.solve_along_load(balance, self.omega, self.newton), 2

@@ -1,10 +1,7 @@
 """What a continuation steps in: the frequency, or any number that a balance can be made from.
 
 A `Parameter` turns a value into a balance and the frequency to solve it at, and knows d R / d value at fixed x. Every
-continuation takes either a balance (it then steps in frequency) or a Parameter.
-"""
-
-from __future__ import annotations
+continuation takes either a balance (it then steps in frequency) or a Parameter."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -26,8 +23,7 @@ class Parameter:
     make : value -> balance
     omega : frequency at which the balance is solved [rad/s]; None where the value itself is the frequency
     scale : typical size of the value, for its finite difference
-    unit : of the value, for sentences
-    """
+    unit : of the value, for sentences"""
 
     name: str
     make: Callable[[float], HarmonicBalance]
@@ -78,8 +74,7 @@ def gap(balance: HarmonicBalance, omega: float) -> Parameter:
 def wear(balance: HarmonicBalance, omega: float, depth: np.ndarray) -> Parameter:
     """Fraction of a worn depth (n_pair,) [m] that is added to the gap, at one frequency [rad/s].
 
-    Raises ValueError where the depth is zero everywhere
-    """
+    Raises ValueError where the depth is zero everywhere"""
     depth = np.asarray(depth, float)
     deepest = float(np.abs(depth).max(initial=0.0))
     if deepest == 0.0:
@@ -104,8 +99,7 @@ def stiffness(balance: HarmonicBalance, omega: float) -> Parameter:
 def friction(balance: HarmonicBalance, omega: float) -> Parameter:
     """Factor on the limit of friction of every law that has one, at one frequency [rad/s].
 
-    Raises ValueError where none has
-    """
+    Raises ValueError where none has"""
     contact = balance.contact
     if not contact.has_friction:
         raise Refusal("no contact law here has a coefficient of friction to change")

@@ -29,8 +29,7 @@ class PeakRefinement:
     """The search from one frequency [rad/s].
 
     known : x by frequency, of the start and of points that are solved already, no fold among them
-    stride : first step [rad/s], by default the condition's; limits : of the frequency [rad/s]
-    """
+    stride : first step [rad/s], by default the condition's; limits : of the frequency [rad/s]"""
 
     def __init__(
         self,
@@ -55,8 +54,7 @@ class PeakRefinement:
     def run(self) -> OperatingPoint:
         """The peak, or the point where the search ended, marked as not found.
 
-        Raises  NoPeak where the response still rises at the highest frequency that is modelled
-        """
+        Raises  NoPeak where the response still rises at the highest frequency that is modelled"""
         if not self._point.solution.converged:
             return self._result(self._point.solution)
         while self._solves < MAX_SOLVES and abs(self._best.distance) > self._resolution:

@@ -15,16 +15,13 @@ the unloaded solution. The bounds so found are reached by some load path; that n
 Source  Ferhatoglu and Zucca 2021 (range of residual tractions and its effect); extreme starts as a far memory are ours.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tribodyn.declarations import Role
-from tribodyn.hbm import newton
+from tribodyn.hbm import harmonics, newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.newton import NewtonOptions, Solution, lead
 from tribodyn.hbm.threads import single
 from tribodyn.refusal import Refusal, SolverFailure
@@ -42,9 +39,8 @@ class ResponseBounds:
     direction : (n_pair, n_tangential) side of the shear in the positive start, +1 or -1
     shear : (3, n_pair, n_tangential) static shear force [N]
     stuck : (3, n_pair, n_tangential) whether the pair sticks all the time: where it does, shear is free in between
-    response : (3, n_output, n_coeff) outputs [m]
-    energy : (3,) friction work per cycle, all pairs [J]
-    """
+    response : (3, n_output, n_coeff) outputs [m]; amplitude : (3, n_output) of their vibration [m]
+    energy : (3,) friction work per cycle, all pairs [J]"""
 
     solutions: tuple[Solution, Solution, Solution]
     direction: np.ndarray
@@ -52,6 +48,7 @@ class ResponseBounds:
     stuck: np.ndarray
     output_names: tuple[str, ...]
     response: np.ndarray
+    amplitude: np.ndarray
     energy: np.ndarray
 
     @property
@@ -60,8 +57,8 @@ class ResponseBounds:
         return np.array([s.converged for s in self.solutions])
 
     def amplitude_range(self, output: str) -> tuple[float, float]:
-        """Least and largest vibration amplitude of an output, see `hbm.continuation.branch.amplitude` [m]."""
-        return self._range(amplitude(self.response[:, self.output_names.index(output)]))
+        """Least and largest vibration amplitude of an output, see `hbm.harmonics.amplitude` [m]."""
+        return self._range(self.amplitude[:, self.output_names.index(output)])
 
     def energy_range(self) -> tuple[float, float]:
         """Least and largest friction work per cycle [J]."""
@@ -85,8 +82,7 @@ def response_bounds(
 
     omega : [rad/s]; start : (n_pair, n_component, n_coeff) guess for the unloaded solution [m], from rest if None
     output : pairs are pushed to the side that raises the vibration of this output; all to the same side if None
-    Raises  ValueError where the law has no friction memory or harmonic 0 is not kept
-    """
+    Raises  ValueError where the law has no friction memory or harmonic 0 is not kept"""
     tangential = _check(balance)
     if start is None:
         unloaded = newton.solve_from_rest(balance, omega, options)
@@ -101,13 +97,15 @@ def response_bounds(
     positive = _solve_pushed(balance, unloaded, direction, reach, options)
     solutions = (unloaded, negative, positive)
     states = [s.state for s in solutions]
+    outputs = np.stack([balance.outputs(s) for s in states])
     return ResponseBounds(
         solutions,
         direction,
         np.stack([s.cycle.force[:, tangential, 0] for s in states]),
         np.stack([stuck(balance, s) for s in states]),
         balance.compliance.output_names,
-        np.stack([balance.outputs(s) for s in states]),
+        outputs,
+        harmonics.amplitude(outputs, balance.basis.harmonics),
         np.array([balance.energy(s).sum() for s in states]),
     )
 
@@ -126,27 +124,25 @@ def amplitude_slope(balance: HarmonicBalance, state: State, output: str, toleran
     """Derivative of the vibration amplitude of an output with respect to the residual shear of each stuck direction.
 
     All other stuck sliders stand still. One linear solve for each direction.
-    Returns (n_pair, n_tangential) [m/N], zero where the pair does not stick
-    """
+    Returns (n_pair, n_tangential) [m/N], zero where the pair does not stick"""
     t = _check(balance)
     linear, point = balance.linearise(_with_sliders_held(balance, state)), balance.at(state.omega)
     row = balance.compliance.output_names.index(output)
-    y = balance.outputs(state)[row]
+    weight = harmonics.amplitude_slope(balance.outputs(state)[row], balance.basis.harmonics)
     slope = np.zeros((len(state.x), len(t)))
     for pair, c in np.argwhere(stuck(balance, state)):
         g = np.zeros(state.g.shape)
         g[pair * state.x.shape[1] + t[c], 0] = -1.0  # one newton more of shear, g = k x - f
         dx, _, _ = linear.solve(point.apply(g), tolerance)
         change = point.outputs(g + linear.departure_slope(dx))[row]
-        slope[pair, c] = y[1:] @ change[1:]
-    return slope / max(float(amplitude(y)), np.finfo(float).tiny)
+        slope[pair, c] = weight @ change
+    return slope
 
 
 def _with_sliders_held(balance: HarmonicBalance, state: State) -> State:
     """The state with the derivative of springs where a direction sticks, also where its slider stands on the rim."""
-    assert state.cycle.jacobian is not None
     m = balance.basis.n_coeff
-    jac = state.cycle.jacobian.copy()
+    jac = state.cycle.slope.copy()
     tangential = _check(balance)
     for pair, c in np.argwhere(stuck(balance, state)):
         block = slice(tangential[c] * m, (tangential[c] + 1) * m)
@@ -185,8 +181,7 @@ def _solve_pushed(
 ) -> Solution:
     """The solution whose stuck pairs bear all the shear they can on the given side.
 
-    Where Newton does not get there at once, the sliders are moved out in steps that halve when one fails.
-    """
+    Where Newton does not get there at once, the sliders are moved out in steps that halve when one fails."""
     x, omega = unloaded.state.x, unloaded.state.omega
     far = -side * START_OFFSET * max(reach.max(), np.finfo(float).tiny)
     solution = newton.solve(balance.with_memory(far), omega, x, options)

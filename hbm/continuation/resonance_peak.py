@@ -1,10 +1,7 @@
 """The condition of a resonance peak, which is tracked directly.
 
 The peak is the zero of d A^2 / d omega along the branch, with dx/d omega from the linearised balance; no sweep is
-needed once a neighbouring peak is known. The first peak, and one that dominates the tracked one, are found by scans.
-"""
-
-from __future__ import annotations
+needed once a neighbouring peak is known. The first peak, and one that dominates the tracked one, are found by scans."""
 
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -15,11 +12,12 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.continuation.methods import adaptive
+from tribodyn.hbm.continuation.curve_peaks import peak_on_arc
+from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.continuation.operating_point import DominantPeak, FrequencyCorrection, OperatingPoint
 from tribodyn.hbm.continuation.peak_refinement import NoPeak, PeakRefinement
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED, BranchEnd
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd, SolveEnd
 from tribodyn.hbm.threads import single
 
 
@@ -47,8 +45,7 @@ class AtPeak:
     first_stride : first step from a neighbouring peak, in half widths of the resonance
     outside_reach : half widths between the points next to a maximum of a scan, by which its peak may lie outside them
     max_refined : maxima of a scan that are refined in turn, the highest first
-    Those from `scan_harmonic_above` on: see docs/accuracy/ablations.md
-    """
+    Those from `scan_harmonic_above` on: see docs/accuracy/ablations.md"""
 
     output: str
     start: float
@@ -76,9 +73,9 @@ class AtPeak:
 
         The scan has fewer harmonics than the balance, unless its maximum is no peak with all of them.
         Where no maximum that may be the highest can be refined, as at a fold, none of the lower ones is taken for it. A
-        scan that ends at a fold behind which no solution is found is repeated from the other end
-        Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
-        """
+        scan that ends at a fold behind which no solution is found is repeated from the other end, and where all that
+        fails the curve nearby is followed by arc length
+        Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance"""
         reduced = self._with_harmonics_to(balance, self.scan_harmonic)
         if reduced.basis != balance.basis:
             branch = self._scan(reduced)
@@ -93,7 +90,22 @@ class AtPeak:
             branch = max(
                 branch, backward, key=lambda scan: float(scan.amplitude(self.output)[scan.converged].max(initial=0.0))
             )
-        return self._highest(balance, branch, self._candidates(branch))
+        peak = self._highest(balance, branch, self._candidates(branch))
+        return peak if peak.solution.converged else self._by_arc_length(balance, peak)
+
+    def _by_arc_length(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
+        """The peak of the curve round a search that has failed, followed round its folds; else the failed one."""
+        start, stop = sorted((self.start, self.stop))
+        near = [peak.state.omega * share for share in (1 - self.same_peak, 1 + self.same_peak)]
+        for low, high in ((start, stop), (max(near[0], start), min(near[1], stop))):
+            curve = arc_length.follow(balance, low, high, arc_length.Options(newton=self.newton))
+            if curve.arrived and not curve.no_peak(self.output):
+                on_arc = peak_on_arc(balance, curve, curve.highest(self.output), self)
+                lowest = (1 - self.tolerance) * peak.amplitude
+                if on_arc is not None and on_arc.solution.converged and on_arc.amplitude > lowest:
+                    return replace(on_arc, solves=peak.solves + len(curve.omega) + on_arc.solves)
+        detail = f"{peak.solution.outcome.detail}; by arc length the curve {curve.end}, without a peak"
+        return replace(peak, solution=replace(peak.solution, outcome=SolveEnd.SITE_NOT_FOUND.say(detail)))
 
     @single
     def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
@@ -112,8 +124,7 @@ class AtPeak:
 
         point : the tracked peak
         Where pairs impact and no solution with all harmonics is found near that with fewer, the peak has fewer, and
-        zeros in the others
-        """
+        zeros in the others"""
         if self.dominance * point.amplitude >= self.linear_bound * balance.load_factor:
             return DominantPeak()
         low, high = sorted((self.start, self.stop))
@@ -193,8 +204,7 @@ class AtPeak:
     ) -> OperatingPoint:
         """A peak of a reduced balance with all harmonics, twice as many at a time.
 
-        accept_fewer : where no solution with more is found, that with the most harmonics counts, the others at zero
-        """
+        accept_fewer : where no solution with more is found, that with the most harmonics counts, the others at zero"""
         current, point = reduced, replace(scanned, solves=0)
         while True:
             harmonics = balance.basis.harmonics[: 2 * len(current.basis.harmonics)]
@@ -227,8 +237,7 @@ class AtPeak:
     def _highest(self, balance: HarmonicBalance, branch: Branch, maxima: np.ndarray) -> OperatingPoint:
         """The first of a branch's maxima that can be refined between its neighbours, or little outside them.
 
-        Its solves include those of the branch
-        """
+        Its solves include those of the branch"""
         solves = len(branch.omega)
         for row in maxima[: self.max_refined]:
             neighbours = branch.omega[row - 1 : row + 2]

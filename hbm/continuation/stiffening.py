@@ -9,10 +9,7 @@ of the largest stiffness that a spring may have is raised in steps as long as th
 from the last two: a spring that is soft already keeps its own. The departure from stuck is measured from springs no
 stiffer than the body. From the contact's own, 1e8 times stiffer, the motion of a pair that lifts would come with eight
 digits less. The end is held to the same tolerance as any other solution, measured so.
-Source  damping by the natural level function: Deuflhard 2004, Newton Methods for Nonlinear Problems, 3.3
-"""
-
-from __future__ import annotations
+Source  damping by the natural level function: Deuflhard 2004, Newton Methods for Nonlinear Problems, 3.3"""
 
 from dataclasses import dataclass, replace
 
@@ -44,8 +41,7 @@ class StiffeningRules:
     least_length : of a damped step
     closeness : next step over the displacement at the end: beside stiff springs a residual alone says too little
     rounding : relative change of the displacement that may be rounding
-    force_known : change of the contact forces by that, beyond which they are not known
-    """
+    force_known : change of the contact forces by that, beyond which they are not known"""
 
     decades: int = 13
     most_steps: int = 600
@@ -119,8 +115,7 @@ def _rounded(balance: HarmonicBalance, state: State) -> float:
 def _softened(balance: HarmonicBalance, level: float, other: HarmonicBalance | None) -> HarmonicBalance:
     """The same problem with no contact spring stiffer than the stiffest times ten to the level.
 
-    other : one of another level, whose linear side it shares where that is the same
-    """
+    other : one of another level, whose linear side it shares where that is the same"""
     stiffest = float(balance.contact.stiffness.max()) * 10.0**level
     contact = balance.contact.with_parameters(lambda p: replace(p, stiffness=np.minimum(p.stiffness, stiffest)))
     if isinstance(balance.model, FlexibleModel):  # made with springs of its own
@@ -169,8 +164,7 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
 
     With much friction closed pairs stick, and where they stick is found at once. As friction falls they slide, and the
     solution moves with it. A wedge that a load presses between two bodies is the example: from the stuck state Newton's
-    method lets go of one of its faces, and nothing holds it any more.
-    """
+    method lets go of one of its faces, and nothing holds it any more."""
     if not balance.contact.has_friction:
         return None
     x, spent, products = balance.stuck(omega), 0, 0

@@ -7,8 +7,7 @@ the outputs y = C u and of the frequency w changes, at a fixed frequency, with a
     (I - G dg/dx)^T l = q_x + (df/dx)^T q_f + (dg/dx)^T B D_s^-H C^H q_y
 
 f_p is the change of the contact forces at the same x, F_p - D_p u that of the loads and the dynamic stiffness at the
-same u: both are explicit (`parameter_effects`), so that the balance is solved again for no parameter.
-"""
+same u: both are explicit (`parameter_effects`), so that the balance is solved again for no parameter."""
 
 from __future__ import annotations
 
@@ -31,8 +30,7 @@ class CycleNumber:
     """A number of a cycle with its slopes by x and by the contact forces (n_contact, n_coeff), by the outputs
     (n_output, n_coeff), each with the others fixed, and by the frequency [rad/s].
 
-    quantity : that it is of, None for none
-    """
+    quantity : that it is of, None for none"""
 
     name: str
     value: float
@@ -60,8 +58,7 @@ def cycle_numbers(
     """Every quantity with slopes at a solved state, of the whole contact and of each joint of several.
 
     output : the observed one; wear : joint -> wear coefficient [m3/J]
-    A number that is zero, such as the work where all pairs stick, is left out: it has no relative derivative
-    """
+    A number that is zero, such as the work where all pairs stick, is left out: it has no relative derivative"""
     cycle, zero = SolvedCycle.of(balance, state, output, wear), CycleNumber.zero(balance, state)
     joints = [joint.name for joint in balance.contact.joints] if len(balance.contact.joints) > 1 else []
     numbers = []
@@ -147,16 +144,14 @@ class Gradient:
     @cached_property
     def _border(self) -> np.ndarray:
         """A row and column that make the transpose regular at a fold, where it has a solution without right-hand side;
-        zero elsewhere.
-        """
+        zero elsewhere."""
         shape = self.state.flat.shape
         border = np.random.default_rng(0).normal(size=shape) if self.at_fold else np.zeros(shape)
         return border / max(float(np.linalg.norm(border)), 1.0)
 
     def _force_transposed(self, v: np.ndarray) -> np.ndarray:
         """(df/dx)^T v."""
-        jacobian = self.state.cycle.jacobian
-        assert jacobian is not None
+        jacobian = self.state.cycle.slope
         return np.matmul(jacobian.transpose(0, 2, 1), v.reshape(len(jacobian), -1, 1)).reshape(v.shape)
 
     def _departure_transposed(self, v: np.ndarray) -> np.ndarray:

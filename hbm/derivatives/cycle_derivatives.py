@@ -3,10 +3,7 @@
 At a peak of A(w, p), where the slope a_w of a = ln A vanishes, dw/dp = - a_wp / a_ww, and dq/dp has q_w dw/dp
 besides. a_wp and a_ww are differences along the curve of the exact gradient, of all parameters together. A peak that is
 a corner of the curve, where a contact transition begins, remains where both sides meet: dw/dp = - [A_p] / [A_w], with
-the jumps of both.
-"""
-
-from __future__ import annotations
+the jumps of both."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -45,8 +42,7 @@ def at_frequency(
     """Derivatives at the fixed frequency of a state, from which it is solved more exactly.
 
     output : the observed one; changes : the parameters; wear : joint -> wear coefficient [m3/J]
-    Raises  NoDerivative at a fold, or where the state is not solved
-    """
+    Raises  NoDerivative at a fold, or where the state is not solved"""
     state = exact_state(balance, state.omega, state.x, options)
     numbers = (number for number in cycle_numbers(balance, state, output, wear) if number.moves_with_state)
     gradient = Gradient(balance, state, tuple(numbers))
@@ -67,8 +63,7 @@ def at_peak(
 
     Values are those of the peak itself: one Newton step on its condition from the state, `RULES.peak_tolerance` away.
     A peak that is a corner of the curve remains where the curve has its corner
-    Raises  NoDerivative where no peak lies next to the state, as at a fold
-    """
+    Raises  NoDerivative where no peak lies next to the state, as at a fold"""
     ends, width = exact_peak(balance, state, output, options)
 
     def gradient_near(end: AmplitudeSlope, widths: float) -> Gradient:
@@ -121,8 +116,7 @@ def _amplitude_row(numbers: Sequence[CycleNumber]) -> int:
 def _curvature_and_moves(points: Sequence[PointSlopes], width: float, slope: float) -> tuple[float, np.ndarray]:
     """(ln A)_ww of two points on both sides of a peak, and d omega of the peak by every column.
 
-    slope : (ln A)_w halfway between them; width : half width of the resonance [rad/s]
-    """
+    slope : (ln A)_w halfway between them; width : half width of the resonance [rad/s]"""
     slopes = [np.concatenate([p.by_frequency[:1], p.columns[0]]) / p.values[0] for p in points]
     curvature, *mixed = (slopes[1] - slopes[0]) / (2 * RULES.curve_step * width)
     if not curvature < 0:

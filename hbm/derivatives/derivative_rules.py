@@ -1,7 +1,5 @@
 """How exactly derivatives are solved for, and why there may be none."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from tribodyn.refusal import SolverFailure

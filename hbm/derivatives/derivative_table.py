@@ -26,8 +26,7 @@ class Derivatives:
     by_frequency : (n_quantity,) dq / d omega at fixed parameters [1/(rad/s)], zero along a peak
     by_gap : (n_quantity, n_pair) dq / d gap of each pair [1/m]
     state : solved, along a peak next to it
-    follows_corner : whether the peak is a corner of the curve, at which a contact transition begins
-    """
+    follows_corner : whether the peak is a corner of the curve, at which a contact transition begins"""
 
     names: tuple[str, ...]
     values: np.ndarray
@@ -46,8 +45,7 @@ class Derivatives:
 class PointSlopes:
     """At one solution: values of numbers, their dq / d omega, both (n_number,), and derivatives at a fixed frequency.
 
-    above, below : (n_number, n_change) one-sided, by the changes; by_gap : (n_number, n_pair)
-    """
+    above, below : (n_number, n_change) one-sided, by the changes; by_gap : (n_number, n_pair)"""
 
     values: np.ndarray
     by_frequency: np.ndarray

@@ -1,12 +1,9 @@
 """The resonance peak next to a state, found more exactly than a run needs it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
-from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.derivatives.derivative_rules import RULES, NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import exact_state
 from tribodyn.hbm.newton import NewtonOptions, Solution
@@ -23,13 +20,11 @@ def exact_peak(
 ) -> tuple[tuple[AmplitudeSlope, ...], float]:
     """The peak next to a state, by secants of the slope, and half width of the resonance [rad/s].
 
-    Two points where the slope does not vanish but jumps: those on both sides of the corner
-    """
+    Two points where the slope does not vanish but jumps: those on both sides of the corner"""
 
     def solve_at(omega: float, origin: AmplitudeSlope) -> AmplitudeSlope:
         return slope_at(balance, exact_state(balance, omega, origin.predict(omega), options), output)
 
-    row = balance.compliance.output_names.index(output)
     start = previous = slope_at(balance, exact_state(balance, state.omega, state.x, options), output)
     longest = RULES.first_step * start.omega
     step = float(np.clip(start.distance, -longest, longest))
@@ -38,7 +33,7 @@ def exact_peak(
         curvature = (point.slope - previous.slope) / step if step else 0.0
         if not curvature < 0:
             break
-        width = float(np.sqrt(-2 / curvature) * amplitude(balance.outputs(point.solution.state))[row])
+        width = float(np.sqrt(-2 / curvature) * point.height)
         previous, step = point, float(np.clip(-point.slope / curvature, -width / 2, width / 2))
         if abs(step) <= RULES.peak_tolerance * width:
             return (point,), width

@@ -1,10 +1,7 @@
 """Exact derivatives of the frequency of a fold of the response.
 
 The transpose of the balance R(x, w, p) = 0 has a solution l without right-hand side at a fold, so that along the fold
-l . (R_w dw + R_p dp) = 0.
-"""
-
-from __future__ import annotations
+l . (R_w dw + R_p dp) = 0."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -30,8 +27,7 @@ def at_fold(
 ) -> Derivatives:
     """Derivatives of every number of the fold next to a state; see `cycle_derivatives.at_frequency`.
 
-    Raises  NoDerivative where no fold lies next to the state
-    """
+    Raises  NoDerivative where no fold lies next to the state"""
     state = _exact_fold(balance, state, options)
     gradient = Gradient(balance, state, (CycleNumber.zero(balance, state),), at_fold=True)
     parameters, (point,) = point_slopes([gradient], changes)

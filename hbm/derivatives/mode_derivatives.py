@@ -1,7 +1,5 @@
 """Exact derivatives of the numbers of a nonlinear mode at a fixed amplitude."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -31,8 +29,7 @@ def at_mode(
 
     modal : the amplitude is that of the mass-normalised mode, else the motion of the output in it
     One solution of the linearised problem for each parameter, whose residual is differenced at the same motion.
-    Raises  NoDerivative where the mode is not solved
-    """
+    Raises  NoDerivative where the mode is not solved"""
     balance, exact = problem.balance, replace(options or NewtonOptions(), tolerance=RULES.mode_tolerance)
     normal = np.zeros(len(point.coordinates))
     normal[-1] = 1.0

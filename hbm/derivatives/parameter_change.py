@@ -17,8 +17,7 @@ class BalanceInputs:
     """What a parameter can change of a balance.
 
     memory : start of the load path; balance : built from these inputs, where there is one
-    same_coordinates : whether the coordinates are those of the solved balance, even with another contact map
-    """
+    same_coordinates : whether the coordinates are those of the solved balance, even with another contact map"""
 
     model: ReducedModel
     contact: JointSet
@@ -39,8 +38,7 @@ class ParameterChange:
 
     double_step : where p acts on the structure, the inputs by two steps, for a difference of order four, which a
         structure near its own resonance needs; empty where the model is linear in p, without corners; None elsewhere
-    contact_part : what p changes of the contact besides, whose forces have corners, by a smaller step
-    """
+    contact_part : what p changes of the contact besides, whose forces have corners, by a smaller step"""
 
     name: str
     step: float

@@ -3,8 +3,7 @@
 At the solution, effects are the change of the contact forces at the same x, and that of x and of the outputs at the
 same contact forces. They are central differences of two balances, by a step so small that their error is rounding.
 Where a parameter changes the coordinates of the model, such as the shapes of a reduction, x and outputs are compared at
-the same g, which needs no common coordinates.
-"""
+the same g, which needs no common coordinates."""
 
 from __future__ import annotations
 
@@ -81,8 +80,7 @@ class ParameterEffects:
     def of_change(self, change: ParameterChange) -> tuple[np.ndarray, np.ndarray]:
         """One-sided slopes above and below a parameter.
 
-        Each is one vector: contact forces at the same x, then x and outputs at the same contact forces
-        """
+        Each is one vector: contact forces at the same x, then x and outputs at the same contact forces"""
         up, down = self._differences(change.above, change.below)
         if change.double_step:
             far = self._differences(*change.double_step)

@@ -3,10 +3,7 @@
 A row pair (a_h, b_h) is the amplitude a_h - i b_h; `ratio` is h w over the largest one asked for, of each h >= 1.
 The core S(i h w) of harmonic h >= 1 (see `expansion`) comes as its factors: `real` and `imag` (n, m, m), of which row j
 holds column j of L and U, and `pivots` (n, m). At rest the core is the diagonal `static` (m,): at h = 0, or everywhere
-where n = 0.
-"""
-
-from __future__ import annotations
+where n = 0."""
 
 import numba
 import numpy as np
@@ -102,8 +99,7 @@ def displaced(products, higher, to_ports, n, n_e, unit, ratio, has_static, real,
 def displaced_slope(forces, higher, to_ports, unit, omega, s_unit, c, t, ratio, has_static, real, imag, pivots, static):
     """d / d omega of `displaced`: of (i ratio)^k it is k / omega times that, of the core d S / d s times i h.
 
-    forces, higher : times modes and e (n_coeff, m + n_e m), times the W_k; c (m, m), t (n_e, m, m) : of the core
-    """
+    forces, higher : times modes and e (n_coeff, m + n_e m), times the W_k; c (m, m), t (n_e, m, m) : of the core"""
     m, n_port, s = len(c), to_ports.shape[1], 1 if has_static else 0
     n_e = len(to_ports) // m - 1
     of_powers = np.repeat(np.arange(n_e + 1) / omega, m)
@@ -132,8 +128,7 @@ def displaced_slope(forces, higher, to_ports, unit, omega, s_unit, c, t, ratio, 
 def nearly_displaced(force, w0, b, b_turned, ratio, has_static, real, imag, pivots, static):
     """Displacement (n, n_coeff) by W_0, which may be empty, and modes alone, in the single precision of these.
 
-    b : (n, m); b_turned : (m, n) the same transposed
-    """
+    b : (n, m); b_turned : (m, n) the same transposed"""
     n, n_coeff = force.shape
     size = n_coeff if n_coeff < 4 else (n_coeff + 3) // 4 * 4
     pieces = 1 + size * n * n // AS_IT_LIES
@@ -178,8 +173,7 @@ def modal_rows(y, n_e, ratio, has_static):
 def gathered(modal, static, higher, n, n_port, unit, ratio, has_static):
     """Displacement (n, n_coeff): modes, W_0 f and sum_k (i ratio)^k unit W_k f, rows of `moved` and `higher`.
 
-    The rows of `higher` are those of the harmonics >= 1.
-    """
+    The rows of `higher` are those of the harmonics >= 1."""
     s = 1 if has_static else 0
     n_power = higher.shape[1] // n_port
     out = np.ascontiguousarray((modal[:, :n] + static[:, :n]).T)

@@ -5,8 +5,7 @@ share one real system, as they do without cyclic symmetry, products are made wit
 as rows.
 
 A model with residual flexibility has no dense compliance: see `flexible_compliance`. Newton's directions are then found
-with the modes alone, and what these leave out is a product with a sparse factor.
-"""
+with the modes alone, and what these leave out is a product with a sparse factor."""
 
 from __future__ import annotations
 
@@ -49,8 +48,7 @@ class ContactCompliance:
     model : reduced model; stiffness : (n_pair, n_component) stuck springs [N/m], of a model with residual flexibility
         those that this was made with
     excitation : loads whose names are ports; omega_max : largest excitation frequency that will be asked for [rad/s]
-    target_error : relative error of dense compliances at the highest harmonic of omega_max; None for the default
-    """
+    target_error : relative error of dense compliances at the highest harmonic of omega_max; None for the default"""
 
     def __init__(
         self,
@@ -186,8 +184,7 @@ class ContactCompliance:
         """(n_contact, r) shapes Q of sqrt(k) x, orthonormal, that carry the contact flexibility but for a small share.
 
         Those that carry most come first. The contact patch moves nearly as a rigid body; what is left is so stiff
-        beside the contact springs that it hardly couples the pairs.
-        """
+        beside the contact springs that it hardly couples the pairs."""
         n, root = self.n_contact, np.sqrt(self.k)
         shapes = [root[:, None] * e.b[:n] / np.sqrt(e.static_lam) for e, _ in self.groups]
         parts = [part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))]
@@ -198,8 +195,7 @@ class ContactCompliance:
     def on_rows(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """W_0, empty where there is none, modes and these transposed of one real system at some contact rows.
 
-        In single precision; the last ones are kept.
-        """
+        In single precision; the last ones are kept."""
         if self._active is None or not np.array_equal(self._active[0], rows):
             e = self.groups[0][0]
             w0, b = e.w0_single, e.b_single
@@ -267,8 +263,7 @@ class Outside:
 
     excitation : forces as rows times [W_0, modes] (n_coeff, n_port + n_modal), and times the W_k (n_row, n_k n_port)
     columns : (n_contact, n_output + n_modal) [W_0, modes]; single : (n_contact, n_k n_output) the W_k
-    to_ports : (n_modal, n_output)
-    """
+    to_ports : (n_modal, n_output)"""
 
     excitation: tuple[np.ndarray, np.ndarray]
     columns: np.ndarray

@@ -21,8 +21,7 @@ class CompliancePoint:
     """Contact compliance at one frequency.
 
     x_lin : (n_contact, n_coeff) relative displacement of the stuck, closed structure under the excitation [m]
-    outputs_lin : (n_output, n_coeff) its outputs [m]
-    """
+    outputs_lin : (n_output, n_coeff) its outputs [m]"""
 
     blocks = None
 
@@ -161,8 +160,7 @@ class CompliancePoint:
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """G restricted to contact rows (active ones) times (n_active, n_coeff), as exact as a Newton direction needs.
 
-        In single precision, where harmonics share a system by W_0 and modes alone
-        """
+        In single precision, where harmonics share a system by W_0 and modes alone"""
         c = self.compliance
         parts = c.on_rows(rows) if c.shared_real else ()
         dense = None if c.shared_real else self.dense[:, rows[:, None], rows].astype(np.complex64)

@@ -14,8 +14,7 @@ the static loads must be in equilibrium.
 with L'(s) = Phi^H (I - s C W(s)), which for a Hermitian damping matrix is L(-s*)^H. With Coriolis forces C is not
 Hermitian; L' then comes from the same recursion with C^H. The error falls like (|s| / omega_next)^order and is measured
 against a direct solve. What s multiplies is small beside W_0 and Phi: single precision keeps it exact enough.
-Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
-"""
+Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971."""
 
 from __future__ import annotations
 
@@ -85,8 +84,7 @@ class Expansion:
     higher : order - 1 matrices (n_port, n_port) W_k s_max^k / unit, views of `single`, which holds them side by side
     error : relative, at s_max, against a direct solve
     rigid : (n, r) motions that nothing resists, mass-normalised; the first r modes
-    Raises  SingularStuckSystem where a motion that nothing resists moves the contacts
-    """
+    Raises  SingularStuckSystem where a motion that nothing resists moves the contacts"""
 
     def __init__(
         self,
@@ -115,7 +113,8 @@ class Expansion:
         self.hermitian = system.gyroscopic is None and system.circulatory is None
         self.rigid = np.zeros((n, 0))
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
-        rounding = n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real)
+        moved, inertia = np.diag(stuck).real, np.diag(mass).real
+        rounding = n * np.finfo(float).eps * np.max(moved[inertia > 0] / inertia[inertia > 0])
         try:
             factor = sla.cho_factor(stuck)
             lam, phi = lowest_modes(stuck, mass, count)
@@ -151,7 +150,8 @@ class Expansion:
         del stuck, free
         probes = np.linspace(0, len(ports) - 1, min(len(ports), RULES.compared_ports)).astype(int)
         previous: list[tuple[int, int, float]] = []
-        rungs, p = [c for c in RULES.truncations if c[0] < len(lam)], self.n_port
+        # the powers diverge from the frequency of the first mode left out on
+        rungs, p = [c for c in RULES.truncations if c[0] < len(lam) and lam[c[0]] > s_max**2], self.n_port
         rungs.sort(key=lambda c: (c[1] - 1) * p * (4 * p + 16 * c[0]) + 48 * c[0] ** 2)  # bytes of three harmonics
         for m, order in rungs:  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[probes]]))
@@ -263,8 +263,7 @@ class Expansion:
 class PortCompliance:
     """D(s)^-1 between ports at one s: sum_k s^k W_k + L S(s)^-1 L'.
 
-    factor and pivots : S(s) = P L U; None at s = 0 without flow, where S is diagonal
-    """
+    factor and pivots : S(s) = P L U; None at s = 0 without flow, where S is diagonal"""
 
     expansion: Expansion
     s: complex

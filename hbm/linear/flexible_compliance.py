@@ -3,10 +3,7 @@
     D(s)^-1 = R + Phi S(s)^-1 Phi^T,   S(s) = Lambda + s C_m + s^2,
 
 with R, `reduction.residual_flexibility`, applied by a sparse factor and never a matrix. There is no W_0 and there are
-no powers of s here: see `expansion`, whose interface this has.
-"""
-
-from __future__ import annotations
+no powers of s here: see `expansion`, whose interface this has."""
 
 import numpy as np
 import scipy.linalg as sla
@@ -27,8 +24,7 @@ class RitzExpansion(Expansion):
     Arguments as for `Expansion`; b and stiffness must be those of the residual flexibility
     b : (n_port, n) modes, b_single those of the contacts in single precision; w0 : None; e, higher : none
     error : relative, of the contact compliance at s_max, by what moves the mass that R leaves out
-    Raises  SingularStuckSystem where the stuck structure can move rigidly
-    """
+    Raises  SingularStuckSystem where the stuck structure can move rigidly"""
 
     def __init__(
         self,

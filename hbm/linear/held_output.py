@@ -6,8 +6,7 @@ at y, the force is F = (y - L g) / a and the contact moves by
     x = F x_F + G g = y x_F / a + (G - x_F L / a) g :
 
 the compliance of another structure, whose response has no fold where that of the driven one has.
-Source  elimination of the force is ours; the test is constant-response control, as in Karaagacli and Ozguven 2021
-"""
+Source  elimination of the force is ours; the test is constant-response control, as in Karaagacli and Ozguven 2021"""
 
 from __future__ import annotations
 
@@ -24,8 +23,7 @@ from tribodyn.refusal import Refusal
 class HeldOutput(ContactCompliance):
     """The compliance of `inner` with the fundamental of an output held at amplitude [m] times cos w t.
 
-    row : of the output; the load factor of a balance multiplies the amplitude
-    """
+    row : of the output; the load factor of a balance multiplies the amplitude"""
 
     inner: ContactCompliance
     row: int

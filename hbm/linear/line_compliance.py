@@ -72,8 +72,7 @@ class LinePorts:
     """Displacement of ports under forces on ports, both the rows R of few coordinates, by a direct solution.
 
     system, B, k, rows, s : of D = `stuck_dynamic_stiffness` and R (n_port, n); change, rows_change : system and rows by
-    the frequency
-    """
+    the frequency"""
 
     system: SecondOrderSystem
     change: SecondOrderSystem

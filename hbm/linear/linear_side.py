@@ -1,7 +1,5 @@
 """What a balance asks of its linear side, and which one a model has."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Protocol
 
@@ -19,8 +17,7 @@ class LinearSide(Protocol):
     """The linear side of a balance at its frequency or frequencies, G; see `CompliancePoint`.
 
     blocks : (n_block, m, m) diagonal blocks of G over equal runs of contact rows with all their coefficients, which
-        then precondition; None where `coarse_part` does
-    """
+        then precondition; None where `coarse_part` does"""
 
     @property
     def blocks(self) -> np.ndarray | None: ...

@@ -7,8 +7,7 @@ matrix for every nodal diameter. Sector n deviates by P^H d_n P, P its rows on a
 
 of which only the matrix in brackets, a few rows for each sector, is solved (Woodbury). Nothing of the size of the wheel
 is decomposed.
-Source  Yang and Griffin 2001; Sherman and Morrison 1950; Woodbury 1950
-"""
+Source  Yang and Griffin 2001; Sherman and Morrison 1950; Woodbury 1950"""
 
 from __future__ import annotations
 
@@ -28,8 +27,7 @@ from tribodyn.refusal import Refusal
 class MistunedCompliance:
     """The compliance of a wheel whose sectors deviate; it serves a balance as `ContactCompliance` does.
 
-    deviation : (N,) relative, of the stiffness of every sector, above -1
-    """
+    deviation : (N,) relative, of the stiffness of every sector, above -1"""
 
     base = None
 
@@ -103,8 +101,7 @@ class MistunedPoint:
 
     x_lin : (N n_c, n_coeff) relative displacement of the stuck, closed wheel under the excitation [m]
     outputs_lin : (n_output, n_coeff) its outputs [m]
-    left_out : of its flexibility, by `nearly` and the products
-    """
+    left_out : of its flexibility, by `nearly` and the products"""
 
     left_out = 0.0
 
@@ -127,8 +124,7 @@ class MistunedPoint:
     def _displaced(self, force: np.ndarray, H: np.ndarray | None = None) -> np.ndarray:
         """Displacement of all ports under forces on all of them, both (n_harmonic, N, n_port) complex.
 
-        H : other matrices (n_harmonic, N, n_port, n_port) for the way from the forces, such as slopes
-        """
+        H : other matrices (n_harmonic, N, n_port, n_port) for the way from the forces, such as slopes"""
         H = self._H if H is None else H
         waves = np.matmul(H, fft.ifft(force, axis=1)[..., None])[..., 0]
         reaction = self._reaction(waves[:, :, self.compliance.nominal.ports])

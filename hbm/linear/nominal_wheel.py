@@ -1,7 +1,5 @@
 """Port compliances of a wheel of equal sectors, index by index."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable
 from itertools import pairwise
@@ -21,8 +19,7 @@ class NominalWheel:
 
     model : a travelling wave whose outputs hold the rows `ports`; springs : (n_pair, n_component) of one sector [N/m]
     excitation : of sector 0; a wave of the model's engine order brings it to the others
-    omega_max : largest excitation frequency to come [rad/s]
-    """
+    omega_max : largest excitation frequency to come [rad/s]"""
 
     def __init__(
         self,

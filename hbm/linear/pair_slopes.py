@@ -1,10 +1,7 @@
 """The slope of the contact forces, one block for each pair, in one pass: at many harmonics nothing is larger.
 
 D is block diagonal, with `slopes` (n_active, m, m) for its blocks, m = n_component * n_coeff, coefficients innermost.
-U (n_active * n_component, r) and A (r * n_coeff, same) are the coarse part of the compliance, G ~ U A U^T.
-"""
-
-from __future__ import annotations
+U (n_active * n_component, r) and A (r * n_coeff, same) are the coarse part of the compliance, G ~ U A U^T."""
 
 import numba
 import numpy as np
@@ -17,8 +14,7 @@ def departures(jacobian, stiffness):
     """Pairs whose force departs from the stuck one, and the slope of the departure, k - d f / d x.
 
     jacobian : (n_pair, m, m) with coefficients innermost [N/m]; stiffness : (n_pair, n_component) [N/m]
-    Returns (n_active,) pairs and (n_active, m, m) slopes
-    """
+    Returns (n_active,) pairs and (n_active, m, m) slopes"""
     n_pair, m, _ = jacobian.shape
     n_coeff = m // stiffness.shape[1]
     active, slopes, n = np.empty(n_pair, np.int64), np.empty(jacobian.shape), 0
@@ -76,8 +72,7 @@ def times(slopes, d):
 def preconditioned(d, slopes, u, a, lower_upper, pivots):
     """d + U (I - A U^T D U)^-1 A U^T D d for d (n_active * n_component, n_coeff).
 
-    lower_upper, pivots : factors of the matrix in brackets; row j of the first holds column j of L and U
-    """
+    lower_upper, pivots : factors of the matrix in brackets; row j of the first holds column j of L and U"""
     x = np.dot(a, np.dot(u.T, times(slopes, d)).ravel())
     for j in range(len(x)):
         x[j], x[pivots[j]] = x[pivots[j]], x[j]

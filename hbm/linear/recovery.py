@@ -1,7 +1,5 @@
 """From the contact back to the part: coordinates and full displacement that belong to a solved contact."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
@@ -16,8 +14,7 @@ def coordinates(
 
     displacement, force : (n_contact, n_coeff) relative displacement [m] and contact force [N]; omega : [rad/s]
     Solves D_h q_h = F_h + B^H (k x - f), where the contact springs k, stuck and closed, are part of D_h so that a
-    structure held by its contact alone is no exception
-    """
+    structure held by its contact alone is no exception"""
     balance = balance.standing(omega)
     basis, excitation = balance.basis, balance.excitation
     k = balance.reference_stiffness
@@ -37,13 +34,19 @@ def full_displacement(
 ) -> np.ndarray:
     """Displacement of every DOF of the full part (n_full, n_coeff) [m]; arguments as `coordinates`.
 
-    Of a cyclic part: of sector 0 in its own frame
-    """
+    Where stress is asked for with what the modes left out carry; of a cyclic part: of sector 0 in its own frame"""
     balance = balance.standing(omega)
     amplitudes = coordinates(balance, displacement, force, omega)
     harmonics = balance.basis.harmonics
-    full = [balance.model.reconstruct(q, h) for h, q in zip(harmonics, amplitudes, strict=True)]
-    part_displacement: np.ndarray = balance.basis.to_real(np.stack(full, axis=-1))
+    fields = [balance.model.reconstruct(q, h) for h, q in zip(harmonics, amplitudes, strict=True)]
+    full = np.stack(fields, axis=-1).astype(complex)
+    omitted = None if balance.stress is None else balance.stress.omitted
+    if omitted is not None and (dynamic := np.flatnonzero(harmonics)).size:
+        n, loads = len(full), omitted.system.loads
+        loaded = [balance.load_factor * balance.excitation.force(harmonics[i], loads, n) for i in dynamic]
+        rate = omega * np.array(harmonics)[dynamic]
+        full[:, dynamic] += omitted.displacement(full[:, dynamic], np.stack(loaded, axis=-1), rate)
+    part_displacement: np.ndarray = balance.basis.to_real(full)
     model = balance.model
     if isinstance(model, FlexibleModel):
         base = balance.excitation.base

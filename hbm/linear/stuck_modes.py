@@ -1,7 +1,5 @@
 """Modes of a structure with its contacts stuck, among them the rigid motions that nothing resists."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +13,7 @@ class RigidModeRules:
     suspect : squared frequency over rounding, below which a mode may be rigid
     gap : squared frequency of a rigid mode over that of the first elastic one, at max_count
     rounded : the same where it is the rounding of far stiffer modes
-    max_count : of rigid modes; four bodies that nothing joins have so many
-    """
+    max_count : of rigid modes; four bodies that nothing joins have so many"""
 
     suspect: float = 1e3
     gap: float = 1e-10
@@ -30,8 +27,7 @@ RIGID_MODES = RigidModeRules()
 def rigid_motions(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]:
     """Mass-normalised motions (n, r) that nothing resists, and a squared frequency between them and the others.
 
-    Raises  LinAlgError where there are none, or the mass is not positive
-    """
+    Raises  LinAlgError where there are none, or the mass is not positive"""
     squares, shapes = sla.eigh(stiffness, mass, subset_by_index=(0, min(len(mass), RIGID_MODES.max_count + 1) - 1))
     largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real)) or 1.0
     size = np.maximum.accumulate(np.abs(squares))
@@ -57,8 +53,7 @@ def rigid_motions(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, 
 def stuck_modes(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All modes of a stuck structure: squared frequencies (n,), shapes (n, n) of unit modal mass, which are rigid (n,).
 
-    Those that nothing resists come first, with zero for their squared frequency.
-    """
+    Those that nothing resists come first, with zero for their squared frequency."""
     largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real))
     squares, shapes = sla.eigh(stiffness, mass)
     free = np.zeros(len(mass), bool)
@@ -78,8 +73,7 @@ def lowest_modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[n
     """The lowest modes: squared frequencies (count,) and shapes (n, count) of unit modal mass.
 
     They come from the compliance's side, M phi = nu K phi: rounding is then relative to the softest mode, however much
-    stiffer the contact springs are, and what it does to stiff ones is as small as their share in the compliance.
-    """
+    stiffer the contact springs are, and what it does to stiff ones is as small as their share in the compliance."""
     n = len(mass)
     nu, phi = sla.eigh(mass, stiffness, subset_by_index=None if count >= n else (n - count, n - 1))
     nu, phi = nu[::-1], phi[:, ::-1]

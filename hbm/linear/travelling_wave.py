@@ -2,10 +2,7 @@
 
 Sector n repeats sector 0 later by n phases: x_n(t) = x_0(t - n phi / w), phi = 2 pi EO / N, in its own turned frame;
 harmonic h lags by h n phi.
-Source  Petrov 2004; Tamatam 2021, section 3.2.3
-"""
-
-from __future__ import annotations
+Source  Petrov 2004; Tamatam 2021, section 3.2.3"""
 
 from dataclasses import replace
 

@@ -1,23 +1,20 @@
 """Vibration amplitude of the observed output."""
 
-from __future__ import annotations
-
 import numpy as np
 
+from tribodyn.hbm.harmonics import amplitude_slope
 from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, MotionInTime, Slopes, SolvedCycle
 
 
 def value(cycle: SolvedCycle) -> float:
-    """Amplitude [m]; see `hbm.continuation.branch.amplitude`."""
+    """Amplitude [m]; half the range of the cycle."""
     return cycle.amplitude
 
 
 def slopes(cycle: SolvedCycle) -> Slopes:
     """Adjoint slopes by the harmonics of the output."""
     by_response = np.zeros_like(cycle.response)
-    row = cycle.response[cycle.output]
-    if cycle.amplitude > 0:
-        by_response[cycle.output] = np.where(cycle.basis.order > 0, row, 0.0) / cycle.amplitude
+    by_response[cycle.output] = amplitude_slope(cycle.response[cycle.output], cycle.basis.harmonics)
     return Slopes(by_response=by_response)
 
 

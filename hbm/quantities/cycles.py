@@ -1,7 +1,5 @@
 """Vibration cycles that the run has passed."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantity import WearQuantity, WornContact
 
 

@@ -1,7 +1,5 @@
 """Friction work of one vibration cycle."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, MotionInTime, Slopes, SolvedCycle
@@ -20,8 +18,6 @@ def slopes(cycle: SolvedCycle) -> Slopes:
 def of_work(cycle: SolvedCycle, weight: np.ndarray) -> Slopes:
     """Adjoint slopes of a weighted sum of the work of the pairs; weight : (n_pair,)."""
     x, force, energy = cycle.displacement, cycle.force, cycle.energy
-    assert x is not None
-    assert force is not None
     assert energy is not None
     by_x, by_force = np.zeros_like(x), np.zeros_like(x)
     static, harmonic = int(cycle.basis.has_static), np.pi * np.asarray(cycle.basis.dynamic)

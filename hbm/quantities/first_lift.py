@@ -1,7 +1,5 @@
 """Cycles until a pair first opens in a part of the cycle that was closed all through it."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantity import WearQuantity, WornContact
 from tribodyn.hbm.wear.history import first
 

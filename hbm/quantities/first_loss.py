@@ -1,7 +1,5 @@
 """Cycles until a pair first touches no more."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantity import WearQuantity, WornContact
 from tribodyn.hbm.wear.history import first
 

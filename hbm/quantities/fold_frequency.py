@@ -1,7 +1,5 @@
 """Frequency of a fold of the response, where two branches of solutions meet."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.quantity import FoldQuantity

@@ -1,7 +1,5 @@
 """Friction work over all cycles of the run."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantity import WearQuantity, WornContact
 
 

@@ -1,7 +1,5 @@
 """Least factor on the vibrating loads along a response under control, where it is found."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantity import CurveQuantity, SolvedCurve
 
 

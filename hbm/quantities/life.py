@@ -1,10 +1,6 @@
 """Cycles until the preload has fallen to a share of its first value: where the contact is lost."""
 
-from __future__ import annotations
-
-import numpy as np
-
-from tribodyn.hbm.quantity import EndOfLife, ErrorKind, WearQuantity, WornContact
+from tribodyn.hbm.quantity import ErrorKind, WearQuantity, WornContact
 from tribodyn.hbm.wear.history import cycles_to_preload, cycles_to_share
 
 
@@ -29,17 +25,6 @@ def remark(worn: WornContact) -> str:
     return f"until {100 * worn.life_share:g} % of the preload{' at rest' if at_rest else ''} is left"
 
 
-def at_end_of_life(end: EndOfLife) -> float:
-    """The life itself."""
-    return end.life
-
-
-def tangent(end: EndOfLife) -> np.ndarray:
-    """Its derivatives."""
-    return end.by_life
-
-
 QUANTITY = WearQuantity(
     "life", "cycles", value, by_joint=True, error=ErrorKind.DURATION, rank=21, remark=remark,
-    at_end_of_life=at_end_of_life, tangent=tangent,
 )  # fmt: skip

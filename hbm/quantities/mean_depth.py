@@ -1,7 +1,5 @@
 """Mean wear depth over the area of the contact, both surfaces together."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantity import WearQuantity, WornContact
 
 

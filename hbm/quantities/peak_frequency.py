@@ -1,7 +1,5 @@
 """Frequency of the cycle: that of the resonance peak, or the one that the scene gives."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, Slopes, SolvedCycle

@@ -1,7 +1,5 @@
 """Phase of the observed output in the lowest harmonic that is driven."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.quantity import CycleQuantity, Slopes, SolvedCycle

@@ -1,7 +1,5 @@
 """Mean normal force of the contact over a cycle."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, MotionInTime, Slopes, SolvedCycle
@@ -16,7 +14,6 @@ def value(cycle: SolvedCycle) -> float | None:
 
 def slopes(cycle: SolvedCycle) -> Slopes:
     """Adjoint slopes: the static normal force itself."""
-    assert cycle.displacement is not None
     by_force = np.zeros_like(cycle.displacement)
     if "n" in cycle.components and cycle.basis.has_static:
         by_force[:, cycle.components.index("n"), 0] = 1.0

@@ -1,7 +1,5 @@
 """Cycles until the last touch of the contact has ended."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantity import WearQuantity, WornContact
 
 

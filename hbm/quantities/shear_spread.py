@@ -1,7 +1,5 @@
 """How far the curve depends on the load path: largest width of the range of amplitudes over its middle."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.quantity import CurveQuantity, SolvedCurve

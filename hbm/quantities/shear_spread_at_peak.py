@@ -1,7 +1,5 @@
 """The same spread by the load path at the peak of the curve."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.quantity import CurveQuantity, SolvedCurve

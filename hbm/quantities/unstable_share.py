@@ -1,7 +1,5 @@
 """Share of the cycles that were worn along an unstable solution of the balance."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantity import WearQuantity, WornContact
 
 

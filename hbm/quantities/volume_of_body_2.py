@@ -1,7 +1,5 @@
 """Volume that is worn off body 2."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantities import volume
 from tribodyn.hbm.quantity import WearQuantity, WornContact
 

@@ -1,7 +1,5 @@
 """Volume that wears in one cycle, where it goes with the friction work."""
 
-from __future__ import annotations
-
 from tribodyn.hbm.quantities.energy import of_work
 from tribodyn.hbm.quantity import CycleQuantity, Slopes, SolvedCycle
 

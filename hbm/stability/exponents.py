@@ -11,12 +11,10 @@ exact where lambda = 0, so that a fold is where an exponent passes zero, and an 
 where it is not. Of small contacts an exponent that grows by it is solved for again with the law's answer to just that
 exponent (perturbed_contact). Floquet multipliers of the integrated motion (`floquet`) need neither assumption.
 Source  Hill's method and the choice of exponents by their centre: Lazarus and Thomas 2010; Guillot et al. 2020; the
-elimination of the contact is ours
-"""
+elimination of the contact is ours"""
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -24,7 +22,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.contact_law import STICKS
+from tribodyn.hbm.contact.contact_law import SLIPS, STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.stability import hill_problem, perturbed_contact
@@ -35,6 +33,7 @@ if TYPE_CHECKING:
     from tribodyn.hbm.stability.wave_exponents import WaveModes
 
 FOLD = "fold"
+CLEAR = 0.02  # growth or decay over omega, of which Hill's method is sure although sliders remember their path
 _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
 
 
@@ -42,8 +41,6 @@ _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  #
 class HillRules:
     """What Hill's method keeps and takes for rounding; see docs/accuracy/ablations.md."""
 
-    # over omega: real parts up to it count as zero, for the solution is no better than that
-    neutral_growth: float = 1e-6
     fewest_modes: int = 20  # friction makes modes far above the excitation flutter, too
     most_modes: int = 30
     copy_distance: float = 0.02  # over omega: how far truncation may drive copies of one exponent apart
@@ -61,8 +58,7 @@ class Stability:
     omega : [rad/s]
     exponents : (n,) complex, growth rates lambda [1/s], largest real part first; imaginary parts within (-w/2, w/2]
     diameters : (n,) of a travelling wave, index of each perturbation's wave beside that of the solution, 0 where it
-        repeats itself from sector to sector as the solution does; None of a motion that is no wave
-    """
+        repeats itself from sector to sector as the solution does; None of a motion that is no wave"""
 
     omega: float
     exponents: np.ndarray
@@ -71,12 +67,17 @@ class Stability:
     @property
     def n_unstable(self) -> int:
         """Number of exponents that grow."""
-        return int(np.sum(self.exponents.real > RULES.neutral_growth * self.omega))
+        return int(np.sum(self.exponents.real > hill_problem.GROWS * self.omega))
 
     @property
     def stable(self) -> bool:
         """Whether no perturbation grows."""
         return self.n_unstable == 0
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the leading exponent is far enough from the axis for what Hill's method leaves out."""
+        return bool(abs(self.exponents[0].real) > CLEAR * self.omega)
 
     @property
     def crossing(self) -> str:
@@ -95,8 +96,7 @@ def stability(balance: HarmonicBalance, state: State, n_modes: int | None = None
     top : highest harmonic of the perturbation, by default that of the balance
     A displacement that is prescribed in harmonic 0 alone is free to grow: the force that holds it stays as it is.
     Raises  ValueError for models whose harmonics see different systems, but for such a displacement and travelling
-        waves
-    """
+        waves"""
     balance = balance.standing(state.omega)
     model = balance.model
     model.require_masters("stability")
@@ -108,6 +108,11 @@ def stability(balance: HarmonicBalance, state: State, n_modes: int | None = None
             "than the solution does"
         )
     return Stability(state.omega, _sorted(_hill(balance, state, n_modes, top), state.omega)[0])
+
+
+def remembers(balance: HarmonicBalance, state: State) -> bool:
+    """Whether sliders move in a cycle: the contact's answer to a perturbation depends on how fast that grows."""
+    return balance.memory.shape[1] > 0 and bool(np.any(state.cycle.status & SLIPS))
 
 
 def _sorted(exponents: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray]:
@@ -179,11 +184,9 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
 
 def _answer(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> hill_problem.Answer | None:
     """The contact's answer to a perturbation; None of large contacts and several laws."""
-    if balance.contact.stiffness.size * basis.n_coeff > RULES.most_refined:
+    if not balance.contact.has_one_law or balance.contact.stiffness.size * basis.n_coeff > RULES.most_refined:
         return None
-    with suppress(ValueError):
-        return perturbed_contact.answer_of(balance, state, basis.harmonics[-1])
-    return None
+    return perturbed_contact.answer_of(balance, state, basis.harmonics[-1])
 
 
 def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> np.ndarray:
@@ -196,8 +199,7 @@ def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasi
             x[:, :, 0 if h == 0 else 2 * h - 1 + has_cosine.get(h, 0)] = state.x[:, :, i]
             has_cosine[h] = 1
     cycle = balance.contact.cycle(x, basis, balance.memory)
-    jac = cycle.jacobian
-    assert jac is not None
+    jac = cycle.slope
     slope = -jac.reshape(n_pair, c, basis.n_coeff, c, basis.n_coeff)
     k = balance.compliance.k.reshape(n_pair, c)
     for j in range(c):
@@ -227,8 +229,7 @@ def _contact_in_modes(slope: np.ndarray, phi: np.ndarray, static: np.ndarray) ->
 def _centre(vectors: np.ndarray, m: int, basis: HarmonicBasis) -> tuple[np.ndarray, np.ndarray]:
     """Mean and mean square of the harmonics of each perturbation, weighted with its square.
 
-    Copies of one exponent have means one apart
-    """
+    Copies of one exponent have means one apart"""
     shape = vectors.reshape(m, basis.n_coeff, -1)
     a, b = shape[:, 1::2], shape[:, 2::2]
     plus = (np.abs(a - 1j * b) ** 2).sum(axis=0) / 4
@@ -243,8 +244,7 @@ def _central(values: np.ndarray, centre: np.ndarray, spread: np.ndarray, count: 
 
     (lambda + i k, centre - k) is the same perturbation as (lambda, centre), for every whole k. Where even and odd
     harmonics do not meet, each set has all exponents with perturbations as central: those that reach further are
-    truncated later.
-    """
+    truncated later."""
     chosen: list[int] = []
     for i in np.lexsort((-spread, np.round(np.abs(centre) / RULES.equally_central))):
         shift = np.round(values[i].imag - values[chosen].imag)

@@ -1,26 +1,22 @@
 """Floquet exponents from the linearised time steps of an integrated periodic motion.
 
 Of large models the largest multiplier alone, by Arnoldi's method on differences of marched periods.
-Source  Newton-Krylov shooting and its multipliers: Sanchez, Net, Garcia-Archilla and Simo 2004
-"""
-
-from __future__ import annotations
+Source  Newton-Krylov shooting and its multipliers: Sanchez, Net, Garcia-Archilla and Simo 2004"""
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import STICKS
-from tribodyn.hbm.stability.exponents import stability
+from tribodyn.hbm.stability.exponents import remembers, stability
 from tribodyn.hbm.time import period_search
 from tribodyn.hbm.time.period_search import Period, PeriodSearch, perturb
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import integrate
 from tribodyn.hbm.time.verify import Verification
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import SolverFailure
 
 MULTIPLIERS = "its Floquet multipliers in time"
 HILL = "Hill's method"
@@ -45,72 +41,73 @@ class MultiplierRules:
 RULES = MultiplierRules()
 
 
+class NoMultipliers(SolverFailure):
+    """Time integration comes to no periodic motion near a state, or to none whose multipliers can be computed."""
+
+
 def floquet_exponents(balance: HarmonicBalance, state: State, options: Options | None = None) -> np.ndarray:
     """Floquet exponents of the motion that time integration finds from a balance state.
 
     Returns (n,) complex [1/s], without those of sliders that never move: any position of theirs is an equilibrium
-    Raises  ValueError for models too large, or where the motion does not become periodic
-    """
+    Raises  NoMultipliers for models too large, or where the motion does not become periodic"""
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
     if not motion.periodic:
-        raise Refusal(f"no periodic motion near this state: {motion.outcome}")
+        raise NoMultipliers(f"no periodic motion near this state: {motion.outcome}")
     multipliers = np.linalg.eigvals(monodromy(stepper, motion.slopes))
     multipliers = multipliers[np.abs(multipliers) > RULES.least_multiplier]
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
 
 
 def largest_multiplier(balance: HarmonicBalance, state: State, options: Options | None = None) -> float:
-    """Modulus of the largest multiplier of the periodic motion near a balance state.
+    """Modulus of the largest multiplier of the periodic motion near a balance state: above 1 the motion is left.
 
-    Sliders that never move do not count, and a force that holds a mean displacement stays as it is. Of a large model,
-    one that is below 1 in any case need not be exact
-    Raises  ValueError where no periodic motion is found near the state, or it has no equation of motion in time
-    """
+    Sliders that never move do not count, and a force that holds a mean displacement stays as it is. Of a large model
+    it is that of differences, and one that is below 1 in any case need not be exact. Where sliders just reach their
+    limit differences have a kink, and what seems to grow may be a combination of both sides that no motion has: a push
+    in its direction or one against it must grow in a plain march, as a multiplier of 1.01 does, else it is taken for 1.
+    Raises  NoMultipliers; Refusal for models without an equation of motion in time"""
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
     if _size(stepper) <= RULES.dense:
         growth = floquet_exponents(balance, state, options).real * 2 * np.pi / state.omega
         return float(np.exp(growth.max(initial=-np.inf)))
-    return _by_differences(stepper, state, options)[0]
-
-
-def is_unstable(balance: HarmonicBalance, state: State, options: Options | None = None) -> bool:
-    """Whether the periodic motion near a balance state is left: a multiplier is above 1.
-
-    Of a large model it is that of differences. Where sliders just reach their limit these have a kink, and what seems
-    to grow may be a combination of both sides that no motion has: a push in its direction or one against it must grow
-    in a plain march, which a multiplier of 1.01 does just so.
-    Raises  as `largest`
-    """
-    options = options or Options()
-    stepper = TimeStepper(balance, state.omega, options)
-    if _size(stepper) <= RULES.dense:
-        return largest_multiplier(balance, state, options) > 1 + RULES.growth
     modulus, direction, period = _by_differences(stepper, state, options)
-    if modulus <= 1 + RULES.growth:
-        return False
-    plain = replace(options, accelerate=False, max_periods=RULES.pushed)
-    return any(perturb(PeriodSearch(stepper, plain, False), period, 8, s * direction).grows for s in (1.0, -1.0))
+    plain = PeriodSearch(stepper, replace(options, accelerate=False, max_periods=RULES.pushed), False)
+    if modulus > 1 + RULES.growth and not any(perturb(plain, period, 8, s * direction).grows for s in (1.0, -1.0)):
+        return 1.0
+    return modulus
+
+
+def grows_in_time(balance: HarmonicBalance, state: State, options: Options | None = None) -> bool | None:
+    """Whether a perturbation of the periodic motion near a state grows in time; None where that is not known."""
+    if balance.model.is_wave or not balance.model.has_motion_in_time:
+        return None
+    try:
+        return largest_multiplier(balance, state, options) > 1 + RULES.growth
+    except NoMultipliers:
+        return None
 
 
 def is_stable(
     balance: HarmonicBalance, state: State, verification: Verification | None, options: Options
-) -> tuple[bool, str]:
-    """Whether no perturbation of the motion near a balance state grows, and the method that says so.
+) -> tuple[bool | None, str]:
+    """Whether no perturbation of the motion near a balance state grows, and the method that says so; None: not known.
 
-    found : the state beside time integration, which may have come to another motion, or to none; None: not compared
-    Hill's method takes the contact's answer to a perturbation as that to a steady vibration. Where pairs slip and lift
-    in a cycle that may miss what grows, so that it serves only where there are no multipliers
-    """
+    verification : the state in time integration, which may have come to another motion, or to none; None: not compared
+    Hill's method takes the contact's answer to a perturbation as that to a steady vibration. Where sliders slip in a
+    cycle that may miss what grows, so that it serves only where there are no multipliers, and is not sure of little
+    growth or decay"""
     is_confirmed = (
         verification is not None and verification.motion.periodic and verification.contact <= MOTION_TOLERANCE
     )
-    if is_confirmed and not balance.model.is_wave:
-        with suppress(ValueError):
-            return not is_unstable(balance, state, options), MULTIPLIERS
-    return stability(balance, state).stable, HILL
+    grows = grows_in_time(balance, state, options) if is_confirmed else None
+    if grows is not None:
+        return not grows, MULTIPLIERS
+    result = stability(balance, state)
+    is_sure = result.is_clear or not remembers(balance, state)
+    return (result.stable, HILL) if is_sure else (None, f"{HILL} is not sure, and time integration does not decide")
 
 
 def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tuple[float, np.ndarray, Period]:
@@ -119,7 +116,7 @@ def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tup
     search = PeriodSearch(stepper, replace(options, accelerate=True), False)
     period = search.mix(stepper.start_from(state))
     if period.drift > options.tolerance:
-        raise Refusal(f"no periodic motion near this state: drift {period.drift:.1e} at least")
+        raise NoMultipliers(f"no periodic motion near this state: drift {period.drift:.1e} at least")
     plain = PeriodSearch(stepper, replace(options, accelerate=False, max_periods=1 + RULES.most_products), False)
     base = plain.step(period.end)
     size = period_search.RULES.difference * float(np.linalg.norm(base.start))
@@ -153,7 +150,7 @@ def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray
         if miss <= RULES.accuracy * modulus or (k >= RULES.fewest_products and modulus + miss < 1):
             return modulus, np.real(np.array(v).T @ vectors[:, top])
         v.append(w / h[k, k - 1])
-    raise Refusal(f"the largest multiplier did not converge: {modulus:.3g}, off by up to {miss:.1g}")
+    raise NoMultipliers(f"the largest multiplier did not converge: {modulus:.3g}, off by up to {miss:.1g}")
 
 
 def _size(stepper: TimeStepper) -> int:
@@ -163,10 +160,9 @@ def _size(stepper: TimeStepper) -> int:
 def monodromy(stepper: TimeStepper, slopes: np.ndarray | None) -> np.ndarray:
     """Derivative of the state (z, f, x, memory that moves) after a period with respect to the one before.
 
-    slopes : of `time_step.Record`; raises ValueError for models too large
-    """
+    slopes : of `time_step.Record`; raises NoMultipliers for models too large"""
     if _size(stepper) > RULES.max_states:
-        raise Refusal(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
+        raise NoMultipliers(f"{_size(stepper)} state variables are too many for Floquet multipliers: use Hill's method")
     assert slopes is not None
     linear, A, c = stepper.linear, stepper.contact.A.T, stepper.c
     n, n_contact, n_memory = len(linear.E), len(A), stepper.balance.memory.size

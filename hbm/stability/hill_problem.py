@@ -1,9 +1,6 @@
 """The eigenproblem of Hill's method in exponentials, for plain structures and wheels and any answer of the contact.
 
-A plain structure is the wave of index 0 at engine order 0; for a wheel see `wave_exponents`.
-"""
-
-from __future__ import annotations
+A plain structure is the wave of index 0 at engine order 0; for a wheel see `wave_exponents`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +9,8 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.sparse.linalg import LinearOperator, eigs
 
-GROWS, ACCURACY = 1e-6, 1e-3  # over omega: growth that is looked at, and how exactly
+# over omega: real parts up to it count as zero, for the solution is no better than that; how exactly they are known
+GROWS, ACCURACY = 1e-6, 1e-3
 SHARES = (0.25, 0.5, 0.75, *8 * (1.0,))  # of the answer to an exponent itself, on the way to it
 
 StuckModes = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -23,8 +21,7 @@ Answer = Callable[[complex], np.ndarray]  # exponent over omega -> as `perturbed
 def refined(exponents: np.ndarray, at: Place, slope: np.ndarray, answer: Answer) -> np.ndarray:
     """Exponents (n,), in units of omega: those that grow by the answer `slope` to a steady vibration solved for again.
 
-    Each is followed to the contact's answer to just that exponent, and stays where that leads nowhere
-    """
+    Each is followed to the contact's answer to just that exponent, and stays where that leads nowhere"""
     rows, steady, result = np.arange(slope.shape[0] * slope.shape[1]), of_exponentials(slope), exponents.copy()
     for i in np.flatnonzero(exponents.real > GROWS):
         exponent = exponents[i]
@@ -61,8 +58,7 @@ def index_exponents(
 def _nearest(now: complex, *problem: Any) -> complex:
     """The exponent of `index_exponents` that is nearest to one, by Arnoldi's method on the inverse beside it.
 
-    Source  Saad, Numerical Methods for Large Eigenvalue Problems, 2nd ed., section 8.2; a fifth of the time of all
-    """
+    Source  Saad, Numerical Methods for Large Eigenvalue Problems, 2nd ed., section 8.2; a fifth of the time of all"""
     numbers, constant, linear = _quadratic(*problem)
     n, shift = len(constant), now + ACCURACY  # at an exponent itself the inverse has no bound
     factors = sla.lu_factor(constant + shift * linear + shift**2 * np.eye(n))
@@ -109,8 +105,7 @@ def _central(numbers: np.ndarray, values: np.ndarray, vectors: np.ndarray) -> tu
 def _contact_in_modes(blocks: np.ndarray, rows: np.ndarray, modes: list[StuckModes]) -> np.ndarray:
     """Phi^H dg of modal displacements, the flexibility W of what follows in series: (nc m, nc m), harmonic by harmonic.
 
-    blocks : (n_active, c, nc, c, nc)
-    """
+    blocks : (n_active, c, nc, c, nc)"""
     n_active, c, nc = blocks.shape[:3]
     m, n = len(modes[0][0]), len(rows)
     if n == 0:

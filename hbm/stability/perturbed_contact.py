@@ -2,10 +2,7 @@
 
 To dx(t) = exp(lambda t) p(t), p periodic, a law answers with exp(lambda t) q(t). A slider remembers where it came to
 rest, when the perturbation had another phase, so that q depends on lambda. At lambda = 0, where Hill's method takes it,
-it feeds modes far above the vibration with energy that they do not get.
-"""
-
-from __future__ import annotations
+it feeds modes far above the vibration with energy that they do not get."""
 
 from collections.abc import Callable
 
@@ -13,7 +10,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import compiled_law
-from tribodyn.hbm.time import time_step
+from tribodyn.hbm.time import coupled_pairs, time_step
 
 STEPS = 256  # of a period
 MOST_MEMORY = 10  # numbers that a pair remembers; the linearised steps of laws with more fill the memory
@@ -23,14 +20,13 @@ def answer_of(balance: HarmonicBalance, state: State, top: int) -> Callable[[com
     """Derivative of g = k x - f (n_pair, c, nc, c, nc) on the amplitudes of exp((rate + i k) w t), |k| <= top, by rate.
 
     None for a law without a memory, on which nothing depends, or with much of it
-    Raises  ValueError for several laws
-    """
+    Raises  ValueError for several laws"""
     joint = balance.contact.merge("stability")
     parameters, memory = joint.parameters, balance.memory
     if not 0 < memory.shape[1] <= MOST_MEMORY:
         return None
     normal = parameters.components.index("n") if "n" in parameters.components else -1
-    contact = time_step.Contact(parameters.packed(), parameters.gap, normal, np.zeros((1, 1)))
+    contact = coupled_pairs.Contact(parameters.packed(), parameters.gap, normal, np.zeros((1, 1)))
     law, (n_pair, c, _), n_state = compiled_law.pointer(joint.module.step), state.x.shape, memory.shape[1]
     angle, nc = 2 * np.pi * np.arange(1, STEPS + 1) / STEPS, 2 * top + 1
     x = np.ascontiguousarray((state.x @ balance.basis.functions(angle).T).transpose(2, 0, 1))

@@ -12,10 +12,7 @@ its harmonic k sees the wave of index k EO + d. With the modes Phi, L of the stu
 
 one quadratic eigenproblem for each d; that of N - d is its conjugate. The assumptions are those of `exponents`.
 Source  Floquet-Bloch perturbations of a periodic solution with space-time symmetry: Krack and Gross 2019, section 3.7,
-for one sector; the extension to all nodal diameters and the elimination of the contact are ours
-"""
-
-from __future__ import annotations
+for one sector; the extension to all nodal diameters and the elimination of the contact are ours"""
 
 import numpy as np
 import scipy.linalg as sla
@@ -31,8 +28,7 @@ COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: 
 class WaveModes:
     """Stuck modes and contact flexibility of the wheel by index, each made once.
 
-    n_modes : of each index that move dynamically; the others follow statically
-    """
+    n_modes : of each index that move dynamically; the others follow statically"""
 
     def __init__(self, model: ReducedModel, stiffness: np.ndarray, n_modes: int):
         from tribodyn.reduction.wave_model import as_wave  # only wheels need it
@@ -80,8 +76,7 @@ def exponents(
 
     slope : (n_pair, c, n_coeff, c, n_coeff) dg/dx with coefficients [x_0, a_1, b_1, ...] up to the highest harmonic of
         the perturbation; answer : as of `refined`
-    Returns exponents (n,) [1/s] and the index d (n,) of each perturbation, from -N/2 + 1 to N/2
-    """
+    Returns exponents (n,) [1/s] and the index d (n,) of each perturbation, from -N/2 + 1 to N/2"""
     order, n = modes.engine_order, modes.n_sectors
     active = np.flatnonzero(np.abs(slope).max(axis=(1, 2, 3, 4)) > 0)
     blocks = of_exponentials(slope[active])
@@ -111,8 +106,7 @@ def _once(
 ) -> np.ndarray:
     """The `wanted` exponents, in units of omega, with the most central perturbations, none of them twice.
 
-    (lambda - i s, d - s EO) with harmonics renumbered by s is the same perturbation as (lambda, d), for whole s
-    """
+    (lambda - i s, d - s EO) with harmonics renumbered by s is the same perturbation as (lambda, d), for whole s"""
     chosen, count = np.empty(min(limit, len(values)), int), 0
     for i in np.argsort(np.abs(centre), kind="stable"):
         before = chosen[:count]

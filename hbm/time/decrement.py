@@ -10,10 +10,7 @@ amplitude A, its logarithmic decrement is
 Only laws know what their springs hold. So the energy is taken in two parts: that of the structure with every contact
 stuck and closed, from the mode; and the work of the departure g = k x - f_c, from the law marched along one slowly
 falling cycle of the mode's own displacement, which holds the loss and what the contact gives back.
-Source  energy balance of slowly varying motion, as of Krack, Bergman and Vakakis, JSV 372 (2016); in this form ours
-"""
-
-from __future__ import annotations
+Source  energy balance of slowly varying motion, as of Krack, Bergman and Vakakis, JSV 372 (2016); in this form ours"""
 
 import numpy as np
 
@@ -22,7 +19,7 @@ from tribodyn.hbm.contact import compiled_law
 from tribodyn.hbm.continuation.free_vibration import FreeVibration, ModePoint
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import single
-from tribodyn.hbm.time import time_step
+from tribodyn.hbm.time import coupled_pairs, time_step
 from tribodyn.refusal import Refusal
 
 LEAST = 1e-4  # decrement over 2 pi of the falling cycle, where the damping is below
@@ -33,8 +30,7 @@ def decrement(balance: HarmonicBalance, mode: Backbone) -> np.ndarray:
     """Logarithmic decrement over 2 pi (n_point,) of a free decay, at the amplitudes mode.first_harmonic.
 
     Its error is of second order in the distance of the points and of first order in the decrement itself.
-    Raises  ValueError for fewer than three points, a backbone that turns back in amplitude, several contact laws
-    """
+    Raises  ValueError for fewer than three points, a backbone that turns back in amplitude, several contact laws"""
     size = np.log(mode.first_harmonic)
     if len(size) < 3 or not (np.all(np.diff(size) > 0) or np.all(np.diff(size) < 0)):
         raise Refusal("a decay has one rate per amplitude where the backbone has three points and never turns back")
@@ -76,7 +72,7 @@ class _Marched:
         joint = balance.contact.merge("the decrement of a free decay")
         components = joint.parameters.components
         normal = components.index("n") if "n" in components else -1
-        self._contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, np.zeros((1, 1)))
+        self._contact = coupled_pairs.Contact(joint.parameters.packed(), joint.parameters.gap, normal, np.zeros((1, 1)))
         self._law = compiled_law.pointer(joint.module.step)
         self._problem, self._memory = problem, balance.memory
         self._k = problem.k.reshape(problem.rest_x.shape[:2])
@@ -103,8 +99,7 @@ class _Marched:
     def _loss(self, x: np.ndarray, x_slope: np.ndarray, fall: float) -> float:
         """Work that the departure g takes in one period [J] while ln A falls through its value by 2 pi fall.
 
-        One more falling period goes before it, and before that one as many periodic ones as memory needs.
-        """
+        One more falling period goes before it, and before that one as many periodic ones as memory needs."""
         basis = self._problem.basis
         angle = np.concatenate([self._angle - 2 * np.pi, self._angle])
         functions = basis.functions(angle)

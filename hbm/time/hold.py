@@ -12,8 +12,7 @@ which with springs s in place of the contact and what its force differs from the
 After a period with the mean displacement B q and force f at the contact that gives p for the next one. Springs only
 say how the contact answers to a change of p: in a motion that repeats itself every choice gives the same p. With those
 that fit the period best (the regression of f on B q) p is right at once where the contact sticks or is loose.
-Source  the force at a prescribed coordinate: Tamatam 2021, eq. 5.4; the correction from period to period is ours
-"""
+Source  the force at a prescribed coordinate: Tamatam 2021, eq. 5.4; the correction from period to period is ours"""
 
 from __future__ import annotations
 
@@ -36,8 +35,7 @@ class Hold:
 
     dofs : (k,) coordinates; target : (k,) their mean displacement [m]; height : that of the load it came from [m]
     stiffness : (n, n) of the structure without contact; B : (n_contact, n); springs : (n_contact,) of the contact
-    load : (n,) static forces [N]; base : (n_contact,) static motion of the ground [m]
-    """
+    load : (n,) static forces [N]; base : (n_contact,) static motion of the ground [m]"""
 
     dofs: np.ndarray
     target: np.ndarray
@@ -79,8 +77,7 @@ class Hold:
         """(k,) force that holds the coordinates [N].
 
         x, f : (n_contact,) mean displacement [m] and force [N] of the contact
-        springs : (n_contact,) in place of the contact, by default those of the stuck one [N/m]
-        """
+        springs : (n_contact,) in place of the contact, by default those of the stuck one [N/m]"""
         springs = self.springs if springs is None else springs
         shapes = self._shapes(springs)
         pull = self.load + self.B.T @ (springs * (x + self.base) - f)

@@ -1,10 +1,7 @@
 """What a motion does on average over its periods, whether it repeats itself or not.
 
 A plain march goes where a machine goes: to a stable periodic motion, to one that takes several periods, or to one that
-never repeats itself. Energy and wear per cycle then are means over periods, and their scatter is given with them.
-"""
-
-from __future__ import annotations
+never repeats itself. Energy and wear per cycle then are means over periods, and their scatter is given with them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -43,8 +40,7 @@ class MeanOptions:
     search : periods in which a periodic motion is looked for
     accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
         the mean that is asked for
-    contact : of the contact's equations in a step
-    """
+    contact : of the contact's equations in a step"""
 
     steps: int = 256
     block: int = 8
@@ -61,8 +57,7 @@ class MeanMotion:
     energy : (n_pair,) friction work per period [J]; normal_force : (n_pair,) [N], zero where the law has none
     observed : mean of what a caller observes in every period; amplitude : (n_output,) [m]
     spread : standard deviation of the work of a period, over its mean; error : standard error of that mean, relative
-    is_stationary : whether the motion came to rest in its statistics; periods : marched in all
-    """
+    is_stationary : whether the motion came to rest in its statistics; periods : marched in all"""
 
     energy: np.ndarray
     normal_force: np.ndarray
@@ -78,8 +73,7 @@ class Follower:
     """A motion that is followed while gaps and frequency change, and the loads do not.
 
     A periodic motion is followed as such, as long as a perturbation decays. Where it does not, or where nothing repeats
-    itself, the motion is marched on plainly, until that becomes periodic.
-    """
+    itself, the motion is marched on plainly, until that becomes periodic."""
 
     def __init__(self, options: MeanOptions):
         self.options = options
@@ -90,18 +84,22 @@ class Follower:
     def start(self, balance: HarmonicBalance, state: State) -> None:
         """Begin at a state of a balance.
 
-        Raises  Refusal for models with no equation of motion in time; IntegrationFailed
-        """
+        Raises  Refusal for models with no equation of motion in time; IntegrationFailed"""
         if balance.model.is_wave:
             raise Refusal("means over a motion serve one part or several bodies, not a travelling wave of a wheel")
         self._motion = self._stepper_at(balance, state.omega).start_from(state)
         self._regular, self._passing = True, False
 
+    @property
+    def _begun(self) -> Moving:
+        if self._motion is None:
+            raise RuntimeError("the motion was not begun")
+        return self._motion
+
     def stored_state(self) -> np.ndarray:
         """What moves, as one vector whose length depends on the model alone."""
-        stepper, motion = self._stepper, self._motion
+        stepper, motion = self._stepper, self._begun
         assert stepper is not None
-        assert motion is not None
         z = np.pad(motion.z, (0, 2 * len(stepper.modes[0]) - len(motion.z)))
         parts = (motion.x, motion.f, motion.memory, motion.bits, motion.hold)
         return np.concatenate([[stepper.omega, self._regular, self._passing], z, *(np.ravel(part) for part in parts)])
@@ -129,8 +127,7 @@ class Follower:
         observe : what to average besides, of one period
         mean_accuracy : relative standard error of the work and of the normal force at which a motion that is not
             periodic, and has been stationary once, passes to the next place; None: it is stationary at every place
-        Raises  IntegrationFailed
-        """
+        Raises  IntegrationFailed"""
         stepper = self._stepper_at(balance, omega)
         spent = 0
         if self._regular:
@@ -156,10 +153,8 @@ class Follower:
         """A stable periodic motion, and the periods marched; else the motion has left it.
 
         A perturbation that grows slowly must grow with twice the time steps, too: growth by too few steps is
-        numerical.
-        """
-        assert self._motion is not None
-        period, perturbed, search, after = self._perturbed(stepper, self._motion)
+        numerical."""
+        period, perturbed, search, after = self._perturbed(stepper, self._begun)
         spent = search + after
         if period is None:
             return None, spent
@@ -192,8 +187,7 @@ class Follower:
         self, stepper: TimeStepper, observe: Callable[[PeriodicMotion], np.ndarray], mean_accuracy: float | None
     ) -> MeanMotion:
         """Means of a plain march, once two blocks of periods show one motion, or of one that is passing."""
-        o, motion = self.options, self._motion
-        assert motion is not None
+        o, motion = self.options, self._begun
         search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
         rows: list[tuple[Any, ...]] = []
         hold_error: list[np.ndarray] = []
@@ -260,8 +254,7 @@ class Follower:
 def _standard_error(work: np.ndarray) -> float:
     """Of the mean, relative: the largest by means of ever longer blocks, since periods that follow are not independent.
 
-    Source  Flyvbjerg and Petersen 1989
-    """
+    Source  Flyvbjerg and Petersen 1989"""
     total, estimates = float(work.mean()), 0.0
     if not total > 0:
         return estimates

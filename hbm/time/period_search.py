@@ -2,10 +2,7 @@
 
 A plain march follows the transient until it has died grows. Mixing the states of past periods (Anderson) is much
 shorter, and where it is thrown off a periodic motion that a plain march leaves, Newton's method finds that (shooting).
-Source  Newton-Krylov shooting: Sanchez, Net, Garcia-Archilla and Simo 2004
-"""
-
-from __future__ import annotations
+Source  Newton-Krylov shooting: Sanchez, Net, Garcia-Archilla and Simo 2004"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -46,8 +43,7 @@ class Period:
     """A period that was marched: state vectors before and after it, what moves after it, its record.
 
     size : of the vibration, as the root of an energy like the length of a state vector
-    drift : change of the state over the period, relative to that
-    """
+    drift : change of the state over the period, relative to that"""
 
     start: np.ndarray
     image: np.ndarray
@@ -61,8 +57,7 @@ class Anderson:
     """Mixing: the next iterate to a fixed point z = P(z) from the last ones; on a linear map it is equivalent to GMRES.
 
     depth : how many differences are remembered
-    Source  Anderson 1965; least-squares form of Walker and Ni 2011
-    """
+    Source  Anderson 1965; least-squares form of Walker and Ni 2011"""
 
     def __init__(self, depth: int):
         self._depth = depth
@@ -94,8 +89,7 @@ class GivenUp(Exception):
 class PeriodSearch:
     """Counts the periods marched and keeps the one that repeats itself best.
 
-    best : the period of least drift so far; periods : marched so far
-    """
+    best : the period of least drift so far; periods : marched so far"""
 
     def __init__(self, stepper: TimeStepper, options: Options, with_slopes: bool):
         self.stepper, self.options, self.with_slopes = stepper, options, with_slopes
@@ -135,8 +129,7 @@ class PeriodSearch:
     def step(self, motion: Moving, patience: float = np.inf) -> Period:
         """March one period.
 
-        Raises  GivenUp where no further period is allowed, or the best one was `patience` periods ago
-        """
+        Raises  GivenUp where no further period is allowed, or the best one was `patience` periods ago"""
         if self.periods >= self.options.max_periods or self.periods - self._best_at >= patience:
             raise GivenUp
         end, record, _, speed = self.stepper.period(motion, self.with_slopes)
@@ -230,8 +223,7 @@ def perturb(plain: PeriodSearch, period: Period, interval: int, direction: np.nd
     plain : search that marches plain periods; period : the periodic motion; interval : periods between two checks
     direction : of the perturbation as a state vector, by default all modes alike
     Sliders that stop elsewhere leave a part of the perturbation, which does not count as growth
-    Raises  IntegrationFailed
-    """
+    Raises  IntegrationFailed"""
     perturbed = plain.vector.perturbed(period.image, RULES.perturbation * period.size, direction)
     distance, motion = 0.0, plain.vector.unpack(perturbed, period.end)
     while plain.periods < plain.options.max_periods:

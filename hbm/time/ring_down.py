@@ -7,10 +7,7 @@ their slopes are the damping and the frequency. Like a narrow filter the smooth 
 along; peaks do not, and one thousandth of the seventh harmonic's frequency changes the damping between two peaks by per
 cents.
 Source  damping by amplitude from a decay: Jin, Chen, Brake and Song, MSSP 141 (2020) 106479; their filter and peaks are
-one local fit here
-"""
-
-from __future__ import annotations
+one local fit here"""
 
 from dataclasses import dataclass
 
@@ -19,6 +16,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
+from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 from tribodyn.hbm.time.time_step import Moving
@@ -32,7 +30,7 @@ class FitRules:
     window: int = 4  # periods of a window
     multiples: tuple[int, ...] = (2, 3)  # of the frequency, fitted along
     refined: int = 4  # rounds in which frequency and damping of a window settle
-    ringing: float = 0.05  # of the amplitude, root mean square, from which on what is left over are other modes
+    ringing: float = 0.05  # of the amplitude, root mean square, from which on what is left over is too much
 
 
 RULES = FitRules()
@@ -43,10 +41,9 @@ class RingDown:
     """A free decay and what it says.
 
     time : (n,) [s]; displacement : (n,) of the output about its mean [m]
-    amplitude : (k,) of the first harmonic [m]; omega : (k,) [rad/s]; damping : (k,) logarithmic decrement of a period
-        over 2 pi; all at the middles of the windows
-    rest : (k,) root mean square of what else rings in a window, over the amplitude
-    """
+    amplitude : (k,) half the range of what is fitted [m]; omega : (k,) [rad/s]
+    damping : (k,) logarithmic decrement of a period over 2 pi; all at the middles of the windows
+    rest : (k,) root mean square of what else rings in a window, over the amplitude"""
 
     time: np.ndarray
     displacement: np.ndarray
@@ -68,8 +65,7 @@ def ring_down(balance: HarmonicBalance, mode: Backbone, periods: int, steps: int
 
     periods : at most so many, of the frequency at the start; steps : per period
     least : amplitude of the output at which to end [m]
-    Raises  ValueError for models with no equation of motion in time, IntegrationFailed
-    """
+    Raises  ValueError for models with no equation of motion in time, IntegrationFailed"""
     free = balance.with_load(0.0)
     omega = float(mode.omega[-1])
     stepper = TimeStepper(free, omega, Options(steps=steps))
@@ -94,8 +90,7 @@ def hammer(
     impulse : of the blow, where and in which direction the vibrating load acts [N s]; it takes no time, and what is so
         stiff that the time steps leave its inertia out does not feel it
     omega : a guess of the frequency that is looked for [rad/s]; output : in which; else as `ring_down`
-    Raises  ValueError where several loads vibrate, or the structure has no equilibrium
-    """
+    Raises  ValueError where several loads vibrate, or the structure has no equilibrium"""
     struck = [name for (h, name), value in balance.excitation.loads.items() if h and value != 0]
     if len(set(struck)) != 1:
         raise Refusal(f"a blow acts where the one vibrating load does: there are {len(set(struck))}")
@@ -133,8 +128,7 @@ def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float, has_oth
     omega : a guess of its frequency [rad/s]
     has_other_modes : whether other modes may be excited, too, which `rest` then states; those within half of the
         frequency disturb
-    Raises  ValueError for a decay that is too short, IntegrationFailed where several modes ring
-    """
+    Raises  ValueError for a decay that is too short, IntegrationFailed where several modes ring"""
     step = time[1] - time[0]
     period = 2 * np.pi / (omega * step)
     n = round(RULES.window * period)
@@ -148,22 +142,24 @@ def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float, has_oth
     for start in range(0, len(time) - n + 1, max(1, round(period / 2))):
         observed = displacement[start : start + n]
         for _ in range(RULES.refined):
-            size, slope, remaining = _fitted(observed, rate * step * n, inside, weight)
+            size, multiples, slope, remaining = _fitted(observed, rate * step * n, inside, weight)
             rate += slope / (size * step * n)
         if not has_other_modes and not remaining < RULES.ringing * abs(size):
             raise IntegrationFailed(
-                f"the decay is no single oscillation: {remaining / abs(size):.0%} of its amplitude are other modes; "
+                f"the decay is no single oscillation: {remaining / abs(size):.0%} of its amplitude are "
+                f"harmonics above {RULES.multiples[-1]} or other modes; "
                 "begin at a smaller amplitude, or end at a larger one"
             )
-        rows.append((abs(size), rate.imag, -rate.real / rate.imag, remaining / abs(size)))
-    amplitude, frequency, damping, equilibrium = np.array(rows).T
-    return RingDown(time, displacement - displacement.mean(), amplitude, frequency, damping, equilibrium)
+        swing = float(amplitude(np.array([size.real, -size.imag, *multiples]), (1, *RULES.multiples)))
+        rows.append((swing, rate.imag, -rate.real / rate.imag, remaining / swing))
+    return RingDown(time, displacement - displacement.mean(), *np.array(rows).T)
 
 
 def _fitted(
     observed: np.ndarray, rate: complex, inside: np.ndarray, weight: np.ndarray
-) -> tuple[complex, complex, float]:
-    """Complex amplitude of exp(rate t) at the middle, its slope over the window, and root mean square of the rest."""
+) -> tuple[complex, np.ndarray, complex, float]:
+    """Complex amplitude of exp(rate t) at the middle, coefficients of its multiples, slope of the amplitude over the
+    window, and root mean square of the rest."""
     carrier = np.exp(rate * inside)
     parts = [
         carrier,
@@ -174,4 +170,5 @@ def _fitted(
     columns = np.column_stack([np.ones_like(inside), inside, *(c for p in parts for c in (p.real, -p.imag))])
     fit = np.linalg.lstsq(columns * weight[:, None], observed * weight, rcond=None)[0]
     equilibrium = float(np.sqrt(np.mean((weight * (observed - columns @ fit)) ** 2)))
-    return complex(fit[2], fit[3]), complex(fit[4], fit[5]), equilibrium
+    turned = np.tile([1.0, -1.0], len(RULES.multiples))  # columns are those of a - ib
+    return complex(fit[2], fit[3]), turned * fit[8:], complex(fit[4], fit[5]), equilibrium

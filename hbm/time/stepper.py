@@ -1,8 +1,7 @@
 """One problem made ready for time stepping at one frequency, and periods marched with it, see `time_step`.
 
 The structure moves in its modal coordinates without contact, exactly but for the contact forces, which count by their
-mean over a step. The law is the `step` kernel of the balance.
-"""
+mean over a step. The law is the `step` kernel of the balance."""
 
 from __future__ import annotations
 
@@ -15,13 +14,16 @@ import scipy.linalg as sla
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import compiled_law
+from tribodyn.hbm.contact.contact_law import STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.time import time_step
+from tribodyn.hbm.time import coupled_pairs, rigid_contact, time_step
 from tribodyn.hbm.time.hold import Hold
 from tribodyn.hbm.time.time_step import Moving, Record
 from tribodyn.refusal import Refusal, SolverFailure
 
 RESOLVED = 1.0  # omega h of a mode from which on its inertia is left out
+ROUNDING = 1e-14  # of the largest mass, below which there is none
+MASSLESS = 1e150  # eigenvalue of modes without mass, whose compliance alone counts
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ class Options:
     accelerate : mix the states of past periods (Anderson) instead of waiting for the transient to decay; finds
         unstable periodic motions, too, from which a plain march would leave. A slider that never slips in the periodic
         motion then stands where the load path of the balance left it, else where the transient did
-    contact : accuracy of the contact's equations, see `time_step.Contact`
-    """
+    contact : accuracy of the contact's equations, see `coupled_pairs.Contact`
+    rigid : unilateral contact and Coulomb friction without the springs of the contact, see `rigid_contact`"""
 
     steps: int = 1024
     tolerance: float = 1e-8
@@ -43,6 +45,7 @@ class Options:
     patience: int = 80
     accelerate: bool = True
     contact: float = 1e-12
+    rigid: bool = False
 
     def __post_init__(self) -> None:
         if self.steps < 8:
@@ -59,12 +62,13 @@ class TimeStepper:
     n_dynamic : modes of the structure without contact that move dynamically, the lowest ones with omega h < RESOLVED;
         the others follow statically, so that all of them count and the more of them move the finer the steps are
     lam, damping : of the modes that move, (n_dynamic,) and (n_dynamic, n_dynamic), with unit modal mass
-    linear, contact : see `time_step`; static : (n_contact, n_contact) compliance W of the modes that follow
+    linear : see `time_step`; contact : see `coupled_pairs`
+    static : (n_contact, n_contact) compliance W of the modes that follow, less that of the springs in series
+    series : (n_pair, n_component) compliance of these, zero but for a rigid contact [m/N]
     modes : of the structure without contact, where another stepper of the same model has them already
     hold : what holds a displacement that is prescribed in harmonic 0; None where there is none
     Raises  ValueError for models whose harmonics see different systems but for such a displacement, or whose mass
-        matrix is singular
-    """
+        matrix is singular"""
 
     def __init__(
         self,
@@ -85,10 +89,14 @@ class TimeStepper:
         self.modes = modes or _free_modes(system)
         lam, phi = self.modes
         self.h = 2 * np.pi / omega / options.steps
-        m = self.n_dynamic = max(1, int(np.sum(lam < (RESOLVED / self.h) ** 2)))
-        self.lam, moving, static_part = lam[:m], phi[:, :m], phi[:, m:] / np.sqrt(lam[m:])
+        m = max(1, int(np.sum(lam < (RESOLVED / self.h) ** 2)))
         self.n_pair, self.c = balance.contact.stiffness.shape
+        self.stops = options.rigid and rigid_contact.stops_masses(m, len(lam), balance.contact)
         B = np.asarray(model.interface.B)
+        if options.rigid and not self.stops:
+            m = rigid_contact.moving_modes(m, lam, B @ phi, balance.contact, self.h)
+        self.n_dynamic = m
+        self.lam, moving, static_part = lam[:m], phi[:, :m], phi[:, m:] / np.sqrt(lam[m:])
         U, follows = np.ascontiguousarray(B @ moving), B @ static_part
         self.static = follows @ follows.T
         rate = system.velocity_matrix
@@ -105,10 +113,13 @@ class TimeStepper:
         basis = balance.basis
         force = balance.loaded(self._load(len(phi)))  # (n, n_coeff)
         self._modal_load = moving.T @ force
-        samples = basis.functions(2 * np.pi * np.arange(1, options.steps + 1) / options.steps)
+        samples = self._samples = basis.functions(2 * np.pi * np.arange(1, options.steps + 1) / options.steps)
         base = balance.excitation.base
         self._base = np.zeros((len(B), basis.n_coeff)) if base is None else balance.loaded(base)
-        E, Q, impulse = _exact_step(self.lam, full, flow, diagonal, self.h, self._modal_load, basis, omega)
+        if self.stops:
+            E, Q, impulse = rigid_contact.stopping_step(np.diag(self.lam) + self.flow, full, self.h, self._modal_load)
+        else:
+            E, Q, impulse = _exact_step(self.lam, full, flow, diagonal, self.h, self._modal_load, basis, omega)
         static = int(basis.has_static)
         self.hold = Hold.of(balance, force[:, :static].sum(axis=1), self._base[:, :static].sum(axis=1))
         at = np.zeros((len(phi), 0)) if self.hold is None else self.hold.at
@@ -120,9 +131,14 @@ class TimeStepper:
         self._of_hold = modal, Q @ modal, follows @ (static_part.T @ at), (rows @ static_part) @ (static_part.T @ at)
         self.linear = time_step.Linear(
             E, Q, U, np.ascontiguousarray(np.roll(samples, 1, axis=0) @ impulse.T),
-            np.ascontiguousarray(samples @ self.rest.T),
+            np.ascontiguousarray(samples @ self.rest.T), 1.0 if self.stops else 0.5,
         )  # fmt: skip
-        compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
+        compliance = self.linear.late * U @ (Q[:m] @ U.T) + self.static
+        self.series = np.zeros((self.n_pair, self.c))
+        if options.rigid:
+            self.balance = balance = rigid_contact.without_springs(balance, compliance if self.stops else self.static)
+            self.series = 1 / balance.contact.stiffness
+            compliance, self.static = (A - np.diag(self.series.ravel()) for A in (compliance, self.static))
         symmetric = system.gyroscopic is None and system.circulatory is None
         A = np.ascontiguousarray(0.5 * (compliance + compliance.T) if symmetric else compliance.T)
         joint = balance.contact.merge("time integration")
@@ -130,8 +146,8 @@ class TimeStepper:
         normal = components.index("n") if "n" in components else -1
         self.law = compiled_law.pointer(joint.module.step)
         forgets = normal >= 0 and time_step.forgets(self.law, packed, gap, normal, balance.memory)
-        self.contact = time_step.Contact(packed, gap, normal, A, forgets, options.contact)
-        self._space = time_step.Space.of(self.n_pair, self.c, balance.memory.shape[1])
+        self.contact = coupled_pairs.Contact(packed, gap, normal, A, forgets, options.contact)
+        self._space = coupled_pairs.Space.of(self.n_pair, self.c, balance.memory.shape[1])
 
     def worn(self, balance: HarmonicBalance) -> TimeStepper:
         """The same for a balance that differs in its gaps alone."""
@@ -150,8 +166,7 @@ class TimeStepper:
         """What moves at t = 0 in a balance state, every coordinate in equilibrium with its contact forces.
 
         at_rest : leave out all but harmonic 0; added : damping ratio of the term - 2 zeta w M q' that sustains a
-            nonlinear mode
-        """
+            nonlinear mode"""
         basis, m = self.balance.basis, self.n_dynamic
         contact_force = state.cycle.force.reshape(len(self.static), -1)
         hold = np.zeros(0) if self.hold is None else self.hold.in_balance(state)
@@ -198,9 +213,11 @@ class TimeStepper:
         x_free += self._of_hold[2] @ hold
         contact = self.contact._replace(A=self.static)
         closed = np.zeros(self.n_pair, bool)
-        scale, space = float(np.abs(x).max()), time_step.Space.of(self.n_pair, self.c, s.shape[1])
-        time_step.displace(contact.A, f, space.y)
-        rounds, _ = time_step.solve_contact(self.law, contact, x_free, x.copy(), closed, s, x, f, scale, space)
+        if self.stops:  # the force of a mass that is stopped is one of a step, not of an instant
+            return Moving(z.copy(), x_free.reshape(x.shape) + self.series * f, f, s, np.full(len(x), STICKS), hold)
+        scale, space = float(np.abs(x).max()), coupled_pairs.Space.of(self.n_pair, self.c, s.shape[1])
+        coupled_pairs.displace(contact.A, f, space.y)
+        rounds, _ = coupled_pairs.solve_contact(self.law, contact, x_free, x.copy(), closed, s, x, f, scale, space)
         if rounds < 0:
             raise IntegrationFailed("the contact has no equilibrium to start from")
         s, bits = time_step.memory_after(self.law, x[None], self.contact, s)
@@ -210,8 +227,7 @@ class TimeStepper:
         """March one period from t = 0.
 
         Returns what moves after it, its record, the rounds of the contact solver and the largest modal speed
-        Raises  IntegrationFailed
-        """
+        Raises  IntegrationFailed"""
         n, n_pair, c, n_state = self.options.steps, self.n_pair, self.c, start.memory.shape[1]
         end = Moving(*(np.array(part) for part in start))
         record = Record(
@@ -233,21 +249,48 @@ class TimeStepper:
         y = y + record.z[:, : self.n_dynamic] @ of_eta.T + record.f.reshape(n, -1) @ of_force.T
         return end, record._replace(y=y), spent, speed / self.h
 
+    def work(self, record: Record) -> tuple[float, float]:
+        """Work of the loads and of the damping over a recorded period that repeats itself [J]."""
+        m, basis = self.n_dynamic, self.balance.basis
+        eta, velocity, load = record.z[:, :m], record.z[:, m:] / self.h, self._samples @ self._modal_load.T
+        travel = eta - np.roll(eta, 1, axis=0)
+        loads = 0.5 * np.sum((load + np.roll(load, 1, axis=0)) * travel)
+        # on what follows statically, by parts: contact force times rate of the displacement under the loads
+        rate = self.omega * self._samples @ basis.rate.T @ self.rest.T
+        loads += self.h * np.sum(rate * record.f.reshape(len(rate), -1))
+        return float(loads), float(self.h * np.sum(velocity * (velocity @ self.damping.T + eta @ self.flow.T)))
+
 
 def _free_modes(system: SecondOrderSystem) -> tuple[np.ndarray, np.ndarray]:
-    matrices = [np.asarray(matrix) for matrix in (system.stiffness, system.mass)]
-    if all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in matrices):
-        k, m = (np.diag(matrix) for matrix in matrices)
+    """Eigenvalues (n,) and modes (n, n) of the structure without contact, of unit modal mass; massless ones are last.
+
+    What has no mass has modes at MASSLESS, whose compliance is that of the stiffness there"""
+    K, M = (np.asarray(matrix) for matrix in (system.stiffness, system.mass))
+    if all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in (K, M)):
+        k, m = np.diag(K), np.diag(M)
         if (m > 0).all():
             order = np.argsort(k / m, kind="stable")
             return (k / m)[order], np.diag(1 / np.sqrt(m))[:, order]
     try:
-        lam, phi = sla.eigh(np.asarray(system.stiffness), np.asarray(system.mass))
+        return sla.eigh(K, M)
     except np.linalg.LinAlgError:
-        raise Refusal(
-            "time integration needs a positive definite mass matrix: give every coordinate some mass"
-        ) from None
-    return lam, phi
+        return _modes_beside_massless(K, M)
+
+
+def _modes_beside_massless(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As `_free_modes`, of a singular mass matrix: coordinates without mass follow the others statically."""
+    mass, direction = sla.eigh(M)
+    if mass[0] < -ROUNDING * mass[-1]:
+        raise Refusal("time integration needs a mass matrix without negative eigenvalues: check the matrices")
+    rest, heavy = np.split(direction, [int(np.sum(mass <= ROUNDING * mass[-1]))], axis=1)
+    try:
+        lower = sla.cholesky(rest.T @ K @ rest, lower=True)
+    except np.linalg.LinAlgError:
+        raise Refusal("a coordinate has neither mass nor stiffness: give it one of them") from None
+    static = sla.solve_triangular(lower, rest.T, lower=True).T  # (n, n_massless), K-orthonormal
+    heavy = heavy - static @ (static.T @ K @ heavy)
+    lam, phi = sla.eigh(heavy.T @ K @ heavy, heavy.T @ M @ heavy)
+    return np.append(lam, np.full(len(lower), MASSLESS)), np.hstack([heavy @ phi, np.sqrt(MASSLESS) * static])
 
 
 def _exact_step(
@@ -262,8 +305,7 @@ def _exact_step(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """E, Q and the impulse per coefficient of the loads (2 m, n_coeff) at the start of the step; see `time_step`.
 
-    load : (m, n_coeff) modal load. All are exponentials of the step's motion together with what drives it
-    """
+    load : (m, n_coeff) modal load. All are exponentials of the step's motion together with what drives it"""
     m = len(lam)
     groups = [[i] for i in range(m)] if diagonal else [list(range(m))]
     E, Q, impulse = np.zeros((2 * m, 2 * m)), np.zeros((2 * m, m)), np.zeros((2 * m, basis.n_coeff))

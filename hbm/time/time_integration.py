@@ -5,10 +5,7 @@ coordinates of the structure without contact, exactly but for the contact forces
 (hbm.time.time_step). The law is the same `step` kernel, but nothing else is shared: no harmonics, no compliance between
 harmonics, no alternation of domains.
 The start (a harmonic balance state, or static equilibrium) and the acceleration of the transient only choose where
-the march begins; what is returned is always one plainly integrated period together with the drift over it.
-"""
-
-from __future__ import annotations
+the march begins; what is returned is always one plainly integrated period together with the drift over it."""
 
 from dataclasses import dataclass, replace
 
@@ -34,13 +31,13 @@ class PeriodicMotion:
     outputs : (n_output, n_step) observed outputs [m]
     energy : (n_pair,) work of the tangential contact force over the period, integral of f dx [J]
     normal_force : (n_pair,) mean over the period [N], zero where the law has no normal component
+    supplied, damped : work of the loads, and of the damping and a flow, over the period [J]
     hold_error : (k,) mean of each coordinate that is prescribed in harmonic 0, less what is prescribed [m]
     status : (n_pair,) bits of what happened: STICKS | SLIPS | SEPARATES
     drift : change of the state over the period, relative to the vibration (both as square roots of energy)
     periods : periods integrated in all
     outcome : CONVERGED, or what went wrong
-    slopes : derivatives of the law along the period, see `time_step.Record`, or None if not asked for
-    """
+    slopes : derivatives of the law along the period, see `time_step.Record`, or None if not asked for"""
 
     omega: float
     time: np.ndarray
@@ -49,6 +46,8 @@ class PeriodicMotion:
     outputs: np.ndarray
     energy: np.ndarray
     normal_force: np.ndarray
+    supplied: float
+    damped: float
     hold_error: np.ndarray
     status: np.ndarray
     drift: float
@@ -73,14 +72,21 @@ class PeriodicMotion:
 
     @property
     def amplitude(self) -> np.ndarray:
-        """(n_output,) vibration amplitude of each output, the root of twice its mean square [m]."""
-        swing: np.ndarray = np.sqrt(2 * self.outputs.var(axis=1))
-        return swing
+        """(n_output,) vibration amplitude of each output [m]: half its range, of parabolas through its extremes."""
+        return 0.5 * (_highest(self.outputs) + _highest(-self.outputs))
 
     def coefficients(self, series: np.ndarray, basis: HarmonicBasis) -> np.ndarray:
         """Fourier coefficients (..., n_coeff) of a series (..., n_step) of this motion, to stand beside the balance."""
         weight = np.where(basis.order == 0, 1.0, 2.0) / series.shape[-1]
         return series @ (basis.functions(self.omega * self.time) * weight)
+
+
+def _highest(series: np.ndarray) -> np.ndarray:
+    """Maximum (n,) of periodic series (n, n_step), of the parabola through the highest sample and its neighbours."""
+    at = series.argmax(axis=1)[:, None] + [-1, 0, 1]
+    before, highest, following = np.take_along_axis(series, at % series.shape[1], axis=1).T
+    slope, curvature = (following - before) / 2, 2 * highest - before - following
+    return np.asarray(highest + np.divide(slope**2, 2 * curvature, out=np.zeros_like(slope), where=curvature > 0))
 
 
 @dataclass(frozen=True)
@@ -89,8 +95,7 @@ class FreeMotion:
 
     energy, energy_spread : friction work of the whole contact per period, mean and standard deviation [J]
     amplitude, amplitude_spread : (n_output,) of each output in a period, likewise [m]
-    drift : change of the state over the last period, as of a `PeriodicMotion`; periods : marched in all
-    """
+    drift : change of the state over the last period, as of a `PeriodicMotion`; periods : marched in all"""
 
     energy: float
     energy_spread: float
@@ -115,8 +120,7 @@ def integrate(
     Of a travelling wave all sectors are marched until it repeats itself, and the first of them is shown; its slopes
     are of all of them
     Returns the last period, also where it is not periodic within max_periods, as its outcome then says
-    Raises  Refusal for models with no equation of motion in time; IntegrationFailed
-    """
+    Raises  Refusal for models with no equation of motion in time; IntegrationFailed"""
     options, balance = options or Options(), balance.standing(omega)
     full_balance, begin = in_time(balance, omega, start, options)
     stepper = TimeStepper(full_balance, omega, options)
@@ -138,8 +142,7 @@ def march_freely(
     added : damping ratio that sustains the start where it is a point of a nonlinear mode, gone at t = 0
     An unstable periodic motion is left, for another one or for one that never repeats itself; means over many periods
     then are what a machine shows
-    Raises  Refusal for models with no equation of motion in time; IntegrationFailed
-    """
+    Raises  Refusal for models with no equation of motion in time; IntegrationFailed"""
     options, balance = replace(options or Options(), accelerate=False), balance.standing(omega)
     full_balance, begin = in_time(balance, omega, start, options)
     assert begin is not None
@@ -181,8 +184,11 @@ def _of_sector(balance: HarmonicBalance, motion: PeriodicMotion) -> PeriodicMoti
     if not balance.model.is_wave:
         return motion
     pairs = slice(0, balance.contact.n_pair)
+    n_sector = len(motion.energy) // balance.contact.n_pair
     return replace(
         motion,
+        supplied=motion.supplied / n_sector,
+        damped=motion.damped / n_sector,
         x=motion.x[pairs],
         force=motion.force[pairs],
         outputs=motion.outputs[: len(balance.compliance.output_names)],
@@ -229,20 +235,28 @@ def motion_of(
     components = stepper.balance.contact.components
     x, f = record.x, record.f
     x0, f0 = (x[-1], f[-1]) if start is None else (start.x, start.f)
-    work = f[1:] + f[:-1]
+    late = stepper.linear.late
+    work = late * f[1:] + (1 - late) * f[:-1]
     work *= x[1:] - x[:-1]
-    work = 0.5 * (work.sum(axis=0) + (f[0] + f0) * (x[0] - x0))[:, stepper.balance.contact.tangential].sum(axis=1)
+    work = work.sum(axis=0) + (late * f[0] + (1 - late) * f0) * (x[0] - x0)
+    # what the springs of a motion that does not repeat itself store is no friction work
+    k = stepper.balance.contact.stiffness
+    work -= np.divide(f[-1] ** 2 - f0**2, 2 * k, out=np.zeros_like(work), where=k > 0)
+    work = work[:, stepper.balance.contact.tangential].sum(axis=1)
     normal = record.f[:, :, components.index("n")].mean(axis=0) if "n" in components else np.zeros(len(work))
+    supplied, damped = stepper.work(record)
     n, hold = len(stepper.balance.compliance.output_names), stepper.hold
     hold_error = np.zeros(0) if hold is None else record.y[:, n:].mean(axis=0) - hold.target
     return PeriodicMotion(
         omega=stepper.omega,
         time=stepper.h * np.arange(1, stepper.options.steps + 1),
-        x=np.moveaxis(record.x, 0, 2),
+        x=np.moveaxis(record.x - stepper.series * record.f, 0, 2),
         force=np.moveaxis(record.f, 0, 2),
         outputs=record.y.T[:n],
         energy=work,
         normal_force=normal,
+        supplied=supplied,
+        damped=damped,
         hold_error=hold_error,
         status=record.bits,
         drift=period.drift,

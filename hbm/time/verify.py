@@ -1,11 +1,10 @@
 """A harmonic balance solution beside direct time integration of the same model: how far they are apart, and why."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tribodyn.hbm import harmonics
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.threads import single
@@ -13,15 +12,13 @@ from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 
-ENERGY_FLOOR = 1e-6  # of (largest force x travel, summed over pairs), below which energies do not differ
-
 
 @dataclass(frozen=True)
 class Verification:
     """Relative differences, balance minus time integration over time integration; outputs by name.
 
     omega : [rad/s]
-    amplitude : vibration amplitude of each output, all harmonics of the time integration counted
+    amplitude : vibration amplitude of each output
     waveform : largest difference over the period of each output's vibration, over its largest deflection from the mean
     mean : difference of the static part of each output, over the vibration amplitude (static over static where none)
     contact : largest difference over pairs and time of the vibration of x, over its largest deflection
@@ -31,8 +28,7 @@ class Verification:
         nan where no periodic motion was found
     drift, periods : how periodic the time integration is, and after how many periods
     outcome : of the time integration: CONVERGED, or what went wrong
-    motion : the last period
-    """
+    motion : the last period"""
 
     omega: float
     amplitude: dict[str, float]
@@ -59,8 +55,7 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
     """Integrate in time from a balance state to the periodic motion nearby and compare.
 
     state : converged state of the balance; options : of the time integration
-    Raises  what `time_integration.integrate` raises
-    """
+    Raises  what `time_integration.integrate` raises"""
     options = options or Options()
     motion = time_integration.integrate(balance, state.omega, state, options)
     functions = balance.basis.functions(state.omega * motion.time)
@@ -71,16 +66,15 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
     floor = energy_floor(motion)
     energy = balance.energy(state)
     total_energy = max(abs(motion.energy.sum()), floor)
-    amplitude = np.array([_relative(a, b) for a, b in zip(_rms(ours), _rms(theirs), strict=True)])
+    balance_amplitude = harmonics.amplitude(balance.outputs(state), balance.basis.harmonics)
+    amplitude = [_relative(a, b) for a, b in zip(balance_amplitude, motion.amplitude, strict=True)]
     means = [
         _relative(a, b, scale or abs(b))
-        for a, b, scale in zip(
-            outputs.mean(axis=1), motion.outputs.mean(axis=1), np.sqrt(2) * _rms(theirs), strict=True
-        )
+        for a, b, scale in zip(outputs.mean(axis=1), motion.outputs.mean(axis=1), motion.amplitude, strict=True)
     ]
     return Verification(
         omega=state.omega,
-        amplitude=dict(zip(names, amplitude.tolist(), strict=True)),
+        amplitude=dict(zip(names, amplitude, strict=True)),
         waveform={
             n: _relative(np.abs(a - b).max(), 0.0, np.abs(b).max()) for n, a, b in zip(names, ours, theirs, strict=True)
         },
@@ -102,22 +96,19 @@ def _step_error(
 ) -> float:
     """Error of the time steps in amplitude and energy, from half as many."""
     coarse = time_integration.integrate(balance, state.omega, state, replace(options, steps=options.steps // 2))
-    rms = zip(_rms(_vibration(coarse.outputs)), _rms(_vibration(motion.outputs)), strict=True)
+    amplitudes = zip(coarse.amplitude, motion.amplitude, strict=True)
     energy = (coarse.energy.sum() - motion.energy.sum()) / total_energy if total_energy > 0 else 0.0
-    return float(max(abs(v) / 3 for v in (*(_relative(a, b) for a, b in rms), energy)))
+    return float(max(abs(v) / 3 for v in (*(_relative(a, b) for a, b in amplitudes), energy)))
 
 
 def energy_floor(motion: PeriodicMotion) -> float:
-    """Energy [J] below which dissipation is rounding: ENERGY_FLOOR x the sum of largest force x travel."""
-    return ENERGY_FLOOR * float((np.abs(motion.force).max(axis=2) * np.ptp(motion.x, axis=2)).sum())
+    """Energy [J] that time steps cannot tell from none: their squared angle x the sum of largest force x travel."""
+    angle = 2 * np.pi / motion.x.shape[2]
+    return angle**2 * float((np.abs(motion.force).max(axis=2) * np.ptp(motion.x, axis=2)).sum())
 
 
 def _vibration(series: np.ndarray) -> np.ndarray:
     return series - series.mean(axis=-1, keepdims=True)
-
-
-def _rms(series: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.mean(series**2, axis=-1))
 
 
 def _relative(value: float, reference: float, scale: float | None = None) -> float:

@@ -1,7 +1,5 @@
 """A travelling wave in time: the sectors until it repeats itself, each with its contact, as one problem."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,10 +2,7 @@
 
 The stages are those of a second-order, L-stable, stiffly accurate Runge-Kutta step (sdirk_stages); a first-order
 companion gives the error estimate. Where no solution with all harmonics follows, fewer are taken; where none follows
-with fewer either, an explicit step gets over the end of the branch.
-"""
-
-from __future__ import annotations
+with fewer either, an explicit step gets over the end of the branch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -49,8 +46,7 @@ def balance_step(
 ) -> WearStep:
     """One accepted step from a state, with as many harmonics as a solution follows with.
 
-    whole : the problem with all harmonics, which rows have; each step tries more of them again
-    """
+    whole : the problem with all harmonics, which rows have; each step tries more of them again"""
     problem, state = start_problem, start = harmonic_fallback.with_most_harmonics(full_problem, state)
     while isinstance(step := _implicit_step(problem, tolerance, state, rows, full_problem), NoSolution):
         start = replace(start, solves=step.solves)
@@ -67,7 +63,7 @@ def balance_step(
         row = row_of(full_problem, shown, row.cycles_in_step, row.worn, row.work, row.step_error, row.memory)
     if step.failure is None:
         following = harmonic_fallback.converted(full_problem, following)
-    return WearStep(row, lambda: following, step.failure)
+    return WearStep(row, lambda: following, step.failure, step.has_constant_rate)
 
 
 class _ImplicitStep:
@@ -149,7 +145,7 @@ def _implicit_step(
         memory = StepMemory(trial.stride * _ratio(trial.error, rows), method.slopes, overtaking.search_share)
     spent = replace(state, solves=solves)
     row = row_of(problem, spent, trial.stride, trial.worn, trial.work, trial.local_error, memory.arrays())
-    return WearStep(row, lambda: replace(following, solves=0))
+    return WearStep(row, lambda: replace(following, solves=0), has_constant_rate=False)
 
 
 def _ratio(error: float, rows: Sequence[WearRow]) -> float:
@@ -161,8 +157,7 @@ def _ratio(error: float, rows: Sequence[WearRow]) -> float:
 def _shifts(state: WearState, following: WearState, expected: np.ndarray) -> bool:
     """Whether a duty's frequency moves so far in a step that it is that of another peak.
 
-    expected : (n_duty,) change of the frequencies that the step before predicts [rad/s]
-    """
+    expected : (n_duty,) change of the frequencies that the step before predicts [rad/s]"""
     omega, after = (np.array([point.state.omega for point in s.points]) for s in (state, following))
     limit = np.maximum(LARGEST_SHIFT * omega, RULES.unexpected * np.abs(expected))
     return bool(np.any(np.abs(after - omega) > limit))
@@ -181,8 +176,7 @@ def _explicit_step(
     The response folds, or the tracked peak merges with a valley: no solution follows on the present one. A step that
     did not get over it, or behind which none was found, is followed by a longer one, up to the tolerance. Where pairs
     impact and branches are short, the rule continues in such steps.
-    problem : that the state is solved in; the search takes the harmonics of scans, failing that fewer
-    """
+    problem : that the state is solved in; the search takes the harmonics of scans, failing that fewer"""
     memory = StepMemory.empty(len(state.points)).arrays()
     scans = harmonic_fallback.scan_problem(full_problem)
     fewer = harmonic_fallback.with_fewer(scans)

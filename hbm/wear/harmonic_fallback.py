@@ -1,10 +1,7 @@
 """Wear with fewer harmonics where no solution with all of them follows: contacts that impact.
 
 Where a step finds no solution with all harmonics, it takes the lower half of them; each later step adds harmonics again
-as far as a solution with them is found. Rows have all coefficients, with zeros in the harmonics that were not used.
-"""
-
-from __future__ import annotations
+as far as a solution with them is found. Rows have all coefficients, with zeros in the harmonics that were not used."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,8 +21,7 @@ LEAST_HARMONIC = 3  # up to which harmonics are kept where no solution with more
 def with_most_harmonics(full_problem: WearProblem, state: WearState) -> tuple[WearProblem, WearState]:
     """The problem with as many harmonics as a solution near a state is found with, and the state in it.
 
-    A state that was solved with fewer harmonics than the problem has carries zeros in the others.
-    """
+    A state that was solved with fewer harmonics than the problem has carries zeros in the others."""
     harmonics = full_problem.balance.basis.harmonics
     top = top_harmonic(full_problem.balance.basis, [point.state.x for point in state.points])
     count = 1 + harmonics.index(top)
@@ -82,11 +78,11 @@ def _needed(problem: WearProblem, least: int) -> int:
 
 
 def _with_harmonics(problem: WearProblem, harmonics: tuple[int, ...]) -> WearProblem:
-    """The problem with some of its harmonics."""
+    """The problem with some of its harmonics; its cycles are looked for, as a known start has all of them."""
     if harmonics == problem.balance.basis.harmonics:
         return problem
     mission = tuple(
-        duty if duty.balance is None else replace(duty, balance=duty.balance.with_harmonics(harmonics))
+        replace(duty, start=None, balance=duty.balance and duty.balance.with_harmonics(harmonics))
         for duty in problem.mission
     )
     return replace(problem, balance=problem.balance.with_harmonics(harmonics), mission=mission)

@@ -1,7 +1,5 @@
 """What a wear run returns: the contact and the response, wear step by wear step, and when contact changes for good."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
@@ -58,8 +56,7 @@ class _State(Generic[Number, Count]):
 class WearRow(_State[float, int]):
     """One wear step; the fields are those of WearHistory, without the row axis.
 
-    worn : (n_pair,) depth that the step wears after this state [m]
-    """
+    worn : (n_pair,) depth that the step wears after this state [m]"""
 
     preload_at_rest: float = float("nan")
     growth: float = float("nan")
@@ -68,6 +65,7 @@ class WearRow(_State[float, int]):
     is_stationary: bool = True
     periods: int = 0
     moving: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    duty_response: np.ndarray = field(default_factory=lambda: np.zeros(0))
     memory: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
@@ -110,9 +108,9 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
         that mean, relative; is_stationary : (n_row,) whether the means came to rest
     moving : (n_row, n) what moved before the row's periods, see hbm.time.mean_motion.Follower; zeros where they began
         in the balance
+    duty_response : (n_row, n_duty, n_output, n_coeff) responses of every duty [m]; None where there is one
     memory : what the rule remembers from step to step, arrays (n_row, ...) by name, see the rule; empty where nothing
-    scheme : of the steps, a `StepScheme`
-    """
+    scheme : of the steps, a `StepScheme`"""
 
     end: Outcome[WearEnd]
     preload_at_rest: np.ndarray | None = None
@@ -122,6 +120,7 @@ class WearHistory(_State[np.ndarray, np.ndarray]):
     is_stationary: np.ndarray | None = None
     periods: np.ndarray | None = None
     moving: np.ndarray | None = None
+    duty_response: np.ndarray | None = None
     memory: Mapping[str, np.ndarray] = field(default_factory=dict)
     scheme: str = StepScheme.UNKNOWN.value
 
@@ -188,8 +187,9 @@ def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float 
 
     The preload is that at rest where the run ends by it. This is the life that converges with the wear step: the last
     touch of a vibrating contact does not end in finite time, near it the work falls with the power 3/2 of what is left
-    to wear.
-    """
+    to wear. 0 for a contact that touches at no moment, already before it wears."""
+    if history.ended is WearEnd.LOST and len(history.cycles) == 1:
+        return 0.0
     at_rest = history.preload_at_rest
     if at_rest is None:
         return cycles_to_share(history.cycles, history.preload, share)
@@ -199,8 +199,7 @@ def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float 
 def cycles_to_share(cycles: np.ndarray, preload: np.ndarray, share: float, at_rest: bool = False) -> float | None:
     """The same of any preload (n_row,) [N], such as that of one joint; cycles (n_row,) at which it is known.
 
-    Between rows along the logarithm of the preload; at rest, where the wear falls on it evenly, along itself
-    """
+    Between rows along the logarithm of the preload; at rest, where the wear falls on it evenly, along itself"""
     rows_below = np.flatnonzero(preload < share * preload[0])
     if len(rows_below) == 0 or rows_below[0] == 0:
         return None
@@ -230,6 +229,8 @@ def history(rows: list[WearRow], end: Outcome[WearEnd], scheme: StepScheme = Ste
     for name in ("preload_at_rest", "growth"):
         if np.isnan(columns[name]).all():
             del columns[name]
+    if not columns["duty_response"].size:
+        del columns["duty_response"]
     memory = {name: np.array([row.memory[name] for row in rows]) for name in (rows[0].memory if rows else ())}
     return WearHistory(**columns, end=end, memory=memory, scheme=scheme.value)
 
@@ -240,8 +241,7 @@ def events(
     """Cycles (n_pair,) from which on a pair opens in a part of the cycle, and touches no more; nan where that is never.
 
     Located between rows by a straight line through the penetration of each pair; none without a normal component.
-    components : of the contact; gap : (n_pair,) of the unworn contact [m]
-    """
+    components : of the contact; gap : (n_pair,) of the unworn contact [m]"""
     if "n" not in components or not len(history.cycles):
         return np.zeros(0), np.zeros(0)
     normal = history.displacement[:, components.index("n") :: len(components)]  # (n_row, n_pair, n_coeff)

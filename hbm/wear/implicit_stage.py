@@ -6,8 +6,7 @@ A pair wears by its own friction work alone, so the implicit stage
 
 is solved pair by pair inside the contact law. Its derivative couples the duties of one pair and stays block diagonal
 over pairs, so the Krylov solver sees nothing new, and the stiffness of pressure against depth is gone.
-Source  ours
-"""
+Source  ours"""
 
 from __future__ import annotations
 
@@ -29,8 +28,7 @@ ROUNDING = 4e-16
 class WornState:
     """The stage evaluated at one x, over the duties of a pair, then its components; see `WearingBalance`.
 
-    omegas : of the duties [rad/s]; x, cycle, g, residual : as of a `State`; depth : (n_pair,) that goes with x [m]
-    """
+    omegas : of the duties [rad/s]; x, cycle, g, residual : as of a `State`; depth : (n_pair,) that goes with x [m]"""
 
     omegas: tuple[float, ...]
     x: np.ndarray
@@ -109,8 +107,7 @@ class WearingBalance:
     guess : (n_pair,) depth to look from [m]; each search starts where the last one ended
     x runs over the duties of a pair, then its components: (n_pair, n_duty * n_component, n_coeff); frequencies are a
     tuple, one per duty. `hbm.newton` solves it as any `criterion.Balance`.
-    reference_stiffness : (n_pair * n_duty * n_component,) stuck springs [N/m]
-    """
+    reference_stiffness : (n_pair * n_duty * n_component,) stuck springs [N/m]"""
 
     def __init__(
         self,
@@ -178,9 +175,7 @@ class WearingBalance:
         bend, gain = np.ones(n_pair), self.cycles * self.gain
         for i, (share, sample, part) in enumerate(zip(self.shares, samples, parts, strict=True)):
             rows = slice(i * width, (i + 1) * width)
-            jac = sample.cycle.jacobian
-            assert jac is not None
-            jacobian[:, rows, rows] = jac
+            jacobian[:, rows, rows] = sample.cycle.slope
             column[:, rows] = sample.column
             work_slopes[:, rows] = share * work_slope(first, part, sample.cycle)
             bend = bend + gain * sample.falls
@@ -228,11 +223,10 @@ class WearingBalance:
             contact = balance.contact.subset(pairs).with_gap(balance.contact.gap[pairs] + depth[pairs])
             cycle = contact.cycle(x, balance.basis, balance.memory[pairs])
             t = contact.tangential
-            assert cycle.jacobian is not None
             if self._normal is None or not balance.basis.has_static:
-                column = np.zeros((len(pairs), cycle.jacobian.shape[1]))
+                column = np.zeros((len(pairs), cycle.slope.shape[1]))
             else:
-                column = cycle.jacobian[:, :, self._normal * balance.basis.n_coeff]
+                column = cycle.slope[:, :, self._normal * balance.basis.n_coeff]
             work = share * np.maximum(balance.basis.work_per_cycle(cycle.force, x)[:, t].sum(axis=1), 0.0)
             falls = share * balance.basis.work_per_cycle(column.reshape(x.shape), x)[:, t].sum(axis=1)
             samples.append(_Sample(cycle, column, work, np.where(work > 0, falls, 0.0)))
@@ -241,8 +235,7 @@ class WearingBalance:
 
 def work_slope(balance: HarmonicBalance, x: np.ndarray, cycle: ContactCycle) -> np.ndarray:
     """(n_pair, n_component * n_coeff) d friction work of a pair / d its x, at the gap that it has [N]."""
-    basis, t, jac = balance.basis, balance.contact.tangential, cycle.jacobian
-    assert jac is not None
+    basis, t, jac = balance.basis, balance.contact.tangential, cycle.slope
     force_slope = jac.reshape(*x.shape, -1).transpose(0, 3, 1, 2)
     slope = basis.work_per_cycle(force_slope, x[:, None])[:, :, t].sum(axis=2)
     turned = np.zeros_like(x)  # the work of f against a unit of each coefficient of x
@@ -254,8 +247,7 @@ def work_slope(balance: HarmonicBalance, x: np.ndarray, cycle: ContactCycle) -> 
 class _Sample:
     """Contact cycles of one duty; work [J] and falls = -d work / d depth [N] carry the duty's share.
 
-    column : (n_pair, n_component * n_coeff) d force / d (static normal displacement) = -d force / d depth [N/m]
-    """
+    column : (n_pair, n_component * n_coeff) d force / d (static normal displacement) = -d force / d depth [N/m]"""
 
     cycle: ContactCycle
     column: np.ndarray
@@ -264,11 +256,9 @@ class _Sample:
 
     def updated(self, pairs: np.ndarray, part: _Sample) -> _Sample:
         """This with the rows of some pairs replaced."""
-        assert self.cycle.jacobian is not None
-        assert part.cycle.jacobian is not None
         for target, values in (
             (self.cycle.force, part.cycle.force),
-            (self.cycle.jacobian, part.cycle.jacobian),
+            (self.cycle.slope, part.cycle.slope),
             (self.cycle.status, part.cycle.status),
             (self.column, part.column),
             (self.work, part.work),

@@ -2,8 +2,7 @@
 
 A law is a module `hbm/wear/<name>.py`, or a file of one's own, with `depth_rate(exposure) -> (n_pair,)`: total wear
 depth of each pair per vibration cycle [m], the sum over both surfaces. Its own numbers, such as a wear coefficient, it
-declares in `class Parameters` with their units, see `tribodyn.declarations`.
-"""
+declares in `class Parameters` with their units, see `tribodyn.declarations`."""
 
 from __future__ import annotations
 
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribodyn import declarations
+from tribodyn.hbm.balance import ROUNDING
 from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
@@ -30,8 +30,7 @@ class JointWear:
     """How a joint wears.
 
     law : name of a wear law, or path of its file
-    numbers : the law's own, scalars or (n_pair,) of the joint, in the units that the law declares
-    """
+    numbers : the law's own, scalars or (n_pair,) of the joint, in the units that the law declares"""
 
     law: str
     numbers: Mapping[str, np.ndarray | float]
@@ -40,8 +39,7 @@ class JointWear:
     def of(cls, law: str, **numbers: np.ndarray | float) -> JointWear:
         """A wear law with its numbers, such as coefficient=2e-15.
 
-        Raises  ValueError where there is no such law, or a number is missing, unknown or out of its limits
-        """
+        Raises  ValueError where there is no such law, or a number is missing, unknown or out of its limits"""
         values = declarations.complete(declared(law), numbers, f"wear law '{Path(law).stem}'")
         return cls(law, values)
 
@@ -56,8 +54,7 @@ class Exposure:
     depth : (n_pair,) wear depth so far [m]; cycles : vibration cycles so far
     on : name of the joint, the first one by default
     motion : in time, of which this is one period and `state` its part in the balance's harmonics; None for a cycle of
-        the balance
-    """
+        the balance"""
 
     balance: HarmonicBalance
     solved: State | Callable[[], State]
@@ -109,24 +106,25 @@ class Exposure:
         """(n_pair,) integral of N |ds| over the cycle, s the slip path in the contact plane [J]."""
         if "n" not in self.components:
             raise Refusal("a wear law that needs the normal force cannot serve a contact without a normal component")
-        slider, normal = self._sliders()
+        slider, normal, travel = self._sliders()
         step = np.linalg.norm(np.roll(slider, -1, axis=3) - slider, axis=2)
+        step[step <= ROUNDING * travel[:, None, None]] = 0.0  # of a pair that sticks
         # geometric mean: a slider that moved while the pair was apart carried no load on the way
         return np.sum(np.sqrt(normal * np.roll(normal, -1, axis=2)) * step, axis=(1, 2))
 
-    def _sliders(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (n_pair, n_slider, n_tangential, n_samples) [m], loads (n_pair, n_slider, n_samples) [N]."""
-        joint, balance = self.joint, self.balance
+    def _sliders(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions (n_pair, n_slider, n_tangential, n_samples) [m], loads (n_pair, n_slider, n_samples) [N], and size
+        of the displacement (n_pair,) [m]."""
+        joint, balance, t = self.joint, self.balance, self.components.index("n")
         if hasattr(joint.module, "slider_positions"):
             x_joint = self.state.x[np.ix_(joint.rows, balance.contact.columns(joint))]
             memory = balance.memory[joint.rows, : joint.n_state]
             slider, normal = joint.module.slider_positions(x_joint, joint.parameters, memory, balance.basis)
-            return slider, normal
+            return slider, normal, np.abs(x_joint[:, :t]).sum(axis=(1, 2))
         x, f = self.history
-        t = self.components.index("n")
         k = joint.parameters.stiffness[:, :t, None]
         slider = x[:, :t] - np.divide(f[:, :t], k, out=np.zeros_like(f[:, :t]), where=k > 0)
-        return slider[:, None], np.maximum(f[:, None, t], 0.0)
+        return slider[:, None], np.maximum(f[:, None, t], 0.0), np.abs(x[:, :t]).max(axis=(1, 2), initial=0.0)
 
 
 KIND = PluginKind("wear law", "tribodyn.hbm.wear.laws", ("depth_rate",))
@@ -136,8 +134,7 @@ names, file_of, load, declared = KIND.names, KIND.file_of, KIND.load, KIND.decla
 def depth_rate(name: str, exposure: Exposure) -> np.ndarray:
     """What the law of this name says of a cycle: (n_pair,) wear depth per cycle [m].
 
-    Raises  ValueError where a law of one's own cannot be run or says what is no depth of every pair
-    """
+    Raises  ValueError where a law of one's own cannot be run or says what is no depth of every pair"""
     law = load(name)
     if not name.endswith(".py"):
         return np.asarray(law.depth_rate(exposure))

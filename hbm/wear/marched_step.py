@@ -1,7 +1,5 @@
 """A wear step along a motion that is integrated in time: a Rosenbrock step of second order (steady_motion)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -32,12 +30,11 @@ class _MarchedStep:
     def __init__(
         self, problem: WearProblem, motion: SteadyMotion, tolerance: Tolerance, state: WearState, depth_limit: float
     ):
-        assert state.means is not None
         self._problem, self._motion, self._tolerance, self._state = problem, motion, tolerance, state
-        self._depth_limit, self._start_error = depth_limit, state.means.error
+        self._depth_limit, self._start_error = depth_limit, state.means_in_time.error
         self.unit = tolerance.share * tolerance.scale / float(state.rate.max())
         self.has_fixed_frequency = all(isinstance(duty.site, AtFrequency) for duty in problem.mission)
-        self.solves, self.periods = 0, state.means.periods
+        self.solves, self.periods = 0, state.means_in_time.periods
 
     def attempt(self, stride: float) -> StepTrial:
         problem, state, tolerance = self._problem, self._state, self._tolerance
@@ -46,14 +43,15 @@ class _MarchedStep:
         if not self.has_fixed_frequency:
             following = assess(problem, depth, cycles, state)
         following, worn, deviation = self._motion.step(state, following, stride)
-        assert following.means is not None
-        self.solves, self.periods = self.solves + following.solves, self.periods + following.means.periods
+        means = following.means_in_time
+        self.solves, self.periods = self.solves + following.solves, self.periods + means.periods
         life = float(expected_life(tolerance, cycles, state.depth + worn))
-        scatter = 0.5 * stride * float(np.hypot(self._start_error, following.means.error)) / (tolerance.share * life)
+        scatter = 0.5 * stride * float(np.hypot(self._start_error, means.error)) / (tolerance.share * life)
         # rates that scatter may agree by chance
         local = max(scatter, local_error(tolerance, problem.area, deviation, following.rate, stride, life))
         error = max(local, float(np.abs(deviation).max()) / self._depth_limit)
-        work = stride * 0.5 * (state.work + following.work)
+        rates, works = state.rate + following.rate, state.work + following.work
+        work = np.divide(worn * works, rates, out=0.5 * stride * works, where=rates > 0)  # that goes with the depth
         return StepTrial(stride, following, worn, work, error, local)
 
     def accepts(self, trial: StepTrial) -> bool:
@@ -97,4 +95,4 @@ def marched_step(
     memory = StepMemory(next_cycles, slopes, overtaking.search_share).arrays()
     spent = replace(state, solves=solves)
     row = row_of(problem, spent, trial.stride, trial.worn, trial.work, trial.local_error, memory)
-    return WearStep(replace(row, periods=method.periods), lambda: replace(following, solves=0))
+    return WearStep(replace(row, periods=method.periods), lambda: replace(following, solves=0), has_constant_rate=False)

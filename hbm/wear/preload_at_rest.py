@@ -2,10 +2,7 @@
 
 Two preloads differ. The static force of a vibrating contact is a mean over the cycle: a contact that lifts off in each
 cycle carries a mean force by impacts even where no interference is left. The force without the harmonic loads is the
-interference that wear uses up, and what a torque wrench or a load cell at a standing machine measures.
-"""
-
-from __future__ import annotations
+interference that wear uses up, and what a torque wrench or a load cell at a standing machine measures."""
 
 from dataclasses import replace
 
@@ -20,8 +17,7 @@ class PreloadAtRest:
     """Solves the contact at rest at the depths of a wear run, each from its neighbour.
 
     Nothing is solved where the problem has no `lost_below_at_rest`. The static solution does not depend on the
-    frequency that it is solved at; that of the first state is taken.
-    """
+    frequency that it is solved at; that of the first state is taken."""
 
     def __init__(self, problem: WearProblem):
         self._problem = problem

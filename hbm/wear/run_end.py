@@ -1,7 +1,5 @@
 """When a wear run is over: the contact is lost, nothing wears any more, or a solve failed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,8 +22,7 @@ def reason_to_stop(
     """Why a run ends at a state; None where it continues.
 
     rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
-        more than ENDLESS cycles for it
-    """
+        more than ENDLESS cycles for it"""
     if state.failure:
         return state.failure
     share = problem.lost_below_at_rest
@@ -44,6 +41,10 @@ def reason_to_stop(
         if state.work.max() > 0.0:
             return WearEnd.NO_LOSS.say()
         return (WearEnd.NO_SLIP if len(rows) else WearEnd.NEVER_SLIPS).say(survival)
+    motion = max(float(np.abs(point.state.x).max()) for point in state.points)
+    if 0.0 < step_depth < np.finfo(float).eps * motion:  # no step of wear changes the motion in double precision
+        numbers = f"steps of {step_depth:.2g} m beside a motion of {motion:.2g} m at the contact"
+        return WearEnd.NO_STEP.say(f": {numbers} are below rounding: check the static loads, which close too little")
     fading = rows and state.work.sum() < FADED_SHARE * rows[0].energy.sum()
     if fading and state.rate.max() * ENDLESS < step_depth:
         return WearEnd.FADED.say(survival)

@@ -2,8 +2,7 @@
 
 A stage is one balance solve with the gap wearing along (implicit_stage). Where a duty's site is a peak, its frequency
 at the worn depth is not known beforehand: the stage is solved again until the miss vanishes.
-Source  SDIRK2: Alexander 1977, SIAM J. Numer. Anal. 14(6), gamma = 1 - 1/sqrt(2)
-"""
+Source  SDIRK2: Alexander 1977, SIAM J. Numer. Anal. 14(6), gamma = 1 - 1/sqrt(2)"""
 
 from __future__ import annotations
 

@@ -8,10 +8,7 @@ The place stays that of the balance, such as its peak.
 Pressure reacts to local depth at once, so that dw/dZ = r(w) is stiff. A Rosenbrock step of second order takes an
 approximate derivative of r: the rate of a pair in proportion to its normal force, and that by the static stiffness of
 the pairs that touch. Its order does not depend on how good the derivative is.
-Source  ROS2: Verwer, Spee, Blom and Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4), gamma = 1 - 1/sqrt(2)
-"""
-
-from __future__ import annotations
+Source  ROS2: Verwer, Spee, Blom and Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4), gamma = 1 - 1/sqrt(2)"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,7 +17,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.stability import exponents, hill_problem
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import PeriodicMotion
@@ -44,8 +41,7 @@ class MotionRules:
     accuracy : standard error of a mean, relative, and difference from the balance's work up to which a periodic motion
         is that of the balance; the errors of many wear steps average out in a life
     most_components : of the contact
-    contact : of a motion that is followed everywhere, see `MeanOptions`
-    """
+    contact : of a motion that is followed everywhere, see `MeanOptions`"""
 
     steps: int = 128
     per_harmonic: int = 16
@@ -61,8 +57,7 @@ class SteadyMotion:
     """The motions of all duties, each followed while the contact wears and the balance's own motion is left.
 
     tolerance : of the steps; always : whether they are followed where the balance's own is kept, too
-    Raises  ValueError where they are to be followed always and cannot be
-    """
+    Raises  ValueError where they are to be followed always and cannot be"""
 
     def __init__(self, problem: WearProblem, tolerance: Tolerance, always: bool = False):
         self._problem, self._tolerance, self.always = problem, tolerance, always
@@ -81,8 +76,7 @@ class SteadyMotion:
     def _stiffness(self) -> np.ndarray:
         """(n_pair, n_pair) static normal forces that fall when gaps open, with every pair closed and stuck [N/m].
 
-        Zero where the contact has no normal component or the balance no harmonic 0
-        """
+        Zero where the contact has no normal component or the balance no harmonic 0"""
         balance = self._problem.balance
         contact, basis = balance.contact, balance.basis
         stiffness = np.zeros((contact.n_pair, contact.n_pair))
@@ -111,8 +105,7 @@ class SteadyMotion:
     def follow(self, state: WearState, planned: float) -> WearState:
         """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own.
 
-        planned : cycles of the step from it, 0 where that is not known
-        """
+        planned : cycles of the step from it, 0 where that is not known"""
         if not self._serves or state.failure or not (self.always or state.growth > 0):
             self._followers, self._moving = [], np.zeros(0)
             return state
@@ -123,9 +116,12 @@ class SteadyMotion:
             marched = self._along(state, state, planned)
         except IntegrationFailed as failure:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
-        assert marched.means is not None
         difference = abs(float(marched.work.sum() - state.work.sum()))
-        if not self.always and marched.means.spread == 0 and difference <= RULES.accuracy * float(state.work.sum()):
+        if (
+            not self.always
+            and marched.means_in_time.spread == 0
+            and difference <= RULES.accuracy * float(state.work.sum())
+        ):
             self._followers, self._moving = [], np.zeros(0)
             return state  # the motion has come back to that of the balance
         return marched
@@ -134,8 +130,7 @@ class SteadyMotion:
         """A step from a state, with the balance at the depth that `predicted_depth` predicts.
 
         Returns the state there with its rates, the depth that wears (n_pair,) and its deviation from a step of first
-        order [m]
-        """
+        order [m]"""
         following = self._along(following, state if following.failure else following, stride)
         matrix, k1 = self._ahead(state, stride)
         k2 = np.linalg.solve(matrix, following.rate - 2 * k1)
@@ -155,7 +150,7 @@ class SteadyMotion:
         try:
             for follower, duty, point in zip(self._followers, self._problem.mission, state.points, strict=True):
                 follower.start(self._problem.in_duty(duty, state.depth), point.state)
-        except ValueError:
+        except Refusal:
             self._followers, self._serves = [], False
         return self._serves
 
@@ -169,12 +164,11 @@ class SteadyMotion:
             balance = problem.in_duty(duty, depth)
 
             def wears(motion: PeriodicMotion, balance: HarmonicBalance = balance) -> np.ndarray:
-                return _depth_rate(problem, balance, motion, depth, cycles)
+                return _wear(problem, balance, motion, depth, cycles)
 
             means_of_duties.append(follower.mean(balance, point.state.omega, wears, accuracy))
         shares = [duty.share for duty in problem.mission]
-        rate = np.sum([s * m.observed for s, m in zip(shares, means_of_duties, strict=True)], axis=0)
-        work = np.sum([s * m.energy for s, m in zip(shares, means_of_duties, strict=True)], axis=0)
+        rate, work = np.sum([s * m.observed for s, m in zip(shares, means_of_duties, strict=True)], axis=0)
         works = np.array([s * float(m.energy.sum()) for s, m in zip(shares, means_of_duties, strict=True)])
         weight = works / works.sum() if works.sum() > 0 else works
         first = means_of_duties[0]
@@ -192,8 +186,7 @@ class SteadyMotion:
 
     def _fall(self, state: WearState) -> np.ndarray:
         """(n_pair, n_pair) - d rate / d depth, about."""
-        assert state.means is not None
-        force = state.means.normal_force
+        force = state.means_in_time.normal_force
         touches = force > 0
         fall = np.zeros((len(force), len(force)))
         stiffness, coupled, separated = (
@@ -211,8 +204,7 @@ def with_growth(problem: WearProblem, state: WearState, always: bool = False) ->
     Above 0 a perturbation grows: what Hill's method takes for rounding is taken off
 
     always : of balances of any size, but waves; nan stays where it is not known: no solution, no exponents, too many
-        unknowns
-    """
+        unknowns"""
     balance = problem.balance
     sectors = balance.model.sectors_in_time
     is_small = balance.contact.stiffness.size * balance.basis.n_coeff * sectors <= MOST_UNKNOWNS
@@ -222,8 +214,8 @@ def with_growth(problem: WearProblem, state: WearState, always: bool = False) ->
     try:
         for duty, point in zip(problem.mission, state.points, strict=True):
             floquet = exponents.stability(problem.in_duty(duty, state.depth), point.state)
-            growth = max(growth, float(floquet.exponents[0].real) / floquet.omega - exponents.RULES.neutral_growth)
-    except ValueError:  # a model without exponents
+            growth = max(growth, float(floquet.exponents[0].real) / floquet.omega - hill_problem.GROWS)
+    except Refusal:  # a model without exponents
         return state
     return replace(state, growth=growth)
 
@@ -233,8 +225,7 @@ def untaken_periodic_share(problem: WearProblem, worn: WearHistory, looks: int) 
 
     An irregular motion may be a transient of some hundred periods, of which its scatter tells nothing, while a wear
     step has 100 000. So a periodic motion that stays is looked for beside the balance's, at `looks` rows: each stands
-    for the same share of the cycles that the work of the balance would add or save.
-    """
+    for the same share of the cycles that the work of the balance would add or save."""
     rows = [row for row in worn.rows() if row.spread > 0 and row.cycles_in_step > 0]
     balances = [problem.in_duty(problem.mission[0], row.depth) for row in rows]
     states = [b.evaluate(row.omega, b.shaped(row.displacement)) for b, row in zip(balances, rows, strict=True)]
@@ -255,12 +246,12 @@ def _steps(problem: WearProblem) -> int:
     return max(RULES.steps, RULES.per_harmonic * problem.balance.basis.harmonics[-1])
 
 
-def _depth_rate(
+def _wear(
     problem: WearProblem, balance: HarmonicBalance, motion: PeriodicMotion, depth: np.ndarray, cycles: float
 ) -> np.ndarray:
-    """(n_pair,) wear depth of one period [m], by the laws of the joints."""
+    """(2, n_pair) wear depth [m], by the laws of the joints, and friction work [J] of one period."""
 
     def state() -> State:
         return balance.evaluate(motion.omega, motion.coefficients(motion.x, balance.basis), jacobian=False)
 
-    return wear_of(problem, balance, state, depth, cycles, motion)[0]
+    return np.stack(wear_of(problem, balance, state, depth, cycles, motion))

@@ -1,7 +1,5 @@
 """The error of a wear step, from which its length follows, and that of a whole run, from its history."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,8 +26,7 @@ def local_error(
     Where wear fades both solutions of a step may wear the same volume while most of a life is still to come, at the
     rate that is left: so that rate counts, and the pairs without their sign. No more than the step's cycles are wrong.
     deviation : (n_pair,) of a step from its companion of lower order [m]; rate : (n_pair,) behind it [m/cycle]
-    area : (n_pair,) [m2]; stride : cycles of the step; cycles : that its error is held to
-    """
+    area : (n_pair,) [m2]; stride : cycles of the step; cycles : that its error is held to"""
     on_depth = np.abs(deviation).max() / tolerance.scale
     volume_error, volume_rate = float(area @ np.abs(deviation)), float(area @ rate)
     is_short = volume_error < stride * volume_rate
@@ -40,8 +37,7 @@ def local_error(
 def expected_life(tolerance: Tolerance, cycles: float | np.ndarray, depth: np.ndarray) -> np.ndarray:
     """Cycles of a whole life that has come to depths (..., n_pair) [m] after `cycles`, at the mean rate so far.
 
-    At a depth of the scale a contact is lost, or nearly so; as wear fades most lives are longer.
-    """
+    At a depth of the scale a contact is lost, or nearly so; as wear fades most lives are longer."""
     return np.asarray(cycles / np.minimum(depth.max(axis=-1) / tolerance.scale, 1.0))
 
 
@@ -70,8 +66,7 @@ def first_order_error(history: WearHistory) -> StepError:
     """Estimate for a run of explicit steps.
 
     A step of Z cycles at the rate of its beginning is off by half the change of the rate over the step. The changes of
-    all pairs count without their sign: rates that oscillate between neighbours are a sign of steps too long.
-    """
+    all pairs count without their sign: rates that oscillate between neighbours are a sign of steps too long."""
     steps = accepted_steps(history)
     if not len(steps):
         return StepError(0.0, 0.0)

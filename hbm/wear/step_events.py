@@ -3,10 +3,7 @@
 Both are located in the same way for steps along the balance and in time: a step that passes an event is taken again,
 shorter. A preload is interpolated along its logarithm. An overtaking is enclosed between a step before it and one
 behind it, and located by regula falsi in the logarithm of the ratio of the peaks.
-Source  Illinois variant: Dowell and Jarratt 1971, BIT 11
-"""
-
-from __future__ import annotations
+Source  Illinois variant: Dowell and Jarratt 1971, BIT 11"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,8 +43,7 @@ RULES = EventRules()
 class PreloadEvent:
     """The next preload at which a row is needed: where life is stated to end, or where the run is to end.
 
-    is_located_once : whether a step is shortened to it once only, as in time, where preloads scatter
-    """
+    is_located_once : whether a step is shortened to it once only, as in time, where preloads scatter"""
 
     def __init__(self, problem: WearProblem, state: WearState, rows: Sequence[WearRow], is_located_once: bool = False):
         self._problem, self._is_located_once = problem, is_located_once
@@ -83,8 +79,7 @@ class OvertakingEvent:
     search_problem : with the harmonics that peaks are searched with; accuracy : relative, of the cycles
     jump : the shortest step known to pass the event, and points : its duties at the higher peaks; None before one is
         found
-    search_share : share of the first preload at which higher peaks are searched next; solves : spent
-    """
+    search_share : share of the first preload at which higher peaks are searched next; solves : spent"""
 
     def __init__(
         self,

@@ -16,8 +16,7 @@ class StepMemory:
 
     next_cycles : length of the next step; 0 behind a step that predicts none, as one over the end of a branch
     frequency_slopes : (n_duty,) d (distance to the operating point) / d omega
-    search_share : share of the first preload at which higher peaks are searched next
-    """
+    search_share : share of the first preload at which higher peaks are searched next"""
 
     next_cycles: float
     frequency_slopes: np.ndarray

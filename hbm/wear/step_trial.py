@@ -20,8 +20,7 @@ class StepTrial:
 
     following : the state that it leads to; worn : (n_pair,) depth [m], work : (n_pair,) friction work [J] of the step
     error : over the tolerance, which the length follows; local_error : what the history states
-    is_lost : whether no solution follows on the branch of the step's start
-    """
+    is_lost : whether no solution follows on the branch of the step's start"""
 
     stride: float
     following: WearState
@@ -66,8 +65,7 @@ def accurate_step(
 ) -> StepTrial | NoSolution:
     """Try strides until one is accurate enough; where it would pass an event, it ends there.
 
-    stride : to try first. Where another peak overtakes, the step is `overtaking.jump`
-    """
+    stride : to try first. Where another peak overtakes, the step is `overtaking.jump`"""
     while True:
         trial = method.attempt(stride)
         if trial.error <= 1.0 and preload.is_passed(trial.following):

@@ -16,10 +16,7 @@ would:
 
 A jump to another resonance, a motion in time, a step over the end of a branch, or a wear law whose rate jumps as a pair
 begins to lift has no derivative.
-Source  ours; of the step Alexander 1977, see sdirk_stages
-"""
-
-from __future__ import annotations
+Source  ours; of the step Alexander 1977, see sdirk_stages"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -59,8 +56,7 @@ def of_life(
 
     worn : a run of the problem; numbers : name -> a wear law's own number, such as coefficient, and joints that have it
     share : of the first preload, where the life ends. The gaps of a joint open together: each pair has the same part
-    Raises  NoDerivative where there is no life, or no derivative along it
-    """
+    Raises  NoDerivative where there is no life, or no derivative along it"""
     life, end = _life_and_last_row(worn, share)
     _check(problem, rows := worn.rows()[: end + 1], worn.scheme)
     changes = tuple(changes)  # all at once: each state asks for all of them
@@ -140,8 +136,7 @@ class Tangent:
 
     by_law : the problem a step above and a step below each number of a wear law, and the step; one column follows, of
         all steps longer together; opens : (n_pair, n) d gap besides the wear; scheme : of the steps
-    corners : cycles of the states where a pair is at a corner of its force, and the tangent that of one side
-    """
+    corners : cycles of the states where a pair is at a corner of its force, and the tangent that of one side"""
 
     problem: WearProblem
     changes: tuple[ParameterChange, ...]
@@ -182,8 +177,7 @@ class Tangent:
     def moved(self, state: WearState, base: np.ndarray, stretch: float) -> tuple[np.ndarray, ...]:
         """Derivatives of a state whose depth is `base` + stretch * rate, base (n_pair, n) by its columns.
 
-        Returns those of depth [m], depth per cycle, both (n_pair, n), and preload of the joints that wear (n,)
-        """
+        Returns those of depth [m], depth per cycle, both (n_pair, n), and preload of the joints that wear (n,)"""
         problem, n, n_change = self.problem, base.shape[1], len(self.changes)
         cycles = [
             WornCycle(self, duty, at.state, state) for duty, at in zip(problem.mission, state.points, strict=True)
@@ -200,9 +194,8 @@ class Tangent:
         stage = WearingBalance(duties, [duty.share for duty in problem.mission], *fixed)
         omegas = tuple(cycle.solved.omega for cycle in cycles)
         solved, side = stage.evaluate(omegas, np.concatenate([c.solved.x for c in cycles], axis=1)), stage.at(omegas)
-        jac, n_coeff, components = solved.cycle.jacobian, solved.x.shape[2], problem.balance.contact.components
+        jac, n_coeff, components = solved.cycle.slope, solved.x.shape[2], problem.balance.contact.components
         normal = components.index("n") * n_coeff
-        assert jac is not None
         gap = -jac[:, :, normal :: len(components) * n_coeff].sum(axis=2)
         opened = force + gap[..., None] * (depth + self.opens)[:, None]
         right = [

@@ -24,8 +24,7 @@ class Duty:
     """A part of the mission: `share` of all cycles run at `site`, with the harmonic loads times `load`.
 
     balance : its own unworn problem over the same contact, as at another speed of rotation; None for the common one
-    start : frequency [rad/s] and x (n_pair, n_component, n_coeff) [m] beside its unworn cycle; looked for where None
-    """
+    start : frequency [rad/s] and x (n_pair, n_component, n_coeff) [m] beside its unworn cycle; looked for where None"""
 
     site: OperatingCondition
     share: float = 1.0
@@ -53,8 +52,7 @@ class WearProblem:
     any_joint : whether a single joint whose preload has fallen below that share ends the run
     copies : of one contact, one behind the other, whose joints then count by themselves: those of a wheel's sectors
     lost_below_at_rest : the run ends when the preload without the harmonic loads falls to this share of its first
-        value, see hbm.wear.preload_at_rest; None: it is not looked at
-    """
+        value, see hbm.wear.preload_at_rest; None: it is not looked at"""
 
     balance: HarmonicBalance
     mission: tuple[Duty, ...]

@@ -1,7 +1,5 @@
 """A wear state as a row of the history, and back, so that a run resumes bit for bit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -46,6 +44,7 @@ def row_of(
         work=np.broadcast_to(work, state.depth.shape),
         duty_omega=np.array([p.state.omega for p in state.points]),
         duty_displacement=np.stack([p.state.x.reshape(shape) for p in state.points]),
+        duty_response=np.stack([p.response for p in state.points]) if len(state.points) > 1 else np.zeros(0),
         preload_at_rest=state.preload_at_rest,
         growth=state.growth,
     )

@@ -3,10 +3,7 @@
 A rule is a module `hbm/wear/rules/<name>.py`, or a file beside a scene, with `class Rule(WearRule)`. It declares its
 numbers in `class Parameters` with their units, see `tribodyn.declarations`; those with the role "accuracy" say how fine
 its steps are. What a rule remembers from step to step it returns with each step, as arrays by name: they stand in the
-history and in the result file, so that a run resumes to the same bits.
-"""
-
-from __future__ import annotations
+history and in the result file, so that a run resumes to the same bits."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -28,8 +25,7 @@ class RuleSettings:
 
     numbers : its declared numbers by name, in SI units; scale : depth that errors are measured by [m], nan if unknown
     motion : along which it wears, see `workflows.scene.wear`; with_growth : whether rows state the growth of
-        perturbations
-    """
+        perturbations"""
 
     numbers: Mapping[str, float]
     scale: float = float("nan")
@@ -42,11 +38,12 @@ class WearStep:
     """A step that was taken.
 
     following : solves the state after it, when the next step asks for it; failure : why no step can follow
-    """
+    has_constant_rate : whether a part of the step is a step too, so that the end of a run is located in it"""
 
     row: WearRow
     following: Callable[[], WearState]
     failure: Outcome[WearEnd] | None = None
+    has_constant_rate: bool = True
 
 
 @dataclass(frozen=True)
@@ -54,8 +51,7 @@ class StepCost:
     """What a plan expects of a rule.
 
     steps : wear steps to loss of contact at an `accuracy`; power : of the accuracy that their number goes with
-    at_peak : balance solves of a step at a peak
-    """
+    at_peak : balance solves of a step at a peak"""
 
     steps: float
     accuracy: float

@@ -1,7 +1,5 @@
 """A worn contact with its solved duties: how it is solved at a depth, and how fast it wears there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -25,8 +23,7 @@ class Means:
     energy : (n_pair,) friction work per period [J]; normal_force : (n_pair,) [N]; amplitude : of the first output [m]
     spread : standard deviation of the work of a period, over its mean; error : standard error of that mean, relative
     is_stationary : whether the means came to rest; periods : marched
-    moving : what moved before, to begin from again; empty where the motion began in the balance
-    """
+    moving : what moved before, to begin from again; empty where the motion began in the balance"""
 
     energy: np.ndarray
     normal_force: np.ndarray
@@ -47,8 +44,7 @@ class WearState:
     preload_at_rest : [N], nan where it was not asked for
     lost : why there is no preload at rest, or no motion in time
     means : of the motion in time where a machine leaves that of the balance, see hbm.wear.steady_motion
-    growth : of the perturbation of the balance's motions that grows fastest, per radian; nan where it is not known
-    """
+    growth : of the perturbation of the balance's motions that grows fastest, per radian; nan where it is not known"""
 
     depth: np.ndarray
     cycles: float
@@ -70,6 +66,13 @@ class WearState:
                 hertz = point.state.omega / (2 * np.pi)
                 return WearEnd.SOLVE_FAILED.say(f" at {hertz:.6g} Hz: {point.solution.outcome}")
         return self.lost
+
+    @property
+    def means_in_time(self) -> Means:
+        """Those of a state that was followed in time."""
+        if self.means is None:
+            raise RuntimeError("the state was not followed in time")
+        return self.means
 
     @property
     def separated(self) -> bool:
@@ -147,8 +150,7 @@ def follow_balance(problem: WearProblem, before: WearState, depth: np.ndarray, c
     """A state of duties at given frequencies that wears along motions in time, whatever their balances do.
 
     The balance's solution next to that of `before` goes along, for what is asked of it later. Where Newton finds none,
-    the last one stays as it is: to look for another may take longer than all wear steps
-    """
+    the last one stays as it is: to look for another may take longer than all wear steps"""
     points = []
     for duty, previous in zip(problem.mission, before.points, strict=True):
         omega, x = previous.state.omega, previous.state.x

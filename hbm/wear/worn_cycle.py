@@ -55,8 +55,7 @@ class WornCycle:
             solved, basis, contact = self.solved, self.balance.basis, self.balance.contact
             gain = self.duty.share * depth_per_work(problem, self.state)
             rate_by_x = gain[:, None] * work_slope(self.balance, solved.x, solved.cycle)
-            assert solved.cycle.jacobian is not None
-            column = -solved.cycle.jacobian[:, :, contact.components.index("n") * basis.n_coeff]
+            column = -solved.cycle.slope[:, :, contact.components.index("n") * basis.n_coeff]
             work = basis.work_per_cycle(column.reshape(solved.x.shape), solved.x)[:, contact.tangential]
             by_gap = by_depth = gain * work.sum(axis=1)
         else:

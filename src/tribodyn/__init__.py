@@ -19,10 +19,7 @@
 
 Studies are in `td.studies`, those of wheels in `td.wheel`, one's own matrices in `td.matrices`, pictures in `td.plot`.
 Units are SI, frequencies are in Hz on both sides. What is not in `__all__` may change without notice. Names are
-imported when they are first used, so that this import takes no time; their homes stand in `__init__.pyi`.
-"""
-
-from __future__ import annotations
+imported when they are first used, so that this import takes no time; their homes stand in `__init__.pyi`."""
 
 import ast
 import importlib

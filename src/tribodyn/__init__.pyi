@@ -18,6 +18,6 @@ from tribodyn.workflows.studies.front_door import (
     scene_names as scene_names,
 )
 from tribodyn.workflows.studies.inspection import inspect as inspect
-from tribodyn.workflows.studies.worn_states import verify as verify
+from tribodyn.workflows.studies.verification import verify as verify
 
 def _show_results_in(shell: object) -> None: ...

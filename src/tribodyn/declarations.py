@@ -9,10 +9,7 @@ A file declares them in one class, each with its unit, its limits and, where the
         hardening: float = number("N/m", default=0.0, low=0.0)
 
 No other file knows their names. They are read from the text of the file, which is not run: a scene is checked without
-running its files. A part or a continuation may leave units out; see `workflows.scene.user_files`.
-"""
-
-from __future__ import annotations
+running its files. A part or a continuation may leave units out; see `workflows.scene.user_files`."""
 
 import ast
 import hashlib
@@ -28,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.consent import require_consent
 from tribodyn.refusal import Refusal
 
 
@@ -61,14 +59,15 @@ def number(
     low: float | None = None,
     above: float | None = None,
     high: float | None = None,
+    usual: tuple[float, float] | None = None,
 ) -> Any:
     """A number of a `Parameters` class, as a keyword field of its dataclass.
 
     unit : SI unit such as "N/m", "" if dimensionless; role : one of `Role`, where the number has one
     default : its value where none is given; without a default the number is required
     low, high : least and largest value allowed; above : the value must be larger than this
-    """
-    limits = {"low": low, "above": above, "high": high}
+    usual : range outside of which a value is noted"""
+    limits = {"low": low, "above": above, "high": high, "usual": usual}
     return field(default=default, kw_only=True, metadata={"unit": unit, "role": role, **limits})
 
 
@@ -78,8 +77,7 @@ class Number:
 
     unit : None where the file states none; role : None for a number that only its law knows
     default : None where the number is required, or its default is no literal
-    required : whether a value must be given; integer : whether it is one; meaning : the text below it
-    """
+    required : whether a value must be given; integer : whether it is one; meaning : the text below it"""
 
     name: str
     unit: str | None = None
@@ -90,6 +88,7 @@ class Number:
     low: float | None = None
     above: float | None = None
     high: float | None = None
+    usual: tuple[float, float] | None = None
     meaning: str = ""
 
     def fault(self, value: Any) -> str:
@@ -116,8 +115,7 @@ def read(path: Path, class_name: str = "Parameters") -> tuple[Number, ...]:
     class_name : "Parameters" of a part or a law, "Options" of a continuation
     The numbers of a base class in a file of the same folder, as in `class Parameters(jenkins.Parameters)`, come first.
 
-    Raises  Refusal where the file cannot be read as Python, or gives a number a role that does not exist
-    """
+    Raises  Refusal where the file cannot be read as Python, or gives a number a role that does not exist"""
     try:
         tree = ast.parse(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, SyntaxError, ValueError) as error:
@@ -179,8 +177,7 @@ def complete(numbers: tuple[Number, ...], values: Mapping[str, Any], owner: str)
     """Values of all numbers of an owner in their declared order, with defaults; arrays are checked entry by entry.
 
     owner : for sentences, such as "contact law 'jenkins'"
-    Raises  Refusal: a value is missing, belongs to no number, is not finite or out of its limits
-    """
+    Raises  Refusal: a value is missing, belongs to no number, is not finite or out of its limits"""
     names = [number.name for number in numbers]
     for name in values:
         if name not in names:
@@ -213,10 +210,10 @@ def run_file(path: Path, title: str, functions: tuple[str, ...]) -> ModuleType:
     """Run a Python file as a module; the same file is run once.
 
     title : what the file is, such as "contact law"; functions : that it must define
-    Raises  Refusal where there is no such file, it fails, or a function is missing
-    """
+    Raises  Refusal where there is no such file, it fails, a function is missing, or without the user's consent"""
     if not path.is_file():
         raise Refusal(f"there is no {title} file '{path}'")
+    require_consent(path)
     # the same name in every process: kernels that numba has cached on disk refer to their module by it
     name = f"tribodyn_own_{path.stem}_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:16]}"
     spec = importlib.util.spec_from_file_location(name, path)

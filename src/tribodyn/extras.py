@@ -1,7 +1,5 @@
 """Packages that only some abilities need, and the extra of the installation that brings each."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Any
 
@@ -9,7 +7,6 @@ from tribodyn.refusal import Refusal
 
 EXTRA = {
     "distributed": "cluster",
-    "emcee": "lives",
     "imageio_ffmpeg": "pictures",
     "plotly": "pictures",
     "pyvista": "pictures",

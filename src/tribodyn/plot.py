@@ -5,13 +5,11 @@
     td.plot.response(result).savefig("response.png")
     td.plot.wear(result, "depth").savefig("depth.png")
 
-`axes`, `draw_field`, `draw_status` and `shades` draw one's own figures in the same style, see `tribodyn.style`.
-"""
+`axes`, `draw_field`, `draw_status` and `shades` draw one's own figures in the same style, see `tribodyn.style`."""
 
 from tribodyn.workflows.export.vtk import mesh_fields, patch_fields
 from tribodyn.workflows.pictures.figures import axes_of as axes, length_unit
 from tribodyn.workflows.pictures.film import film
-from tribodyn.workflows.pictures.live import Live
 from tribodyn.workflows.pictures.loop_plots import hysteresis
 from tribodyn.workflows.pictures.maps import (
     draw_field,
@@ -27,7 +25,6 @@ from tribodyn.workflows.pictures.wear_plots import wear
 from tribodyn.workflows.pictures.wheel_diagrams import campbell, nodal_diameters, safe, shades
 
 __all__ = [
-    "Live",
     "axes",
     "campbell",
     "draw_field",

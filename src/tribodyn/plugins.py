@@ -1,7 +1,5 @@
 """Files found by their name, in a folder of the package or beside a scene: contact laws, wear laws, continuations."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from dataclasses import dataclass
@@ -19,8 +17,7 @@ class PluginKind:
 
     title : of the kind, in words; package : whose modules are the shipped files
     functions : functions or classes that each file must define
-    class_name : of the class that declares its numbers, see `tribodyn.declarations`
-    """
+    class_name : of the class that declares its numbers, see `tribodyn.declarations`"""
 
     title: str
     package: str
@@ -40,8 +37,7 @@ class PluginKind:
     def file_of(self, name: str) -> Path:
         """The file of a name, which is not run; refuses an unknown name with a list of those that there are.
 
-        name : of a shipped file, or the path of a user's file, which ends with .py
-        """
+        name : of a shipped file, or the path of a user's file, which ends with .py"""
         if name.endswith(".py"):
             return Path(name)
         if name not in self.names():

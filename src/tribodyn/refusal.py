@@ -1,7 +1,5 @@
 """The two ends that are no defects: a refused input, and a solver that failed."""
 
-from __future__ import annotations
-
 
 class Refusal(ValueError):
     """Bad input: a sentence that says what is wrong and how to mend it; the command ends with exit code 2.
@@ -9,8 +7,7 @@ class Refusal(ValueError):
     It is a ValueError so that the validators of scenes collect it.
 
     key : of the scene, the file or the option, value : its value, cure : what to write in its place; each "" or None
-    where the sentence says it
-    """
+    where the sentence says it"""
 
     def __init__(self, sentence: str = "", *, key: str = "", value: object = None, cure: str = "") -> None:
         super().__init__(f"{sentence}: {cure}" if cure else sentence)

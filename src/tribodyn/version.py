@@ -1,7 +1,5 @@
 """The version of this program and of the packages that it uses, as they are installed."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 

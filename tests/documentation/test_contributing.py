@@ -1,7 +1,5 @@
 """The page for contributors: every path that it names exists, and each kind of file is tried by a test."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -24,16 +22,13 @@ def test_a_path_on_the_page_exists(path: str) -> None:
     assert any(ROOT.glob(pattern.rstrip("/"))), path
 
 
-@pytest.mark.parametrize(
-    ("folder", "names"),
-    [
-        ("hbm/contact/laws", contact_law.names()),
-        ("hbm/wear/laws", wear_law.names()),
-        ("hbm/wear/rules", wear_rule.names()),
-        ("hbm/continuation/methods", continuation.names()),
-        ("hbm/quantities", quantity.FILES.names()),
-    ],
-)
+@pytest.mark.parametrize(("folder", "names"), [
+    ("hbm/contact/laws", contact_law.names()),
+    ("hbm/wear/laws", wear_law.names()),
+    ("hbm/wear/rules", wear_rule.names()),
+    ("hbm/continuation/methods", continuation.names()),
+    ("hbm/quantities", quantity.FILES.names()),
+])  # fmt: skip
 def test_every_file_of_a_folder_is_found_by_its_name(folder: str, names: list[str]) -> None:
     assert f"`{folder}/NAME.py`" in PAGE.read_text(encoding="utf-8")
     assert names == sorted(file.stem for file in (ROOT / folder).glob("*.py") if file.stem != "__init__")

@@ -1,7 +1,5 @@
 """Numbers and names that stand in pages and come from data or code are the same in both."""
 
-from __future__ import annotations
-
 import pkgutil
 import re
 

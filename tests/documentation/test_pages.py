@@ -3,8 +3,6 @@
 The build of the documentation, a step of the same check, follows docs.outputs.FOLLOWED and fails where a command does.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import re
@@ -81,8 +79,7 @@ def test_the_readme_shows_what_the_first_command_prints(after_the_first_command:
     """All but the seconds; where numbers have changed, put what is printed here into the README.
 
     The contact wears along a motion that never repeats itself, which rounding on another processor changes: numbers of
-    wear are the same within the error of the life.
-    """
+    wear are the same within the error of the life."""
     (shown,) = [fence.text for fence in fences(README) if fence.language == "text"]
     printed = "\n".join(text.brief(td.load(after_the_first_command / "results/beam"))) + "\n"
     firm = [
@@ -141,7 +138,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def test_tests_that_pages_name_exist() -> None:
-    saved = {item.name for item in (ROOT / "tests").rglob("test_*.py")}
+    saved = {item.name for folder in ("tests", "proof") for item in (ROOT / folder).rglob("test_*.py")}
     named = {(page.name, test) for page in pages() for test in re.findall(r"test_\w+\.py", page.read_text("utf-8"))}
     assert named
     assert not [item for item in named if item[1] not in saved]
@@ -169,13 +166,11 @@ def test_the_paper_states_what_the_first_command_prints() -> None:
     """Its numbers are those of the README, which are those of the command."""
     paper = (ROOT / "paper/paper.md").read_text(encoding="utf-8")
     match = re.search(r"`tribodyn run beam`.*?less than a minute", paper, re.DOTALL)
-    assert match is not None
     (shown,) = [fence.text for fence in fences(README) if fence.language == "text"]
     numbers = re.findall(r"\d[\d.]*(?: million cycles| DOFs| %)?", match[0])
     assert len(numbers) >= 4
     assert [number for number in numbers if number not in shown] == []
     life = re.search(r"life +(\d+ million cycles) +([\d.]+ %)", shown)
-    assert life is not None
     assert "{} with an error of {}".format(*life.groups()) in " ".join(match[0].split())
 
 

@@ -1,7 +1,5 @@
 """Coriolis forces: a rotating ring in closed form, and a wheel whose sectors are joined."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -44,8 +42,7 @@ def ring() -> Sector:
 @pytest.mark.parametrize("waves", [2, 3, 4])
 def test_waves_of_a_rotating_ring_split_as_the_closed_form_says(waves: int) -> None:
     """Inextensional bending of a thin ring: in its own frame the two waves of n lie 4 n speed / (n2 + 1) apart, the one
-    against the rotation higher; source: Bryan 1890, Carrier 1945. To 0.1 %.
-    """
+    against the rotation higher; source: Bryan 1890, Carrier 1945. To 0.1 %."""
     sector = ring()
     with_it, against = (2 * np.pi * nodal_diameters(sector, [index], 6)[0] for index in (waves, -waves))
     still = replace(sector, system=replace(sector.system, gyroscopic=None))

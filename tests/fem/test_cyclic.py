@@ -4,21 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 from tests.helpers import small_wheel as small
 from tribodyn.fem import cyclic_symmetry
 from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.contact_faces import ContactFaces
 from tribodyn.fem.modes import modes
-from tribodyn.geometry.placement import rotation
+from tribodyn.fem.sector_fit import describe_fault
+from tribodyn.geometry.placement import place, rotation
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.sector_reduction import nodal_diameters
+from tribodyn.workflows.scene.fields import parsed_direction
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.02], ids=["rigid disk", "flexible disk"])
 def sector(request, tmp_path_factory):
     return small.full_sector(tmp_path_factory.mktemp("wheel") / "s.msh", request.param)[1]
+
+
+@pytest.fixture(scope="module")
+def sector_part(tmp_path_factory):
+    return small.full_sector(tmp_path_factory.mktemp("wheel") / "s.msh", 0.02)[0]
 
 
 def test_rotation_is_right_handed_about_its_axis():
@@ -57,6 +65,26 @@ def test_opposite_waves_are_mirror_images(sector):
         assert not np.iscomplexobj(B)
     assert cyclic_symmetry.phase(3, 8) == pytest.approx(np.exp(-2j * np.pi * 3 / 8))
     assert cyclic_symmetry.phase(-3, 8) == pytest.approx(np.conj(cyclic_symmetry.phase(3, 8)))
+
+
+@pytest.mark.parametrize(("sectors", "axis", "turn", "shift", "fault"), [
+    (small.N, "x", (0, 0, 0), (0, 0, 0), ""),
+    (small.N + 1, "x", (0, 0, 0), (0, 0, 0), f"give wheel.sectors = {small.N}"),
+    (small.N, "-x", (0, 0, 0), (0, 0, 0), "swap the two faces"),
+    (small.N, "y", (0, 0, 0), (0, 0, 0), 'give wheel.axis = "x"'),
+    (small.N, "x", (0, np.pi / 2, 0), (0, 0, 0), 'give wheel.axis = "-z"'),
+    (small.N, "x", (0, 0, 0.3), (0, 0, 0), "give wheel.axis = [0.955336, 0.29552, 0.0]"),
+    (small.N, "x", (0, 0, 0), (0.1, 0.2, -0.3), "its axis goes through (0, 0.2, -0.3) m: move it"),
+    (9, "y", (0, 0, 0), (0, 0, 0), f'give wheel.axis = "x", and give wheel.sectors = {small.N}'),
+])  # fmt: skip
+def test_the_key_of_a_wheel_that_is_wrong_is_found(sector_part, sectors, axis, turn, shift, fault):
+    """The rotation that brings one seam to the other says which."""
+    R = scipy.spatial.transform.Rotation.from_rotvec(turn).as_matrix()
+    mesh, sets = place(sector_part.mesh, 1.0, R, np.array(shift)), sector_part.node_sets
+    said = parsed_direction(axis)
+    sentence = describe_fault(mesh, sets, ("cyclic_right", "cyclic_left"), sectors, said)
+    assert fault in sentence
+    assert bool(sentence) == bool(fault)
 
 
 def test_an_unclamped_wheel_moves_rigidly_in_the_waves_it_should(tmp_path):

@@ -1,7 +1,5 @@
 """The sparse factorisation, and with it every result, gives the same bits in every process."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Resultants, work and symmetries that a factor of 1.001 or a wrong sign breaks: each is known without any solve."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import skfem

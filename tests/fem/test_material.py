@@ -1,7 +1,5 @@
 """Elastic constants by the definition of Young's modulus, Poisson's ratio and the shear modulus."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

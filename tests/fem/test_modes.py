@@ -1,7 +1,5 @@
 """Factorisation, modes and the part chain: residuals, singular matrices, the published beam."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import skfem

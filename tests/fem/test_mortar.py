@@ -1,7 +1,5 @@
 """Contacts of faces that do not match: patch tests, moments, gaps of the geometry."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -146,6 +144,8 @@ def test_a_face_that_overhangs_is_cut_where_the_other_ends():
     interface, B_2 = halves(assembly, "upper.bottom", "lower.top")
     assert interface.area.sum() == pytest.approx(0.75 * 0.7, rel=1e-12)
     assert (interface.area > 0).all()
+    assert (interface.points[:, 0] <= 1.0).all()  # the lower face ends there, within elements of the upper one
+    assert interface.points[:, 0].max() > 0.9
     ones = np.ones(3 * assembly.doflocs.shape[1])
     assert np.abs((interface.B - B_2) @ ones).max() < 1e-12
 

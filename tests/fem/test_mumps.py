@@ -1,7 +1,5 @@
 """A factor by MUMPS in MPI processes of the system's Python: the same model, where PETSc is installed."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

@@ -12,15 +12,9 @@ from tribodyn.fem.material import Material
 from tribodyn.geometry.sources import foreign_file
 
 FORMATS = [
-    ("a.msh", "4.1"),
-    ("b.msh", "2.2"),
-    ("c.inp", ""),
-    ("d.bdf", ""),
-    ("e.cdb", ""),
-    ("f.vtu", ""),
-    ("g.vtk", ""),
+    ("a.msh", "4.1"), ("b.msh", "2.2"), ("c.inp", ""), ("d.bdf", ""), ("e.cdb", ""), ("f.vtu", ""), ("g.vtk", ""),
     ("h.med", ""),
-]
+]  # fmt: skip
 
 
 def squared_frequencies(mesh):
@@ -52,20 +46,17 @@ def test_every_format_gives_the_same_frequencies_and_set(name, kind, tmp_path):
         np.testing.assert_array_equal(fixed, np.flatnonzero(abs(body.mesh.doflocs[0]) < 1e-9))
 
 
-@pytest.mark.parametrize(
-    ("name", "original", "replacement", "sentence"),
-    [
-        ("d.bdf", "GRID*                  1", "GRID*                  x", "expects a whole number"),
-        ("d.bdf", "210.+9", "stiff", "expects a number, got 'stiff'"),
-        ("e.cdb", "       -1\nCMBLOCK", "", "ends inside its elements|broken element"),
-        ("e.cdb", "N,R5.3,LOC,       -1,", "", "broken node|cut off"),
-        ("e.cdb", "(8i10)", "(a10)", "has a block with the format"),
-        ("e.cdb", "EBLOCK,19,SOLID", "EBLOCK,10,SHELL", "no volume elements"),
-        ("f.vtu", "<Points>", "<Pints>", "cannot be read"),
-        ("g.vtk", "CELL_TYPES", "CELL_TIPES", "cannot be read|no volume"),
-        ("c.inp", "*NODE\n1, ", "*NODE\n9999, ", "names node 1, which the deck has not"),
-    ],
-)
+@pytest.mark.parametrize(("name", "original", "replacement", "sentence"), [
+    ("d.bdf", "GRID*                  1", "GRID*                  x", "expects a whole number"),
+    ("d.bdf", "210.+9", "stiff", "expects a number, got 'stiff'"),
+    ("e.cdb", "       -1\nCMBLOCK", "", "ends inside a block|broken EBLOCK"),
+    ("e.cdb", "N,R5.3,LOC,       -1,", "", "broken NBLOCK"),
+    ("e.cdb", "(8i10)", "(a10)", "has a broken CMBLOCK"),
+    ("e.cdb", "EBLOCK,19,SOLID", "EBLOCK,10,SHELL", "no volume elements"),
+    ("f.vtu", "<Points>", "<Pints>", "cannot be read"),
+    ("g.vtk", "CELL_TYPES", "CELL_TIPES", "cannot be read|no volume"),
+    ("c.inp", "*NODE\n1, ", "*NODE\n9999, ", "names node 1, which the deck has not"),
+])  # fmt: skip
 def test_broken_files_are_refused_in_one_sentence(name, original, replacement, sentence, tmp_path):
     path = foreign_files.write(reference()[0], tmp_path / name, "")
     data = path.read_bytes()

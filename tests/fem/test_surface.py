@@ -1,7 +1,5 @@
 """Surfaces, contact interfaces and loads against hand calculations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -200,21 +198,18 @@ def test_pairs_at_face_centres_are_means_of_their_corners():
         ContactFaces("bottom", (1, 0, 0), face_centres=True).build(block(tets=True))
 
 
-@pytest.mark.parametrize(
-    ("face", "t1", "changes", "message"),
-    [
-        ("none", (1, 0, 0), {}, "empty"),
-        ("inner", (1, 0, 0), {}, "inside the body"),
-        ("bottom", (0, 0, 1), {}, "along the contact normal"),
-        ("bottom", (0, 0, 0), {}, "not all zero"),
-        ("bottom", (1, 0, 0), {"components": ("n", "t1")}, "in this order"),
-        ("bottom", (1, 0, 0), {"gap": np.zeros(3)}, "3 values for 15 node pairs"),
-        ("bottom", (1, 0, 0), {"plane": (0, 0, -1), "inclination": np.pi / 2}, "inclination"),
-        ("bottom", (1, 0, 0), {"inclination": 0.1}, "plane ground"),
-        ("bottom", (1, 0, 0), {"opposite": "top", "pairing": "magnets"}, "there are auto, nodes, mortar"),
-        ("bottom", (1, 0, 0), {"opposite": "top", "plane": (0, 0, -1)}, "exclude each other"),
-    ],
-)
+@pytest.mark.parametrize(("face", "t1", "changes", "message"), [
+    ("none", (1, 0, 0), {}, "empty"),
+    ("inner", (1, 0, 0), {}, "inside the body"),
+    ("bottom", (0, 0, 1), {}, "along the contact normal"),
+    ("bottom", (0, 0, 0), {}, "not all zero"),
+    ("bottom", (1, 0, 0), {"components": ("n", "t1")}, "in this order"),
+    ("bottom", (1, 0, 0), {"gap": np.zeros(3)}, "3 values for 15 node pairs"),
+    ("bottom", (1, 0, 0), {"plane": (0, 0, -1), "inclination": np.pi / 2}, "inclination"),
+    ("bottom", (1, 0, 0), {"inclination": 0.1}, "plane ground"),
+    ("bottom", (1, 0, 0), {"opposite": "top", "pairing": "magnets"}, "there are auto, nodes, mortar"),
+    ("bottom", (1, 0, 0), {"opposite": "top", "plane": (0, 0, -1)}, "exclude each other"),
+])  # fmt: skip
 def test_contact_refuses(face, t1, changes, message):
     mesh = block()
     extra = {"none": np.zeros(0, int), "inner": np.flatnonzero(mesh.f2t[1] >= 0)}

@@ -1,8 +1,5 @@
 """Asperities of height maps: caps of known radius and heights, Nayak's random faces, the command, what is refused."""
 
-from __future__ import annotations
-
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +7,7 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tests.helpers.command import leave
+from tests.helpers.command import printed_record, printed_text, refusal
 from tests.helpers.rough_faces import caps, gaussian
 from tribodyn.geometry.asperities import Moments, identify, moments, summits
 from tribodyn.geometry.height_map import HeightMap
@@ -96,16 +93,13 @@ def stepped() -> HeightMap:
     return replace(face, z=np.round(face.z / 30e-9) * 30e-9)
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: identify(stepped()), "its heights come in steps .*: give `shortest`"),
-        (lambda: identify(caps(RADIUS, some_heights(4), SPACING_OF_SUMMITS, STEP)), "16 summits are too few"),
-        (lambda: identify(caps(RADIUS, np.full((8, 8), 5e-7), SPACING_OF_SUMMITS, STEP)).table(1), "a table of 1 rows"),
-        (lambda: summits(HeightMap(*2 * (np.arange(5.0),), np.full((5, 5), np.nan))), "without height"),
-        (lambda: td.studies.asperities(stepped(), mirror="x"), "one face only"),
-    ],
-)
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda: identify(stepped()), "its heights come in steps .*: give `shortest`"),
+    (lambda: identify(caps(RADIUS, some_heights(4), SPACING_OF_SUMMITS, STEP)), "16 summits are too few"),
+    (lambda: identify(caps(RADIUS, np.full((8, 8), 5e-7), SPACING_OF_SUMMITS, STEP)).table(1), "a table of 1 rows"),
+    (lambda: summits(HeightMap(*2 * (np.arange(5.0),), np.full((5, 5), np.nan))), "without height"),
+    (lambda: td.studies.asperities(stepped(), mirror="x"), "one face only"),
+])  # fmt: skip
 def test_what_has_no_asperities_is_one_sentence(call, words):
     with pytest.raises(ValueError, match=words):
         call()
@@ -121,13 +115,10 @@ def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.Captur
     np.savetxt(tmp_path / "scan.txt", face.z.T * 1e6)
     units = ["--spacing", "1um,1um", "--lateral-unit", "1 m", "--height-unit", "1um"]
     out, command = tmp_path / "asperities.csv", ["study", "asperities", str(tmp_path / "scan.txt")]
-    code, message, err = leave([*command, *units, "--out", str(tmp_path), "--json"], capsys)
-    assert code == 0, err
-    record, fit = json.loads(message), identify(face)
+    record, fit = printed_record([*command, *units, "--out", str(tmp_path), "--json"], capsys), identify(face)
     assert record["radius_m"] == pytest.approx(fit.radius, rel=1e-6)
     np.testing.assert_allclose(np.loadtxt(out, delimiter=","), fit.table(), rtol=1e-6, atol=1e-3)
-    code, message, _ = leave([*command, *units, "--out", str(tmp_path)], capsys)
-    assert code == 0
+    message = printed_text([*command, *units, "--out", str(tmp_path)], capsys)
     assert 'law = "rough", table = "asperities.csv", radius = "' in message
     contact = {
         "law": "rough", "table": out.name, "radius": record["radius_m"], "young": "200 GPa", "poisson": 0.3,
@@ -138,6 +129,4 @@ def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.Captur
     scene = td.read_scene(beam, {f"contact.{key}": value for key, value in contact.items()}).scene
     assert len(scene.contact.table) == 101
     for words, cure in ((["--spacing", "1um"], "give two steps"), (["--cutoff", "soon"], "--cutoff")):
-        code, _, err = leave([*command, *units[2:], *words], capsys)
-        assert code == 2
-        assert cure in err
+        assert cure in refusal([*command, *units[2:], *words], capsys)

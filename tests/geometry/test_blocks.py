@@ -77,20 +77,15 @@ def test_surface_names_survive_as_boundaries_with_area(tmp_path):
         assert item.assemble(facets) == pytest.approx(area)
 
 
-@pytest.mark.parametrize(
-    ("make", "sentence"),
-    [
-        (lambda: blocks.body([blocks.Block(LINE[::-1], LINE, LINE, "b")]), "u of a block in 'b' does not increase"),
-        (lambda: blocks.body([blocks.Block(LINE, LINE, LINE, "b", {"x+": "s"})]), "no side 'x+'"),
-        (lambda: blocks.body([blocks.Block(LINE + 3 * i, LINE, LINE, "b") for i in (0, 1)]), "fall into 2 pieces"),
-        (lambda: blocks.body([blocks.Block(LINE, LINE, LINE, "b")], {"p": (0.4, 0, 0)}), "no mesh node lies at point"),
-        (lambda: blocks.body([blocks.Block(LINE, LINE, LINE, "b", mapping=lambda p: p * [1, 1, 0])]), "collapses"),
-        (
-            lambda: blocks.write("never.msh", blocks.body([blocks.Block(LINE, LINE, LINE, "b", {"u-": "b"})])),
-            "b names groups of different dimension",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("make", "sentence"), [
+    (lambda: blocks.body([blocks.Block(LINE[::-1], LINE, LINE, "b")]), "u of a block in 'b' does not increase"),
+    (lambda: blocks.body([blocks.Block(LINE, LINE, LINE, "b", {"x+": "s"})]), "no side 'x+'"),
+    (lambda: blocks.body([blocks.Block(LINE + 3 * i, LINE, LINE, "b") for i in (0, 1)]), "fall into 2 pieces"),
+    (lambda: blocks.body([blocks.Block(LINE, LINE, LINE, "b")], {"p": (0.4, 0, 0)}), "no mesh node lies at point"),
+    (lambda: blocks.body([blocks.Block(LINE, LINE, LINE, "b", mapping=lambda p: p * [1, 1, 0])]), "collapses"),
+    (lambda: blocks.write("never.msh", blocks.body([blocks.Block(LINE, LINE, LINE, "b", {"u-": "b"})])),
+        "b names groups of different dimension"),
+])  # fmt: skip
 def test_refusals_are_sentences(make, sentence):
     with pytest.raises(ValueError, match=sentence.replace("+", r"\+")):
         make()

@@ -1,7 +1,5 @@
 """What becomes of each card of a deck is what its format's table says; what is read is the structure it should be."""
 
-from __future__ import annotations
-
 import re
 from contextlib import suppress
 from functools import cache
@@ -11,6 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
+import tribodyn as td
 from tests.helpers.small_decks import archive, bricks, bulk, cut, frequencies, straight
 from tribodyn.geometry.sources import abaqus_cards, ansys, foreign_file, nastran
 
@@ -18,6 +17,7 @@ TABLES = {"inp": abaqus_cards.TABLE, "bdf": nastran.TABLE, "cdb": ansys.TABLE}
 SMALL = (2, 1, 1)
 END = len(cut(SMALL, straight)[0])  # a node beyond those of the solids comes after
 STEEL = "*MATERIAL, NAME=S\n*ELASTIC\n200000., .3\n*DENSITY\n7.8e-9\n*SOLID SECTION, ELSET=ALL, MATERIAL=S\n"
+TYPES = "ETBLOCK,1,1\n(2i9,19a9)\n        1      186        0        0        1\n       -1\n"
 POINT = "*NODE\n999, 150., 0., 0.\n"
 PART = (
     "*PART, NAME=P\n"
@@ -92,8 +92,8 @@ READ = {
         "LOAD": ("bdf", "LOAD,9,2.,3.,1\nFORCE,1,2,,5.,1.,0.,0.\n"),
         "SPCADD": ("bdf", "SPC = 9\nBEGIN BULK\nSPC1,1,123,1\nSPCADD,9,1\n"),
         "MPCADD": ("bdf", "MPC = 9\nBEGIN BULK\nMPC,1,1,1,1.,2,1,-1.\nMPCADD,9,1\n"),
-        "MAT9": ("bdf", "MAT9,1,3.+5,1.+5,1.+5,,,,3.+5\n+,1.+5,,,,3.+5,,,\n+,1.+5,,,1.+5,,1.+5,7.8-9\n"),
-        "MAT11": ("bdf", "MAT11,1,140000.,9000.,10000.,.3,.28,.4,5000.\n+,4500.,3500.,1.6-9\n"),
+        "MAT9": ("bdf", "MAT9,2,3.+5,1.+5,1.+5,,,,3.+5\n+,1.+5,,,,3.+5,,,\n+,1.+5,,,1.+5,,1.+5,7.8-9\n"),
+        "MAT11": ("bdf", "MAT11,2,140000.,9000.,10000.,.3,.28,.4,5000.\n+,4500.,3500.,1.6-9\n"),
         "SET1": ("bdf", "SET1,5,1,2,3\n"),
         "PARAM": ("bdf", "PARAM,WTMASS,.001\n"),
         "PARAM WTMASS": ("bdf", "PARAM,WTMASS,.001\n"),
@@ -111,7 +111,10 @@ READ = {
         "N": ("cdb", f"N,{END + 1},150.,0.,0.\nF,{END + 1},FX,1.\n"),
         "CMBLOCK": ("cdb", "CMBLOCK,SOME,NODE,       2\n(8i10)\n         1         2\n"),
         **dict.fromkeys(("ET", "KEYOPT"), ("", BASES["cdb"].replace("EBLOCK,19", "KEYOPT,1,3,1\nEBLOCK,19"))),
-        "KEYOP": ("", BASES["cdb"].replace("EBLOCK,19", "KEYOP,1,3,1\nEBLOCK,19")),
+        **{
+            name: ("", BASES["cdb"].replace("EBLOCK,19", f"{name},1,3,1\nEBLOCK,19")) for name in ("KEYOP", "KEYO")
+        },
+        "ETBLOCK": ("", BASES["cdb"].replace("ET,1,186\n", TYPES)),
         "MPDATA": ("cdb", "MPDATA,R5.0, 1,EX  ,  1, 1,  2.1E+05,\n"),
         "CSYS": ("cdb", "CSYS,11\n"),
         "LOCAL": ("", archive(SMALL, straight, system=11) + "MP,EX,1,2E5\nMP,EY,1,1E5\nLOCAL,11,0,0.,0.,0.,30.\n"),
@@ -131,7 +134,7 @@ def without(text: str, card: str, ending: str) -> str:
         return re.sub(rf"(?m)^\*{card}(?=[,\n]).*\n([^*\n].*\n)*", "", text)
     if ending == "bdf":
         return re.sub(rf"(?m)^{card.split()[0]}[, ].*\n(\+.*\n)*", "", text)
-    blocks = {"NBLOCK": r"N,R5.*\n", "EBLOCK": r"\s+-1\n", "CMBLOCK": r"\s+1\s+2\n"}
+    blocks = {"NBLOCK": r"N,R5.*\n", "EBLOCK": r"\s+-1\n", "CMBLOCK": r"\s+1\s+2\n", "ETBLOCK": r"\s+-1\n"}
     return re.sub(rf"(?m)^{card},.*\n" + (rf"(.*\n)*?{blocks[card]}" if card in blocks else ""), "", text)
 
 
@@ -173,7 +176,15 @@ def test_a_card_that_is_read_matters(ending: str, card: str) -> None:
     smaller = without(text, card, ending)
     assert smaller != text
     *_, refused = full = outcome_of(text, ending)
-    assert not refused or card in ("ET", "KEYOPT", "KEYOP", "CSYS", "LOCAL")  # what these choose is refused
+    assert not refused or card in (
+        "ET",
+        "ETBLOCK",
+        "KEYOPT",
+        "KEYOP",
+        "KEYO",
+        "CSYS",
+        "LOCAL",
+    )  # what these choose is refused
     with suppress(ValueError):  # of a deck that lacks what it cannot do without
         assert card in FRAMES or outcome_of(smaller, ending) != full
 
@@ -188,9 +199,58 @@ def test_harmless_cards_are_named_and_others_refused(ending: str) -> None:
         assert result == base[0], card
         assert card in unused[-1], card
         assert not refused, card
-    for card in table.silents - {"BEGIN", "RESTART"}:
+    for card in table.silents - {"RESTART"}:
         assert outcome_of(BASES[ending] + line.format(card), ending) == base, card
     assert list(outcome_of(BASES[ending] + line.format("OTHER"), ending)[-1]) == [line.format("OTHER").strip(",1\n")]
+
+
+FORCE = "FORCE,1,2,,5.,1.,0.,0.\n"
+# what is written in two ways: added to the base of a format, or in place of another text
+ALIKE = {
+    "a long free line": ("bdf", "SPC1,1,123,1,2,3,4,5,6,7,8,9,10\n", "SPC1,1,123,1,THRU,10\n"),
+    "after ENDDATA": ("bdf", "ENDDATA\nSPC1,1,123,1\nNOTES OF AN OLD RUN\n", ""),
+    "a marker": ("bdf", f"SPC1,1,123,1,2,3,4,5,6,+A\n{FORCE}+A,7,8\n", f"SPC1,1,123,1,THRU,8\n{FORCE}"),
+    "a marker before": ("bdf", f"{FORCE}+A,7,8\nSPC1,1,123,1,2,3,4,5,6,+A\n", f"{FORCE}SPC1,1,123,1,THRU,8\n"),
+    "a range": ("cdb", "D,1,UX,0,,5,2,UY\n", "D,1,UX\nD,3,UX\nD,5,UX\nD,1,UY\nD,3,UY\nD,5,UY\n"),
+    "a range of forces": ("cdb", "F,1,FX,2.,,2\n", "F,1,FX,2.\nF,2,FX,2.\n"),
+    "defaults": ("cdb", "ACEL,0.,0.,0.  ! none\nBFUNIF,TEMP,_TINY\n*IF,_CDRDOFF,EQ,1,THEN\n", ""),
+    "a format of integers": ("cdb", "(3i9,6e21.13e3)\n", "(1i9,2i9,6e21.13)\n"),
+    "types in a block": ("cdb", "ET,1,186\n", TYPES.replace("        1\n", "\n")),
+}
+
+
+@pytest.mark.parametrize("case", ALIKE)
+def test_ways_to_write_a_card_are_alike(case: str) -> None:
+    ending, first, second = ALIKE[case]
+    base = BASES[ending]
+    texts = [base, base.replace(first, second)] if first in base else [base + first, base + second]
+    assert outcome_of(texts[0], ending)[0] == outcome_of(texts[1], ending)[0]
+    assert not outcome_of(texts[0], ending)[-1]
+
+
+@pytest.mark.parametrize(("ending", "extra", "words"), [
+    ("bdf", "GRID,1,,5.,0.,0.\n", "has a second GRID 1, which differs"),
+    ("bdf", "CTETRA,1,1,1,2,3,5\n", "two elements have the number 1"),
+    ("bdf", "MAT1,1,1000.,,.3\n", "has a second MAT1 1"),
+    ("bdf", "SPC1,1,123,1\n+B,2\n+C,3\n+D,4\nSPC1,1,123,1,2,3,4,5,6,+Q\n+R,1\n", "no card ends with the marker"),
+    ("cdb", "N,1,5.,0.,0.\n", "two nodes have the number 1"),
+])  # fmt: skip
+def test_what_contradicts_itself_is_refused(ending: str, extra: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        outcome_of(BASES[ending] + extra, ending)
+
+
+@pytest.mark.parametrize(("ending", "extra", "refused"), [
+    ("bdf", "GRID,999,,1.,0.,0.,,,7\n", "GRID, 7 in field 8"),
+    ("bdf", "CONM2,5,1,7,1.-3,,,,,2.\n", "CONM2, inertia along a system"),
+    ("cdb", "D,1,UX,0,3.\n", "D, 3., an imaginary part"),
+    ("cdb", "F,1,FX,2.,,2,1,UY\n", "F, UY in field 7"),
+    ("cdb", "LOCAL,11,1,0,0,0,0,0,0,2.\n", "LOCAL, an elliptic system"),
+    ("cdb", "ACEL,0.,0.,9810.\n", "ACEL"),
+    ("cdb", "*IF,A,GT,1,THEN\nD,1,UX\n*ENDIF\n", "*IF"),
+])  # fmt: skip
+def test_what_a_reader_does_not_know_is_refused_by_name(ending: str, extra: str, refused: str) -> None:
+    assert refused in outcome_of(BASES[ending] + extra, ending)[-1]
 
 
 # the same structure in the words of two formats
@@ -216,27 +276,19 @@ PLY_INP = """*MATERIAL, NAME=PLY
 TURNED = "*ORIENTATION, NAME=OWN\n.8660254037844387, .5, 0., -.5, .8660254037844387, 0.\n"
 EQUAL_DECKS = {
     "PS": ("bdf", bulk(COUNTS, straight, "123456") + STEEL_BDF, STEEL),
-    "GRDSET": (
-        "bdf",
-        "GRDSET,,,,,,,23\n" + bulk(COUNTS, straight, "123") + STEEL_BDF,
-        STEEL + "*BOUNDARY\nALL, 2, 3\n",
-    ),
-    "WTMASS": (
-        "bdf",
+    "GRDSET": ("bdf", "GRDSET,,,,,,,23\n" + bulk(COUNTS, straight, "123") + STEEL_BDF,
+        STEEL + "*BOUNDARY\nALL, 2, 3\n"),
+    "WTMASS": ("bdf",
         bulk(COUNTS, straight, "123") + "PSOLID,1,1\nMAT1,1,200000.,,.3,7.8-6\nPARAM,WTMASS,.001\nCONM2,1,5,,.05\n",
-        STEEL + "*ELEMENT, TYPE=MASS, ELSET=M\n90, 5\n*MASS, ELSET=M\n5e-5\n",
-    ),
+        STEEL + "*ELEMENT, TYPE=MASS, ELSET=M\n90, 5\n*MASS, ELSET=M\n5e-5\n"),
     "CELAS2": (
         "bdf",
         bulk(COUNTS, straight, "123") + STEEL_BDF + "CELAS2,9,500.,5,2\nCELAS2,10,700.,5,3,7,3\n",
         STEEL + "*ELEMENT, TYPE=SPRING1, ELSET=K\n90, 5\n*SPRING, ELSET=K\n2\n500.\n"
         "*ELEMENT, TYPE=SPRING2, ELSET=L\n91, 5, 7\n*SPRING, ELSET=L\n3, 3\n700.\n",
     ),
-    "MPC": (
-        "bdf",
-        bulk(COUNTS, straight, "123") + STEEL_BDF + "MPC,1,6,2,1.,7,2,-2.\n+,,8,3,.5\n",
-        STEEL + "*EQUATION\n3\n6, 2, 1., 7, 2, -2., 8, 3, .5\n",
-    ),
+    "MPC": ("bdf", bulk(COUNTS, straight, "123") + STEEL_BDF + "MPC,1,6,2,1.,7,2,-2.\n+,,8,3,.5\n",
+        STEEL + "*EQUATION\n3\n6, 2, 1., 7, 2, -2., 8, 3, .5\n"),
     "RBE3": (
         "bdf",
         bulk(COUNTS, straight, "123") + STEEL_BDF + "GRID,999,,50.,40.,5.\nRBE3,9,,999,123456,1.,123,5,6\n+,7,8\n"
@@ -258,11 +310,8 @@ EQUAL_DECKS = {
         + "CE,R5.0,DEFI, 3, 1, 0.0\nCE,R5.0,NODE, 6,UY  , 1.0, 7,UY  , -2.0\nCE,R5.0,NODE, 8,UZ  , 0.5\n",
         STEEL + "*EQUATION\n3\n6, 2, 1., 7, 2, -2., 8, 3, .5\n",
     ),
-    "CP": (
-        "cdb",
-        archive(COUNTS, straight) + STEEL_CDB + "CP,1,UY,5,6,7\n",
-        STEEL + "*EQUATION\n2\n6, 2, 1., 5, 2, -1.\n*EQUATION\n2\n7, 2, 1., 5, 2, -1.\n",
-    ),
+    "CP": ("cdb", archive(COUNTS, straight) + STEEL_CDB + "CP,1,UY,5,6,7\n",
+        STEEL + "*EQUATION\n2\n6, 2, 1., 5, 2, -1.\n*EQUATION\n2\n7, 2, 1., 5, 2, -1.\n"),
     "orthotropic": ("cdb", archive(COUNTS, straight) + PLY, PLY_INP + "\n"),
     "orthotropic, minor ratios": ("cdb", archive(COUNTS, straight) + MINOR, PLY_INP + "\n"),
     "ESYS": (
@@ -338,6 +387,15 @@ def test_a_table_of_a_material_is_taken_at_the_initial_temperature(tmp_path: Pat
     np.testing.assert_allclose(
         frequencies(TABLED + WARM, 2, tmp_path), frequencies(by_hand, 2, tmp_path), rtol=1e-10
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("hot", ["", '[loads.static.hot]\ntemperature = "50 K"\n'])
+def test_a_table_at_one_temperature_is_noted_where_the_scene_heats(hot: str, tmp_path: Path) -> None:
+    (tmp_path / "own.inp").write_text(TABLED.replace("*DENSITY", "*EXPANSION\n1e-5\n*DENSITY") + WARM)
+    scene = f'[decks.d]\nfile = "own.inp"\nunit = "mm"\n{hot}[loads.harmonic.shake]\ngroup = "ALL.ALL"\n'
+    (tmp_path / "s.toml").write_text(scene + 'direction = "x"\nvalue = 1.0\n[response]\n')
+    notes = [note for note in td.inspect(str(tmp_path / "s.toml")).remarks if "initial temperature" in note]
+    assert [note.partition(" of material")[0] for note in notes] == (["*ELASTIC and *DENSITY"] if hot else [])
 
 
 @pytest.mark.parametrize("warm", ["", WARM + "3, 60.\n", WARM.replace("EVERY", "FOOT")])

@@ -1,7 +1,5 @@
 """Axes of a material that a deck turns, against CalculiX."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Half beam with a lap, bolt, nut and washer: volumes against closed forms, groups, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,17 +49,14 @@ def test_the_lap_meets_itself_turned_by_half_a_turn(tmp_path):
     assert body.doflocs.T[sets["tip"][0]] == pytest.approx([-0.36, 0, 0], abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("part", "changes", "words"),
-    [
-        (lap_beam, {"pad": 8e-3}, "geometry.pad must lie between"),
-        (lap_beam, {"lap": 0.08}, "geometry.lap must exceed"),
-        (bolt, {"n_around": 10}, "multiple of 12"),
-        (bolt, {"length": 0.03}, "geometry.length must exceed"),
-        (nut, {"bore": 9e-3}, "geometry.seat_diameter must lie between"),
-        (washer, {"bore": 0.02}, "geometry.bore must be less"),
-    ],
-)
+@pytest.mark.parametrize(("part", "changes", "words"), [
+    (lap_beam, {"pad": 8e-3}, "geometry.pad must lie between"),
+    (lap_beam, {"lap": 0.08}, "geometry.lap must exceed"),
+    (bolt, {"n_around": 10}, "multiple of 12"),
+    (bolt, {"length": 0.03}, "geometry.length must exceed"),
+    (nut, {"bore": 9e-3}, "geometry.seat_diameter must lie between"),
+    (washer, {"bore": 0.02}, "geometry.bore must be less"),
+])  # fmt: skip
 def test_what_cannot_be_is_refused(part, changes, words):
     with pytest.raises(ValueError, match=words):
         replace(part.Parameters(), **changes)

@@ -1,7 +1,5 @@
 """The door to Gmsh: what it writes is whole, or is told."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from types import SimpleNamespace

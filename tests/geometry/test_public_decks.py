@@ -1,7 +1,5 @@
 """Decks in the style of those that come with CalculiX and Nastran: read as CalculiX solves them, or refused by name."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -65,43 +63,26 @@ DECKS = {
     "equation": ("inp", CLAMPED + "".join(f"*EQUATION\n2\n{n}, 1, 1., {TIP[0]}, 1, -1.\n" for n in TIP[1:]), []),
     "spring": ("inp", CLAMPED + f"*ELEMENT, TYPE=SPRING1, ELSET=SP\n900, {TIP[0]}\n*SPRING, ELSET=SP\n2\n800.\n", []),
     "tie": ("inp", lap(FINE, fine_at_the_corner(FINE, False), fine_at_the_corner(FINE, True)) + TIED, []),
-    "rigid body": (
-        "inp",
+    "rigid body": ("inp",
         CLAMPED + "*NODE\n900, 130., 10., 5.\n901, 130., 10., 5.\n*RIGID BODY, NSET=TIP, REF NODE=900, ROT NODE=901\n",
-        ["*RIGID BODY, ROT NODE"],
-    ),
-    "turned supports": (
-        "inp",
-        BEAM + "*TRANSFORM, NSET=FOOT, TYPE=C\n0., 0., 0., 0., 0., 1.\n" + FIX,
-        ["*TRANSFORM"],
-    ),
-    "shell skin": (
-        "inp",
+        []),
+    "turned supports": ("inp", BEAM + "*TRANSFORM, NSET=FOOT, TYPE=C\n0., 0., 0., 0., 0., 1.\n" + FIX, ["*TRANSFORM"]),
+    "shell skin": ("inp",
         CLAMPED + "*ELEMENT, TYPE=S4, ELSET=SKIN\n900, 1, 2, 3, 4\n*SHELL SECTION, ELSET=SKIN, MATERIAL=EL\n1.\n",
-        ["S4", "*SHELL SECTION"],
-    ),
-    "sector": (
-        "inp",
-        CLAMPED + "*CYCLIC SYMMETRY MODEL, N=12, TIE=T1\n0., 0., 0., 1., 0., 0.\n",
-        ["*CYCLIC SYMMETRY MODEL"],
-    ),
-    "heated": (
-        "inp",
+        ["S4", "*SHELL SECTION"]),
+    "sector": ("inp", CLAMPED + "*CYCLIC SYMMETRY MODEL, N=12, TIE=T1\n0., 0., 0., 1., 0., 0.\n",
+        ["*CYCLIC SYMMETRY MODEL"]),
+    "heated": ("inp",
         CLAMPED + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nTIP, 20.\n*STEP\n*TEMPERATURE\nTIP, 90.\n*END STEP\n",
-        ["*TEMPERATURE"],
-    ),
+        ["*TEMPERATURE"]),
     "normal modes": ("bdf", DEMO + bulk(N, straight) + BULK_STEEL + f"SPC1,1,123,{FOOT}\nSPC1,2,123,{TIP[0]}\n", []),
-    "plates on a block": (
-        "bdf",
+    "plates on a block": ("bdf",
         DEMO + bulk(N, straight) + BULK_STEEL + "CQUAD4,900,2,1,2,3,4\nPSHELL,2,1,1.\nSPC1,1,123,1,2\n",
-        ["CQUAD4", "PSHELL"],
-    ),
+        ["CQUAD4", "PSHELL"]),
     "archive": ("cdb", archive(N, straight) + "MP,EX,1,210000.\nMP,PRXY,1,.3\nMP,DENS,1,7.8E-9\nANTYPE,MODAL\n", []),
-    "archive with a pressure": (
-        "cdb",
+    "archive with a pressure": ("cdb",
         archive(N, straight) + "MP,EX,1,210000.\nMP,PRXY,1,.3\nMP,DENS,1,7.8E-9\nSFE,1,3,PRES,0,R5.0\n  5.0,\n",
-        ["SFE"],
-    ),
+        ["SFE"]),
 }  # fmt: skip
 
 

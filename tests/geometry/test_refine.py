@@ -1,7 +1,5 @@
 """A mesh cut into elements of half the size: the same body, the same groups."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A card that would change the structure and is not carried over is refused by its name; what is ignored is said."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -66,16 +66,10 @@ def test_orthotropic_stiffness_becomes_engineering_constants():
 
 BROKEN = {
     "cut inside an element": (", 6, 11, 12, 7\n*Nset, nset=All", "\n*Nset, nset=All", "ends inside element 2"),
-    "missing node": (
-        "     12,          20.,          10.,          10.\n",
-        "",
-        "names node 12, which the deck has not",
-    ),
-    "no number": (
-        "10.,          10.,          10.\n      8",
-        "10.,  ten,  10.\n      8",
-        "expects a number, got 'ten'",
-    ),
+    "missing node": ("     12,          20.,          10.,          10.\n", "",
+        "names node 12, which the deck has not"),
+    "no number": ("10.,          10.,          10.\n      8", "10.,  ten,  10.\n      8",
+        "expects a number, got 'ten'"),
     "no whole number": ("\n1, 1, 2, 3, 4", "\n1, 1, two, 3, 4", "expects a whole number, got 'two'"),
     "unknown part": ("part=Block\n          0.", "part=Blok\n          0.", "names the part 'Blok'"),
     "two instances of one name": ("name=Block-2, part", "name=Block-1, part", "name 'Block-1' of another instance"),
@@ -84,31 +78,22 @@ BROKEN = {
     "half a tie": ("Lower, Upper", "Lower", "needs a slave and a master"),
     "unknown reference": ("ref node=RP", "ref node=RQ", "names 'RQ', which is no node and no set"),
     "reference of many": ("ref node=RP", "ref node=Foot", "needs one reference node, 'Foot' has 4"),
-    "kinematic alone": (
-        "*Coupling, constraint name=carried, ref node=RP, surface=End\n",
-        "",
-        "needs a \\*COUPLING before",
-    ),
+    "kinematic alone": ("*Coupling, constraint name=carried, ref node=RP, surface=End\n", "",
+        "needs a \\*COUPLING before"),
     "cut inside an equation": ("Block-2.12, 1, -1.\n", "", "ends before its 2 terms"),
     "unknown material": ("material=Steel", "material=Stahl", "names the material 'Stahl'"),
-    "material twice": (
-        "*Material, name=Steel",
-        "*Material, name=Steel\n*Material, name=STEEL",
-        "defines the material 'STEEL' again",
-    ),
+    "material twice": ("*Material, name=Steel", "*Material, name=Steel\n*Material, name=STEEL",
+        "defines the material 'STEEL' again"),
     "elastic alone": ("*Material, name=Steel\n", "", "stands before any \\*MATERIAL"),
     "half a load": ("RP, 2, -100.", "RP, 2", "needs node, direction and value"),
     "unknown set in a support": ("Foot, ENCASTRE", "Fuss, ENCASTRE", "names 'Fuss'"),
     "generated mesh": ("*Nset, nset=Left", "*Ngen\n1, 9, 2\n*Nset, nset=Left", "generates a mesh"),
     "unknown system": ("*Node\n      1,           0.", "*Node, system=Q\n      1,           0.", "one of R, C, S"),
-    "missing include": (
-        "*Part, name=Block",
-        "*Include, input=gone.inp\n*Part, name=Block",
-        "'gone.inp', which does not exist",
-    ),
+    "missing include": ("*Part, name=Block", "*Include, input=gone.inp\n*Part, name=Block",
+        "'gone.inp', which does not exist"),
     "only shells": ("type=C3D8R", "type=S4", "no volume elements"),
     "data first": ("*Heading\n", "1, 2, 3\n*Heading\n", "data at line 1 before any card"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", BROKEN)

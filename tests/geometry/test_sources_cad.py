@@ -66,14 +66,11 @@ def test_one_solid_alone_with_edges_of_the_size_that_is_asked_for(blocks):
         assert np.median(length) == pytest.approx(size, rel=0.2)
 
 
-@pytest.mark.parametrize(
-    ("sizes", "sentence"),
-    [
-        (Sizes(faces={99: 1.0}), "has no face 99 to give a size to"),
-        (Sizes(bodies={"middle": 1.0}), "has no solid middle"),
-        (Sizes(-1.0), "must be above zero"),
-    ],
-)
+@pytest.mark.parametrize(("sizes", "sentence"), [
+    (Sizes(faces={99: 1.0}), "has no face 99 to give a size to"),
+    (Sizes(bodies={"middle": 1.0}), "has no solid middle"),
+    (Sizes(-1.0), "must be above zero"),
+])  # fmt: skip
 def test_sizes_that_cannot_be_are_refused(blocks, sizes, sentence):
     with pytest.raises(ValueError, match=sentence):
         foreign_file.read(blocks, "mm", sizes)
@@ -96,12 +93,9 @@ def test_broken_cad_files_are_refused_in_one_sentence(tmp_path, blocks):
 def test_drawings_are_meshed(tmp_path):
     drawing = tmp_path / "box.geo"
     text = (
-        'SetFactory("OpenCASCADE");',
-        "Box(1) = {0, 0, 0, 1, 2, 3};",
-        'Physical Volume("box") = {1};',
-        'Physical Surface("end") = {1};',
-        "Mesh.MeshSizeMax = 1;",
-    )
+        'SetFactory("OpenCASCADE");', "Box(1) = {0, 0, 0, 1, 2, 3};", 'Physical Volume("box") = {1};',
+        'Physical Surface("end") = {1};', "Mesh.MeshSizeMax = 1;",
+    )  # fmt: skip
     drawing.write_text("\n".join(text) + "\n")
     (body,) = foreign_file.read(drawing, "mm").bodies.values()
     assert facts(body.mesh).volume == pytest.approx(6e-9)

@@ -140,7 +140,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, version, bi
         gmsh.write(str(path))
     full, rng = path.read_bytes(), np.random.default_rng(3)
     refusals = []
-    for place in rng.integers(0, len(full) - 8, 24):
+    for place in rng.integers(0, len(full) - 8, 6):
         turned = bytearray(full)
         turned[place] ^= 1 << int(rng.integers(8))
         for damaged in (full[:place], bytes(turned), full[:place] + full[place + 3 :]):
@@ -150,7 +150,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, version, bi
                     assert np.isfinite(quality(body.mesh).volume)
             except ValueError as refusal:
                 refusals.append(str(refusal))
-    assert len(refusals) > 24
+    assert len(refusals) > 6
     assert not any("\n" in message for message in refusals)
 
 

@@ -90,18 +90,15 @@ def through_sdf_binary(folder, *arguments):
     return read(folder / "face.sdf")
 
 
-@pytest.mark.parametrize(
-    ("reader", "arguments"),
-    [
-        (through_xyz, ()),
-        (through_matrix, ()),
-        (through_sdf_text, ("ISO-1.0",)),
-        (through_sdf_text, ("BCR-1.0",)),
-        (through_sdf_binary, ("ISO-1.0", "<i4", 6, -(2**31))),
-        (through_sdf_binary, ("ISO-2.0", "<f8", 7, -np.finfo(float).max)),
-        (through_sdf_binary, ("BCR-1.0", "<i4", 6, 2**31 - 1)),
-    ],
-)
+@pytest.mark.parametrize(("reader", "arguments"), [
+    (through_xyz, ()),
+    (through_matrix, ()),
+    (through_sdf_text, ("ISO-1.0",)),
+    (through_sdf_text, ("BCR-1.0",)),
+    (through_sdf_binary, ("ISO-1.0", "<i4", 6, -(2**31))),
+    (through_sdf_binary, ("ISO-2.0", "<f8", 7, -np.finfo(float).max)),
+    (through_sdf_binary, ("BCR-1.0", "<i4", 6, 2**31 - 1)),
+])  # fmt: skip
 def test_every_format_gives_the_same_map(reader, arguments, tmp_path):
     face, back = with_hole(), reader(tmp_path, *arguments)
     np.testing.assert_allclose(back.x, face.x, atol=1e-15)
@@ -281,28 +278,25 @@ def noise():
     return of(z=z)
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: check(of(z=np.full((60, 90), np.nan))), "no point has a height"),
-        (lambda: check(of(z=surface().z * 1e6)), "median slope is .* give the height unit"),
-        (lambda: check(of(z=surface().z * 1e-7)), "less than an atom"),
-        (lambda: check(of(x=surface().x * 1e6)), "give the lateral unit"),
-        (lambda: check(surface(), (2e-3, 5e-3)), "it covers 0.00118 m in x but the contact 0.002 m"),
-        (lambda: check(surface(), (1e-4, 1.7e-3)), "are map and unit right"),
-        (lambda: of(z=surface().z[:, :-1]), "axes 60 and 90 points"),
-        (lambda: of(x=surface().x[:3], z=surface().z[:3]), "too few"),
-        (lambda: of(x=surface().x ** 2), "equal steps"),
-        (lambda: remove_outliers(noise()), "this is noise"),
-        (lambda: fill_holes(of(z=np.where(np.arange(60)[:, None] < 20, np.nan, surface().z))), "33 % of its points"),
-        (lambda: split(of(z=with_nan()), 0.3e-3), "fill the holes"),
-        (lambda: split(surface(), 5e-3), "cutoff 0.005 m must lie between"),
-        (lambda: onto_nodes(surface(), rig_nodes()), "centre it on the patch"),
-        (lambda: onto_nodes(surface(), surface().x[:5, None] * [1.0, 1.0]), "on a line"),
-        (lambda: facing_gap(np.array([np.nan]), np.zeros(1)), "no height"),
-        (lambda: synthetic_pair(1, spacing=0.0), "must be positive"),
-    ],
-)
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda: check(of(z=np.full((60, 90), np.nan))), "no point has a height"),
+    (lambda: check(of(z=surface().z * 1e6)), "median slope is .* give the height unit"),
+    (lambda: check(of(z=surface().z * 1e-7)), "less than an atom"),
+    (lambda: check(of(x=surface().x * 1e6)), "give the lateral unit"),
+    (lambda: check(surface(), (2e-3, 5e-3)), "it covers 0.00118 m in x but the contact 0.002 m"),
+    (lambda: check(surface(), (1e-4, 1.7e-3)), "are map and unit right"),
+    (lambda: of(z=surface().z[:, :-1]), "axes 60 and 90 points"),
+    (lambda: of(x=surface().x[:3], z=surface().z[:3]), "too few"),
+    (lambda: of(x=surface().x ** 2), "equal steps"),
+    (lambda: remove_outliers(noise()), "this is noise"),
+    (lambda: fill_holes(of(z=np.where(np.arange(60)[:, None] < 20, np.nan, surface().z))), "33 % of its points"),
+    (lambda: split(of(z=with_nan()), 0.3e-3), "fill the holes"),
+    (lambda: split(surface(), 5e-3), "cutoff 0.005 m must lie between"),
+    (lambda: onto_nodes(surface(), rig_nodes()), "centre it on the patch"),
+    (lambda: onto_nodes(surface(), surface().x[:5, None] * [1.0, 1.0]), "on a line"),
+    (lambda: facing_gap(np.array([np.nan]), np.zeros(1)), "no height"),
+    (lambda: synthetic_pair(1, spacing=0.0), "must be positive"),
+])  # fmt: skip
 def test_garbage_is_refused_in_one_sentence(call, words):
     with pytest.raises(ValueError, match=words) as refusal:
         call()
@@ -315,29 +309,26 @@ def with_nan():
     return z
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "options", "words"),
-    [
-        ("none.xyz", None, {}, "there is no height map"),
-        ("a.txt", "hello\n", {}, "holds no numbers"),
-        ("a.txt", "", {}, "a.txt is empty"),
-        ("a.sdf", "", {}, "a.sdf is empty"),
-        ("a.sur", "", {}, "a.sur is empty"),
-        ("a.txt", "1 2 3\n4 5\n", {}, "lines of 2 to 3 numbers"),
-        ("a.txt", "1 2 3\noops 5 6\n", {}, "words in line 2"),
-        ("a.txt", "1 2 3 4\n5 6 7 8\n", {}, "give spacing"),
-        ("a.txt", "0 0 1\n0 1 2\n1 0 3\n1.37 1 4\n3 0 2\n", {}, "off a regular grid"),
-        ("a.txt", "0 0 1\n0 0 1\n1 0 1\n1 1 1\n", {}, "twice"),
-        ("a.txt", "1 2\n3 4\n", {"spacing": (1.0, -1.0)}, "two positive steps"),
-        ("a.sdf", sdf_text(surface((5, 4)), Zscale=None), {}, "lacks a number for Zscale"),
-        ("a.sdf", sdf_text(surface((5, 4)), NumPoints=6), {}, "holds 20 heights but announces 6 x 4"),
-        ("a.sdf", sdf_text(surface((5, 4)), Yscale=0), {}, "scale of zero"),
-        ("a.sdf", sdf_text(surface((5, 4)), DataType=9), {}, "DataType 9"),
-        ("a.sdf", sdf_text(surface((5, 4)), Compression=1), {}, "compressed"),
-        ("a.sdf", sdf_text(surface((5, 4))), {"height_unit": MICRO}, "carries its own units"),
-        ("a.sdf", "bISO-1.0 short", {}, "ends within its header"),
-    ],
-)
+@pytest.mark.parametrize(("name", "content", "options", "words"), [
+    ("none.xyz", None, {}, "there is no height map"),
+    ("a.txt", "hello\n", {}, "holds no numbers"),
+    ("a.txt", "", {}, "a.txt is empty"),
+    ("a.sdf", "", {}, "a.sdf is empty"),
+    ("a.sur", "", {}, "a.sur is empty"),
+    ("a.txt", "1 2 3\n4 5\n", {}, "lines of 2 to 3 numbers"),
+    ("a.txt", "1 2 3\noops 5 6\n", {}, "words in line 2"),
+    ("a.txt", "1 2 3 4\n5 6 7 8\n", {}, "give spacing"),
+    ("a.txt", "0 0 1\n0 1 2\n1 0 3\n1.37 1 4\n3 0 2\n", {}, "off a regular grid"),
+    ("a.txt", "0 0 1\n0 0 1\n1 0 1\n1 1 1\n", {}, "twice"),
+    ("a.txt", "1 2\n3 4\n", {"spacing": (1.0, -1.0)}, "two positive steps"),
+    ("a.sdf", sdf_text(surface((5, 4)), Zscale=None), {}, "lacks a number for Zscale"),
+    ("a.sdf", sdf_text(surface((5, 4)), NumPoints=6), {}, "holds 20 heights but announces 6 x 4"),
+    ("a.sdf", sdf_text(surface((5, 4)), Yscale=0), {}, "scale of zero"),
+    ("a.sdf", sdf_text(surface((5, 4)), DataType=9), {}, "DataType 9"),
+    ("a.sdf", sdf_text(surface((5, 4)), Compression=1), {}, "compressed"),
+    ("a.sdf", sdf_text(surface((5, 4))), {"height_unit": MICRO}, "carries its own units"),
+    ("a.sdf", "bISO-1.0 short", {}, "ends within its header"),
+])  # fmt: skip
 def test_bad_files_are_refused_in_one_sentence(name, content, options, words, tmp_path):
     if content is not None:
         (tmp_path / name).write_text(content)

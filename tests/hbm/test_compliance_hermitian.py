@@ -46,14 +46,9 @@ def balance():
     rng = np.random.default_rng(3)
     systems = [random_system(rng, c) for c in (False, True, False)]
     interface = ContactInterface(
-        ("t1", "t2", "n"),
-        np.zeros((N_PAIR, 3)),
-        np.tile(np.eye(3), (N_PAIR, 1, 1)),
-        np.ones(N_PAIR),
-        np.zeros(N_PAIR),
-        systems[1][1],
-        np.zeros((0, 4), int),
-    )
+        ("t1", "t2", "n"), np.zeros((N_PAIR, 3)), np.tile(np.eye(3), (N_PAIR, 1, 1)), np.ones(N_PAIR),
+        np.zeros(N_PAIR), systems[1][1], np.zeros((0, 4), int),
+    )  # fmt: skip
     model = HarmonicModel(systems[1][0], interface, system_of=lambda h: systems[SYSTEM_OF[h]])
     parameters = ContactParameters.of(interface.components, np.full((N_PAIR, 3), 3e3), friction=0.4)
     load = Excitation.of({"rest": 2e3}, {1: {"shaker": 900 - 300j}, 3: {"shaker": 200j}})

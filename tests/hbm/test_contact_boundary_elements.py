@@ -1,10 +1,7 @@
 """The rough law beside boundary elements on a half space (tamaas): one sphere, and a random face from its height map.
 
 The law's asperities neither merge nor sink with their neighbours, and all have one radius; the boundary elements have
-none of these limits. The approach is that of the mean plane of the deformed face in both.
-"""
-
-from __future__ import annotations
+none of these limits. The approach is that of the mean plane of the deformed face in both."""
 
 import numpy as np
 import pytest

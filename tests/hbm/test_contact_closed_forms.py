@@ -47,8 +47,7 @@ def test_planar_coulomb_on_a_circle(n_samples, ratio):
     It lags by alpha with sin alpha = r / A, and T of size mu N is tangent to its circle, so
     T = mu N (-sin(t - alpha), cos(t - alpha)) and E = 2 pi A mu N sqrt(1 - r^2 / A^2). The implicit step gives the
     friction of the middle of a step to its end: for large A the phase is off by half a step, pi / n_samples, and by
-    less with chords, which follow the slider from sample to sample exactly.
-    """
+    less with chords, which follow the slider from sample to sample exactly."""
     kt, mu, load = 2.0, 0.4, 5.0
     limit = mu * load
     amplitude = ratio * limit / kt
@@ -86,8 +85,7 @@ def test_planar_coulomb_on_a_circle_converges_with_the_samples():
 def test_planar_coulomb_is_right_to_a_thousandth_at_128_samples(top):
     """Under turning friction, with stick, slip, lift and pairs that come to stick; against 16384 implicit steps.
 
-    A sampled force has kinks, and that of unequal springs steps implicitly: see the law
-    """
+    A sampled force has kinks, and that of unequal springs steps implicitly: see the law"""
     law, rng = contact_law.load("coulomb_planar"), np.random.default_rng(0)
     saved = tuple(range(top + 1))
     fine, typical = HarmonicBasis(saved, 2**14), HarmonicBasis(saved, 128)
@@ -116,8 +114,7 @@ def test_planar_coulomb_is_right_to_a_thousandth_at_128_samples(top):
 def test_a_planar_slider_that_can_just_stick_comes_to_the_middle_of_its_ellipse(more, side):
     """Ellipse of half-axes 1 + more and 0.3 about (0, side), leash 1: the slider may stand across it up to
     sqrt(1 - (1 + more)^2) off the middle, which is where it comes to from outside; each cycle moves it by the cube of
-    its distance, so that marching alone does not end.
-    """
+    its distance, so that marching alone does not end."""
     basis = HarmonicBasis((0, 1), 128)
     x = np.array([[[0.0, 1 + more, 0.0], [side, 0.0, 0.3], [1.0, 0.0, 0.0]]])
     parameters = ContactParameters.of(("t1", "t2", "n"), [[1.0, 1.0, 1.0]], friction=1.0)

@@ -1,7 +1,6 @@
 """What every contact law must obey, run over every law file and every set of its components.
 
-The laws of the package are found by their names, those of tests/hbm/laws by their files; see contact_draws.
-"""
+The laws of the package are found by their names, those of tests/hbm/laws by their files; see contact_draws."""
 
 import numpy as np
 import pytest
@@ -157,8 +156,7 @@ def test_friction_stays_within_its_limit_and_the_normal_force_pushes(name, compo
 def test_no_law_makes_energy(name, components):
     """Work of the tangential forces over a cycle; exactly >= 0 where sampled closed or located, not where a pair lifts.
 
-    Without friction it is zero: to rounding if located or smooth.
-    """
+    Without friction it is zero: to rounding if located or smooth."""
     law = contact_law.load(name)
     t = tangential(components)
     for way in transitions_of(name, components):

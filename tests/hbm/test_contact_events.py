@@ -1,7 +1,5 @@
 """Transitions of any law located from its own steps: beside the closed forms of laws that locate them themselves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

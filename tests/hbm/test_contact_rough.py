@@ -1,9 +1,5 @@
 """Rough contact: one asperity against Hertz, Mindlin and Cattaneo, a face against its sum, cycles against marching."""
 
-from __future__ import annotations
-
-import time
-
 import numpy as np
 import pytest
 
@@ -207,28 +203,3 @@ def test_a_law_without_its_table_or_with_a_wrong_one_is_one_sentence():
             contact_law.complete("rough", wrong)
     with pytest.raises(ValueError, match="takes no table"):
         contact_law.complete("jenkins", ContactParameters.of(ALL, np.ones((1, 3)), table=FACE, friction=0.1))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("swing", [1e-9, 3e-8, 1e-6])
-def test_an_evaluation_costs_so_many_of_jenkins(swing: float, capsys: pytest.CaptureFixture[str]):
-    """Harmonics 0 to 3, 128 samples, with the Jacobian: seconds of the processor per pair, printed."""
-    basis, n = HarmonicBasis((0, 1, 2, 3), 128), 250
-    rng = np.random.default_rng(0)
-    x = np.zeros((n, 3, basis.n_coeff))
-    x[:, 2, 0] = rng.uniform(5e-6, 9e-6, n)
-    springs = ContactParameters.of(ALL, np.full((n, 3), 1e7), friction=MU)
-    laws = [("rough", face(n)), ("jenkins", contact_law.complete("jenkins", springs))]
-    memory = [rough.memory_at_rest(x[:, :, 0], laws[0][1]), np.zeros((n, 2))]
-    x[:, :, 1:3] += swing * rng.normal(size=(n, 3, 2)) * np.array([1.0, 0.3, 0.3])[:, None]
-    cost = []
-    for (name, parameters), start in zip(laws, memory, strict=True):
-        law, times = contact_law.load(name), []
-        for _ in range(6):  # the first compiles
-            clock = time.process_time()
-            aft.cycle(law, x, parameters, basis, start)
-            times.append((time.process_time() - clock) / n)
-        cost.append(min(times))
-    with capsys.disabled():
-        print(f"\nswing {swing:.0e} m: {1e6 * cost[0]:.3g} us a pair, jenkins {1e6 * cost[1]:.3g} us")
-    assert cost[0] < 300 * cost[1]

@@ -268,21 +268,18 @@ def test_ratio_beside_the_published_patches(sides, published):
     assert k_n > 2e9
 
 
-@pytest.mark.parametrize(
-    ("call", "word"),
-    [
-        (lambda: rectangular_punch(0.0, 1e-3, *STEEL), "a is 0"),
-        (lambda: rectangular_punch(1.0, 1e-10, *STEEL), "check their units"),
-        (lambda: rectangular_punch(1e-3, 1e-3, 210e9, 0.6, 210e9, 0.3), "nu1"),
-        (lambda: rectangular_punch(1e-3, 1e-3, inf, 0.3, inf, 0.3), "elastic"),
-        (lambda: rectangular_punch(1e-3, 1e-3, *STEEL, edge_radius=1e-4), "give load"),
-        (lambda: rectangular_punch(1e-3, 1e-3, *STEEL, edge_radius=-1.0), "edge_radius"),
-        (lambda: PUNCH.stiffness(LINE_LOAD, 1e-3), "too shallow"),
-        (lambda: PUNCH.shear_traction(0.0, 1.0, 0.6, 0.5), "slides"),
-        (lambda: RoundedPunch(0.0, 0.0, MIXED), "no shape"),
-        (lambda: PUNCH.half_contact(-1.0), "load"),
-    ],
-)
+@pytest.mark.parametrize(("call", "word"), [
+    (lambda: rectangular_punch(0.0, 1e-3, *STEEL), "a is 0"),
+    (lambda: rectangular_punch(1.0, 1e-10, *STEEL), "check their units"),
+    (lambda: rectangular_punch(1e-3, 1e-3, 210e9, 0.6, 210e9, 0.3), "nu1"),
+    (lambda: rectangular_punch(1e-3, 1e-3, inf, 0.3, inf, 0.3), "elastic"),
+    (lambda: rectangular_punch(1e-3, 1e-3, *STEEL, edge_radius=1e-4), "give load"),
+    (lambda: rectangular_punch(1e-3, 1e-3, *STEEL, edge_radius=-1.0), "edge_radius"),
+    (lambda: PUNCH.stiffness(LINE_LOAD, 1e-3), "too shallow"),
+    (lambda: PUNCH.shear_traction(0.0, 1.0, 0.6, 0.5), "slides"),
+    (lambda: RoundedPunch(0.0, 0.0, MIXED), "no shape"),
+    (lambda: PUNCH.half_contact(-1.0), "load"),
+])  # fmt: skip
 def test_bad_numbers_are_refused_in_one_sentence(call, word):
     with pytest.raises(ValueError, match=word) as refusal:
         call()

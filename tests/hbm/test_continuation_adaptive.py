@@ -1,7 +1,5 @@
 """Adaptive points: interpolation error at the tolerance, far fewer points than equidistant ones, jumps told."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,8 +16,7 @@ def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
     """Response between the points of a branch, by the cubic through the four nearest points.
 
     values : (n,) of the stepped parameter, within the branch
-    Returns (n, n_output, n_coeff) Fourier coefficients of the outputs [m]
-    """
+    Returns (n, n_output, n_coeff) Fourier coefficients of the outputs [m]"""
     order = np.argsort(branch.parameter)
     reference, response = branch.parameter[order], branch.response[order]
     window = min(EXTRAPOLATION_DEGREE + 1, len(reference))

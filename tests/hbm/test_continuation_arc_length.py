@@ -1,7 +1,5 @@
 """Pseudo arc length: closed-form folds, kinks, corners, several pairs, parameters, and where it ends."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Folds against a second parameter: closed form, round the cusp, against branches traced anew, and refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -112,6 +110,5 @@ def test_a_fold_whose_points_rounding_holds_in_place_is_found_in_few_solves(duff
         ends.append(curve_segment.CurvePoint.of(value, solution, tangent))
     monkeypatch.setattr(curve_segment.bordered, "correct", rounded)
     fold = curve_segment.locate_fold(path, curve_segment.Segment(*ends, metric), newton, 1e-9)
-    assert fold is not None
     assert len(solves) < 20
     np.testing.assert_allclose(fold.value, duffing_branch.omega[i], rtol=1e-7)

@@ -1,7 +1,5 @@
 """Closed curves beside the main one: each step stays on its branch, whatever the length of the steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

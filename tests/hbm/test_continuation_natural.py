@@ -1,10 +1,11 @@
 """Natural continuation at folds: it jumps where the closed form has them, says so, and goes on."""
 
-from __future__ import annotations
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from proof import branches
 from tests.helpers.continuation_models import Duffing, Lifting
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.methods import arc_length, natural
@@ -57,3 +58,18 @@ def test_it_jumps_in_the_load_too():
         branch = natural.follow(path, start, stop, Options(n_points=25))
         assert branch.ended is BranchEnd.JUMPED
         np.testing.assert_allclose(branch.parameter[list(branch.folds)], folds.parameter[fold], rtol=1e-8)
+
+
+@pytest.mark.parametrize("seed", [13, 30, 34, 87])
+def test_planar_friction_at_the_default_samples_is_followed_to_the_end(seed: int) -> None:
+    """Two lost their whole curve to a search for a periodic slider, two ended at a value without a solution."""
+    problem = branches.problem(seed, "sampled")
+    contact = problem.balance.contact
+    planar = replace(contact, joints=tuple(replace(joint, law="coulomb_planar") for joint in contact.joints))
+    springs = contact.stiffness[:, [0, 0, 2]]
+    planar = planar.with_parameters(lambda parameters: replace(parameters, stiffness=springs))
+    balance = replace(problem.balance, contact=planar, memory=np.zeros((contact.n_pair, 2)))
+    branch = natural.follow(balance, problem.low, problem.high, Options(n_points=41))
+    assert branch.omega[-1] == problem.high, branch.end
+    unsolved = [f"{hertz:.6g} Hz" for hertz in branch.frequency[~branch.converged]]
+    assert all(place in str(branch.end) for place in unsolved)

@@ -1,7 +1,5 @@
 """Tests under control: constant response and phase resonance beside closed forms and beside constant force."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -47,7 +45,6 @@ def test_constant_response_of_a_duffing_oscillator_is_the_closed_form_where_cons
     np.testing.assert_allclose(phase, -np.angle(needed), atol=1e-6)
     assert result.load_factor.min() * 10 < result.load_factor.max()
     peak = result.peak("mass")  # where it takes least, up to the spacing of points
-    assert peak is not None
     np.testing.assert_allclose(result.omega[peak], np.sqrt((STIFFNESS + KT + 0.75 * CUBIC * a**2) / MASS), rtol=0.1)
     force = FORCE * result.load_factor[peak + 1]  # the curve of that force folds, and goes through the same state
     curve = arc_length.follow(balance.with_load(force / FORCE), 100.0, 2000.0)

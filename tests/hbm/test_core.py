@@ -1,7 +1,5 @@
 """The compliance form beside the dense algorithm, its derivatives, the tracked peak and both wear rules."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -108,9 +106,7 @@ def test_nothing_slips_below_the_friction_limit(model: ReducedModel) -> None:
 
 
 @pytest.mark.parametrize(("located", "in_frequency", "in_amplitude"), [(True, 1e-6, 1e-7), (False, 1e-4, 1e-5)])
-def test_tracked_peak_is_that_of_a_fine_sweep(
-    model: ReducedModel, located: bool, in_frequency: float, in_amplitude: float
-) -> None:
+def test_tracked_peak_is_that_of_a_fine_sweep(model, located, in_frequency, in_amplitude):
     """Forces at equidistant samples bend the curve in steps, where a peak is no better known than they are wide."""
     balance = balance_of(model)
     balance = balance.with_samples(balance.basis.n_samples, located)

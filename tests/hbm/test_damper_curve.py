@@ -1,7 +1,5 @@
 """The performance curve of a friction damper, peak amplitude over its load, against its closed form (Griffin 1980)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
@@ -37,8 +35,7 @@ def peak(limit: float, harmonics: tuple[int, ...] = (1,)) -> float:
 def chain_peak(limit: float, waves: int, blades: int = 6) -> tuple[float, float]:
     """Peak amplitude of a chain without symmetry of blades, a shroud between neighbours; and how far blades differ.
 
-    Every blade is a mode as above; the force is a wave of so many nodal diameters, shrouds slip at a limit [N]
-    """
+    Every blade is a mode as above; the force is a wave of so many nodal diameters, shrouds slip at a limit [N]"""
     item, angle = np.eye(blades), 2 * np.pi * waves / blades * np.arange(blades)
     observed = {f"tip {k}": item[k] for k in range(blades)}
     system = SecondOrderSystem(item, item, DAMPING * item, {"cos": np.cos(angle), "sin": np.sin(angle)}, observed)

@@ -1,7 +1,5 @@
 """Derivatives of a solved balance are those of balances solved again, for every contact law, and at a peak."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

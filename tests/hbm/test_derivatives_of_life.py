@@ -1,7 +1,5 @@
 """Derivatives of a life against the same steps taken again, laws of scaling, and where there is none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 
@@ -73,15 +71,11 @@ def found_of(problem, worn, site, names, share=SHARE, numbers=None):
     return tangent.of_life(problem, worn, changes, numbers or {"coefficient": ("coefficient", ["contact"])}, share)
 
 
-@pytest.mark.parametrize(
-    ("rule", "site", "names"),
-    [
-        ("error_controlled", AT, ("friction", "gap")),
-        ("thesis", AT, ("press",)),
-        pytest.param("error_controlled", PEAK, ("friction", "t1", "shake", "gap"), marks=pytest.mark.slow),
-    ],
-    ids=["frequency", "thesis", "peak"],
-)
+@pytest.mark.parametrize(("rule", "site", "names"), [
+    ("error_controlled", AT, ("friction", "gap")),
+    ("thesis", AT, ("press",)),
+    pytest.param("error_controlled", PEAK, ("friction", "t1", "shake", "gap"), marks=pytest.mark.slow),
+], ids=["frequency", "thesis", "peak"])  # fmt: skip
 def test_derivatives_of_a_life_are_those_of_its_steps_taken_again(rule, site, names):
     problem = problem_of(site)
     if rule == "thesis":
@@ -117,20 +111,16 @@ TWO_DUTIES = (Duty(AT, 0.6), Duty(AtFrequency("tip", 300.0, EXACT), 0.4, 1.3))
 NEAR_PEAK = (Duty(AtPeakRatio(PEAK, 0.97)),)
 
 
-@pytest.mark.parametrize(
-    ("law", "mission", "names"),
-    [
-        ("own", (Duty(AT),), ("friction", "depth", "cycles")),
-        ("energy", TWO_DUTIES, ("shake", "gap")),
-        pytest.param("archard", TWO_DUTIES, ("friction", "coefficient"), marks=pytest.mark.slow),
-        pytest.param("impact", (Duty(AT),), ("friction",), marks=pytest.mark.slow),
-        pytest.param("energy", NEAR_PEAK, ("friction", "shake"), marks=pytest.mark.slow),
-        pytest.param(
-            "energy", (*TWO_DUTIES[:1], Duty(NEAR_PEAK[0].site, 0.4)), ("friction", "gap"), marks=pytest.mark.slow
-        ),
-    ],
-    ids=["own", "mission", "archard", "impact", "beside", "both"],
-)
+@pytest.mark.parametrize(("law", "mission", "names"), [
+    ("own", (Duty(AT),), ("friction", "depth", "cycles")),
+    ("energy", TWO_DUTIES, ("shake", "gap")),
+    pytest.param("archard", TWO_DUTIES, ("friction", "coefficient"), marks=pytest.mark.slow),
+    pytest.param("impact", (Duty(AT),), ("friction",), marks=pytest.mark.slow),
+    pytest.param("energy", NEAR_PEAK, ("friction", "shake"), marks=pytest.mark.slow),
+    pytest.param(
+        "energy", (*TWO_DUTIES[:1], Duty(NEAR_PEAK[0].site, 0.4)), ("friction", "gap"), marks=pytest.mark.slow
+    ),
+], ids=["own", "mission", "archard", "impact", "beside", "both"])  # fmt: skip
 def test_other_laws_and_missions_have_the_derivatives_of_their_steps_taken_again(tmp_path, law, mission, names):
     """Where pairs lift, archard's sum over samples is rough: that is marked, and differences meet it to 1 % only."""
     (tmp_path / "own.py").write_text(OWN_LAW)
@@ -203,10 +193,8 @@ def test_where_a_life_has_no_derivative_is_a_sentence():
     problem = problem_of(AT)
     worn = evolve(error_controlled.Rule(problem, Tolerance(0.3, 2e-4)))
     jumped, marched, stepped = (
-        worn.duty_omega.copy(),
-        np.zeros(len(worn.cycles), int),
-        worn.memory["next_cycles"].copy(),
-    )
+        worn.duty_omega.copy(), np.zeros(len(worn.cycles), int), worn.memory["next_cycles"].copy(),
+    )  # fmt: skip
     jumped[2:] *= 1.5
     marched[1], stepped[1] = 3, 0.0
     moving = np.zeros((len(marched), 1))

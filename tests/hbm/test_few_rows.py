@@ -1,7 +1,5 @@
 """Products of few rows with a matrix in pieces are the product itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Flutter of a small wheel and its limit cycles by friction: eigenvalues of the whole wheel, and time integration."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -52,8 +50,7 @@ def wave(factor=1.0):
 def wheel_with_flow(reduced: ReducedSector, wheel: ReducedModel, springs: np.ndarray, flow: Flow) -> ReducedModel:
     """All sectors of a wheel, alike or not, with the forces of a flow on the modes of the wheel of sectors alike.
 
-    wheel : of `cyclic.wheel_model`, damped or not; springs : (n_pair, n_component) of one sector
-    """
+    wheel : of `cyclic.wheel_model`, damped or not; springs : (n_pair, n_component) of one sector"""
     sector, n = reduced.sector, reduced.sector.n_sectors
     transform = seam_parts(sector)[0].T  # a sector's own coordinates from all of them
     total = [np.zeros((wheel.system.n_dof, wheel.system.n_dof), complex) for _ in range(4)]

@@ -1,7 +1,5 @@
 """Small problems with hard contacts, or with nothing but their contact: solved from rest and followed past grazing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -33,7 +31,7 @@ def test_a_hard_stop_is_followed_past_grazing_from_both_ends():
     assert len(ups) >= 2
     np.testing.assert_allclose([ups[0], ups[-1]], [downs[0], downs[-1]], rtol=1e-6)
     softer = arc_length.follow(stopped(1e4), 0.5, 2.0)
-    limit = 1.4813  # to which the stops tend, as hardness^-1/2: 1.4862, 1.4823, 1.4815
+    limit = 1.5847  # to which the stops tend, as hardness^-1/2: 1.5891 at 1e4, 1.5849 at 1e7
     assert abs(up.amplitude("mass").max() - limit) < 0.1 * abs(softer.amplitude("mass").max() - limit)
     for omega, contact in list(zip(up.omega, up.contact, strict=True))[::20]:
         balance = stopped(hardness)

@@ -1,7 +1,5 @@
 """Choice of harmonics: the estimate is the true change, and the set is the smallest that brute force finds."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The highest peak of several outputs, from the points of a scan."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -50,7 +48,6 @@ def test_the_peak_is_the_one_that_its_slope_finds() -> None:
     branch = adaptive.follow(balance, site.start, site.stop, adaptive.Options(tolerance=0.03, newton=site.newton))
     result, selection = highest_peak.highest(balance, branch, [site.output], replace(site, output="none"))
     exact = site.solve(balance)
-    assert result is not None
     assert selection == 0
     assert result.amplitude == pytest.approx(exact.amplitude, rel=1e-4)
     assert result.state.omega == pytest.approx(exact.state.omega, rel=1e-3)

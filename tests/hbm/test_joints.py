@@ -1,7 +1,5 @@
 """Several joints in one balance: a face cut in two is the face, two laws are two models, what a joint does not see."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

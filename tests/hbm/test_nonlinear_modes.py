@@ -1,7 +1,5 @@
 """Backbones: the stuck linear mode at small amplitude, closed forms, and the forced response they organise."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -38,36 +36,34 @@ def jenkins(n_samples: int = 8192) -> HarmonicBalance:
     )
 
 
-def test_frequency_and_damping_of_a_jenkins_element_are_the_closed_form():
-    slip = LIMIT / KT
-    mode = backbone(jenkins(), 0.1 * slip, 100 * slip)
-    assert str(mode.end).startswith("reached")
-    x = mode.amplitude
-    slides = x > slip
-    theta = np.arccos(np.where(slides, 1 - 2 * slip / x, -1.0))
-    in_phase = KT / np.pi * (theta - np.sin(theta) * np.cos(theta))
-    dissipated = 4 * LIMIT * np.maximum(x - slip, 0.0)
-    omega = np.sqrt((STIFFNESS + in_phase) / MASS)
+SLIP = LIMIT / KT
+
+
+def closed_form(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frequency, damping and energy per cycle over the amplitude."""
+    theta = np.arccos(np.where(x > SLIP, 1 - 2 * SLIP / x, -1.0))
+    omega = np.sqrt((STIFFNESS + KT / np.pi * (theta - np.sin(theta) * np.cos(theta))) / MASS)
+    dissipated = 4 * LIMIT * np.maximum(x - SLIP, 0.0)
     viscous = 2 * RATIO * np.sqrt(MASS * STIFFNESS)
-    zeta = viscous / (2 * MASS * omega) + dissipated / (2 * np.pi * MASS * omega**2 * x**2)
+    return omega, viscous / (2 * MASS * omega) + dissipated / (2 * np.pi * MASS * omega**2 * x**2), dissipated
+
+
+def test_frequency_and_damping_of_a_jenkins_element_are_the_closed_form():
+    mode = backbone(jenkins(), 0.1 * SLIP, 100 * SLIP)
+    assert str(mode.end).startswith("reached")
+    omega, zeta, dissipated = closed_form(mode.amplitude)
     np.testing.assert_allclose(mode.omega, omega, rtol=1e-6)
     np.testing.assert_allclose(mode.damping, zeta, rtol=2e-6)
-    np.testing.assert_allclose(mode.response[:, 0, 1], x, rtol=1e-9)
+    np.testing.assert_allclose(mode.response[:, 0, 1], mode.amplitude, rtol=1e-9)
     np.testing.assert_allclose(mode.energy, dissipated, rtol=1e-6, atol=1e-9 * dissipated.max())
     assert mode.damping.max() > 9 * RATIO
 
 
 @pytest.mark.parametrize("between", [1e-3, 1e-4])
 def test_straight_lines_between_points_miss_no_more_than_asked_where_slip_begins(between):
-    slip = LIMIT / KT
-    mode = backbone(jenkins(), 0.1 * slip, 100 * slip, options=BackboneOptions(between=between))
+    mode = backbone(jenkins(), 0.1 * SLIP, 100 * SLIP, options=BackboneOptions(between=between))
     log_x = np.linspace(*np.log(mode.amplitude[[0, -1]]), 2001)
-    x = np.exp(log_x)
-    slides = x > slip
-    theta = np.arccos(np.where(slides, 1 - 2 * slip / x, -1.0))
-    omega = np.sqrt((STIFFNESS + KT / np.pi * (theta - np.sin(theta) * np.cos(theta))) / MASS)
-    dissipated = 4 * LIMIT * np.maximum(x - slip, 0.0)
-    zeta = RATIO * np.sqrt(STIFFNESS / MASS) / omega + dissipated / (2 * np.pi * MASS * omega**2 * x**2)
+    omega, zeta, _ = closed_form(np.exp(log_x))
     exact = np.log(mode.amplitude)
     assert np.abs(np.interp(log_x, exact, mode.omega) / omega - 1).max() < 1.5 * between
     assert np.abs(np.interp(log_x, exact, mode.damping) - zeta).max() < 1.5 * between

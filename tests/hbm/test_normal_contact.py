@@ -1,14 +1,12 @@
 """Unilateral contact alone: only normal unknowns, rigid-body modes, moving ground, chattering and impact wear."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from proof.chatter import chatter, sign_changes
 from tests.helpers.verification_models import floating_beam
 from tribodyn.hbm import newton
-from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS, ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.excitation import Excitation
@@ -93,10 +91,13 @@ def _coordinates(balance, state):
 def test_rigid_modes_agree_with_time_integration():
     balance = shaken(shake=0.25, harmonics=tuple(range(14)))
     solution = newton.solve_from_rest(balance, OMEGA)
-    motion = time_integration.integrate(balance, OMEGA, solution.state, Options(steps=2048))
+    assert_agrees_in_time(balance, solution.state)
+
+
+def assert_agrees_in_time(balance: HarmonicBalance, state: State) -> None:
+    motion = time_integration.integrate(balance, OMEGA, state, Options(steps=2048))
     theirs = motion.coefficients(motion.outputs, balance.basis)
-    ours = balance.outputs(solution.state)
-    assert np.abs(ours - theirs).max() < 2e-3 * np.abs(theirs).max()
+    assert np.abs(balance.outputs(state) - theirs).max() < 2e-3 * np.abs(theirs).max()
     assert motion.outcome == CONVERGED
 
 
@@ -151,9 +152,7 @@ def test_moving_ground_agrees_with_time_integration():
     )
     solution = newton.solve_from_rest(balance, OMEGA)
     assert (solution.state.cycle.status & SEPARATES).any()
-    motion = time_integration.integrate(balance, OMEGA, solution.state, Options(steps=2048))
-    theirs = motion.coefficients(motion.outputs, balance.basis)
-    assert np.abs(balance.outputs(solution.state) - theirs).max() < 2e-3 * np.abs(theirs).max()
+    assert_agrees_in_time(balance, solution.state)
 
 
 def test_sign_changes_of_a_cosine_are_its_roots():
@@ -174,13 +173,13 @@ def test_sign_changes_of_a_cosine_are_its_roots():
         np.testing.assert_allclose(result, rough, atol=4e-4)
 
 
+KNOWN = np.zeros((9, 1, 3))  # three pairs always closed, never, and by 0.5 + sin for 2/3 of the cycle
+KNOWN[:3, 0] = [[1.0, 0.5, 0.0], [-1.0, 0.5, 0.0], [0.5, 0.0, 1.0]]
+
+
 def test_chatter_of_a_cycle_that_is_known():
     balance = shaken(harmonics=(0, 1))
-    x = np.zeros((9, 1, 3))
-    x[0, 0] = [1.0, 0.5, 0.0]  # always closed
-    x[1, 0] = [-1.0, 0.5, 0.0]  # never
-    x[2, 0] = [0.5, 0.0, 1.0]  # 0.5 + sin: closed for 2/3 of the cycle
-    result = chatter(balance, balance.evaluate(OMEGA, x))
+    result = chatter(balance, balance.evaluate(OMEGA, KNOWN))
     period = 2 * np.pi / OMEGA
     np.testing.assert_allclose(result.touching[:3], [1.0, 0.0, 2 / 3])
     np.testing.assert_allclose(result.contact_duration[:3], period * result.touching[:3])
@@ -188,19 +187,15 @@ def test_chatter_of_a_cycle_that_is_known():
     np.testing.assert_allclose(result.opening[2] / period, [7 / 12])
     np.testing.assert_allclose(result.closing[2] / period, [11 / 12])
     np.testing.assert_allclose(result.impact_velocity[:3], [0, 0, OMEGA * np.sqrt(0.75)])
-    with_gap = chatter(balance.with_gap(np.full(9, 0.5)), balance.evaluate(OMEGA, x))
+    with_gap = chatter(balance.with_gap(np.full(9, 0.5)), balance.evaluate(OMEGA, KNOWN))
     assert with_gap.touching[2] == pytest.approx(0.5)
 
 
 def test_impact_work_is_that_of_the_deepest_compression():
     balance = shaken(harmonics=(0, 1), samples=4096)
-    x = np.zeros((9, 1, 3))
-    x[0, 0] = [1.0, 0.5, 0.0]
-    x[1, 0] = [-1.0, 0.5, 0.0]
-    x[2, 0] = [0.5, 0.0, 1.0]
     k = balance.contact.stiffness[0, 0]
     base = {"coefficient": np.full(9, 3e-12)}
-    exposure = Exposure(balance, balance.evaluate(OMEGA, x), np.full(9, 2e-4), base, np.zeros(9), 0.0)
+    exposure = Exposure(balance, balance.evaluate(OMEGA, KNOWN), np.full(9, 2e-4), base, np.zeros(9), 0.0)
     np.testing.assert_allclose(impact_work(exposure)[:3], [0.0, 0.0, k * 1.5**2 / 2], rtol=1e-5)
     angle = 2 * np.pi * np.arange(400) / 400
     spring = 0.2 + 0.1 * np.cos(angle)

@@ -1,7 +1,5 @@
 """The preload that is left when the vibration stops, as the end of a wear run."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import root
@@ -51,7 +49,6 @@ def static_preload(problem: WearProblem, depth: np.ndarray) -> float:
 def test_a_run_ends_where_the_preload_at_rest_is_lost(problem: WearProblem, rule: str) -> None:
     result = worn(problem, rule)
     at_rest = result.preload_at_rest
-    assert at_rest is not None
     assert str(result.end) == f"{WearEnd.LOST_AT_REST.say()} 0.4 of its first value"
     assert at_rest[-1] <= 0.4 * at_rest[0] < at_rest[-2]
     assert result.cycles_in_step[-1] == 0.0

@@ -1,14 +1,12 @@
 """Stiff springs against rigid contact in closed form: Den Hartog's mass on a spring with Coulomb friction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from proof.extremes_models import rigid
+from proof.hard_settings.extremes_models import rigid
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.newton import NewtonOptions
@@ -19,8 +17,7 @@ MASS_SPRING, FORCE, NORMAL, FRICTION = 1e6, 60.0, 100.0, 0.2  # N/m, N, N; natur
 def den_hartog(ratio: float) -> float:
     """Amplitude [m] of the motion without stops under rigid Coulomb friction; ratio : of driving to natural frequency.
 
-    Source  Den Hartog 1931, Trans. ASME 53, APM-53-9
-    """
+    Source  Den Hartog 1931, Trans. ASME 53, APM-53-9"""
     magnified = 1 / (1 - ratio**2)
     damped = np.sin(np.pi / ratio) / (ratio * (1 + np.cos(np.pi / ratio)))
     return float(FORCE / MASS_SPRING * np.sqrt(magnified**2 - (FRICTION * NORMAL / FORCE * damped) ** 2))

@@ -1,7 +1,5 @@
 """Units mean nothing: scaled by 1e-9 to 1e9 in length or in force, the problem has the scaled solution."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A wedge that a load presses between two walls slides to where friction and the walls hold it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -43,7 +41,6 @@ def test_a_wedge_slides_to_where_friction_holds_it(degrees: float) -> None:
     angle = np.radians(degrees)
     balance = wedge(angle)
     result = solve_along_friction(balance, OMEGA, NewtonOptions())
-    assert result is not None
     assert result.converged
     tangential, normal = result.state.cycle.force[:, :, 0].T
     expected = LOAD / 2 / (np.sin(angle) + FRICTION * np.cos(angle))

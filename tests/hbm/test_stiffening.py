@@ -1,15 +1,13 @@
 """Contacts far stiffer than the body, which lift and slip: solved, and held against the dense free structure."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from proof.extremes_march import march_checks
-from proof.extremes_models import Setting, lattice
+from proof.hard_settings.extremes_march import march_checks
+from proof.hard_settings.extremes_models import Setting, lattice
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
@@ -65,7 +63,6 @@ def test_the_limit_of_stiff_springs_is_come_to() -> None:
     for stiffness in (1e10, 1e11, 1e12):
         setting = replace(body.ordinary, tangential=stiffness, normal=stiffness)
         solution = solve_along_stiffness(body.balance(setting), setting.omega, NewtonOptions())
-        assert solution is not None
         rows.append(solution.state.cycle.force[:, 2])
     steps = [np.linalg.norm(b - a) for a, b in pairwise(rows)]
     assert steps[1] < 0.7 * steps[0]

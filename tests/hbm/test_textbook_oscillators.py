@@ -1,7 +1,5 @@
 """Oscillators of the textbooks: a curve in closed form, grazing, doubled periods, motions that are not periodic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

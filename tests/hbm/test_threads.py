@@ -1,7 +1,5 @@
 """Threads: every entry of the solver takes one by itself, gives back what it found, and minds who asks for more."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits

@@ -32,16 +32,13 @@ def solved(balance, frequency):
     return solution.state
 
 
-@pytest.mark.parametrize(
-    ("disk_radius", "engine_order", "frequency", "observed"),
-    [
-        (0.0, 3, 310.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),
-        (0.0, 2, 250.0, {STICKS | SLIPS}),  # harmonic 2 is index 4, real; harmonic 3 is index -2
-        (0.02, 1, 250.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),
-        (0.02, 4, 310.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),  # harmonic 2 is index 0: all sectors in phase
-        (0.02, 0, 250.0, None),  # everything in phase: every harmonic sees one real system
-    ],
-)
+@pytest.mark.parametrize(("disk_radius", "engine_order", "frequency", "observed"), [
+    (0.0, 3, 310.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),
+    (0.0, 2, 250.0, {STICKS | SLIPS}),  # harmonic 2 is index 4, real; harmonic 3 is index -2
+    (0.02, 1, 250.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),
+    (0.02, 4, 310.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),  # harmonic 2 is index 0: all sectors in phase
+    (0.02, 0, 250.0, None),  # everything in phase: every harmonic sees one real system
+])  # fmt: skip
 def test_one_sector_is_the_whole_wheel(sectors, disk_radius, engine_order, frequency, observed):
     """Item 2 of the issue: to 1e-6, in every sector, displacement, force and output."""
     item, wheel = small.wave_and_wheel(sectors[disk_radius], engine_order)
@@ -196,8 +193,7 @@ def test_responses_to_several_engine_orders(sectors):
 def test_mistuned_wheel_is_made_of_the_same_parts(sectors):
     """Stiffness deviations of a few per cent: an example of what cyclic symmetry cannot say.
 
-    The same reduced sector, eight times, each with its own factor on the stiffness; the load runs round as before
-    """
+    The same reduced sector, eight times, each with its own factor on the stiffness; the load runs round as before"""
     deviation = np.array([0.03, -0.02, 0.01, -0.04, 0.02, 0.0, -0.01, 0.04])
     basis_order = 3
     tuned, _ = small.wave_and_wheel(sectors[0.0], basis_order, harmonics=(0, 1))

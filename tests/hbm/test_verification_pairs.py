@@ -1,7 +1,5 @@
 """Many pairs with variable normal load and separation: balance against time integration as harmonics are added."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -101,13 +99,6 @@ def test_four_periodic_motions_at_one_frequency_and_time_integration_finds_each(
     for result in computed.values():
         assert result.outcome == CONVERGED
         assert max(result.largest, result.waveform["edge"], result.contact) < 0.01
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("top", "bound"), [(15, 2e-3), (25, 1e-3)])
-def test_55_sliding_pairs_keep_converging(top, bound):
-    _, errors, _ = slab_verified(BESIDE_RESONANCE, top, steps=4096)
-    assert max(errors) < bound
 
 
 @pytest.mark.parametrize("law", ["jenkins", "coulomb_planar"])

@@ -1,7 +1,5 @@
 """Travelling waves in time, on as many sectors as they need, against the whole wheel and against the balance."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stability of travelling waves against every perturbation wave, held against the whole wheel."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Wear laws: archard beside energy, laws whose depth per work changes, files of one's own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -64,14 +62,11 @@ def test_a_file_that_is_no_wear_law_is_refused(tmp_path: Path, text: str | None,
         wear_law.load(str(path))
 
 
-@pytest.mark.parametrize(
-    ("body", "says"),
-    [
-        ("return exposure.enrgy", "cannot be run: AttributeError: .* 'enrgy'"),
-        ("return exposure.energy[:1]", r"depths of shape \(1,\) and not"),
-        ("return exposure.energy + float('nan')", "not finite"),
-    ],
-)
+@pytest.mark.parametrize(("body", "says"), [
+    ("return exposure.enrgy", "cannot be run: AttributeError: .* 'enrgy'"),
+    ("return exposure.energy[:1]", r"depths of shape \(1,\) and not"),
+    ("return exposure.energy + float('nan')", "not finite"),
+])  # fmt: skip
 def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, says: str) -> None:
     path = tmp_path / "law.py"
     path.write_text(f"def depth_rate(exposure):\n    {body}\n")
@@ -82,3 +77,10 @@ def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, say
 def test_a_law_that_takes_nothing_off_is_not_called_a_contact_at_rest() -> None:
     worn = evolve(thesis.Rule(wear_problem(wear=JointWear.of("energy", coefficient=0.0)), 5e-7))
     assert worn.ended is WearEnd.NO_LOSS
+
+
+def test_steps_below_the_rounding_of_the_motion_end_the_run() -> None:
+    worn = evolve(thesis.Rule(wear_problem(), 1e-30), max_steps=5)
+    assert worn.ended is WearEnd.NO_STEP
+    assert len(worn.cycles) == 1
+    assert "are below rounding: check the static loads" in str(worn.end)

@@ -1,7 +1,5 @@
 """Wear of rough faces: a rigid block that slides on five of them, beside its differential equation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -55,8 +53,7 @@ def test_a_sliding_block_wears_as_its_differential_equation_says() -> None:
     """dw/dZ = WEAR 4 N (X - 0.8 MU d / RATIO) / A, Hertzian asperities that keep the shape the preload gave them.
 
     The springs of a Hertzian contact carry N d' at depths d' whose mean, weighted with N, is 0.8 d; each slips by the
-    swing X less MU d' / RATIO, four times in a cycle.
-    """
+    swing X less MU d' / RATIO, four times in a cycle."""
     balance = block()
     base = asperity((YOUNG, POISSON, RADIUS, YIELD, TANGENT))
     preloaded = np.maximum(balance.at_rest[:, 1] - GAP, 0.0)

@@ -1,7 +1,5 @@
 """Both wear rules: what they wear, that they converge to one another, missions, ends of branches, resumption."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -265,11 +263,14 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
     assert life(worn) == pytest.approx(life(evolve(error_controlled.Rule(problem, tolerance))), rel=0.02)
 
 
-def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(problem: WearProblem) -> None:
-    class Never(AtFrequency):
-        def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
-            return FrequencyCorrection(state.omega, 0)
+class Never(AtFrequency):
+    """A frequency whose branch goes on nowhere."""
 
+    def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
+        return FrequencyCorrection(state.omega, 0)
+
+
+def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(problem: WearProblem) -> None:
     tolerance = Tolerance(0.1, 2e-4)
     worn = evolve(error_controlled.Rule(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance))
     explicit = evolve(thesis.Rule(problem, balance_step.EXPLICIT_STEPS[-1] * 0.1 * 2e-4))
@@ -284,22 +285,19 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
     full = wear_problem(balance=balance_of(pressed_body(), tuple(range(8))))
     observed = []
 
-    class Never(AtFrequency):
+    class Observed(Never):
         def solve(self, balance: HarmonicBalance) -> OperatingPoint:
             observed.append(len(balance.basis.harmonics))
             return super().solve(balance)
 
-        def correction(self, balance: HarmonicBalance, state: State) -> FrequencyCorrection:
-            return FrequencyCorrection(state.omega, 0)
-
     tolerance = Tolerance(0.1, 2e-4)
-    never = replace(full, mission=(Duty(Never("tip", 420.0)),))
+    never = replace(full, mission=(Duty(Observed("tip", 420.0)),))
     worn = evolve(error_controlled.Rule(never, tolerance), max_steps=2)
     assert observed == [8, 8, 8]  # at the start and behind both steps
-    assert np.all(worn.step_error == 1.0)
+    assert worn.step_error.tolist() == [1.0, 1.0, 0.0]
     assert np.all(np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2)))  # the step wears with all of them
 
-    class Ends(Never):
+    class Ends(Observed):
         def solve(self, balance: HarmonicBalance) -> OperatingPoint:
             if len(balance.basis.harmonics) == 8 and balance.contact.gap.max() > full.balance.contact.gap.max():
                 raise NoPeak("the scan with all of them ends early")
@@ -358,7 +356,6 @@ def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearPro
     lower = AtPeak("tip", 500.0, 545.0).solve(problem.balance)
     assert lower.amplitude < highest.amplitude / 2
     dominant = site.dominant_peak(problem.balance, lower)
-    assert dominant.point is not None
     assert dominant.solves > dominant.point.solves > 0  # the sweep's, too
     assert dominant.point.state.omega == pytest.approx(highest.state.omega, rel=1e-4)
     assert dominant.nearness == pytest.approx(highest.amplitude / (site.dominance * lower.amplitude), rel=1e-6)
@@ -368,7 +365,6 @@ def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearPro
     neighbour = AtPeakRatio(site, 1.01)
     current = neighbour.solve_near(problem.balance, 1.01 * lower.state.omega, lower.state.x)
     shifted = neighbour.dominant_peak(problem.balance, current).point
-    assert shifted is not None
     assert shifted.state.omega == pytest.approx(1.01 * highest.state.omega, rel=1e-4)
 
 
@@ -399,9 +395,7 @@ def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypat
     assert "where it still rises" in str(stopped.solution.outcome)
 
 
-def test_no_lower_peak_is_taken_for_one_that_is_not_refined(
-    problem: WearProblem, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_lower_peak_is_taken_for_one_that_is_not_refined(problem, monkeypatch):
     """Rig 41 of the scoreboard's seed 16180: its peak was a fold, and one a fifteenth as high was taken for it."""
     site = AtPeak("tip", 250.0, 1200.0)
     highest, solve = site.solve(problem.balance), newton.solve
@@ -415,8 +409,8 @@ def test_no_lower_peak_is_taken_for_one_that_is_not_refined(
     monkeypatch.setattr(AtPeak, "_scan", lambda *options: branch)
     monkeypatch.setattr(newton, "solve", ends)
     computed = site.solve(problem.balance)
-    assert not computed.solution.converged
-    assert computed.amplitude > 0.7 * highest.amplitude
+    assert computed.solution.converged  # by arc length
+    assert computed.amplitude == pytest.approx(highest.amplitude, rel=1e-5)
 
 
 LEAP_DEPTH, SECOND = 2e-5, 520.0  # depth [m] from which on a second place is the higher one, and its frequency [rad/s]

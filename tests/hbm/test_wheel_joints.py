@@ -1,7 +1,5 @@
 """Several joints in a sector of a wheel: between neighbours and between bodies inside the sector."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -55,8 +53,7 @@ def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_
     """Nodes on the cuts belong to two joints, each with its share of the area.
 
     The expansion of the compliance is asked for more than the 5e-10 that a run needs. All blades alike in order 0 are
-    softest beside the springs: what is left there is rounding of its reduced matrices.
-    """
+    softest beside the springs: what is left there is rounding of its reduced matrices."""
     exact = replace(expansion.RULES, wanted_error=1e-13, rounding=1e-13)
     monkeypatch.setattr(expansion, "RULES", exact)
     mesh, node_sets = small.read(tmp_path / "s.msh")

@@ -1,7 +1,5 @@
 """A headless Chromium, and what a reader does in a report: the tests of several cases share it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import time

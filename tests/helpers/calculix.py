@@ -1,10 +1,7 @@
 """The bodies of a scene and their contacts as a deck of CalculiX (ccx), an independent solution of the contact at rest.
 
 Bodies are of 20-node hexahedra over the corner and edge nodes of ours; contact is of surfaces, with the same springs
-per area and friction.
-"""
-
-from __future__ import annotations
+per area and friction."""
 
 import re
 import subprocess

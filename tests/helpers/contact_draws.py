@@ -1,9 +1,6 @@
 """Contact laws that the tests run over, and random contact pairs with motions of every kind, in units of order one.
 
-The laws are those of the package and those in tests/hbm/laws. Their numbers are drawn from what they declare.
-"""
-
-from __future__ import annotations
+The laws are those of the package and those in tests/hbm/laws. Their numbers are drawn from what they declare."""
 
 import re
 from pathlib import Path

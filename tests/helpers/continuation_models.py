@@ -1,7 +1,5 @@
 """Oscillators with closed-form response curves, and two with friction, for the checks of continuations."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import brentq
 

@@ -1,7 +1,5 @@
 """A fingerprint of the matrices that a small beam is reduced to."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 
@@ -15,13 +13,9 @@ def digest(folder: Path) -> str:
     from tribodyn.workflows.scene.scene_file import read
 
     small = (
-        "harmonics.kept=[0, 1]",
-        "geometry.n_patch=5",
-        "geometry.n_length=4",
-        "geometry.n_height=1",
-        "reduction.modes=4",
-        "wear=",
-    )
+        "harmonics.kept=[0, 1]", "geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1",
+        "reduction.modes=4", "wear=",
+    )  # fmt: skip
     system = modelling.build(read("beam", small), Progress()).reduced.system
     two_results = np.ascontiguousarray(np.concatenate([np.asarray(system.stiffness), np.asarray(system.mass)]))
     return hashlib.sha256(two_results.tobytes()).hexdigest()

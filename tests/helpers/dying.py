@@ -1,7 +1,5 @@
 """What a process of a pool does instead of a run; by itself, because each process imports it anew."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """What a scene says to measured numbers, and fits of models whose derivatives are differences."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

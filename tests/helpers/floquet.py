@@ -1,7 +1,5 @@
 """Floquet multipliers of a stability that was found."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.stability.exponents import Stability

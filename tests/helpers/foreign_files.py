@@ -1,7 +1,5 @@
 """One mesh of twenty-node bricks written in every format, by writers that share nothing with the readers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import meshio

@@ -1,7 +1,5 @@
 """Two bodies, one of which is held at a height that harmonic 0 prescribes and presses on the other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -26,8 +24,7 @@ def two_bodies(seed: int = 3) -> ReducedModel:
     """A chain of masses in three dimensions on springs, and above it a second one; three node pairs between them.
 
     Body 1 is held by springs, body 2 only sideways and, in the direction of its height, by springs of 4e5 N/m at
-    coordinates 21 and 22.
-    """
+    coordinates 21 and 22."""
     random = np.random.default_rng(seed)
     n1, n2 = 12, 12
     n = n1 + n2
@@ -55,14 +52,9 @@ def two_bodies(seed: int = 3) -> ReducedModel:
     system = SecondOrderSystem(M, K, None, loads, {"tip": np.eye(n)[10]})
     system = replace(system, damping=modal_damping(system, 0.02))
     interface = ContactInterface(
-        COMPONENTS,
-        np.zeros((N_PAIR, 3)),
-        np.tile(np.eye(3), (N_PAIR, 1, 1)),
-        np.array([1.0, 2.0, 1.0]),
-        np.zeros(N_PAIR),
-        B,
-        np.zeros((0, 4), int),
-    )
+        COMPONENTS, np.zeros((N_PAIR, 3)), np.tile(np.eye(3), (N_PAIR, 1, 1)), np.array([1.0, 2.0, 1.0]),
+        np.zeros(N_PAIR), B, np.zeros((0, 4), int),
+    )  # fmt: skip
     return ReducedModel(system, interface)
 
 

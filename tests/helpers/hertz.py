@@ -1,7 +1,5 @@
 """Sphere on a plane, or two spheres: Hertz against normal load, Mindlin against shear."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 
@@ -14,8 +12,7 @@ class SphereContact:
 
     radius : relative radius of curvature, 1/R = 1/R1 + 1/R2 [m]
     pair : the elastic bodies
-    Source  Johnson, Contact Mechanics, 1985: eqs 4.22-4.24 (normal), 7.41-7.44 (tangential)
-    """
+    Source  Johnson, Contact Mechanics, 1985: eqs 4.22-4.24 (normal), 7.41-7.44 (tangential)"""
 
     radius: float
     pair: ElasticPair

@@ -1,7 +1,5 @@
 """A run in a process of its own that can be killed: without the imports, which the server has done before."""
 
-from __future__ import annotations
-
 import signal
 import time
 from pathlib import Path
@@ -17,8 +15,7 @@ SPENT = "spent"  # in the folder of a run that came to its end: processor second
 def go_on(folder: Path, overrides: tuple[str, ...], killed_after: float = 0.0) -> None:
     """Begin the small beam in a folder, or resume it.
 
-    killed_after : processor seconds, 0 for never; the kernel ends the process at them, in the middle of anything
-    """
+    killed_after : processor seconds, 0 for never; the kernel ends the process at them, in the middle of anything"""
     began = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, killed_after)
     path = folder / "result.h5"

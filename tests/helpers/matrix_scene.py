@@ -1,7 +1,5 @@
 """A small scene made of matrices, with its files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -11,36 +9,28 @@ from tests.helpers.verification_models import random_structure
 SCENE = """
 [scene]
 title = "Matrices of another program"
-
 [model]
 file = "part.npz"
-
 [contact]
 dofs = [[0, 1, 2], [3, 4, 5]]
 area = "10 mm2"
 tangential_stiffness = "2 N/um"
 normal_stiffness = "3 N/um"
 friction = 0.4
-
 [loads.static.press]
 dofs = [2, 5]
 value = "50 N"
-
 [loads.harmonic.shaker]
 dofs = [8]
 value = "20 N"
-
 [response]
 dofs = [9]
 frequency = ["35 Hz", "120 Hz"]
 points = 30
-
 [response.others.mid]
 dofs = [6, 7]
-
 [harmonics]
 kept = [0, 1, 2, 3]
-
 [wear]
 coefficient = "2e3 um3/J"
 step = "1 um"

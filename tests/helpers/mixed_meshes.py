@@ -1,7 +1,5 @@
 """A box of four kinds of elements: hexahedra below, pyramids with tetrahedra between, prisms above."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which node of the mesh stands where a pair of a contact does."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.workflows.result.faces import Face

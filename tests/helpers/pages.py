@@ -9,8 +9,6 @@ In a page, a fence
 Other fences are shown only. Commands and Python begin in a process that has its packages loaded (tests.helpers.warm).
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

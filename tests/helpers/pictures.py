@@ -1,7 +1,5 @@
 """Whether a picture shows anything."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A small body with four pairs that a static load presses and a harmonic one shakes, and its wear problem."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """How many identifiers of a tree are pronouns, adverbs or bare participles: words that do not say what a thing is."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable, Iterator
 from pathlib import Path

@@ -2,10 +2,7 @@
 
 `balance_problems` draws them for hypothesis; what a matrix holds comes from a drawn seed, what decides how hard a
 problem is (stiffness, friction, loads, damping, frequency, harmonics) is drawn one by one, so that hypothesis can find
-the extremes and shrink to them.
-"""
-
-from __future__ import annotations
+the extremes and shrink to them."""
 
 import os
 from collections.abc import Callable
@@ -47,8 +44,7 @@ class Drawn:
 
     Powers of ten: contact [N/m] of all pairs, static and dynamic loads [N], gap [m] (signed by gap_sign)
     structure : "clamped", "rigid" (two modes that contact alone holds) or "soft" (six powers of ten between its modes)
-    tuning : frequency over that of a mode of the stuck structure; memory : whether sliders start somewhere else
-    """
+    tuning : frequency over that of a mode of the stuck structure; memory : whether sliders start somewhere else"""
 
     law: str
     components: tuple[str, ...]
@@ -85,28 +81,18 @@ def drawn_problems(draw: st.DrawFn, laws: list[tuple[str, tuple[str, ...]]] = LA
     harmonics = draw(st.sampled_from(HARMONICS))
     ways = ("sampled", "located") if (law, components) in EVENT_BASED else ("sampled",)
     return Drawn(
-        law=law,
-        components=components,
-        n_pair=draw(st.integers(1, 4)),
-        n_extra=draw(st.integers(0, 4)),
+        law=law, components=components, n_pair=draw(st.integers(1, 4)), n_extra=draw(st.integers(0, 4)),
         structure=draw(st.sampled_from(("clamped", "rigid", "soft"))),
-        damping=draw(st.sampled_from((0.01, None, 0.0, 1e-4, 0.3, 1.0))),
-        contact=draw(_power(1, 13)),
+        damping=draw(st.sampled_from((0.01, None, 0.0, 1e-4, 0.3, 1.0))), contact=draw(_power(1, 13)),
         contact_spread=draw(st.sampled_from((0.0, 0.3, 2.0))),
-        friction=draw(st.sampled_from((0.3, 0.0, 1e-3, 1.0, 10.0))),
-        gap=draw(_power(-9, 0)),
-        gap_sign=draw(st.sampled_from((0, 1, -1))),
-        static=draw(st.none() | _power(-3, 6)),
-        dynamic=draw(st.none() | _power(-6, 6)),
-        base=draw(st.none() | _power(-9, -2)),
-        memory=draw(st.booleans()),
-        harmonics=harmonics,
-        n_samples=draw(st.integers(2 * harmonics[-1] + 1, 96)),
+        friction=draw(st.sampled_from((0.3, 0.0, 1e-3, 1.0, 10.0))), gap=draw(_power(-9, 0)),
+        gap_sign=draw(st.sampled_from((0, 1, -1))), static=draw(st.none() | _power(-3, 6)),
+        dynamic=draw(st.none() | _power(-6, 6)), base=draw(st.none() | _power(-9, -2)), memory=draw(st.booleans()),
+        harmonics=harmonics, n_samples=draw(st.integers(2 * harmonics[-1] + 1, 96)),
         transitions=draw(st.sampled_from(ways)),
-        tuning=draw(st.sampled_from((0.9, 0.01, 0.3, 0.999, 1.0, 1.1, 3.0))),
-        mode=draw(st.integers(0, 3)),
+        tuning=draw(st.sampled_from((0.9, 0.01, 0.3, 0.999, 1.0, 1.1, 3.0))), mode=draw(st.integers(0, 3)),
         seed=draw(st.integers(0, 2**16)),
-    )
+    )  # fmt: skip
 
 
 def structure_of(d: Drawn, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -186,8 +172,7 @@ def contact_forces(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
 
     The memory is the one at which a march from the start of the load path repeats. Nothing is shared with the solver
     but the law's step, for planar friction that along a chord, which begins at its memory. Returns nan where the memory
-    does not repeat within LONGEST cycles
-    """
+    does not repeat within LONGEST cycles"""
     joint, basis = balance.contact.joints[0], balance.basis
     law, p = joint.module, joint.parameters.packed()
     n_pair, n_comp, _ = x.shape
@@ -225,8 +210,7 @@ def contact_forces(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
 def displacement_under(balance: HarmonicBalance, omega: float, x: np.ndarray, force: np.ndarray) -> np.ndarray:
     """(n_contact, n_coeff) relative displacement [m] that dense solves with the contact forces at x give back.
 
-    One complex solve for each harmonic of the whole system, with the contact springs on both sides.
-    """
+    One complex solve for each harmonic of the whole system, with the contact springs on both sides."""
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
     basis, k = balance.basis, balance.contact.stiffness.ravel()
     damping = np.zeros_like(system.mass) if system.damping is None else system.damping
@@ -242,13 +226,3 @@ def displacement_under(balance: HarmonicBalance, omega: float, x: np.ndarray, fo
         if driven.any():  # an undamped resonance that nothing drives stays at rest
             back[:, position] = b @ np.linalg.solve(dynamic, driven)
     return basis.to_real(back) - base
-
-
-def condition(balance: HarmonicBalance, omega: float) -> float:
-    """Largest condition number of the stuck dynamic stiffness of any harmonic, unit stiffness in every coordinate."""
-    system, b = balance.model.system, np.asarray(balance.model.interface.B)
-    damping = np.zeros_like(system.mass) if system.damping is None else system.damping
-    stuck = system.stiffness + b.T @ (balance.contact.stiffness.reshape(-1, 1) * b)
-    scale = 1 / np.sqrt(np.diag(stuck))
-    matrices = [stuck + 1j * h * omega * damping - (h * omega) ** 2 * system.mass for h in balance.basis.harmonics]
-    return max(float(np.linalg.cond(scale[:, None] * matrix * scale)) for matrix in matrices)

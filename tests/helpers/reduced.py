@@ -1,7 +1,5 @@
 """Reduced models for tests: of a part as `modelling.build` makes it, without the cache; of systems that differ."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

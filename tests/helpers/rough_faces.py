@@ -1,7 +1,5 @@
 """Rough faces of which all is known: caps of spheres on a plane, and waves of a band with random phases."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.geometry.asperities import Moments

@@ -6,10 +6,7 @@ sums of flat punches. Partial slip is the difference of two normal problems (Jae
 
 A half-plane has no absolute stiffness: every displacement here is taken relative to the point at `depth` under the
 middle of the contact, in both bodies. For two equal bodies of nu = 0.3 a depth of four half-widths gives a square flat
-punch its three-dimensional stiffness; the product has `rectangle` where the length of the contact is known.
-"""
-
-from __future__ import annotations
+punch its three-dimensional stiffness; the product has `rectangle` where the length of the contact is known."""
 
 from dataclasses import dataclass
 from math import acos, isfinite, log, pi
@@ -29,8 +26,7 @@ class RoundedPunch:
     half_width : half-width a of the flat [m], 0 for a cylinder (Hertz)
     edge_radius : radius R of the edges [m], 0 for a sharp punch
     pair : the elastic bodies
-    Source  Ciavarella, Hills and Monno, Proc. IMechE C 212 (1998) 319-328; here 1/E* = sum (1 - nu^2)/E
-    """
+    Source  Ciavarella, Hills and Monno, Proc. IMechE C 212 (1998) 319-328; here 1/E* = sum (1 - nu^2)/E"""
 
     half_width: float
     edge_radius: float
@@ -77,8 +73,7 @@ class RoundedPunch:
     def shear_traction(self, x: np.ndarray, load: float, shear: float, friction: float) -> np.ndarray:
         """Shear traction [Pa] under a shear force per length Q [N/m] first applied.
 
-        q = mu [p(x, P) - p(x, P - Q/mu)]
-        """
+        q = mu [p(x, P) - p(x, P - Q/mu)]"""
         require_shear_within(load, shear, friction)
         remaining = load - shear / friction
         stuck = self.pressure(x, remaining) if remaining > 0 else 0.0
@@ -87,8 +82,7 @@ class RoundedPunch:
     def stiffness(self, load: float, depth: float) -> tuple[float, float]:
         """Tangent stiffness per length (k_n, k_t) [N/m^2] at a load per length [N/m], without slip.
 
-        depth : reference depth in both bodies [m]
-        """
+        depth : reference depth in both bodies [m]"""
         b = self.half_contact(load)
         return 1 / self._compliance(b, depth, -1), 1 / self._compliance(b, depth, +1)
 

@@ -1,10 +1,7 @@
 """Run scenes and tell as JSON what each imported, factorised, allocated and stored.
 
 python -m tests.helpers.run_probe reads lines [SCENE, [section.key=value ...]] and answers each with a line. A scene
-runs in a child of an interpreter that has imported nothing but this file.
-"""
-
-from __future__ import annotations
+runs in a child of an interpreter that has imported nothing but this file."""
 
 import json
 import os
@@ -44,23 +41,16 @@ def tell(scene: str, overrides: list[str]) -> None:
             file.visititems(lambda name, item: arrays.update({name: getattr(item, "shape", None)}) and None)
     balance = models[0].balance
     messages = {
-        "state": result.state,
-        "imported": [name for name in OPTIONAL if name in sys.modules],
-        "factorised": factorised,
-        "models": len(models),
+        "state": result.state, "imported": [name for name in OPTIONAL if name in sys.modules],
+        "factorised": factorised, "models": len(models),
         "groups": sorted(name for name, shape in arrays.items() if shape is None),
         "arrays": {name: shape for name, shape in arrays.items() if shape is not None},
-        "pairs": balance.contact.n_pair,
-        "components": len(balance.contact.components),
-        "coefficients": balance.basis.n_coeff,
-        "unknowns": balance.n_unknown,
-        "memory": balance.memory.size,
-        "systems": len(balance.compliance.groups),
-        "coordinates": balance.model.system.n_dof,
-        "masters": len(balance.model.origin.masters),
-        "modes": balance.model.origin.n_modes,
+        "pairs": balance.contact.n_pair, "components": len(balance.contact.components),
+        "coefficients": balance.basis.n_coeff, "unknowns": balance.n_unknown, "memory": balance.memory.size,
+        "systems": len(balance.compliance.groups), "coordinates": balance.model.system.n_dof,
+        "masters": len(balance.model.origin.masters), "modes": balance.model.origin.n_modes,
         "delta_max": result.facts.delta_max,
-    }
+    }  # fmt: skip
     print(json.dumps(messages), flush=True)
 
 

@@ -1,7 +1,5 @@
 """Small decks of Abaqus and CalculiX, their natural frequencies here and by CalculiX (ccx)."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from collections.abc import Callable
@@ -33,8 +31,7 @@ def straight(x: np.ndarray) -> np.ndarray:
 def cut(counts: tuple[int, int, int], shape: Shape) -> tuple[np.ndarray, list[list[int]], list[int]]:
     """The unit cube in bricks of twenty nodes, mapped by a function of points, and the nodes, from 1, at x = 0.
 
-    Nodes that meet after mapping are one, so that a cube may be bent to a ring. Returns points, bricks, foot
-    """
+    Nodes that meet after mapping are one, so that a cube may be bent to a ring. Returns points, bricks, foot"""
     local = 2 * REFERENCE_POINTS["hexahedron27"][:20]
     number: dict[tuple[float, ...], int] = {}
     foot, cells = set(), []

@@ -35,29 +35,11 @@ SEAM = ("cyclic_right", "cyclic_left")
 def parameters(disk_radius=0.0):
     """A blade of 80 mm on a wheel of eight."""
     return blade.Parameters(
-        n_blades=N,
-        hub_radius=0.06,
-        span=0.08,
-        root_chord=0.035,
-        tip_chord=0.024,
-        root_thickness=0.01,
-        tip_thickness=0.008,
-        camber=0.04,
-        edge=0.65,
-        tip_stagger=0.6,
-        contact_length=0.02,
-        contact_height=0.012,
-        shroud_length=0.035,
-        root_height=0.015,
-        root_length=0.05,
-        disk_radius=disk_radius,
-        n_along=3,
-        n_up=2,
-        n_span=3,
-        n_side=1,
-        n_root=1,
-        n_disk=1,
-    )
+        n_blades=N, hub_radius=0.06, span=0.08, root_chord=0.035, tip_chord=0.024, root_thickness=0.01,
+        tip_thickness=0.008, camber=0.04, edge=0.65, tip_stagger=0.6, contact_length=0.02, contact_height=0.012,
+        shroud_length=0.035, root_height=0.015, root_length=0.05, disk_radius=disk_radius,
+        n_along=3, n_up=2, n_span=3, n_side=1, n_root=1, n_disk=1,
+    )  # fmt: skip
 
 
 def read(path, disk_radius=0.0):

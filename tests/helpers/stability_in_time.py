@@ -1,7 +1,5 @@
 """Stability by Floquet multipliers of the integrated motion, to hold Hill's method against."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State

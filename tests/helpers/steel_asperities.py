@@ -1,7 +1,5 @@
 """Steel faces of asperities for the tests of the rough laws, and motions of their pairs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis

@@ -1,7 +1,5 @@
 """The steps of a wear run taken again with one number changed: differences that derivatives of a life have to meet."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -24,8 +22,7 @@ def exactly(problem, **site):
 def again(problem, worn, end, longer):
     """Cycles, largest depth and volume behind the steps of a run of another problem, and ln of the preload left.
 
-    longer : factor on all steps
-    """
+    longer : factor on all steps"""
     rows = worn.rows()
     state = assess(problem, np.zeros_like(problem.area), 0.0, state_of(problem, rows[0]))
     first = problem.preload_of(state)
@@ -46,8 +43,7 @@ def again(problem, worn, end, longer):
 def elasticity_anew(worn, share, problem_of, guess):
     """Central difference of runs whose steps keep their shares of a life that ends at the same share of the preload.
 
-    problem_of : factor on the number -> problem; guess : the elasticity of the life, near it
-    """
+    problem_of : factor on the number -> problem; guess : the elasticity of the life, near it"""
     end, h = int(np.flatnonzero(worn.preload < share * worn.preload[0])[0]), 3e-5
     equal = problem_of(1.0)
     values, remaining = again(equal, worn, end, 1.0)

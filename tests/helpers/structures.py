@@ -1,7 +1,5 @@
 """Scenes of several bodies that tests share, and their models."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tribodyn.workflows.run import modelling

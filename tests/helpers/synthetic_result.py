@@ -1,7 +1,5 @@
 """A made-up result with the shape of a real one, for tests of the store, the summary and the pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
@@ -17,6 +15,7 @@ from tribodyn.workflows.result.result import (
     References,
     Result,
     ShearBounds,
+    Stress,
     WornResponses,
 )
 from tribodyn.workflows.scene.scene_file import read
@@ -66,7 +65,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     response = np.stack([0 * omega, slipping.real, -slipping.imag], -1)[:, None]
     frf = Branch(
         omega, ("response",), response, np.zeros((61, 3 * n_pair, 3)), np.abs(slipping), (CONVERGED,) * 61,
-        np.full(61, 3), BranchEnd.REACHED.say(" 700 Hz"), (20, 30), "frequency", omega, np.ones(61),
+        np.full(61, 3), BranchEnd.REACHED.say(" 700 Hz"), (0, 1), (20, 30), "frequency", omega, np.ones(61),
     )  # fmt: skip
     rng = np.random.default_rng(1)
     row_response = np.stack([0 * t, 1e-3 * (1 + 4 * t), 1e-4 * t], -1)[:, None]
@@ -76,38 +75,25 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     energy = np.tile(2 * np.sqrt(1 - t**2)[:, None], n_pair)
     omega_row = 2 * np.pi * (500 - 85 * t)
     wear = WearHistory(
-        cycles=np.concatenate([[0.0], np.cumsum(cycles_in_step)[:-1]]),
-        cycles_in_step=cycles_in_step,
-        depth=depth,
-        worn=np.diff(depth, axis=0, append=depth[-1:]),
-        energy=energy,
-        preload=6e3 * (1 - t),
-        preload_at_rest=5e3 * (1 - t),
-        growth=0.1 * t - 0.05,
+        cycles=np.concatenate([[0.0], np.cumsum(cycles_in_step)[:-1]]), cycles_in_step=cycles_in_step, depth=depth,
+        worn=np.diff(depth, axis=0, append=depth[-1:]), energy=energy, preload=6e3 * (1 - t),
+        preload_at_rest=5e3 * (1 - t), growth=0.1 * t - 0.05,
         normal_force=np.outer(6e3 * (1 - t), where.area / where.area.sum()),
-        status=np.where(t[:, None] * np.ones(n_pair) < 0.6, 3, 6).astype(np.int64),
-        omega=omega_row,
-        amplitude=np.hypot(row_response[:, 0, 1], row_response[:, 0, 2]),
-        force=1e6 * displacement,
-        response=row_response,
-        solves=np.full(n_row, 4),
-        step_error=np.zeros(n_row),
-        work=cycles_in_step[:, None] * energy,
-        duty_omega=omega_row[:, None],
-        duty_displacement=displacement[:, None],
-        end=WearEnd.LOST.say(),
-        spread=0.3 * t,
-        mean_error=0.01 * t,
-        is_stationary=np.ones(n_row, bool),
-        periods=(t > 0.5) * 64,
-        moving=np.outer(t, np.arange(5.0)),
-    )
+        status=np.where(t[:, None] * np.ones(n_pair) < 0.6, 3, 6).astype(np.int64), omega=omega_row,
+        amplitude=np.hypot(row_response[:, 0, 1], row_response[:, 0, 2]), force=1e6 * displacement,
+        response=row_response, solves=np.full(n_row, 4), step_error=np.zeros(n_row),
+        work=cycles_in_step[:, None] * energy, duty_omega=omega_row[:, None], duty_response=row_response[:, None],
+        duty_displacement=displacement[:, None], end=WearEnd.LOST.say(), spread=0.3 * t, mean_error=0.01 * t,
+        is_stationary=np.ones(n_row, bool), periods=(t > 0.5) * 64, moving=np.outer(t, np.arange(5.0)),
+    )  # fmt: skip
     rows = np.array([0, n_row // 2, n_row - 1])
     shape = (part.points[:, 0] / LENGTH) ** 2
     bend = np.zeros((3, len(part.points), 3, 3))
     bend[:, :, 2, 0] = -5e-3 * np.linspace(0.2, 1, 3)[:, None] * shape
     bend[:, :, 1, 1] = 3e-3 * np.linspace(0.4, 1, 3)[:, None] * shape
     loop_x = (displacement.reshape(n_row, n_pair, 3, 3) @ functions.T)[rows]
+    spot, stress = np.zeros((len(rows), 1), int), [v * np.ones(bend.shape[:2]) for v in (1e6, 0.5, 0.0, 1e6)]
+    stress.append(stress[0][..., None, None] * np.ones((2, 1)) * np.eye(6)[0])  # pulled along x
     loops = Loops(rows, loop_x, np.clip(1e8 * loop_x, -4e2, 4e2))
     return Result(
         provenance={"scene_name": "beam", "scene_text": file.text},
@@ -129,5 +115,6 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
             rows, np.tile(omega, (3, 1)), np.abs([resonance(hertz, 0.015) for hertz in (510, 460, 420)])
         ),
         fields=Fields(rows, bend),
+        stress_field=Stress(rows, *stress, spot, np.zeros((len(rows), 1, 3)), spot),
         loops=loops,
     )

@@ -1,7 +1,5 @@
 """Three pairs of a random stiff structure, whose periodic motion doubles its period where they lift."""
 
-from __future__ import annotations
-
 from tests.helpers.verification_models import random_structure
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import ContactParameters

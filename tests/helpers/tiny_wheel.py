@@ -1,7 +1,5 @@
 """A wheel of five sectors with four degrees of freedom each, small enough for its monodromy matrix."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.fem.cyclic_symmetry import Sector
@@ -26,8 +24,7 @@ NONE = np.empty((0, 3), dtype=int)
 def sector(components: tuple[str, ...], turning: float = 0.0, n_sectors: int = N) -> ReducedSector:
     """Two faces that move along t1 and n, joined by springs; the right one meets the left one of the next sector.
 
-    turning : Coriolis matrix entry [N s/m]
-    """
+    turning : Coriolis matrix entry [N s/m]"""
     ground, between = np.diag([1.0e4, 1.6e4, 0.9e4, 1.4e4]), np.array([[8e3, 1.5e3], [1.5e3, 1.2e4]])
     stiffness = ground + np.block([[between, -between], [-between, between]])
     loads = {"shaker": np.array([1.0, 0.3, 0.0, 0.0])}

@@ -1,7 +1,5 @@
 """Small models for the checks of harmonic balance against time integration and closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as sla
 
@@ -29,8 +27,7 @@ def modal_damping(mass: np.ndarray, stiffness: np.ndarray, ratio: float) -> np.n
 def oscillator(mass: float, stiffness: float, ratio: float, component: str = "t1") -> ReducedModel:
     """One moving mass whose tangential (with a second mass for the normal) or normal displacement meets the ground.
 
-    component : "t1" gives DOFs (t1, n), the normal one loaded by "normal"; "n" gives one DOF, loaded by either name
-    """
+    component : "t1" gives DOFs (t1, n), the normal one loaded by "normal"; "n" gives one DOF, loaded by either name"""
     n = 2 if component == "t1" else 1
     m, k = mass * np.eye(n), stiffness * np.eye(n)
     loads = {"force": np.eye(n)[0], "normal": np.eye(n)[-1]}
@@ -64,8 +61,7 @@ def slab(nx: int, ny: int, ratio: float = 0.02) -> ReducedModel:
     """An elastic slab of two layers of nodes on the ground: it slides, rocks and lifts at its edges.
 
     Contact pairs are the lower nodes; loads: "press" (down, spread over the upper layer), "shake" (along x),
-    "rock" (up and down at one edge of the upper layer); output: "edge", x of a corner of the upper layer
-    """
+    "rock" (up and down at one edge of the upper layer); output: "edge", x of a corner of the upper layer"""
     xy = np.array([(i * 2e-3, j * 2e-3) for i in range(nx) for j in range(ny)])
     points = np.concatenate([np.c_[xy, np.zeros(len(xy))], np.c_[xy, np.full(len(xy), 3e-3)]])
     n = 3 * len(points)
@@ -100,8 +96,7 @@ def floating_beam(n_node: int = 9, ratio: float = 0.02) -> ReducedModel:
     """An elastic beam that nothing but unilateral contact along its underside holds: it lifts, pitches and bends.
 
     Coordinates are the heights of its nodes; two of its modes are rigid. Loads: "press" (down, spread evenly),
-    "shake" (up, at one end); output: "end", height of the other end. Contact pairs: component n, closing downwards
-    """
+    "shake" (up, at one end); output: "end", height of the other end. Contact pairs: component n, closing downwards"""
     stations = np.linspace(0.0, 1.0, n_node)
     bend = np.diff(np.eye(n_node), 2, axis=0) / np.diff(stations)[0] ** 2
     stiffness = 3.0 * bend.T @ bend / n_node

@@ -4,10 +4,7 @@ A command of a page spends three to six seconds of a processor on imports, most 
 the arguments, environment, folder and open files of who asked, and leaves with the command's exit code. The first
 command of the README and the tests of start, kill and Ctrl-C run in interpreters of their own.
 
-python -m tests.helpers.warm SOCKET serves until its standard input is closed.
-"""
-
-from __future__ import annotations
+python -m tests.helpers.warm SOCKET serves until its standard input is closed."""
 
 import atexit
 import importlib
@@ -57,8 +54,6 @@ def program() -> str:
     command = [sys.executable, "-m", "tests.helpers.warm", str(name)]
     server = subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     asks, says = server.stdin, server.stdout
-    assert asks is not None
-    assert says is not None
     assert says.readline() == b"ready\n"
 
     def end() -> None:

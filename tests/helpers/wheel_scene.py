@@ -3,7 +3,6 @@
 WHEEL = """
 [scene]
 title = "Six coarse blades on a flexible disk"
-
 [geometry]
 part = "blade"
 fixed = ["clamp"]
@@ -26,18 +25,15 @@ n_span = 3
 n_side = 1
 n_root = 1
 n_disk = 1
-
 [material]
 young = "210 GPa"
 density = "7860 kg/m3"
 poisson = 0.3
-
 [wheel]
 sectors = 6
 engine_order = 1
 axis = "x"
 seam = ["cyclic_right", "cyclic_left"]
-
 [contact]
 group = "shroud_right"
 opposite = "shroud_left"
@@ -47,25 +43,20 @@ tangential_stiffness = "9 N/um"
 normal_stiffness = "11 N/um"
 friction = 5.0
 gap = "-0.1 mm"
-
 [loads.harmonic.wave]
 group = "excitation"
 direction = "y"
 value = "20 N"
-
 [response]
 group = "tip"
 direction = "y"
 frequency = ["400 Hz", "404 Hz"]
 points = 5
-
 [reduction]
 modes = 6
-
 [harmonics]
 kept = [0, 1]
 samples = 32
-
 [damping]
 modal = "2 %"
 """

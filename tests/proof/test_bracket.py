@@ -1,7 +1,5 @@
 """The bracket: its volume, its faces, and what it refuses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

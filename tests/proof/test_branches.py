@@ -1,7 +1,5 @@
 """`./tribodyn prove branches`: random friction problems followed both ways, and a judge that sees what is wrong."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The table of extremes in its quick form, and that its judge sees a wrong number."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -9,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proof import __main__ as cli, extremes, extremes_march, extremes_wear
-from proof.extremes_judge import judged, sampled_honestly, solve_and_judge
-from proof.extremes_march import march_checks
-from proof.extremes_models import lattice, rigid
+from proof import __main__ as cli
+from proof.hard_settings import extremes, extremes_march, extremes_wear
+from proof.hard_settings.extremes_judge import judged, sampled_honestly, solve_and_judge
+from proof.hard_settings.extremes_march import march_checks
+from proof.hard_settings.extremes_models import lattice, rigid
 from tests.helpers.pressed_body import growth_by_few_modes
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.wear.rules import thesis

@@ -1,7 +1,5 @@
 """The list of planted faults stays true; a fault is planted in a process, seen and measured, and ends with it."""
 
-from __future__ import annotations
-
 import ast
 import csv
 import json
@@ -15,10 +13,10 @@ from proof import planted_faults, planting, reference_runs
 from proof.planted_faults import Detection, Fault, Room
 from proof.rewriting import Rule, rewritten
 from tribodyn.hbm.wear.history import cycles_to_share
-from tribodyn.workflows.errors.extrapolation import limit_of
+from tribodyn.workflows.errors.ladders import limit_of
 
 TREE = Path(__file__).parents[2]
-LIMIT = "workflows/errors/extrapolation.py"
+LIMIT = "workflows/errors/ladders.py"
 
 
 def fault_in(file: str) -> Fault:
@@ -60,18 +58,15 @@ def sums(a, b):
 """
 
 
-@pytest.mark.parametrize(
-    ("place", "rule", "line"),
-    [
-        ("", "[2, 3] -> [3, 2]", "FACES = [[0, 1], [3, 2]]"),
-        ("Spring.force", "A * B - C -> A * B + C", "pull = self.stiffness * x + self.damping * x"),
-        ("Spring.force", "A = B - C * D -> A = A * C", "pull = pull * self.damping"),
-        ("sums", "2 of 2: A + B -> A - B", "second = a[1] - b[1]"),
-        ("sums", "A <= 1.0 -> A < 1.0", "if first < 1.0:"),
-        ("sums", "A -= B * C -> A += B * C", "second += 2 * first"),
-        ("sums", "return A, B -> return B, A", "return (second, first)"),
-    ],
-)
+@pytest.mark.parametrize(("place", "rule", "line"), [
+    ("", "[2, 3] -> [3, 2]", "FACES = [[0, 1], [3, 2]]"),
+    ("Spring.force", "A * B - C -> A * B + C", "pull = self.stiffness * x + self.damping * x"),
+    ("Spring.force", "A = B - C * D -> A = A * C", "pull = pull * self.damping"),
+    ("sums", "2 of 2: A + B -> A - B", "second = a[1] - b[1]"),
+    ("sums", "A <= 1.0 -> A < 1.0", "if first < 1.0:"),
+    ("sums", "A -= B * C -> A += B * C", "second += 2 * first"),
+    ("sums", "return A, B -> return B, A", "return (second, first)"),
+])  # fmt: skip
 def test_a_rule_rewrites_one_place(place: str, rule: str, line: str) -> None:
     module = rewritten(SOURCE, place, Rule.parse(rule))
     compile(module, "source", "exec")
@@ -121,7 +116,7 @@ def test_a_fault_is_seen_by_its_test_and_a_test_that_always_fails_is_not_counted
     (tmp_path / "workflows").symlink_to(TREE / "workflows")
     test = tmp_path / "test_of_limit.py"
     test.write_text(
-        "from tribodyn.workflows.errors.extrapolation import limit_of\n\n\n"
+        "from tribodyn.workflows.errors.ladders import limit_of\n\n\n"
         "def test_always_wrong():\n    assert False\n\n\n"
         "def test_limit():\n    assert abs(limit_of([1, 2, 4], [2.0, 1.25, 1.0625]).value - 1.0) < 1e-9\n"
     )

@@ -1,15 +1,14 @@
 """The scoreboard on scenes of two families, its table, and that a violated error is seen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from proof import reference, scoreboard, scoreboard_scenes, scoreboard_table
-from proof.scoreboard import Judged, Row
+from proof import reference
+from proof.unseen_scenes import scoreboard, scoreboard_scenes, scoreboard_table
+from proof.unseen_scenes.scoreboard import Judged, Row
 
 SEED = 2
 SCENES = (12, 7)  # a beam and a plate that take a second each
@@ -26,7 +25,7 @@ def test_what_is_stated_of_untuned_scenes_holds(rows: list[Row]) -> None:
     for row in rows:
         assert row.outcome == "measured"
         assert {item.quantity for item in row.judged if item.counted} >= {"peak_frequency", "amplitude"}
-        assert {item["refinement"] for item in row.changes} >= {"harmonics", "mesh and contact grid", "combined"}
+        assert {item["refinement"] for item in row.changes} >= {"harmonics", "mesh and contact grid"}
     violated = [item for row in rows for item in row.judged if item.violated]
     assert {item.quantity for item in violated} <= {"amplitude"}
     assert all((item.true or 0.0) < 1.35 * (item.error or 0.0) for item in violated)
@@ -42,7 +41,6 @@ def test_the_reference_is_finer_in_every_setting(tmp_path: Path) -> None:
     for name in ("n_patch", "n_length", "n_height"):
         assert fine.geometry.parameters[name] > scene.geometry.parameters[name]
     assert fine.reduction.modes is not None
-    assert scene.reduction.modes is not None
     assert fine.reduction.modes > 2 * scene.reduction.modes
     assert max(fine.harmonics.kept) >= max(scene.harmonics.kept) + 3
     assert fine.harmonics.samples > scene.harmonics.samples
@@ -53,7 +51,6 @@ def test_scenes_that_all_wear_do_so_in_time(tmp_path: Path) -> None:
     drawn = scoreboard_scenes.draw(4, SEED, tmp_path, wearing=True)
     assert drawn.family == "rig"  # the fifth of five families: no wave of a wheel is worn in time
     wear = drawn.file(tmp_path).scene.wear
-    assert wear is not None
     assert (wear.motion, wear.rule) == ("time", "error_controlled")
 
 

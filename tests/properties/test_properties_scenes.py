@@ -1,9 +1,6 @@
 """Properties of scenes with garbage in them: a plan or a run, or one sentence and exit code 2, never a traceback.
 
-More cases, drawn anew at every run, on demand: see test_properties_solver.
-"""
-
-from __future__ import annotations
+More cases, drawn anew at every run, on demand: see test_properties_solver."""
 
 import contextlib
 import io

@@ -5,21 +5,18 @@ same displacement; friction never gives energy away; nothing is nan; no exceptio
 
 The test command runs the same few hundred cases every time. More of them, drawn anew at every run:
 
-    TRIBODYN_CASES=5000 pytest tests/test_properties_solver.py tests/test_properties_scenes.py
-"""
-
-from __future__ import annotations
+    TRIBODYN_CASES=5000 pytest tests/test_properties_solver.py tests/test_properties_scenes.py"""
 
 from dataclasses import replace
 
 import numpy as np
 from hypothesis import example, given, strategies as st
 
+from proof.hard_settings.extremes_judge import condition
 from tests.helpers.contact_draws import LAWS
 from tests.helpers.random_problems import (
     Drawn,
     cases,
-    condition,
     contact_forces,
     displacement_under,
     drawn_problems,

@@ -1,7 +1,5 @@
 """Craig-Bampton: exact with all modes, statically exact always, and an error estimate that tells the truth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -29,15 +27,15 @@ def model(part):
 
 
 def test_masters(part, model):
-    """25 pairs with 3 DOFs, the 2 DOFs of the point load, the 25 of the mean tip displacement; not the pressure."""
+    """25 pairs with 3 DOFs, 2 DOFs of the point load, 25 of the tip's mean displacement; two shapes of the pressure."""
     masters = model.origin.masters
     assert len(masters) == 75 + 2 + 25 - 5  # the patch and the tip share 5 nodes
-    assert model.system.n_dof == len(masters) + 15
+    assert model.system.n_dof == len(masters) + 15 + 2
     q = np.zeros(model.system.n_dof)
     q[3] = 1.0
     assert model.reconstruct(q)[masters] == pytest.approx(q[: len(masters)], abs=1e-14)
     extra = craig_bampton(part.system, part.interface, n_modes=0, extra_masters=[0, 1, 2])
-    assert extra.system.n_dof == len(masters) + 3
+    assert extra.system.n_dof == len(masters) + 3 + 2
     with pytest.raises(ValueError, match="a master lies outside"):
         craig_bampton(part.system, part.interface, n_modes=0, extra_masters=[part.system.n_dof])
 
@@ -63,14 +61,15 @@ def test_all_modes_are_exact():
     assert model.origin.first_omitted_frequency == np.inf
 
 
-def test_statics_are_exact_with_few_modes(part, model):
-    """A load on masters gives the exact static field for any number of modes; preload included."""
+@pytest.mark.parametrize("load", ["point", "pressure"])
+def test_statics_are_exact_with_few_modes(part, model, load):
+    """A load on masters or on slaves gives the exact static field for any number of modes; preload included."""
     k = part.interface.stiffness(*SPRINGS)
     guyan = craig_bampton(part.system, part.interface, n_modes=0)
-    x = factorise(stuck_stiffness(part.system.stiffness, part.interface.B, k)).solve(part.system.loads["point"])
+    x = factorise(stuck_stiffness(part.system.stiffness, part.interface.B, k)).solve(part.system.loads[load])
     for reduced in (guyan, model):
         K = stuck_stiffness(reduced.system.stiffness, reduced.interface.B, k)
-        q = np.linalg.solve(K, reduced.system.loads["point"])
+        q = np.linalg.solve(K, reduced.system.loads[load])
         assert np.abs(reduced.reconstruct(q) - x).max() < 1e-9 * np.abs(x).max()
         assert reduced.interface.B @ q == pytest.approx(part.interface.B @ x, abs=1e-9 * np.abs(x).max())
         for name in ("mid", "tip"):

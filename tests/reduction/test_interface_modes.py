@@ -1,7 +1,5 @@
 """Interface reduction: exact with all modes, converging with few, and its physical DOFs stay what they are."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 
@@ -21,13 +19,9 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
 SMALL = (
-    "harmonics.kept=[0, 1]",
-    "geometry.n_patch=3",
-    "geometry.n_length=4",
-    "geometry.n_height=2",
-    "reduction.modes=8",
+    "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=2", "reduction.modes=8",
     "response.points=30",
-)
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,7 @@ def thesis(model: ReducedModel, balance: HarmonicBalance, height: float, force: 
     """Unknowns [F_k^0, X_u^0, X^1, ...] of the rearranged equations 5.8, by a dense Newton.
 
     model : without prescription; start : static X_u and all harmonics >= 1 (n, n_coeff)
-    Returns F_k^0 (k,), X (n, n_coeff)
-    """
+    Returns F_k^0 (k,), X (n, n_coeff)"""
     M, C, K = (np.asarray(m) for m in (model.system.mass, model.system.damping, model.system.stiffness))
     B, n, m = model.interface.B, len(K), balance.basis.n_coeff
     k = PLATFORM

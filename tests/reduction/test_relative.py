@@ -44,15 +44,9 @@ def built(path, **contact):
     mesh, sets = mesh_file.read(path)
     springs = [Spring(name, axis, 3e7) for name in ("lid", "base") for axis in np.eye(3)]
     return fem_part.build(
-        mesh,
-        sets,
-        Material(200e9, 0.3, 7900.0),
-        [],
-        [ContactFaces("bottom", (1.0, 0.3, 0.0), "top", **contact)],
-        {"push": NodalForce("point", (1, 0, 0))},
-        {"tip": NodalForce("point", (0, 0, 1))},
-        springs=springs,
-    )
+        mesh, sets, Material(200e9, 0.3, 7900.0), [], [ContactFaces("bottom", (1.0, 0.3, 0.0), "top", **contact)],
+        {"push": NodalForce("point", (1, 0, 0))}, {"tip": NodalForce("point", (0, 0, 1))}, springs=springs,
+    )  # fmt: skip
 
 
 def test_full_model_is_the_same_in_other_coordinates(part):

@@ -1,7 +1,5 @@
 """Modes of the stuck structure with residual flexibility, against the full model and against Craig-Bampton."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 
@@ -102,7 +100,6 @@ def test_statics_are_exact_and_what_is_left_out_is_told(beam) -> None:
     _, part, springs = beam
     model = residual_flexibility(part.system, part.interface, springs, 8, clusters=3)
     flexibility, B = model.residual, part.interface.B.toarray()
-    assert flexibility is not None
     K_s = part.system.stiffness.toarray() + B.T @ (springs.ravel()[:, None] * B)
     exact = B @ np.linalg.solve(K_s, B.T)
     result = flexibility.apply(np.eye(len(B))) + flexibility.at_contact @ (
@@ -128,7 +125,6 @@ def test_the_error_is_that_of_the_mass_left_out(beam) -> None:
     for modes, clusters in ((6, 1), (20, 4)):
         model = residual_flexibility(part.system, part.interface, springs, modes, clusters=clusters)
         flexibility, B = model.residual, part.interface.B.toarray()
-        assert flexibility is not None
         K_s = part.system.stiffness.toarray() + B.T @ (springs.ravel()[:, None] * B)
         exact = B @ np.linalg.solve(K_s - omega**2 * part.system.mass.toarray(), B.T)
         modal = flexibility.at_contact @ (flexibility.at_contact.T / (flexibility.squares - omega**2)[:, None])
@@ -144,7 +140,6 @@ def test_what_a_solve_does_not_ask_for_is_below_its_tolerance(beam, monkeypatch:
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
     flexibility, requested = balance.model.residual, []
-    assert flexibility is not None
     assert flexibility.left_out <= NEARLY_ALL
     force = np.random.default_rng(0).normal(size=(75, 4)) * np.sqrt(springs.ravel())[:, None]
     shifted, x = flexibility.apply(force), np.random.default_rng(1).normal(size=(75, 4))
@@ -180,7 +175,6 @@ def test_what_was_asked_for_is_known_of_all_that_adds_up_to_it(beam, monkeypatch
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
     flexibility, rng = balance.model.residual, np.random.default_rng(0)
-    assert flexibility is not None
     left_out = flexibility.left_out
     solved: list[int] = []
     plain = type(flexibility).apply
@@ -228,7 +222,6 @@ def test_directions_know_what_is_recalled(beam) -> None:
     file, part, springs = beam
     balance = _balance(file, residual_flexibility(part.system, part.interface, springs, 20, clusters=16))
     flexibility, requested = balance.model.residual, list[np.ndarray]()
-    assert flexibility is not None
     state = newton.solve_from_rest(balance, OMEGA).state
     flexibility.ask(state.g, requested, 0.0)
     nearby = replace(balance, remainder=lambda g: flexibility.recalled(g, requested))
@@ -279,7 +272,6 @@ def test_a_copy_in_another_process_makes_its_own_factor(beam) -> None:
     flexibility = residual_flexibility(part.system, part.interface, springs, 4, clusters=2).residual
     force = np.random.default_rng(0).normal(size=(75, 2))
     record = pickle.loads(pickle.dumps(flexibility))
-    assert flexibility is not None
     assert np.allclose(record.apply(force), flexibility.apply(force), rtol=1e-10, atol=0)
 
 

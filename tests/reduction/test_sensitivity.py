@@ -1,7 +1,5 @@
 """Reduced matrices follow the full ones as models do that are reduced anew."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

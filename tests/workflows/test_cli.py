@@ -1,7 +1,5 @@
 """The command: exit codes with one sentence, summaries, and which packages stay out."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
@@ -10,11 +8,12 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.helpers.command import leave
+from tests.helpers.command import leave, printed_text, refusal
 from tests.helpers.synthetic_result import result
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.workflows.command.main import BAD_INPUT, INTERRUPTED, READER_LEFT, guard
@@ -50,15 +49,11 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_sentence_and_exit_code_2(
-    case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bad_input_is_one_sentence_and_exit_code_2(case, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     arguments, words = BAD[case]
-    code, _, err = leave(arguments, capsys)
-    assert code == 2
+    err = refusal(arguments, capsys)
     assert words in err
-    assert err.count("\n") == 1
     assert err.endswith((".\n", "?\n"))
 
 
@@ -67,10 +62,7 @@ def test_a_mesh_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_p
     start, end = beam.index("[geometry]"), beam.index("[material]")
     scene = tmp_path / "own.toml"
     scene.write_text(beam[:start] + '[geometry]\nmesh = "gone.msh"\nfixed = ["clamp"]\n' + beam[end:])
-    code, _, err = leave(["run", str(scene), "--out", str(tmp_path / "out")], capsys)
-    assert code == 2
-    assert "gone.msh' does not exist" in err
-    assert err.count("\n") == 1
+    assert "gone.msh' does not exist" in refusal(["run", str(scene), "--out", str(tmp_path / "out")], capsys)
 
 
 WRITING = {
@@ -82,9 +74,7 @@ WRITING = {
 
 
 @pytest.mark.parametrize("case", WRITING)
-def test_what_cannot_be_written_is_refused_before_long_work(
-    case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_what_cannot_be_written_is_refused_before_long_work(case, capsys, tmp_path):
     (tmp_path / "file").touch()
     (tmp_path / "folder.html").mkdir()
     words, out, says = WRITING[case]
@@ -100,17 +90,13 @@ def test_closed_standard_streams_do_not_matter() -> None:
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-def test_list_names_every_scene(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = leave(["cases"], capsys)
-    assert code == 0
-    assert "beam" in out
+PLANNED = ("169 node pairs", "524 DOFs", "1521 in each", "GB", "about 33 steps", "finer model", "whole run")
 
 
-def test_plan_says_what_will_be_modelled(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = leave(["plan", "beam_thesis"], capsys)
-    assert code == 0
-    for words in ("169 node pairs", "524 DOFs", "1521 in each", "GB", "about 33 steps", "finer model", "whole run"):
-        assert words in out
+@pytest.mark.parametrize(("arguments", "words"), [(["cases"], ("beam",)), (["plan", "beam_thesis"], PLANNED)])
+def test_cases_and_plans_are_told(arguments: list[str], words: tuple[str, ...], capsys: Any) -> None:
+    out = printed_text(arguments, capsys)
+    assert [word for word in words if word not in out] == []
 
 
 def test_show_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -120,8 +106,6 @@ def test_show_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
     numbers = json.loads(out)
     wear, patch = written.wear, written.patch
     assert code == 0
-    assert wear is not None
-    assert patch is not None
     assert numbers["depth"] == wear.depth[-1].max()
     assert numbers["mean_depth"] == pytest.approx(wear.depth[-1].mean())
     assert numbers["separated_cycles"] == wear.cycles[-1]
@@ -138,30 +122,27 @@ def test_show_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
 
 def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     store.save(tmp_path / "result.h5", result())
-    code, out, _ = leave(["show", str(tmp_path / "result.h5")], capsys)
-    assert code == 0
+    out = printed_text(["show", str(tmp_path / "result.h5")], capsys)
     assert out.count("\n") <= 25
-    assert [line.split()[0] for line in out.splitlines()[1:] if line[0] != " "] == ["model", "response", "wear"]
+    heads = [line.split()[0] for line in out.splitlines()[1:] if line[0] != " "]
+    assert heads == ["model", "response", "wear", "warning"]
     _, extra, _ = leave(["show", str(tmp_path / "result.h5"), "--verbose"], capsys)
     assert extra.startswith(out)
     for words in ("contact lost", "mean_depth / m", "solves"):
         assert words in extra
 
 
-@pytest.mark.parametrize(
-    ("value", "unit", "error", "shown"),
-    [
-        (0.00095074, "m", 0.053, "0.951 mm"),
-        (796.236, "Hz", 0.021, "796 Hz"),
-        (7376.7, "N", 0.025, "7.38 kN"),
-        (2.219e7, "cycles", 0.3, "22 million cycles"),
-        (9.996e5, "cycles", 0.5, "1 000 000 cycles"),
-        (2.24e-6, "m3", 0.02, "2240 mm³"),
-        (3.7e-8, "m", 0.2, "37 nm"),
-        (123456.0, "Hz", 1e-5, "123.456 kHz"),
-        (0.0, "N", 0.1, "0 N"),
-    ],
-)
+@pytest.mark.parametrize(("value", "unit", "error", "shown"), [
+    (0.00095074, "m", 0.053, "0.951 mm"),
+    (796.236, "Hz", 0.021, "796 Hz"),
+    (7376.7, "N", 0.025, "7.38 kN"),
+    (2.219e7, "cycles", 0.3, "22 million cycles"),
+    (9.996e5, "cycles", 0.5, "1 000 000 cycles"),
+    (2.24e-6, "m3", 0.02, "2240 mm³"),
+    (3.7e-8, "m", 0.2, "37 nm"),
+    (123456.0, "Hz", 1e-5, "123.456 kHz"),
+    (0.0, "N", 0.1, "0 N"),
+])  # fmt: skip
 def test_a_number_has_the_digits_that_its_error_allows(value: float, unit: str, error: float, shown: str) -> None:
     assert number_format.measured(value, unit, number_format.digits(error)) == shown
     last = 10.0 ** (np.floor(np.log10(abs(value) or 1)) + 1 - number_format.digits(error))
@@ -180,7 +161,6 @@ def test_a_sparkline_has_its_highest_block_at_the_resonance():
 
 def test_what_is_beyond_the_linear_model_is_warned_of() -> None:
     built = result()
-    assert built.wear is not None
     bent = replace(
         built, wear=replace(built.wear, periods=None, amplitude=np.geomspace(1e-3, 0.15, len(built.wear.amplitude)))
     )
@@ -243,7 +223,6 @@ def test_a_full_disk_is_told_by_name(capsys: pytest.CaptureFixture[str], tmp_pat
 def curve(peak: int, unstable: range | None = None):
     """A made-up result without wear, its response highest at one of its points, unstable at some."""
     built = result()
-    assert built.response is not None
     assert built.stability is not None
     response = built.response.response.copy()
     response[peak, 0, 1] = 10 * np.abs(response).max()
@@ -261,10 +240,10 @@ def test_an_unstable_peak_is_reported_with_the_highest_stable_point() -> None:
     assert numbers["peak_frequency"]["stable"] == frf.frequency[best]
     assert numbers["amplitude"]["stable"] == frf.amplitude("response")[best]
     assert any(line.split()[:2] == ["stable", "point"] for line in text.brief(falls))
-    assert ["this peak is unstable" in line for line in text.warnings(falls)] == [True]
-    assert list(text.warnings(steady)) == []
+    assert any("this peak is unstable" in line for line in text.warnings(falls))
+    assert all("detached" in line for line in text.warnings(steady))
     assert "stable" not in summary.summary(curve(30, range(61)))["peak_frequency"]
-    assert ["no point is stable" in line for line in text.warnings(curve(30, range(61)))] == [True]
+    assert any("no point is stable" in line for line in text.warnings(curve(30, range(61))))
     assert summary.summary(curve(30))["peak_is_stable"] is None
 
 
@@ -277,7 +256,6 @@ def test_the_end_of_the_range_is_no_peak() -> None:
 
 def test_a_point_beside_a_peak_that_was_not_found_is_no_peak() -> None:
     built = curve(30)
-    assert built.response is not None
     outcome = tuple(SolveEnd.BESIDE_PEAK.say() if i == 30 else item for i, item in enumerate(built.response.outcome))
     lost = replace(built, response=replace(built.response, outcome=outcome))
     assert summary.summary(lost)["peak_at_end"] is True
@@ -287,7 +265,6 @@ def test_a_point_beside_a_peak_that_was_not_found_is_no_peak() -> None:
 
 def test_separation_is_reported_only_where_contact_was_lost() -> None:
     built = result()
-    assert built.wear is not None
     unfinished = replace(built, wear=replace(built.wear, end=WearEnd.STEPS_DONE.say(" 8 wear steps")))
     numbers = summary.summary(unfinished)
     assert numbers["separated_cycles"] is None
@@ -304,23 +281,17 @@ def test_a_result_before_any_solve_has_a_summary() -> None:
 
 def test_render_draws_the_pictures_of_a_result(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     store.save(tmp_path / "result.h5", result())
-    code, out, _ = leave(["draw", str(tmp_path), "--dpi", "40"], capsys)
-    assert code == 0
+    out = printed_text(["draw", str(tmp_path), "--dpi", "40"], capsys)
     assert (tmp_path / "pictures" / "frf.png").is_file()
     assert "part.png" in out or "no renders: " in out
 
 
-@pytest.mark.parametrize(
-    ("statement", "banned"),
-    [
-        ("import tribodyn.workflows.command.main", {"gmsh", "pyvista", "vtk", "matplotlib", "numba", "skfem", "h5py"}),
-        ("import tribodyn.workflows.run.pipeline", {"gmsh", "pyvista", "vtk", "matplotlib"}),
-        (
-            "import tribodyn.workflows.result.summary, tribodyn.workflows.result.store",
-            {"gmsh", "pyvista", "vtk", "matplotlib", "skfem"},
-        ),
-    ],
-)
+@pytest.mark.parametrize(("statement", "banned"), [
+    ("import tribodyn.workflows.command.main", {"gmsh", "pyvista", "vtk", "matplotlib", "numba", "skfem", "h5py"}),
+    ("import tribodyn.workflows.run.pipeline", {"gmsh", "pyvista", "vtk", "matplotlib"}),
+    ("import tribodyn.workflows.result.summary, tribodyn.workflows.result.store",
+        {"gmsh", "pyvista", "vtk", "matplotlib", "skfem"}),
+])  # fmt: skip
 def test_packages_are_imported_only_where_they_are_used(statement: str, banned: set[str]) -> None:
     code = f"{statement}; import sys; print(' '.join(sorted(set(sys.modules) & {banned!r})))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

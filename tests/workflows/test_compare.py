@@ -1,9 +1,9 @@
 """Measurements are read in their units and directions, and stand beside what a scene computes."""
 
-from __future__ import annotations
-
+import contextlib
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +11,9 @@ import pyuff
 from scipy.io import savemat
 
 import tribodyn as td
+from proof.fuzzing.fuzz_damage import bytes_damaged
+from tests.helpers.matrix_scene import matrix_folder
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.export import formats
 from tribodyn.workflows.export.result_tables import DataKind, Function, function
@@ -121,6 +124,15 @@ def test_a_decay_is_read_as_the_backbone_that_it_follows(tmp_path: Path) -> None
     assert run.amplitude.max() == pytest.approx(1e-4, rel=0.06)
 
 
+def test_matrices_are_compared_in_rows(tmp_path: Path) -> None:
+    """The direction of a scene of matrices is its rows; its force is not where its output is."""
+    scene = td.read_scene(matrix_folder(tmp_path) / "own.toml", ("response.points=8",))
+    write_columns({"frequency_Hz": [50.0, 60.0], "acceleration [g]": [1.0, 2.0]}, tmp_path / "sweep.csv")
+    comparison = td.studies.compare(scene, tmp_path / "sweep.csv")
+    assert np.isfinite([row["computed_amplitude_m"] for row in comparison.rows()]).all()
+    assert not comparison.measured.force_at_output(scene.scene)
+
+
 def test_a_small_decay_at_the_frequency_and_damping_at_rest_is_that_of_the_scene(tmp_path: Path) -> None:
     """Stuck, the beam is linear: a decay of its own frequency and damping has the decrement that is computed."""
     overrides = (*SMALL, "contact.friction=100", "backbone.modal_amplitude=[1e-6, 1e-5]", "backbone.points=8")
@@ -136,37 +148,75 @@ def test_a_small_decay_at_the_frequency_and_damping_at_rest_is_that_of_the_scene
     assert off["damping_difference"] < 0.01
 
 
-def test_repeated_runs_are_their_mean_with_their_scatter() -> None:
-    hertz = np.linspace(1.0, 2.0, 5)
-    none = np.full((5, 2), np.nan)
-    runs = tuple(Run("a", "", hertz, s * np.ones(5, complex), none[:, 0], none[:, 0], none) for s in (0.9, 1.0, 1.1))
-    (mean,) = measurement.merged(measurement.Measurement("response", runs)).runs
-    np.testing.assert_allclose(mean.amplitude, 1.0)
-    np.testing.assert_allclose(mean.errors[:, 1], 0.1)
-
-
-def universal(path: Path, nodes: tuple[int, ...]) -> Path:
-    """Accelerance at some nodes along -z, and a mode, as another program writes them."""
-    file, hertz = pyuff.UFF(str(path)), np.linspace(60.0, 100.0, 9)
-    for node in nodes:
-        data = node * (1 + 1j) * hertz
+def universal(path: Path, *changes: dict[str, Any]) -> Path:
+    """Accelerances of 4 along -z from 0 Hz on, as another program writes them, each dataset with changes of its own."""
+    file, hertz = pyuff.UFF(str(path)), np.linspace(0.0, 100.0, 9)
+    for change in changes:
         entry = function(
-            Function.FRF, f"node {node}", "frequency", DataKind.FREQUENCY, "Hz", hertz, DataKind.ACCELERATION,
-            "m/s^2", data, node,
+            Function.FRF, "tap", "frequency", DataKind.FREQUENCY, "Hz", hertz, DataKind.ACCELERATION, "m/s^2",
+            (1 + 1j) * hertz, 4,
         )  # fmt: skip
-        file.write_sets(entry | {"rsp_dir": -3, "ref_dir": 3, "ref_node": 1}, "add")
+        file.write_sets(entry | {"rsp_dir": -3, "ref_dir": 3, "ref_node": 1} | change, "add")
     return path
 
 
 def test_a_universal_file_says_node_and_direction(tmp_path: Path) -> None:
-    path = universal(tmp_path / "hammer.uff", (4, 7))
-    with pytest.raises(ValueError, match=r"hammer\.uff: it has 2 measured places.*4, 7.*give node = NUMBER"):
+    path = universal(tmp_path / "hammer.uff", {}, {"rsp_node": 7}, {"rsp_node": 7, "rsp_dir": 1})
+    with pytest.raises(ValueError, match=r"hammer\.uff: it has 3 measured places.*4, 7.*give node = NUMBER"):
         reading.read(path)
-    content = reading.read(path, {"node": "7"})
+    content = reading.read(path, {"node": "7", "direction": "-z"})
     assert content.per_force
     assert (content.direction, content.force_direction) == ((-0.0, -0.0, -1.0), (0.0, 0.0, 1.0))
-    run = content.runs[0]
-    np.testing.assert_allclose(run.displacement, -7 * (1 + 1j) * run.frequency / (2 * np.pi * run.frequency) ** 2)
+    assert content.unused == ("1 lines at 0 Hz, where nothing vibrates",)
+    assert reading.read(path, {"node": "7", "direction": "x"}).direction == (1.0, 0.0, 0.0)
+
+
+def units(length: float, force: float) -> dict[str, Any]:
+    """A dataset 164: numbers of the file that are 1 m and 1 N."""
+    return {"type": 164, "units_code": 9, "length": length, "force": force, "temp": 1.0, "temp_offset": 0.0}
+
+
+@pytest.mark.parametrize(("changes", "facts", "factor"), [
+    ([{}], {}, 1.0),
+    ([{"ordinate_axis_units_lab": "g"}], {}, 9.80665),
+    ([{"ordinate_axis_units_lab": "in/sec^2", "orddenom_axis_units_lab": "lbf"}], {}, 0.0254 / 4.4482216152605),
+    ([{"abscissa_axis_units_lab": "kHz"}], {}, 1e-6),
+    ([units(1e3, 1e3), {"ordinate_axis_units_lab": "NONE"}], {}, 1.0),
+    ([units(1.0, 1e3), {"ordinate_axis_units_lab": "NONE"}], {}, 1e3),
+    ([{"ordinate_axis_units_lab": "bogus"}], {"unit": "mm/s2/N"}, 1e-3),
+    ([{}, {"data": 3 * (1 + 1j) * np.linspace(0.0, 100.0, 9)}], {}, 2.0),  # repeats become their mean
+])  # fmt: skip
+def test_a_universal_file_has_the_units_of_its_labels(changes, facts, factor, tmp_path):
+    (run,) = measurement.merged(reading.read(universal(tmp_path / "tap.uff", *changes), facts)).runs
+    hertz = np.linspace(12.5, 100.0, 8)
+    np.testing.assert_allclose(run.displacement, -factor * (1 + 1j) * hertz / (2 * np.pi * hertz) ** 2)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({"ordinate_axis_units_lab": "bogus"}, r'"bogus" is not a unit: .* give --fact unit=UNIT'),
+    ({"ordinate_axis_units_lab": "mm"}, "in mm, and derivative 2 of a motion by record 9"),
+    ({"orddenom_spec_data_type": 12}, "no response over a force"),
+    ({"rsp_dir": 4}, "direction: expected an axis .* got 'about 4'"),
+    ({"func_type": 6}, "it has no response"),
+])  # fmt: skip
+def test_a_universal_file_of_something_else_is_refused(change: dict, words: str, tmp_path: Path) -> None:
+    with pytest.raises(Refusal, match=words):
+        reading.read(universal(tmp_path / "tap.uff", change))
+
+
+@pytest.mark.parametrize("ending", [".csv", ".uff", ".mat"])
+def test_a_damaged_measurement_is_read_or_refused(ending: str, tmp_path: Path) -> None:
+    path, rng, hertz = tmp_path / f"own{ending}", np.random.default_rng(0), np.linspace(60.0, 100.0, 9)
+    columns = {"frequency_Hz": hertz, "acceleration_m_s2": hertz, "phase_deg": hertz}
+    if ending == ".uff":
+        universal(path, {})
+    else:
+        write_columns(columns, path) if ending == ".csv" else savemat(path, columns)
+    whole = path.read_bytes()
+    for _ in range(8 if ending == ".mat" else 100):  # a MATLAB file is read in a process of its own
+        path.write_bytes(bytes_damaged(whole, rng)[0])
+        with contextlib.suppress(Refusal):
+            reading.read(path)
 
 
 def test_modes_of_a_universal_file_stand_beside_those_at_rest(tmp_path: Path) -> None:
@@ -188,23 +238,18 @@ def test_modes_of_a_universal_file_stand_beside_those_at_rest(tmp_path: Path) ->
 SWEEP = "frequency_Hz,displacement_um,force_N,phase_deg\n" + "".join(f"{f},1,1,0\n" for f in range(400, 410))
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (SWEEP.replace("frequency", "pitch"), "no column frequency or time among pitch_Hz"),
-        (SWEEP.replace("displacement_um", "displacement"), r"column displacement: give its unit"),
-        (SWEEP.replace("displacement_um", "displacement [Pa]"), "expected a displacement, velocity or acceleration"),
-        (SWEEP.replace("displacement_um", "acceleration [mm]"), "mm is no unit of it"),
-        (SWEEP.replace("force_N", "force_Pa"), "column force: expected a force"),
-        ("# direction = x\n" + SWEEP, "measured along x, output response of the scene is along y"),
-        ("# output = tip\n" + SWEEP, 'output = "tip": the scene has response'),
-        ("# heading = x\n" + SWEEP, "unknown key heading"),
-        ("# position = 1 m, 0 m, 0 m\n" + SWEEP, "position: measured"),
-        ("# position = 1 m, 0 m\n" + SWEEP, "position: expected three lengths"),
-        (SWEEP.replace("400,1,", "400,0,"), "numbers above 0 in every row"),
-        (SWEEP.replace("400,1,1,0\n", "400,1,1\n"), "rows of as many values"),
-    ],
-)
+@pytest.mark.parametrize(("text", "words"), [
+    (SWEEP.replace("frequency", "pitch"), "no column frequency or time among pitch_Hz"),
+    (SWEEP.replace("displacement_um", "displacement"), r"column displacement: give its unit"),
+    (SWEEP.replace("displacement_um", "acceleration [mm]"), "mm is no unit of it"),
+    (SWEEP.replace("force_N", "force_Pa"), "column force: expected a force"),
+    ("# direction = x\n" + SWEEP, "measured along x, output response of the scene is along y"),
+    ("# output = tip\n" + SWEEP, 'output = "tip": the scene has response'),
+    ("# heading = x\n" + SWEEP, "unknown key heading"),
+    ("# position = 1 m, 0 m, 0 m\n" + SWEEP, "position: measured"),
+    (SWEEP.replace("400,1,", "400,0,"), "numbers above 0 in every row"),
+    (SWEEP.replace("400,1,1,0\n", "400,1,1\n"), "rows of as many values"),
+])  # fmt: skip
 def test_what_does_not_fit_is_one_sentence_and_exit_code_2(text: str, words: str, tmp_path: Path, capsys) -> None:
     path = tmp_path / "sweep.csv"
     path.write_text(text, encoding="utf-8")

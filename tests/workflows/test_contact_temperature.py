@@ -1,7 +1,5 @@
 """Friction and stiffness of a contact by its temperature."""
 
-from __future__ import annotations
-
 import pytest
 
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile, read
@@ -49,19 +47,16 @@ def test_a_scene_that_was_written_out_reads_again() -> None:
     assert type(scene).model_validate_json(scene.model_dump_json()) == scene
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ((f"{ROOT}.temperature=900 K",), r"at 900 K, but by_temperature goes from 0 to 800 K: extend it"),
-        ((f"{ROOT}.friction=0.4",), r"contacts\.root_right\.friction: by_temperature gives it too"),
-        ((f"{ROOT}.by_temperature.friction=[0.5, 0.4]",), "friction: give 3 values, one for each temperature"),
-        ((f'{ROOT}.by_temperature.temperature=["0 K", "9 K", "5 K"]',), "ascending order"),
-        ((f"{ROOT}.by_temperature.friction=[0.5, 0.4, -0.2]",), "friction: expected a value at least 0"),
-        ((f"{ROOT}.by_temperature.fricton=[0.5, 0.4, 0.2]",), "did you mean friction"),
-        (('loads.static.map={field="t.csv"}',), "give the contact's own temperature"),
-        (("contacts.root_left.temperature=400 K",), "is for by_temperature, which is not there"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "said"), [
+    ((f"{ROOT}.temperature=900 K",), r"at 900 K, but by_temperature goes from 0 to 800 K: extend it"),
+    ((f"{ROOT}.friction=0.4",), r"contacts\.root_right\.friction: by_temperature gives it too"),
+    ((f"{ROOT}.by_temperature.friction=[0.5, 0.4]",), "friction: give 3 values, one for each temperature"),
+    ((f'{ROOT}.by_temperature.temperature=["0 K", "9 K", "5 K"]',), "ascending order"),
+    ((f"{ROOT}.by_temperature.friction=[0.5, 0.4, -0.2]",), "friction: expected a value at least 0"),
+    ((f"{ROOT}.by_temperature.fricton=[0.5, 0.4, 0.2]",), "did you mean friction"),
+    (('loads.static.map={field="t.csv"}',), "give the contact's own temperature"),
+    (("contacts.root_left.temperature=400 K",), "is for by_temperature, which is not there"),
+])  # fmt: skip
 def test_what_cannot_be_is_one_sentence(changes: tuple[str, ...], said: str) -> None:
     with pytest.raises(SceneError, match=said):
         turbine(*changes)

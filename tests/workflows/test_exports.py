@@ -1,7 +1,5 @@
 """What is exported is read back with the readers of each format, and gives the numbers of the result."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -18,11 +16,11 @@ from scipy.io import loadmat
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
+from tests.helpers.command import refusal
 from tests.helpers.nodes_of_pairs import node_of_pair
 from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
 from tribodyn.reduction import foreign
 from tribodyn.reduction.nastran_matrix import read_op4
-from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.export import formats, result_tables, vtk
 from tribodyn.workflows.pictures import exploded
 from tribodyn.workflows.result import contact_states, faces, store
@@ -33,15 +31,9 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.structure_tables import NamedContact
 
 SMALL = (
-    "verdict.enabled=false",
-    "harmonics.kept=[0, 1]",
-    "geometry.n_patch=3",
-    "geometry.n_length=2",
-    "geometry.n_height=1",
-    "reduction.modes=3",
-    "response.points=5",
-    "wear=",
-)
+    "verdict.enabled=false", "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=2",
+    "geometry.n_height=1", "reduction.modes=3", "response.points=5", "wear=",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +69,6 @@ def test_scipy_reads_the_matlab_file(tmp_path: Path) -> None:
     synthetic = result()
     (path,) = formats.write(synthetic, ["mat"], tmp_path)
     read = loadmat(path, simplify_cells=True)
-    assert synthetic.wear is not None
-    assert synthetic.response is not None
     np.testing.assert_array_equal(read["wear"]["cycles"], synthetic.wear.cycles)
     np.testing.assert_array_equal(read["response"]["response_amplitude_m"], synthetic.response.amplitude("response"))
     assert list(read["bifurcations"]["kind"]) == ["fold", "fold"]
@@ -91,14 +81,12 @@ def test_pyuff_reads_responses_histories_and_loops(tmp_path: Path) -> None:
     (path,) = formats.write(synthetic, ["uff"], tmp_path)
     sets = pyuff.UFF(str(path)).read_sets()
     response = next(s for s in sets if s["type"] == 58 and s["id1"].startswith("response over force, harmonic 1"))
-    assert synthetic.response is not None
     assert response["func_type"] == 4
     load = synthetic.scene.loads.harmonic["shake"]
     expected = (synthetic.response.response[:, 0, 1] - 1j * synthetic.response.response[:, 0, 2]) / load.value
     np.testing.assert_allclose(response["data"], expected, rtol=1e-10, atol=1e-11 * np.abs(expected).max())
     np.testing.assert_allclose(response["x"], synthetic.response.frequency, rtol=1e-5)  # single precision in the format
     preload = next(s for s in sets if s.get("id1", "").startswith("preload_N"))
-    assert synthetic.wear is not None
     np.testing.assert_allclose(preload["data"], synthetic.wear.preload, rtol=1e-10)
 
 
@@ -113,9 +101,6 @@ def test_two_forces_are_no_frequency_response_function() -> None:
 def test_paraview_reader_opens_the_series(series: Path) -> None:
     synthetic = result()
     wear, patch, part = synthetic.wear, synthetic.patch, synthetic.part
-    assert wear is not None
-    assert patch is not None
-    assert part is not None
     reader = pv.PVDReader(series / "contact_wear.pvd")
     np.testing.assert_array_equal(reader.time_values, wear.cycles)
     reader.set_active_time_point(4)
@@ -129,13 +114,11 @@ def test_paraview_reader_opens_the_series(series: Path) -> None:
     grid = _read(series / "part_wear.pvd", 8)
     assert grid.n_cells == len(part.cells)
     np.testing.assert_allclose(grid.point_data["depth_on_this_face"][patch.nodes], 0.5 * wear.depth[8])
-    assert synthetic.fields is not None
     np.testing.assert_array_equal(grid.point_data["displacement_b1"], synthetic.fields.displacement[2, ..., 2])
 
 
 def test_a_cycle_is_the_sum_of_its_harmonics(series: Path) -> None:
     synthetic = result()
-    assert synthetic.fields is not None
     terms = synthetic.fields.displacement[1]
     quarter = _read(series / "part_cycle_4.pvd", vtk.INSTANTS // 4)
     np.testing.assert_allclose(quarter.point_data["displacement"], terms[..., 0] + terms[..., 2], atol=1e-15)
@@ -145,8 +128,6 @@ def test_the_contact_over_a_cycle_has_forces_and_status_of_its_instants(series: 
     """Read by VTK itself, as ParaView does; forces are vectors along x, y, z."""
     synthetic = result()
     loops, patch = synthetic.loops, synthetic.patch
-    assert loops is not None
-    assert patch is not None
     listing = ElementTree.parse(series / "contact_cycle_4.pvd")
     entries = [(float(e.attrib["timestep"]), series / e.attrib["file"]) for e in listing.iter("DataSet")]
     np.testing.assert_allclose([time for time, _ in entries], np.arange(vtk.INSTANTS) / vtk.INSTANTS)
@@ -168,8 +149,6 @@ def test_the_contact_over_a_cycle_has_forces_and_status_of_its_instants(series: 
 
 def test_vtk_itself_reads_the_worn_part(series: Path) -> None:
     synthetic = result()
-    assert synthetic.part is not None
-    assert synthetic.wear is not None
     reader = vtkXMLUnstructuredGridReader()
     reader.SetFileName(str(series / "part_wear" / "part_wear_0008.vtu"))
     reader.Update()
@@ -192,9 +171,6 @@ def test_meshio_reads_the_worn_part(ending: str, tmp_path: Path) -> None:
     synthetic = result()
     path = next(p for p in formats.write(synthetic, ["mesh"], tmp_path, ending) if p.suffix == ending)
     mesh = meshio.read(path)
-    assert synthetic.part is not None
-    assert synthetic.wear is not None
-    assert synthetic.patch is not None
     np.testing.assert_array_equal(mesh.cells_dict["hexahedron"], synthetic.part.cells)
     displacement = np.abs(mesh.points - synthetic.part.points).max(axis=1)
     np.testing.assert_allclose(
@@ -209,7 +185,6 @@ def test_meshio_reads_the_worn_part(ending: str, tmp_path: Path) -> None:
 def test_xarray_opens_the_result_file(tmp_path: Path) -> None:
     synthetic = result()
     store.save(tmp_path / "result.h5", synthetic)
-    assert synthetic.wear is not None
     with xr.open_dataset(tmp_path / "result.h5", group="wear", engine="h5netcdf") as wear:
         np.testing.assert_array_equal(wear["depth"], synthetic.wear.depth)
         assert wear["depth"].dims == ("row", "pair")
@@ -266,14 +241,12 @@ def two_blocks(fine: int) -> Result:
     """Two blocks one upon the other, the lower one with a mesh of its own."""
     synthetic = result()
     part, lower_body = synthetic.part, block(fine, fine // 4, 2)
-    assert part is not None
     lower = lower_body.points - [0, 0, np.ptp(lower_body.points[:, 2])]
     blocks = replace(
         part,
         points=np.concatenate([lower, part.points]),
         cells=np.concatenate([lower_body.cells, part.cells + len(lower)]),
     )
-    assert synthetic.patch is not None
     patch = replace(synthetic.patch, nodes=synthetic.patch.nodes + len(lower))
     return replace(synthetic, part=blocks, patch=patch, facts=replace(synthetic.facts, wear_split=0.25))
 
@@ -282,8 +255,6 @@ def test_both_faces_of_a_contact_inside_the_mesh() -> None:
     """Nodes of both blocks stand at the same places."""
     synthetic = two_blocks(8)
     part, patch = synthetic.part, synthetic.patch
-    assert part is not None
-    assert patch is not None
     (meeting,) = faces.meetings_of(synthetic)
     first, second = meeting.faces
     np.testing.assert_array_equal(node_of_pair(first), patch.nodes)
@@ -300,8 +271,6 @@ def test_a_face_whose_mesh_does_not_match_wears_as_the_pairs_around_its_nodes() 
     """A depth that is linear over the patch is taken off every node of the other face exactly."""
     synthetic = two_blocks(20)
     part, patch = synthetic.part, synthetic.patch
-    assert part is not None
-    assert patch is not None
     (meeting,) = faces.meetings_of(synthetic)
     other = meeting.faces[1]
     assert len(other.nodes) == 6 * 6  # x from 0.15 to 0.2 m in steps of 0.01 m, six nodes across
@@ -315,7 +284,6 @@ def test_bodies_are_drawn_apart_along_their_faces() -> None:
     synthetic = two_blocks(20)
     part, patch = synthetic.part, synthetic.patch
     assert part is not None
-    assert patch is not None
     body, offsets = faces.bodies(part), exploded.explosion_offsets(synthetic)
     between = offsets[body == body[patch.nodes[0]]][0] - offsets[body != body[patch.nodes[0]]][0]
     np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(patch.area.sum())], atol=1e-12)
@@ -329,8 +297,6 @@ def test_bodies_are_drawn_apart_along_their_faces() -> None:
 def test_status_at_an_instant_is_that_of_the_force() -> None:
     synthetic = result()
     loops, patch = synthetic.loops, synthetic.patch
-    assert loops is not None
-    assert patch is not None
     force = np.zeros((1, len(patch.area), 3, 4))  # of one state, at four instants
     force[0, 0] = [[0, 4, -5, 0], [0, 4, 0, 0], [10, 10, 10, 0]]  # mu = 0.5: sticks, sticks (5.7 in all), slips, open
     force[0, 1:, 2] = 10.0
@@ -345,8 +311,6 @@ def test_status_at_an_instant_is_that_of_the_force() -> None:
 def test_every_named_contact_slips_at_its_own_friction() -> None:
     """Two contacts with 0.5 and 0.1: the same forces stick in the one and slip in the other."""
     synthetic = result()
-    assert synthetic.loops is not None
-    assert synthetic.patch is not None
     n = len(synthetic.patch.area)
     table = {"group": "face", "first": "a", "second": "b"}
     first, second = (NamedContact.model_construct(**table, friction=mu) for mu in (0.5, 0.1))
@@ -366,18 +330,10 @@ def test_every_named_contact_slips_at_its_own_friction() -> None:
     assert (status[6:] == 1).all()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--to", "paper"], "--to paper: no such format; there are vtk, csv"),
-        (["--to", "mesh", "--mesh-ending", ".docx"], 'no format ".docx"'),
-    ],
-)
-def test_wrong_wishes_are_one_sentence(
-    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--to", "paper"], "--to paper: no such format; there are vtk, csv"),
+    (["--to", "mesh", "--mesh-ending", ".docx"], 'no format ".docx"'),
+])  # fmt: skip
+def test_wrong_wishes_are_one_sentence(arguments, words, tmp_path, capsys):
     store.save(tmp_path / "result.h5", result())
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["export", str(tmp_path), *arguments])
-    assert stop.value.code == 2
-    assert words in capsys.readouterr().err
+    assert words in refusal(["export", str(tmp_path), *arguments], capsys)

@@ -1,8 +1,5 @@
 """tribodyn study identify: numbers of a scene that made the measured ones are found again, and bad files end well."""
 
-from __future__ import annotations
-
-import json
 import tomllib
 from types import SimpleNamespace
 from typing import Any
@@ -13,17 +10,18 @@ import pytest
 import tribodyn as td
 from proof.problems import cycle_at
 from tests.helpers.coarse_scenes import BLADE, RIG
+from tests.helpers.command import printed_record, refusal
 from tests.helpers.fits import fit_by_differences, plain, predict
+from tests.helpers.matrix_scene import matrix_folder
 from tests.helpers.pages import ROOT, fences
 from tests.helpers.structures import BLOCKS
-from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file, scene_fit
-from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
+from tribodyn.workflows.studies.fits.curve_target import FULL, Curve, CurveTarget
 from tribodyn.workflows.studies.fits.fit_file import FitTables, MeasuredTarget
 from tribodyn.workflows.studies.fits.identification import FitParameter, MeasuredNumber
 from tribodyn.workflows.studies.measured.measurement import Run
@@ -59,10 +57,7 @@ def test_contact_springs_and_friction_are_found_again():
         "k_t": {"keys": ["contact.tangential_stiffness"], "low": "100 N/um", "high": "1 N/nm"},
         "mu": {"keys": ["contact.friction"], "low": 0.1, "high": 0.9, "ratio": False},
     }
-    measured = {
-        "mode": {"of": "stuck frequency", "mode": 1},
-        "energy": {"of": "energy", "at": "700 Hz", "load": 2.0},
-    }
+    measured = {"mode": {"of": "stuck frequency", "mode": 1}, "energy": {"of": "energy", "at": "700 Hz", "load": 2.0}}
     result, changes = found_again("beam", BEAM, true, searched, measured)
     assert result.values == pytest.approx([300e6, 0.42], rel=1e-3)
     assert result.origin == pytest.approx([470e6, 0.5])  # the scene's own, where it starts
@@ -70,6 +65,15 @@ def test_contact_springs_and_friction_are_found_again():
     assert changes[0].endswith(" N/m")
     assert scene_file.read("beam", (*BEAM, *changes)).scene.contact.numbers["friction"] == pytest.approx(0.42, rel=1e-3)
     assert abs(result.sensitivity[0, 1]) < 1e-9  # a stuck mode knows no friction
+
+
+def test_friction_of_a_scene_of_matrices_is_found_again(tmp_path):
+    scene = str(matrix_folder(tmp_path) / "own.toml")
+    searched = {"mu": {"keys": ["contact.friction"], "low": 0.1, "high": 0.8}}
+    measured = {name: {"of": name, "at": "60 Hz"} for name in ("amplitude", "energy")}
+    result, _ = found_again(scene, (), ("contact.friction=0.3",), searched, measured)
+    assert result.values == pytest.approx([0.3], rel=1e-3)
+    assert result.origin == [0.4]
 
 
 LOCATED = ("harmonics.transitions=located", "wear=")  # where derivatives are exact
@@ -190,35 +194,28 @@ PARAMETER = '[parameters.k]\nkeys = ["damping.modal"]\nlow = 0.01\nhigh = 0.06\n
 MEASURED = '[measured.e]\nof = "energy"\nat = "290 Hz"\nvalue = "1 mJ"\n'
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("x = [", "is not valid TOML"),
-        (PARAMETER, "measured is missing"),
-        (MEASURED, "parameters is missing"),
-        (PARAMETER.replace("low = 0.01\n", "") + MEASURED, "parameters.k.low is missing"),
-        (PARAMETER.replace("high", "highest") + MEASURED, "unknown key parameters.k.highest"),
-        (PARAMETER.replace("modal", "modall") + MEASURED, "the scene has no damping.modall: give start"),
-        (PARAMETER.replace("damping.modal", "scene.title") + MEASURED, "scene.title is not a number"),
-        (PARAMETER.replace("0.01", "0.03") + MEASURED, "between 0.03 and 0.06 but 0.026: give start"),
-        (PARAMETER.replace("0.01", '"1 um"').replace("0.06", '"1 N"') + MEASURED, "k.high: expected a length"),
-        (
-            PARAMETER.replace("0.01", '"1 um"').replace("0.06", '"3 um"\nstart = ["2 um"]') + MEASURED,
-            "damping.modal: expected a number such as",
-        ),
-        (PARAMETER + MEASURED.replace("energy", "heat"), "of: expected one of open frequency, stuck frequency, "),
-        (PARAMETER + MEASURED.replace('at = "290 Hz"\n', ""), 'expected at for of = "energy"'),
-        (PARAMETER + MEASURED + "left = 0.5\n", 'expected no left for of = "energy"'),
-        (PARAMETER + MEASURED.replace("1 mJ", "1 N"), "measured.e.value: expected an energy"),
-        (PARAMETER + MEASURED.replace("1 mJ", "-1 mJ"), "measured numbers above 0"),
-    ],
-)
+@pytest.mark.parametrize(("text", "words"), [
+    ("x = [", "is not valid TOML"),
+    (PARAMETER, "measured is missing"),
+    (MEASURED, "parameters is missing"),
+    (PARAMETER.replace("low = 0.01\n", "") + MEASURED, "parameters.k.low is missing"),
+    (PARAMETER.replace("high", "highest") + MEASURED, "unknown key parameters.k.highest"),
+    (PARAMETER.replace("modal", "modall") + MEASURED, "the scene has no damping.modall: give start"),
+    (PARAMETER.replace("damping.modal", "scene.title") + MEASURED, "scene.title is not a number"),
+    (PARAMETER.replace("0.01", "0.03") + MEASURED, "between 0.03 and 0.06 but 0.026: give start"),
+    (PARAMETER.replace("0.01", '"1 um"').replace("0.06", '"1 N"') + MEASURED, "k.high: expected a length"),
+    (PARAMETER.replace("0.01", '"1 um"').replace("0.06", '"3 um"\nstart = ["2 um"]') + MEASURED,
+        "damping.modal: expected a number such as"),
+    (PARAMETER + MEASURED.replace("energy", "heat"), "of: expected one of open frequency, stuck frequency, "),
+    (PARAMETER + MEASURED.replace('at = "290 Hz"\n', ""), 'expected at for of = "energy"'),
+    (PARAMETER + MEASURED + "left = 0.5\n", 'expected no left for of = "energy"'),
+    (PARAMETER + MEASURED.replace("1 mJ", "1 N"), "measured.e.value: expected an energy"),
+    (PARAMETER + MEASURED.replace("1 mJ", "-1 mJ"), "measured numbers above 0"),
+])  # fmt: skip
 def test_a_bad_file_is_one_sentence_and_exit_code_2(text, words, tmp_path, capsys):
     (tmp_path / "fit.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["study", "identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))])
-    assert stop.value.code == 2
-    sentence = capsys.readouterr().err.strip().splitlines()[-1]
+    arguments = ["study", "identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))]
+    sentence = refusal(arguments, capsys)
     assert sentence.startswith("tribodyn: ")
     assert words in sentence
 
@@ -238,27 +235,26 @@ def test_the_file_that_comes_with_the_program_is_sound_and_the_command_prints(tm
     assert fit_file.read(tomllib.loads(shown)) == task
     (tmp_path / "fit.toml").write_text(PARAMETER + MEASURED, encoding="utf-8")
     words = ["study", "identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))]
-    with pytest.raises(SystemExit) as stop:
-        cli.main([*words, "--json"])
-    assert not stop.value.code
-    record = json.loads(capsys.readouterr().out)
+    record = printed_record([*words, "--json"], capsys)
     assert record["set"][0].startswith("damping.modal=")
     assert record["numbers"][0]["measured"] == 1e-3
 
 
 def test_friction_is_found_again_from_a_measured_curve(tmp_path):
-    """A response of the scene with other friction, seen as accelerations; and a file whose runs are others."""
+    """A response of the scene with other friction, seen as accelerations with their phase; a file with other runs."""
     base = ("beam_thesis", (*BEAM, "harmonics.kept=[0, 1]", "response.points=10", "response.frequency=[700, 1300]"))
     true = td.run(base[0], overrides=(*base[1], "contact.friction=0.38", "wear=", "verdict.enabled=false")).response
     w, x = true.omega, true.response[:, 0, 1] - 1j * true.response[:, 0, 2]
     columns = {"frequency_Hz": w / (2 * np.pi), "acceleration_m_s2": w**2 * np.abs(x), "control": ["force"] * len(w)}
-    write_columns(columns, tmp_path / "sweep.csv")
+    write_columns({**columns, "phase_deg": np.degrees(np.angle(-x))}, tmp_path / "sweep.csv")
     friction = {"keys": ["contact.friction"], "low": 0.2, "high": 0.8}
     task = {"parameters": {"mu": friction}, "curves": {"sweep": {"file": str(tmp_path / "sweep.csv"), "error": "5 %"}}}
     computed = td.studies.identify(base[0], task, overrides=base[1]).identification
     assert computed.values == pytest.approx([0.38], rel=1e-3)
     assert computed.rms < 1e-3
-    assert len(computed.measured) == len(w)
+    assert len(computed.measured) == 2 * len(w)
+    assert computed.after[len(w) :] == pytest.approx(np.ones(len(w)), abs=1e-3)  # phases
+    assert np.abs(computed.before[len(w) :] - 1).max() > 0.01
     assert computed.measured[0].weight == pytest.approx(0.2)
     task["curves"]["sweep"]["control"] = "response"
     with pytest.raises(td.SceneError, match=r"curves\.sweep: no run has control = response"):
@@ -316,4 +312,4 @@ def test_errors_that_are_given_go_before_those_of_a_curve():
         ({"frequency_error": 3e-3}, [3e-3, 1e-2]),
     ):
         numbers = CurveTarget("curve", Curve.model_validate({"file": "a.csv", **inputs}), measured).numbers()
-        assert [number.error for number in numbers] == errors
+        assert [FULL / number.weight for number in numbers] == pytest.approx(errors)

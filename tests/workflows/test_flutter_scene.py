@@ -1,7 +1,5 @@
 """Flutter from a scene: which waves of the wheel, and the limit cycle that friction makes of them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -70,14 +68,11 @@ def test_the_command_tells_which_waves_flutter(scene: Path, tmp_path: Path, caps
         flutter.flutter(scene, 1e-6)
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        (("flow.by_diameter=[[0, 0, 0.01]]",), "either influence or by_diameter"),
-        (("flow.influence=", "flow.by_diameter=[[0, 0, 0.01]]"), "a row for each of the 6 waves"),
-        (("flow.influence=[[1, 0, 0.1], [1, 0, 0.2]]",), "a row is there twice"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "said"), [
+    (("flow.by_diameter=[[0, 0, 0.01]]",), "either influence or by_diameter"),
+    (("flow.influence=", "flow.by_diameter=[[0, 0, 0.01]]"), "a row for each of the 6 waves"),
+    (("flow.influence=[[1, 0, 0.1], [1, 0, 0.2]]",), "a row is there twice"),
+])  # fmt: skip
 def test_what_cannot_be_is_one_sentence(scene: Path, changes: tuple[str, ...], said: str) -> None:
     with pytest.raises(SceneError, match=said):
         scene_file.read(str(scene), changes)

@@ -1,7 +1,5 @@
 """`import tribodyn`: what it offers, that it is quick, and that it says the same as the command."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -16,18 +14,10 @@ from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result.provenance import rebuilt
 
 SMALL = {
-    "harmonics.kept": [0, 1],
-    "wear.tolerance": 0.02,
-    "wear.at": "peak",
-    "wear.motion": "machine",
-    "geometry.n_patch": 5,
-    "geometry.n_length": 4,
-    "geometry.n_height": 1,
-    "reduction.modes": 4,
-    "response.points": 12,
-    "wear.max_steps": 2,
-    "verdict.enabled": False,
-}
+    "harmonics.kept": [0, 1], "wear.tolerance": 0.02, "wear.at": "peak", "wear.motion": "machine",
+    "geometry.n_patch": 5, "geometry.n_length": 4, "geometry.n_height": 1, "reduction.modes": 4,
+    "response.points": 12, "wear.max_steps": 2, "verdict.enabled": False,
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -70,23 +60,18 @@ def test_a_scene_is_a_name_a_path_or_a_dict(tmp_path: Path) -> None:
     assert repeated.folder == tmp_path.resolve()
 
 
-@pytest.mark.parametrize(
-    ("source", "overrides", "sentence"),
-    [
-        ("baem", (), 'there is no scene "baem"'),
-        ({"geometry": {"part": "beam"}}, (), "is missing"),
-        ("beam", {"contact.fraction": 1}, r"unknown key contact.fraction \(did you mean friction\?\)"),
-        ("beam", "contact.friction=1", "give a list of texts"),
-    ],
-)
+@pytest.mark.parametrize(("source", "overrides", "sentence"), [
+    ("baem", (), 'there is no scene "baem"'),
+    ({"geometry": {"part": "beam"}}, (), "is missing"),
+    ("beam", {"contact.fraction": 1}, r"unknown key contact.fraction \(did you mean friction\?\)"),
+    ("beam", "contact.friction=1", "give a list of texts"),
+])  # fmt: skip
 def test_a_bad_scene_is_one_sentence(source: object, overrides: object, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         td.read_scene(source, overrides)  # type: ignore[arg-type]
 
 
-def test_a_run_in_memory_is_that_of_the_command(
-    worn: td.Result, messages: list[tuple[str, float | None]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_in_memory_is_that_of_the_command(worn, messages, tmp_path, capsys):
     sets = [word for key, value in SMALL.items() for word in ("--set", f"{key}={json.dumps(value)}")]
     cli.app(["run", "beam", *sets, "--no-pictures", "--out", str(tmp_path)], result_action="return_value")
     capsys.readouterr()
@@ -94,8 +79,6 @@ def test_a_run_in_memory_is_that_of_the_command(
     theirs, ours = json.loads(capsys.readouterr().out), json.loads(json.dumps(worn.summary()))
     assert {**theirs, "seconds": 0, "error_budget": 0} == {**ours, "seconds": 0, "error_budget": 0}
     loaded = td.load(tmp_path)
-    assert loaded.response is not None
-    assert worn.response is not None
     assert np.array_equal(loaded.response.frequency, worn.response.frequency)
     assert loaded.summary() == td.load(tmp_path / "result.h5").summary()
     shares = [share for text, share in messages if text.startswith("frequency response") and share is not None]
@@ -112,11 +95,7 @@ def test_resume_and_pictures_need_a_folder() -> None:
 
 def test_fields_on_the_mesh_are_those_of_the_result(worn: td.Result) -> None:
     grid, patch = td.plot.mesh_fields(worn), td.plot.patch_fields(worn)
-    assert worn.part is not None
-    assert worn.patch is not None
-    assert worn.fields is not None
     assert grid.n_points == len(worn.part.points)
-    assert worn.wear is not None
     depth = np.asarray(patch.point_data["depth"])
     assert np.array_equal(depth, worn.wear.depth[-1])  # of the state that the row solved
     split = worn.facts.share_of_body_1

@@ -1,7 +1,5 @@
 """Hard ends: full disks, damaged files, two runs in one folder, absurd sizes, Ctrl-C while the program is loaded."""
 
-from __future__ import annotations
-
 import importlib.abc
 import os
 import subprocess
@@ -104,13 +102,9 @@ killed_runs.go_on(Path(sys.argv[1]), tuple(words))
 def test_one_run_through_all_of_it_ends_as_if_nothing_had_happened(tmp_path: Path) -> None:
     """Killed, its folder claimed by another run, its checkpoint damaged, its disk full; resumed, all the same."""
     overrides = (
-        *TINY[:5],
-        "verdict.enabled=false",
-        "response.points=5",
-        "wear.rule=thesis",
-        "wear.step=1 um",
+        *TINY[:5], "verdict.enabled=false", "response.points=5", "wear.rule=thesis", "wear.step=1 um",
         "wear.max_steps=4",
-    )
+    )  # fmt: skip
     root, folder, path = Path(__file__).parents[2], tmp_path / "run", tmp_path / "run" / "result.h5"
     folder.mkdir()
     total = td.run("beam", tmp_path / "whole", overrides=overrides)
@@ -136,21 +130,16 @@ def test_one_run_through_all_of_it_ends_as_if_nothing_had_happened(tmp_path: Pat
     assert store.load(path).state  # what was there is there
     assert subprocess.run(command, cwd=root, check=False).returncode == 0
     resumed = store.load(path)
-    assert total.wear is not None
-    assert resumed.wear is not None
     assert np.array_equal(resumed.wear.depth, total.wear.depth)
     assert np.array_equal(resumed.wear.cycles, total.wear.cycles)
 
 
-@pytest.mark.parametrize(
-    "override",
-    [
-        "geometry.n_length=1000000",
-        "loads.static.press.value=1e300 kN",
-        "contact.tangential_stiffness=1e12 N/um",
-        "harmonics.tolerance=1e-300",
-    ],
-)
+@pytest.mark.parametrize("override", [
+    "geometry.n_length=1000000",
+    "loads.static.press.value=1e300 kN",
+    "contact.tangential_stiffness=1e12 N/um",
+    "harmonics.tolerance=1e-300",
+])  # fmt: skip
 def test_absurd_sizes_are_refused_at_once(override: str) -> None:
     start = time.process_time()
     with pytest.raises(td.SceneError, match=override.partition("=")[0].rpartition(".")[2]):
@@ -166,9 +155,7 @@ def test_a_mesh_beyond_the_memory_is_refused_before_it_is_factorised(monkeypatch
         td.run("beam", overrides=TINY)
 
 
-def test_ctrl_c_while_the_program_is_loaded_ends_quietly(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ctrl_c_while_the_program_is_loaded_ends_quietly(monkeypatch, capsys):
     class Interrupting(importlib.abc.MetaPathFinder):
         def find_spec(self, name, path, target=None):
             if name == "tribodyn.workflows.command.main":

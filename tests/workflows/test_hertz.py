@@ -1,7 +1,5 @@
 """Hertz contact of two bodies whose meshes do not match, from mesh files and a scene to the pressure."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identification: known parameters are found again, and what the numbers do not determine is said, not hidden."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -60,9 +58,7 @@ def test_standard_error_is_that_of_the_mean():
     """Scatter about one constant: the logarithm's standard error is s / sqrt(n)."""
     scatter = 0.05 * np.random.default_rng(2).standard_normal(40)
     result = fit(
-        [FitParameter("level", 0.1, 10.0, (1.0,))],
-        numbers(3.0 * np.exp(scatter)),
-        lambda v: np.full(40, v["level"]),
+        [FitParameter("level", 0.1, 10.0, (1.0,))], numbers(3.0 * np.exp(scatter)), lambda v: np.full(40, v["level"])
     )
     assert result.values[0] == pytest.approx(3.0 * np.exp(scatter.mean()), rel=1e-6)
     assert result.deviation[0] == pytest.approx(scatter.std(ddof=1) / np.sqrt(40), rel=1e-6)
@@ -107,18 +103,32 @@ def test_the_best_of_several_starts_is_kept():
     assert result.before[0] == pytest.approx(folded({"x": 1.0})[0])
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: FitParameter("k", 2.0, 1.0, (1.5,)), "bounds low < high"),
-        (lambda: FitParameter("k", 1.0, 2.0, (3.0,)), "starts between them"),
-        (lambda: FitParameter("k", 1.0, 2.0, ()), "starts between them"),
-        (lambda: FitParameter("k", 0.0, 2.0, (1.0,)), "a ratio needs bounds above 0"),
-        (lambda: fit(PAIR, numbers([1.0, 0.0]), springs_in_a_row), "measured numbers above 0"),
-        (lambda: fit(PAIR, numbers([1.0, 2.0, 3.0]), springs_in_a_row), "instead of 3 numbers"),
-        (lambda: fit(PAIR, numbers([1.0]), lambda v: np.array([-1.0])), "narrow the bounds"),
-    ],
-)
+@pytest.mark.parametrize(("bumps", "said"), [(0.0, False), (0.02, True), (0.05, False)])
+def test_no_start_contradicts_another_where_the_sum_of_squares_is_bumpy(bumps, said):
+    """Every start ends at an interval that holds the true number and the best fits from the others."""
+    scatter = 0.01 * np.random.default_rng(1).standard_normal(12)
+
+    def curve(values):
+        x = values["x"]
+        return x ** np.linspace(0.5, 1.0, 12) * (1 + bumps * np.sin(150 * x + np.arange(12)) ** 2)
+
+    measured = numbers(curve({"x": 0.3}) * np.exp(scatter))
+    results = [fit([FitParameter("x", 0.1, 0.9, (start,))], measured, curve) for start in (0.12, 0.29, 0.35, 0.85)]
+    for result in results:
+        for x in (0.3, *(other.values[0] for other in results)):
+            assert abs(np.log(result.values[0] / x)) < 2.5 * result.deviation[0]
+    assert ("bumpy" in results[0].report()) == said
+
+
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda: FitParameter("k", 2.0, 1.0, (1.5,)), "bounds low < high"),
+    (lambda: FitParameter("k", 1.0, 2.0, (3.0,)), "starts between them"),
+    (lambda: FitParameter("k", 1.0, 2.0, ()), "starts between them"),
+    (lambda: FitParameter("k", 0.0, 2.0, (1.0,)), "a ratio needs bounds above 0"),
+    (lambda: fit(PAIR, numbers([1.0, 0.0]), springs_in_a_row), "measured numbers above 0"),
+    (lambda: fit(PAIR, numbers([1.0, 2.0, 3.0]), springs_in_a_row), "instead of 3 numbers"),
+    (lambda: fit(PAIR, numbers([1.0]), lambda v: np.array([-1.0])), "narrow the bounds"),
+])  # fmt: skip
 def test_what_cannot_be_is_one_sentence(call, words):
     with pytest.raises(ValueError, match=words) as refusal:
         call()

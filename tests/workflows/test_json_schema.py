@@ -1,7 +1,5 @@
 """The JSON schema of scenes is that of the program: it takes what the program takes and refuses what that refuses."""
 
-from __future__ import annotations
-
 import copy
 import random
 import tomllib

@@ -1,10 +1,8 @@
 """Lives as distributions: against closed forms, in their confidence, and by the command on a scene."""
 
-from __future__ import annotations
-
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 import tribodyn as td
-from tests.helpers.command import leave
+from tests.helpers.command import printed_text
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.many import pool, quantiles, study_file, study_pictures
 from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
@@ -68,13 +66,13 @@ def lasts(values: dict[str, float]) -> float:
     return MEDIAN * math.prod((values[key] / medians[key]) ** power for key, power in POWERS.items())
 
 
-def engine(life: Callable[[dict[str, float], StudyRun], dict[str, float] | None]) -> Any:
+def engine(life: Callable[[dict[str, float], StudyRun], dict[str, float] | None], keys: Iterable[str] = VARY) -> Any:
     """In place of the processes: rows with a closed-form life."""
 
     def finished(tasks: Sequence[StudyRun], workers: int, solve: Any) -> Iterator[RunRow]:
         for task in tasks:
             message = dict(text.split("=", 1) for text in task.overrides)
-            numbers = life({key: float(message[key]) for key in VARY}, task)
+            numbers = life({key: float(message[key]) for key in keys}, task)
             done = numbers is not None
             yield RunRow(task.number, task.key, "complete" if done else "failed", "told", numbers or {})
 
@@ -96,12 +94,13 @@ def planted(seed: int) -> tuple[ParameterSpace, Callable[[np.ndarray], np.ndarra
     return space(study(vary, seed=seed)), log_life
 
 
-def covered(seeds: range, runs: int) -> tuple[float, float]:
+@pytest.mark.parametrize(("problems", "share"), [(4, 0.5), pytest.param(50, 0.8, marks=pytest.mark.slow)])
+def test_the_claimed_confidence_is_kept_on_planted_problems(problems: int, share: float) -> None:
     """Share of problems whose P10 lies in its 90 % interval, and the largest error of its logarithm."""
     inside, errors = [], []
-    for seed in seeds:
+    for seed in range(problems):
         of, log_life = planted(seed)
-        points = of.values(qmc.Sobol(4, seed=np.random.default_rng(seed)).random(runs))
+        points = of.values(qmc.Sobol(4, seed=np.random.default_rng(seed)).random(64))
         surrogate = Surrogate.fitted(of.coordinates(points), log_life(points))
         sample = Sample.of(of, surrogate)
         large, _ = of.draw(17, seed=99)
@@ -109,13 +108,8 @@ def covered(seeds: range, runs: int) -> tuple[float, float]:
         low, high = np.quantile(quantiles.drawn(sample, surrogate, 0.1), [0.05, 0.95])
         inside.append(low <= truth <= high)
         errors.append(abs(sample.quantile(0.1) - truth))
-    return float(np.mean(inside)), float(np.max(errors))
-
-
-def test_the_claimed_confidence_is_kept_on_planted_problems() -> None:
-    share, error = covered(range(4), 64)
-    assert share >= 0.5
-    assert error < 0.05
+    assert np.mean(inside) >= share
+    assert np.max(errors) < 0.05
 
 
 def test_counting_holds_a_quantile_beside_a_jump_that_the_surrogate_smooths() -> None:
@@ -135,13 +129,6 @@ def test_counting_holds_a_quantile_beside_a_jump_that_the_surrogate_smooths() ->
         low, high = quantiles.counted(sample, surrogate.values[:, None], surrogate.left_out[:, None], 0.5, 0.9)
         inside["counted"] += low <= truth <= high
     assert inside["counted"] >= 7 > inside["surrogate"]
-
-
-@pytest.mark.slow
-def test_the_claimed_confidence_is_kept_on_fifty_planted_problems() -> None:
-    share, error = covered(range(50), 64)
-    assert share >= 0.8
-    assert error < 0.05
 
 
 def test_quantiles_and_indices_are_those_of_the_closed_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,9 +175,7 @@ def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypa
     assert repeated.quantiles[0] == result.quantiles[0]
 
 
-def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(tmp_path, monkeypatch):
     """A life that jumps with friction and damping alone, times powers of loads and wear coefficient."""
     shake, wear = "loads.harmonic.shake.value", "wear.coefficient"
     vary = VARY | {
@@ -204,19 +189,11 @@ def test_what_scales_a_life_is_found_by_two_runs_and_needs_no_others(
         full = MEDIAN * math.exp(jump - 3 * ratio) * (2e-15 / x[wear]) ** powers[0]
         return full * (20e3 / x[PRESS]) ** powers[1]
 
-    def runs(powers: tuple[float, float]) -> Any:
-        def finished(tasks: Sequence[StudyRun], workers: int, solve: Any) -> Iterator[RunRow]:
-            for task in tasks:
-                message = dict(text.split("=", 1) for text in task.overrides)
-                numbers = {"life": life({key: float(message[key]) for key in vary}, powers)}
-                yield RunRow(task.number, task.key, "complete", "told", numbers)
-
-        return finished
-
     of = space(study(vary))
     tables = study(vary, runs=45, lives={"model_error": 0})
     for powers, scaled in (((1.0, 1.0), 2), ((1.0, 1.2), 1)):
-        monkeypatch.setattr(pool, "finished", runs(powers))
+        given = engine(lambda x, task, powers=powers: {"life": life(x, powers)}, vary)
+        monkeypatch.setattr(pool, "finished", given)
         result = td.studies.lives(tables, tmp_path / str(scaled))
         assert len(result.scaled) == scaled
         assert result.runs == 48
@@ -287,11 +264,8 @@ def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:
 def test_covariances_of_derivatives_are_derivatives_of_covariances() -> None:
     draw = np.random.default_rng(0)
     a, b, log, h = (
-        draw.standard_normal((4, 2)),
-        draw.standard_normal((3, 2)),
-        np.array([0.3, -1.0, -9, 0.2, -0.4]),
-        1e-5,
-    )
+        draw.standard_normal((4, 2)), draw.standard_normal((3, 2)), np.array([0.3, -1.0, -9, 0.2, -0.4]), 1e-5,
+    )  # fmt: skip
 
     def of(a: np.ndarray, i: int, b: np.ndarray, j: int) -> np.ndarray:
         return covariance(log, a, np.full(4, i), b, np.full(3, j))
@@ -322,26 +296,19 @@ def test_runs_with_derivatives_say_as_much_as_three_times_as_many() -> None:
     assert error(16, True) < error(48, False)
 
 
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        ({"lives": {"number": "lifes"}}, 'has no number "lifes": there are life'),
-        ({"lives": {"shares": [1.5]}}, "lives.shares"),
-        ({"vary": VARY | {"damping.modal": [0.01, 0.02]}}, "vary.damping.modal: expected a distribution"),
-        ({"study": {"scene": "beam", "design": "list"}, "vary": {FRICTION: [0.5]}}, "lives are drawn"),
-    ],
-)
-def test_what_cannot_be_is_refused(
-    change: dict[str, Any], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize(("change", "sentence"), [
+    ({"lives": {"number": "lifes"}}, 'has no number "lifes": there are life'),
+    ({"lives": {"shares": [1.5]}}, "lives.shares"),
+    ({"vary": VARY | {"damping.modal": [0.01, 0.02]}}, "vary.damping.modal: expected a distribution"),
+    ({"study": {"scene": "beam", "design": "list"}, "vary": {FRICTION: [0.5]}}, "lives are drawn"),
+])  # fmt: skip
+def test_what_cannot_be_is_refused(change, sentence, tmp_path, monkeypatch):
     monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life": 1e6}))
     with pytest.raises(ValueError, match=sentence):
         td.studies.lives(study() | change, tmp_path)
 
 
-def test_the_command_tells_the_verdict_with_the_distribution(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_tells_the_verdict_with_the_distribution(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(pool, "finished", lambda tasks, workers, solve: map(solve, tasks))
     file = tmp_path / "mine.toml"
     file.write_text(
@@ -352,8 +319,7 @@ def test_the_command_tells_the_verdict_with_the_distribution(
         f'[vary]\n{FRICTION} = {{ distribution = "uniform", low = 0.4, high = 0.6 }}\n'
         '[lives]\nnumber = "amplitude_first"\n'
     )
-    code, out, _ = leave(["study", "lives", str(file), "--out", str(tmp_path / "out")], capsys)
-    assert code == 0
+    out = printed_text(["study", "lives", str(file), "--out", str(tmp_path / "out")], capsys)
     assert "verdict on the run at the medians" in out
     assert (tmp_path / "out" / "lives.png").stat().st_size > 5000
     record = json.loads((tmp_path / "out" / "lives.json").read_text())

@@ -1,7 +1,5 @@
 """Models that come as matrices: a scene of a file and DOF lists, end to end, and the documented Python example."""
 
-from __future__ import annotations
-
 import json
 import textwrap
 from pathlib import Path
@@ -9,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.command import leave
+from tests.helpers.command import printed_text, refusal
 from tests.helpers.matrix_scene import SCENE, matrix_folder
 from tests.helpers.verification_models import random_structure
 from tribodyn.hbm.balance import HarmonicBalance
@@ -34,26 +32,21 @@ from tribodyn.workflows.scene.scene_file import parse, read
 
 def test_a_scene_of_matrices_runs_to_wear_and_pictures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     short = ["--set", "verdict.enabled=false"]
-    code, out, err = leave(["run", str(folder / "own.toml"), "--out", str(folder / "out"), *short], capsys)
-    assert code == 0, err
+    out = printed_text(["run", str(folder / "own.toml"), "--out", str(folder / "out"), *short], capsys)
     assert "18 DOFs; 2 node pairs" in out
     assert (folder / "out" / "pictures" / "frf.png").is_file()
     assert (folder / "out" / "pictures" / "hysteresis.png").is_file()
     result = store.load(folder / "out" / "result.h5")
     assert result.state == "complete: stopped after 4 wear steps"
-    assert result.response is not None
-    assert result.wear is not None
     assert result.response.output_names == ("response", "mid")
     assert set(result.response.outcome) == {CONVERGED}
-    assert result.wear.worn.max(axis=1) == pytest.approx(1e-6, rel=1e-3)  # the step of the scene, whole cycles
+    assert result.wear.worn[:-1].max(axis=1) == pytest.approx(1e-6, rel=1e-3)  # the step of the scene, whole cycles
     # worn volume is the coefficient times the friction work
     assert result.wear.worn.sum(0) @ np.full(2, 5e-6) == pytest.approx(2e-15 * result.wear.work.sum(), rel=1e-12)
     for command in (["show", "--json"], ["draw"], ["verify", "--at", "60 Hz", "--steps", "128", "--json"]):
-        code, out, err = leave([command[0], str(folder / "out"), *command[1:]], capsys)
-        assert code == 0, err
+        out = printed_text([command[0], str(folder / "out"), *command[1:]], capsys)
     assert json.loads(out)["frequency_hz"] == pytest.approx(60)
-    code, out, _ = leave(["plan", str(folder / "own.toml")], capsys)
-    assert code == 0
+    out = printed_text(["plan", str(folder / "own.toml")], capsys)
     assert "2 node pairs" in out
 
 
@@ -66,8 +59,7 @@ def folder(tmp_path: Path) -> Path:
 def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The example of reduction_foreign, word for word, gives what the scene gives.
 
-    With located transitions: sampled ones put kinks into the curve, among which rounding chooses the peak.
-    """
+    With located transitions: sampled ones put kinks into the curve, among which rounding chooses the peak."""
     text = reduction_foreign.__doc__ or ""
     example = textwrap.dedent(text[text.index("    matrices =") : text.index("with `ContactParameters`")])
     assert len(example.strip().splitlines()) <= 15
@@ -81,15 +73,11 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
     }  # fmt: skip
     exec(example, names)
     overrides = [
-        f"response.frequency=['{200 / (2 * np.pi)!r} Hz', '{800 / (2 * np.pi)!r} Hz']",
-        "response.points=60",
-        "wear.max_steps=5",
-        "harmonics.transitions=located",
-        "verdict.enabled=false",
-    ]
+        f"response.frequency=['{200 / (2 * np.pi)!r} Hz', '{800 / (2 * np.pi)!r} Hz']", "response.points=60",
+        "wear.max_steps=5", "harmonics.transitions=located", "verdict.enabled=false",
+    ]  # fmt: skip
     result = pipeline.run(read("own.toml", overrides), folder, Progress())
     assert result.response is not None
-    assert result.wear is not None
     ours, theirs = names["response"], result.response
     common = np.isin(theirs.omega, ours.omega)  # the scene's curve has its solved peaks, too
     assert theirs.amplitude("response")[common] == pytest.approx(ours.amplitude("tip"), rel=1e-6)
@@ -101,13 +89,10 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
 def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
     written = modelling.build(read(str(folder / "own.toml")), Progress()).balance
     named = [
-        "contact.dofs={variable = 'touching'}",
-        "contact.area={variable = 'areas'}",
-        "contact.points={variable = 'corners'}",
-        "response.dofs=",
-        "response.vector={variable = 'tip'}",
+        "contact.dofs={variable = 'touching'}", "contact.area={variable = 'areas'}",
+        "contact.points={variable = 'corners'}", "response.dofs=", "response.vector={variable = 'tip'}",
         "reduction.modes=8",
-    ]
+    ]  # fmt: skip
     # every mode kept: Craig-Bampton is exact
     reduced = modelling.build(read(str(folder / "own.toml"), named), Progress())
     assert reduced.part is None
@@ -144,10 +129,7 @@ BAD = {
 def test_what_cannot_be_is_one_sentence(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     override, words = BAD[case]
     where = ["--out", str(folder / "out")]
-    code, _, err = leave(["run", str(folder / "own.toml"), "--set", override, *where], capsys)
-    assert code == 2
-    assert words in err
-    assert err.count("\n") == 1
+    assert words in refusal(["run", str(folder / "own.toml"), "--set", override, *where], capsys)
     assert not (folder / "out" / "result.h5").exists()
 
 

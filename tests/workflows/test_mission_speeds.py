@@ -1,7 +1,5 @@
 """A mission of a wheel over several speeds of rotation: wear adds over them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +34,6 @@ def worn(scene: Path, *changes: str) -> WearHistory:
     file = scene_file.read(str(scene), (*SLIPPING, *changes))
     model = modelling.build(file, Progress())
     wear = file.scene.wear
-    assert wear is not None
     problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
     return evolve(wear_run.rule_of(file.scene, problem, 2e-6), wear.max_steps)
 
@@ -62,7 +59,7 @@ def test_a_mission_of_two_equal_points_is_one(scene: Path, rule: str) -> None:
     item = worn(scene, "wear.at=810 Hz", *changes)
     mission = 'wear.mission=[{at="810 Hz", share=0.5}, {at="810 Hz", share=0.5, speed="6000 rpm"}]'
     pair = worn(scene, mission, *changes)
-    assert len(item.cycles) == len(pair.cycles) == 2
+    assert len(item.cycles) == len(pair.cycles) == 3
     np.testing.assert_allclose(pair.depth, item.depth, rtol=1e-6, atol=1e-15)
     np.testing.assert_allclose(pair.cycles, item.cycles, rtol=1e-6)
 

@@ -1,7 +1,5 @@
 """Patterns of blades that differ, drawn and solved by the command; the wear of one of them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -60,9 +58,7 @@ def test_a_pattern_depends_on_seed_and_number_alone() -> None:
     assert not np.allclose(item.stiffness, mistuned_blades.drawn(requested, 400, 8).stiffness)
 
 
-def test_the_command_draws_patterns_and_resumes(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_draws_patterns_and_resumes(scene, tmp_path, capsys):
     words = ["wheel", "patterns", str(scene), "--workers", "1", "--out", str(tmp_path), "--json"]
     cli.app(words, result_action="return_value")
     record = json.loads(capsys.readouterr().out)
@@ -88,7 +84,7 @@ def test_blades_alike_amplify_nothing(scene: Path) -> None:
 def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) -> None:
     """Worn volume differs by blade, is that of its own work, and changes whose amplitude is how large."""
     computed = mistuned_wear.pattern_wear(scene, 1)
-    assert len(computed.history.cycles) == 2
+    assert len(computed.history.cycles) == 3
     volume = computed.volume[-1]
     assert volume.min() >= 0
     assert np.ptp(volume) > 0.05 * volume.max() > 0
@@ -106,7 +102,7 @@ def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) 
 def test_what_cannot_be_is_one_sentence(scene: Path, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"blade has no \[mistuning\]"):
         patterns.patterns("blade", tmp_path)
-    with pytest.raises(SceneError, match=r"mistuning is for a \[wheel\]"):
+    with pytest.raises(SceneError, match=r"wheel is missing"):
         scene_file.read("beam", ('mistuning.frequency="1 %"',))
     with pytest.raises(SceneError, match=r"mistuning\.frequency"):
         scene_file.read(str(scene), ("mistuning.frequency=2",))

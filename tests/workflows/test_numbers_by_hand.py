@@ -1,15 +1,13 @@
 """What solver and statements say of a state, each number found by a second way: sums over time, differences, ratios."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from proof.extremes_march import march_checks
-from proof.extremes_models import lattice, rigid
+from proof.hard_settings.extremes_march import march_checks
+from proof.hard_settings.extremes_models import lattice, rigid
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.amplitude_slope import AmplitudeSlope
@@ -22,11 +20,11 @@ from tribodyn.hbm.wear.history import cycles_to_share
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import energy
 from tribodyn.reduction.linear_damping import rayleigh, rayleigh_of_ratios
-from tribodyn.workflows.errors.extrapolation import limit_of
 from tribodyn.workflows.errors.judgement import total_error
+from tribodyn.workflows.errors.ladders import limit_of
 from tribodyn.workflows.errors.operating_states import relative_change
 from tribodyn.workflows.result.verdict import MeasuredChange, Refinement
-from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run import modelling, scene_loads
 from tribodyn.workflows.run.references import delta_max
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.load_tables import StaticLoad
@@ -136,7 +134,7 @@ def test_delta_max_of_a_wheel_is_half_the_mean_approach() -> None:
 def test_gravity_acts_along_its_direction_and_an_accelerated_ground_against_it() -> None:
     for key, sign in (("acceleration", 1.0), ("base_acceleration", -1.0)):
         load = StaticLoad(**{key: 9.81}, direction=(0.0, 0.0, 1.0))
-        result = modelling.make_load(load, None, None, None)
+        result = scene_loads.make_load(load, None, None, None)
         np.testing.assert_allclose(result.direction, [0, 0, sign])
 
 
@@ -159,8 +157,7 @@ def test_a_sequence_of_known_order_is_extrapolated_to_its_limit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "ratio", "total"),
-    [(0.01, 2.0, 0.025), (0.01, 1.5, 0.0375), (0.0, 2.0, 2.5e-3), (0.3, 2.0, 0.75)],
+    ("change", "ratio", "total"), [(0.01, 2.0, 0.025), (0.01, 1.5, 0.0375), (0.0, 2.0, 2.5e-3), (0.3, 2.0, 0.75)]
 )
 def test_the_total_error_extrapolates_the_change(change: float, ratio: float, total: float) -> None:
     row = MeasuredChange(Refinement.COMBINED, "energy", 1.0, 1.0, change, "")

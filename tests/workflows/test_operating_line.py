@@ -1,7 +1,5 @@
 """A wheel whose speed goes with the frequency, against the whole wheel at each speed, and its scene keys."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -34,22 +32,18 @@ def line(sectors: int, order: int, *overrides: str) -> HarmonicBalance:
     return modelling.build(scene(sectors, *LINE, f"wheel.engine_order={order}", *overrides), Progress()).balance
 
 
-@pytest.mark.parametrize(
-    ("sectors", "order", "hertz", "law"),
-    [
-        (5, -2, (240, 264), "jenkins"),
-        pytest.param(6, -1, (110, 150), "jenkins", marks=pytest.mark.slow),
-        pytest.param(5, -2, (240, 261), "coulomb_planar", marks=pytest.mark.slow),
-        pytest.param(6, -1, (110, 150), "coulomb_planar", marks=pytest.mark.slow),
-        pytest.param(5, -2, (240, 264), "coulomb_planar", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize(("sectors", "order", "hertz", "law"), [
+    (5, -2, (240, 264), "jenkins"),
+    pytest.param(6, -1, (110, 150), "jenkins", marks=pytest.mark.slow),
+    pytest.param(5, -2, (240, 261), "coulomb_planar", marks=pytest.mark.slow),
+    pytest.param(6, -1, (110, 150), "coulomb_planar", marks=pytest.mark.slow),
+    pytest.param(5, -2, (240, 264), "coulomb_planar", marks=pytest.mark.slow),
+])  # fmt: skip
 def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz, law):
     """Slipping, with Coriolis forces, near a resonance; the wheel anew at every speed, with nothing alike assumed.
 
     The blades of a wheel are sampled at other phases than the one of the wave, which planar friction feels by more
-    than 1e-4 at 32 samples: it gets samples that go into all sectors
-    """
+    than 1e-4 at 32 samples: it gets samples that go into all sectors"""
     low, high = hertz
     samples = 32 * (sectors if law == "coulomb_planar" else 1)
     span = (

@@ -1,7 +1,5 @@
 """Optimisation of designs: closed forms whose best trades are known, and the command on a scene that is linear."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -82,8 +80,7 @@ def test_the_search_goes_on_where_the_process_is_unsure(seed: int) -> None:
 def test_two_aims_come_to_their_known_trade() -> None:
     """(2x)^2 + (y - 0.3)^2 against (2x - 1)^2 + (y - 0.3)^2: y = 0.3, x from 0 to 0.5, roots that sum to 1.
 
-    Source  Schaffer 1985, with a second variable
-    """
+    Source  Schaffer 1985, with a second variable"""
 
     def aims(s):
         off = (s[:, 1] - 0.3) ** 2

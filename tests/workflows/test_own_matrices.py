@@ -1,7 +1,5 @@
 """One's own matrices by the front door: any rows, several contacts with their laws, no damping, frequencies in Hz."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -145,43 +143,34 @@ def test_rows_that_pick_dofs_are_the_contact_of_those_dofs() -> None:
     assert np.array_equal(item.area, other.area)
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda m: m.contact_rows(np.ones((1, 3)), ("n",), area=1.0), "one of the 4 DOFs"),
-        (lambda m: m.contact_rows(np.ones((3, 4)), ("t1", "n"), area=1.0), "give 2 for each pair"),
-        (lambda m: m.contact_rows(np.zeros((1, 4)), ("n",), area=1.0), "can never move"),
-        (lambda m: m.contact_rows(np.full((1, 4), np.nan), ("n",), area=1.0), "not finite"),
-        (lambda m: m.contact_rows(RUB, ("n", "t1"), area=1.0), "in this order"),
-        (lambda m: own.from_arrays(MASS, STIFFNESS[:3, :3]), "4 rows but the stiffness matrix has 3"),
-        (lambda m: own.from_arrays(MASS, np.triu(STIFFNESS)), "one triangle only"),
-        (lambda m: own.reduce(m, (), loads=LOADS, outputs={"tip": 3}), "at least one contact"),
-        (lambda m: structure(0.01, np.eye(4)), "hold a damping matrix"),
-        (lambda m: balance(structure()).response(1, 2, nonsense=3), "nonsense"),
-        (lambda m: balance(structure()).response(1, 2, method="magic"), "no continuation 'magic'"),
-        (lambda m: balance(structure()).peak(1, 2, "toe"), "no output 'toe': there are tip, bow"),
-        (
-            lambda m: balance(structure()).wear(own.wear_law("energy", coefficient=1.0), at=50.0),
-            "needs either step",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda m: m.contact_rows(np.ones((1, 3)), ("n",), area=1.0), "one of the 4 DOFs"),
+    (lambda m: m.contact_rows(np.ones((3, 4)), ("t1", "n"), area=1.0), "give 2 for each pair"),
+    (lambda m: m.contact_rows(np.zeros((1, 4)), ("n",), area=1.0), "can never move"),
+    (lambda m: m.contact_rows(np.full((1, 4), np.nan), ("n",), area=1.0), "not finite"),
+    (lambda m: m.contact_rows(RUB, ("n", "t1"), area=1.0), "in this order"),
+    (lambda m: own.from_arrays(MASS, STIFFNESS[:3, :3]), "4 rows but the stiffness matrix has 3"),
+    (lambda m: own.from_arrays(MASS, np.triu(STIFFNESS)), "one triangle only"),
+    (lambda m: own.reduce(m, (), loads=LOADS, outputs={"tip": 3}), "at least one contact"),
+    (lambda m: structure(0.01, np.eye(4)), "hold a damping matrix"),
+    (lambda m: balance(structure()).response(1, 2, nonsense=3), "nonsense"),
+    (lambda m: balance(structure()).response(1, 2, method="magic"), "no continuation 'magic'"),
+    (lambda m: balance(structure()).peak(1, 2, "toe"), "no output 'toe': there are tip, bow"),
+    (lambda m: balance(structure()).wear(own.wear_law("energy", coefficient=1.0), at=50.0), "needs either step"),
+])  # fmt: skip
 def test_what_cannot_be_is_one_sentence(call, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         call(own.from_arrays(MASS, STIFFNESS))
 
 
-@pytest.mark.parametrize(
-    ("body", "words"),
-    [
-        ("coordinate real general\n2 2 1\n1 1 1.0D3\n", "not written as"),  # scipy reads 1.0
-        ("array real general\n2 2\n1\n2\n3\n", "4 entries"),
-        ("array real symmetric\n2 2\n1\n2\n3\n4\n", "3 entries"),
-        ("coordinate real general\n2 2 2\n1 1 1.0\n3 2 2\n", "broken Matrix Market"),
-        ("coordinate complex general\n2 2 1\n1 1 1 2\n", "real numbers are needed"),
-        ("coordinate real general\n2 2 1\n1 1 nan\n", "not finite"),
-    ],
-)
+@pytest.mark.parametrize(("body", "words"), [
+    ("coordinate real general\n2 2 1\n1 1 1.0D3\n", "not written as"),  # scipy reads 1.0
+    ("array real general\n2 2\n1\n2\n3\n", "4 entries"),
+    ("array real symmetric\n2 2\n1\n2\n3\n4\n", "3 entries"),
+    ("coordinate real general\n2 2 2\n1 1 1.0\n3 2 2\n", "broken Matrix Market"),
+    ("coordinate complex general\n2 2 1\n1 1 1 2\n", "real numbers are needed"),
+    ("coordinate real general\n2 2 1\n1 1 nan\n", "not finite"),
+])  # fmt: skip
 def test_a_matrix_market_file_that_is_not_what_it_says_is_refused(tmp_path: Path, body: str, words: str) -> None:
     (tmp_path / "m.mtx").write_text(f"%%MatrixMarket matrix {body}")
     with pytest.raises(ValueError, match=words):

@@ -1,7 +1,5 @@
 """A third wear rule: one file beside a scene, found by its name, with its own numbers and its own memory."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py
@@ -67,18 +65,14 @@ def test_a_rule_beside_a_scene_wears_resumes_and_is_refined(tmp_path: Path) -> N
     file = scene(tmp_path, "wear.max_steps=3")
     assert planning.plan(file).wear_steps is None
     full = pipeline.run(file, tmp_path / "whole", Progress()).wear
-    assert full is not None
-    np.testing.assert_allclose(full.worn.max(axis=1), [2e-6, 4e-6, 8e-6], rtol=1e-12)
+    np.testing.assert_allclose(full.worn.max(axis=1), [2e-6, 4e-6, 8e-6, 0.0], rtol=1e-12)
     pipeline.run(scene(tmp_path, "wear.max_steps=2"), tmp_path / "part", Progress())
     earlier = checkpoint.earlier(tmp_path / "part" / "result.h5", file)
     resumed = pipeline.run(file, tmp_path / "part", Progress(), earlier=earlier).wear
-    assert resumed is not None
     np.testing.assert_array_equal(resumed.depth, full.depth)
     stored = store.load(tmp_path / "part").wear
-    assert stored is not None
-    np.testing.assert_allclose(stored.memory["next_depth"], [4e-6, 8e-6, 16e-6])
+    np.testing.assert_allclose(stored.memory["next_depth"], [4e-6, 8e-6, 16e-6, 16e-6])
     finer = refine.wear(file, 2.0).scene.wear
-    assert finer is not None
     assert finer.parameters == {"first_depth": 1e-6, "ratio": 2.0}
 
 

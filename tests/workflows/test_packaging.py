@@ -1,7 +1,5 @@
 """What is installed: one top-level package, complete, that works beside modules of the same plain names."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re
@@ -21,17 +19,9 @@ ROOT = Path(__file__).parents[2]
 FOLDERS = ("geometry", "fem", "reduction", "hbm", "workflows")
 OTHERS = 'raise ImportError("this is the module of another package")\n'  # as llama-index-workflows brings one
 SMALL = [
-    "harmonics.kept=[0, 1]",
-    "wear.tolerance=2 %",
-    "wear.at=peak",
-    "wear.motion=machine",
-    "geometry.n_patch=3",
-    "geometry.n_length=2",
-    "geometry.n_height=1",
-    "reduction.modes=3",
-    "wear.max_steps=1",
-    "verdict.enabled=false",
-]
+    "harmonics.kept=[0, 1]", "wear.tolerance=2 %", "wear.at=peak", "wear.motion=machine", "geometry.n_patch=3",
+    "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "wear.max_steps=1", "verdict.enabled=false",
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """A wheel that turns rests in an equilibrium of contact and stress; against the whole wheel, merged node by node."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rough law and a preload without friction, said in a scene: the beam pressed on a rough ground."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -13,26 +11,14 @@ from tribodyn.hbm.contact.contact_law import SLIPS, STICKS
 from tribodyn.workflows.scene import scene_file
 
 SMALL = {
-    "harmonics.kept": [0, 1],
-    "geometry.n_patch": 3,
-    "geometry.n_length": 3,
-    "geometry.n_height": 1,
-    "reduction.modes": 4,
-    "wear": None,
-    "verdict.enabled": False,
-    "harmonics.samples": 32,
-}
+    "harmonics.kept": [0, 1], "geometry.n_patch": 3, "geometry.n_length": 3, "geometry.n_height": 1,
+    "reduction.modes": 4, "wear": None, "verdict.enabled": False, "harmonics.samples": 32,
+}  # fmt: skip
 ROUGH = {
-    "contact.law": "rough",
-    "contact.table": "asperities.csv",
-    "contact.tangential_stiffness": None,
-    "contact.normal_stiffness": None,
-    "contact.young": "200 GPa",
-    "contact.poisson": 0.3,
-    "contact.radius": "1.4 mm",
-    "contact.yield_stress": "330 MPa",
-    "contact.tangent_modulus": "620 MPa",
-}
+    "contact.law": "rough", "contact.table": "asperities.csv", "contact.tangential_stiffness": None,
+    "contact.normal_stiffness": None, "contact.young": "200 GPa", "contact.poisson": 0.3, "contact.radius": "1.4 mm",
+    "contact.yield_stress": "330 MPa", "contact.tangent_modulus": "620 MPa",
+}  # fmt: skip
 FRICTIONLESS = {"preload.frictionless": True}
 
 
@@ -83,15 +69,12 @@ def test_the_stuck_springs_of_a_rough_face_are_its_tangents_at_rest(scene: Path)
     np.testing.assert_allclose(kn, unloading, rtol=2e-2)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"contact.table": None}, "contact.table is missing"),
-        ({"contact.table": "nowhere.csv"}, "there is no file"),
-        ({"contact.normal_stiffness": "1 N/um"}, "has no meaning where it follows from a punch or the law"),
-        ({"contact.gap_map": "nowhere.csv"}, "there is no file"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [
+    ({"contact.table": None}, "contact.table is missing"),
+    ({"contact.table": "nowhere.csv"}, "there is no file"),
+    ({"contact.normal_stiffness": "1 N/um"}, "has no meaning where it follows from a punch or the law"),
+    ({"contact.gap_map": "nowhere.csv"}, "there is no file"),
+])  # fmt: skip
 def test_what_a_rough_contact_cannot_be_is_one_sentence(scene: Path, change: dict[str, Any], words: str) -> None:
     with pytest.raises(td.SceneError, match=words):
         td.read_scene(scene, ROUGH | change)

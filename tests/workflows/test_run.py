@@ -1,7 +1,5 @@
 """A whole run of a small beam: balances of the result, checkpoints, resuming after kills, Ctrl-C, failed solves."""
 
-from __future__ import annotations
-
 import multiprocessing
 import signal
 import subprocess
@@ -13,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.command import leave
+from tests.helpers.command import leave, refusal
 from tests.helpers.killed_runs import SPENT, go_on
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.pictures import plots
@@ -27,20 +25,10 @@ from tribodyn.workflows.scene.scene_file import read
 
 ROOT = Path(__file__).parents[2]
 SMALL = [
-    "harmonics.kept=[0, 1]",
-    "wear.tolerance=2 %",
-    "wear.at=peak",
-    "wear.motion=machine",
-    "geometry.n_patch=5",
-    "geometry.n_length=4",
-    "geometry.n_height=1",
-    "reduction.modes=4",
-    "response.points=25",
-    "wear.rule=thesis",
-    "wear.step=30 %",
-    "wear.lost_below=0",
-    "verdict.enabled=false",
-]
+    "harmonics.kept=[0, 1]", "wear.tolerance=2 %", "wear.at=peak", "wear.motion=machine", "geometry.n_patch=5",
+    "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "response.points=25", "wear.rule=thesis",
+    "wear.step=30 %", "wear.lost_below=0", "verdict.enabled=false",
+]  # fmt: skip
 SMALLER = [*SMALL, "geometry.n_patch=3", "response.points=10"]
 
 
@@ -72,7 +60,6 @@ def wait_for_rows(process: subprocess.Popen[str], path: Path, count: int) -> Non
 def test_the_run_ends_with_contact_lost(finished: Result) -> None:
     assert finished.state == "complete: contact lost at every pair"
     assert finished.contact_lost
-    assert finished.wear is not None
     assert finished.wear.preload[0] > 1e3
     assert finished.wear.preload[-1] == 0.0
     assert finished.wear.depth[-1].max() > finished.facts.delta_max
@@ -80,17 +67,12 @@ def test_the_run_ends_with_contact_lost(finished: Result) -> None:
 
 def test_worn_volume_is_coefficient_times_energy(finished: Result) -> None:
     wear, patch = finished.wear, finished.patch
-    assert wear is not None
-    assert patch is not None
     assert wear.depth[-1] @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)
 
 
 def test_static_forces_balance_in_the_full_field(finished: Result) -> None:
     """The displacement field of every node, projected on the contact, is what the balance solved for."""
     wear, patch, fields = finished.wear, finished.patch, finished.fields
-    assert wear is not None
-    assert patch is not None
-    assert fields is not None
     for row, field in zip(fields.row, fields.displacement, strict=True):
         local = np.einsum("pij,pjc->pic", patch.frames, field[patch.nodes])
         solved = wear.displacement[row].reshape(local.shape)
@@ -100,8 +82,6 @@ def test_static_forces_balance_in_the_full_field(finished: Result) -> None:
 def test_loops_enclose_the_energy(finished: Result, tmp_path: Path) -> None:
     """Polygons of 4096 points do, down to the last touch; the loops kept are 64 of them, marched in coarser steps."""
     wear, loops = finished.wear, finished.loops
-    assert wear is not None
-    assert loops is not None
     balance = modelling.build(read("beam", SMALL), Progress()).balance.with_samples(4096, located=False)
     fine = full_fields.hysteresis_loops(balance, [wear.rows()[row] for row in loops.row], loops.row)
     for row, x, force in zip(loops.row, fine.displacement, fine.force, strict=True):
@@ -115,7 +95,6 @@ def test_loops_enclose_the_energy(finished: Result, tmp_path: Path) -> None:
 
 def test_references_peak_where_the_modes_are(finished: Result) -> None:
     references = finished.references
-    assert references is not None
     hertz = references.omega / (2 * np.pi)
     spacing = hertz[1] - hertz[0]
     free = finished.facts.open_frequencies[0]
@@ -123,7 +102,6 @@ def test_references_peak_where_the_modes_are(finished: Result) -> None:
     stuck = finished.facts.stuck_frequencies
     refined = stuck[(stuck > hertz[0]) & (stuck < hertz[-1])]
     assert np.abs(hertz[np.argmax(references.stuck)] - refined).min(initial=np.inf) <= 2 * spacing
-    assert finished.wear is not None
     # without contact the peak is the free one, 1 % damping: amplitudes agree where the grid of 5 Hz allows
     assert finished.wear.amplitude[-1] >= 0.99 * references.free.max()
 
@@ -149,7 +127,6 @@ def test_transitions_are_located_where_every_law_can(tmp_path: Path) -> None:
 @pytest.mark.faults
 def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:
     full = pipeline.run(read("beam", SMALLER), tmp_path / "whole", Progress())
-    assert full.wear is not None
     path = tmp_path / "result.h5"
     process = start(tmp_path)
     wait_for_rows(process, path, len(full.wear.cycles) // 2)
@@ -163,11 +140,8 @@ def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:
 
 
 @pytest.mark.faults
-def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
-    finished: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(finished, tmp_path, monkeypatch):
     """Where the loss of contact is stored but not yet the sentence that says so."""
-    assert finished.wear is not None
     rows: list[Result] = []
     monkeypatch.setattr(store, "save", lambda path, state: rows.append(state))
     earlier = replace(finished, stage=Stage.WEARING, wear=replace(finished.wear, end=WearEnd.UNFINISHED.say()))
@@ -236,7 +210,6 @@ def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
     assert str(tmp_path / "result.h5") in err
     assert err.endswith("--set 'wear.step=0.01 %' --resume.\n")
     wear = store.load(tmp_path / "result.h5").wear
-    assert wear is not None
     assert len(wear.cycles) >= 2
 
 
@@ -248,13 +221,10 @@ def test_a_failed_solve_says_where_and_leaves_with_3(tmp_path: Path, capsys: pyt
     assert store.load(tmp_path / "result.h5").response is not None
 
 
-def test_resuming_another_scene_is_refused(
-    finished: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_resuming_another_scene_is_refused(finished, tmp_path, capsys):
     store.save(tmp_path / "result.h5", finished)
     sizes = ("--set", "geometry.n_patch=5", "--set", "response.points=25")
-    code, _, err = leave(words(tmp_path, "--resume", *sizes, "--set", "contact.friction=0.4"), capsys)
-    assert code == 2
+    err = refusal(words(tmp_path, "--resume", *sizes, "--set", "contact.friction=0.4"), capsys)
     assert "contact.friction differs" in err
 
 
@@ -274,8 +244,6 @@ def test_a_mesh_file_gives_what_its_part_gives(finished: Result, tmp_path: Path)
     base.write_text(text[:begin] + '[geometry]\nmesh = "mesh.msh"\nfixed = ["clamp"]\n' + text[end:])
     overrides = [override for override in SMALL if not override.startswith("geometry.")]
     result = pipeline.run(read(str(base), [*overrides, "wear="]), tmp_path, Progress())
-    assert result.response is not None
-    assert finished.response is not None
     assert np.array_equal(result.response.response, finished.response.response)
 
 
@@ -287,9 +255,7 @@ def test_more_steps_go_on_from_a_run_that_stopped(finished: Result, tmp_path: Pa
     assert not checkpoint.is_complete(stopped, longer.scene)
     assert checkpoint.same_problem(short.scene, longer.scene) == ""
     extra = pipeline.run(longer, tmp_path, Progress(), stopped)
-    assert extra.wear is not None
-    assert finished.wear is not None
-    assert np.array_equal(extra.wear.depth, finished.wear.depth[:4])
+    assert np.array_equal(extra.wear.depth, finished.wear.depth[:5])  # the last row is the state behind the last step
 
 
 def test_a_share_of_no_deflection_is_refused_before_long_work(tmp_path: Path) -> None:
@@ -301,9 +267,6 @@ def test_a_share_of_no_deflection_is_refused_before_long_work(tmp_path: Path) ->
 def test_curves_of_the_worn_contact_walk_to_the_free_one(finished: Result, tmp_path: Path) -> None:
     result = pipeline.run(read("beam", [*SMALL, "wear.responses=3"]), tmp_path, Progress())
     worn = store.load(tmp_path / "result.h5").worn
-    assert worn is not None
-    assert result.wear is not None
-    assert finished.wear is not None
     assert np.array_equal(result.wear.depth, finished.wear.depth)
     assert len(worn.row) == 3
     assert worn.row[-1] == len(finished.wear.cycles) - 1
@@ -320,20 +283,13 @@ def test_curves_of_the_worn_contact_walk_to_the_free_one(finished: Result, tmp_p
 def test_the_error_controlled_rule_runs_from_a_scene(tmp_path: Path) -> None:
     mission = 'wear.mission=[{at = "peak", share = "60 %"}, {at = "98 % of peak", share = "40 %"}]'
     overrides = [
-        *SMALL,
-        "wear.rule=error_controlled",
-        "wear.step=",
-        "wear.at=",
-        "wear.max_steps=3",
-        "wear.motion=balance",
+        *SMALL, "wear.rule=error_controlled", "wear.step=", "wear.at=", "wear.max_steps=3", "wear.motion=balance",
         mission,
-    ]
+    ]  # fmt: skip
     result = pipeline.run(read("beam", overrides), tmp_path, Progress())
     wear, patch = result.wear, result.patch
-    assert wear is not None
-    assert patch is not None
     assert result.state == "complete: stopped after 3 wear steps"
-    assert wear.duty_omega.shape == (3, 2)
+    assert wear.duty_omega.shape == (4, 2)
     assert wear.duty_omega[:, 1] == pytest.approx(0.98 * wear.duty_omega[:, 0], rel=1e-4)
     assert wear.step_error.max() <= 1.0
     assert wear.worn.sum(0) @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)

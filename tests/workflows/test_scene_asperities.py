@@ -1,7 +1,5 @@
 """A scan named in a scene's [surfaces] gives the table of asperities of the law `rough` by itself."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -41,15 +39,12 @@ def test_the_scan_gives_radius_and_table(scene: Path):
     assert base.table == scene_file.read("brb_flat").scene.joints["lap"].table
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ([NO_TABLE], "contact.table is missing"),
-        ([NO_TABLE, *FACES, "surfaces.first=none.txt"], "no asperities for the law 'rough'"),
-        ([NO_TABLE, *FACES, "surfaces.shortest=1 mm"], "no asperities for the law 'rough'"),
-        ([NO_TABLE, *FACES, "surfaces.cutoff=0 um"], "surfaces.cutoff"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "said"), [
+    ([NO_TABLE], "contact.table is missing"),
+    ([NO_TABLE, *FACES, "surfaces.first=none.txt"], "no asperities for the law 'rough'"),
+    ([NO_TABLE, *FACES, "surfaces.shortest=1 mm"], "no asperities for the law 'rough'"),
+    ([NO_TABLE, *FACES, "surfaces.cutoff=0 um"], "surfaces.cutoff"),
+])  # fmt: skip
 def test_what_cannot_be_is_told(scene: Path, changes: list[str], said: str):
     with pytest.raises(SceneError, match=said):
         scene_file.read(str(scene), changes)

@@ -1,9 +1,6 @@
 """Every field of a scene declares the stage that reads it first; a change of it leaves earlier stages as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -19,8 +16,8 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import PARAMETERS, Table
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_values import SceneValue, scene_values, values_through
-from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.stages import CONTACT, DRAW, LOADS, PART, REDUCTION, SOLVE, SceneStage, stage_of
+from tribodyn.workflows.scene.wheel_scene import WheelScene
 
 WEAR = '[wear]\ncoefficient = "2e3 um3/J"\nstep = "5 %"\n'
 BACKBONE = "[backbone]\nmodal_amplitude = [1e-6, 1e-3]\n"
@@ -54,7 +51,7 @@ def fields_without_stage(table: type[Table], checked: set[type[Table]]) -> Itera
             yield from fields_without_stage(kind, checked)
 
 
-@pytest.mark.parametrize("kind", [MeshScene, MatrixScene])
+@pytest.mark.parametrize("kind", [WheelScene, MatrixScene])
 def test_every_field_has_a_stage(kind: type[Table]) -> None:
     assert list(fields_without_stage(kind, set())) == []
 
@@ -168,9 +165,7 @@ CHANGES: list[tuple[str, SceneStage, tuple[str, ...]]] = [
 
 
 @pytest.mark.parametrize(("scene", "stage", "changes"), CHANGES)
-def test_earlier_stages_make_the_same_of_a_changed_scene(
-    scene: str, stage: SceneStage, changes: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_earlier_stages_make_the_same_of_a_changed_scene(scene, stage, changes, monkeypatch, tmp_path):
     monkeypatch.setenv("TRIBODYN_CACHE", "off")
     files = [scene_file.parse(SCENES[scene], "scene.toml", set_, tmp_path) for set_ in ((), changes)]
     different = _different(*(list(scene_values(file.scene)) for file in files))

@@ -1,7 +1,5 @@
 """Studies: designs against closed forms, one table for any number of workers, nothing finished is lost or repeated."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess
@@ -20,7 +18,7 @@ from scipy import stats
 
 import tribodyn as td
 from tests.helpers import dying
-from tests.helpers.command import leave
+from tests.helpers.command import leave, printed_text
 from tribodyn.hbm.linear import compliance
 from tribodyn.workflows.run import model_cache, modelling
 from tribodyn.workflows.run.failure import SolveFailed
@@ -30,13 +28,9 @@ from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, solve
 from tribodyn.workflows.studies.many.study_table import Journal
 
 TINY = [
-    "harmonics.kept=[0, 1]",
-    "geometry.n_patch=3",
-    "geometry.n_length=3",
-    "geometry.n_height=1",
-    "response.points=6",
+    "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "response.points=6",
     "wear=",
-]
+]  # fmt: skip
 PRESS, FRICTION = "loads.static.press.value", "contact.friction"
 TABLES: dict[str, Any] = {
     "study": {"scene": "beam", "design": "grid", "set": TINY},
@@ -92,38 +86,32 @@ def test_correlations_are_those_of_a_gaussian_copula() -> None:
         drawn("sobol", 8, vary, correlations=item)
 
 
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        ({"vary": {"contact.fricton": [0.3]}}, "unknown key contact.fricton .did you mean friction"),
-        ({"vary": {FRICTION: 0.3}}, "vary.contact.friction: expected a list of values or a distribution"),
-        ({"vary": {FRICTION: {"distribution": "normal", "mean": 0.3}}}, "draw with design"),
-        ({"vary": {}}, "vary is empty"),
-        ({"study": {"scene": "beam", "design": "sobol"}}, "say how many runs"),
-        ({"study": {"scene": "beam", "design": "grid", "runs": 3}}, "leave it out"),
-        ({"study": {"scene": "beam", "design": "list"}, "vary": {"a": [1], "b": [1, 2]}}, "need one length"),
-        ({"study": {"scene": "beam", "design": "grid", "worker": 2}}, "unknown key study.worker"),
-        ({"study": {"scene": "beam", "design": "grid", "set": ["solver.threads=2"]}}, "every run has one thread"),
-        ({"study": {"scene": "no", "design": "grid"}}, 'there is no scene "no"'),
-        ({"correlations": [{"keys": [FRICTION, "b"], "value": 0.1}]}, "does not vary by a distribution"),
-    ],
-)
+@pytest.mark.parametrize(("change", "sentence"), [
+    ({"vary": {"contact.fricton": [0.3]}}, "unknown key contact.fricton .did you mean friction"),
+    ({"vary": {FRICTION: 0.3}}, "vary.contact.friction: expected a list of values or a distribution"),
+    ({"vary": {FRICTION: {"distribution": "normal", "mean": 0.3}}}, "draw with design"),
+    ({"vary": {}}, "vary is empty"),
+    ({"study": {"scene": "beam", "design": "sobol"}}, "say how many runs"),
+    ({"study": {"scene": "beam", "design": "grid", "runs": 3}}, "leave it out"),
+    ({"study": {"scene": "beam", "design": "list"}, "vary": {"a": [1], "b": [1, 2]}}, "need one length"),
+    ({"study": {"scene": "beam", "design": "grid", "worker": 2}}, "unknown key study.worker"),
+    ({"study": {"scene": "beam", "design": "grid", "set": ["solver.threads=2"]}}, "every run has one thread"),
+    ({"study": {"scene": "no", "design": "grid"}}, 'there is no scene "no"'),
+    ({"correlations": [{"keys": [FRICTION, "b"], "value": 0.1}]}, "does not vary by a distribution"),
+])  # fmt: skip
 def test_what_cannot_be_is_refused_with_a_sentence(change: dict[str, Any], sentence: str, tmp_path: Path) -> None:
     with pytest.raises(td.SceneError, match=sentence):
         td.studies.grid(TABLES | change, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    ("table", "sentence"),
-    [
-        ({"distribution": "normal", "mean": "3 N", "std": "2 mm"}, "different units"),
-        ({"distribution": "uniform", "low": 2, "high": 1}, "low 2.0 is not below high 1.0"),
-        ({"distribution": "lognormal", "median": -1, "cov": 0.1}, "median -1.0 is not above 0"),
-        ({"distribution": "triangular", "low": 0, "high": 1}, "needs high, low, mode; this has high, low"),
-        ({"distribution": "normal", "mean": 0, "std": 1, "low": 99}, "nothing is left"),
-    ],
-)
+@pytest.mark.parametrize(("table", "sentence"), [
+    ({"distribution": "normal", "mean": "3 N", "std": "2 mm"}, "different units"),
+    ({"distribution": "uniform", "low": 2, "high": 1}, "low 2.0 is not below high 1.0"),
+    ({"distribution": "lognormal", "median": -1, "cov": 0.1}, "median -1.0 is not above 0"),
+    ({"distribution": "triangular", "low": 0, "high": 1}, "needs high, low, mode; this has high, low"),
+    ({"distribution": "normal", "mean": 0, "std": 1, "low": 99}, "nothing is left"),
+])  # fmt: skip
 def test_a_wrong_distribution_is_refused(table: dict[str, Any], sentence: str) -> None:
     with pytest.raises(td.SceneError, match=sentence):
         drawn("sobol", 4, {"a": table})
@@ -176,9 +164,7 @@ def test_runs_that_share_their_linear_side_give_what_each_gives_by_itself(monkey
     assert len(rows) == 4  # the first, other springs, other damping, and back: not for friction and loads
 
 
-def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
-    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(done, tmp_path, monkeypatch):
     lines = (done / "rows.jsonl").read_text().splitlines(keepends=True)
     assert len(lines) == 2
     (tmp_path / "rows.jsonl").write_text(lines[0] + lines[1] + '{"run": 2, "key": "torn')
@@ -226,9 +212,7 @@ def test_a_process_that_dies_takes_no_other_run_with_it(tmp_path: Path, monkeypa
 
 
 @pytest.mark.faults
-def test_the_command_resumes_a_study_that_was_killed(
-    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_resumes_a_study_that_was_killed(done, tmp_path, capsys):
     file = tmp_path / "mine.toml"
     file.write_text(
         f'[study]\nscene = "beam"\ndesign = "grid"\nset = {json.dumps(TINY)}\n'
@@ -249,8 +233,7 @@ def test_the_command_resumes_a_study_that_was_killed(
     while any(_runs(pid) for pid in base):
         assert time.monotonic() < end  # none waits for ever for a study that is gone
         time.sleep(0.05)
-    code, out, _ = leave([*words, "--resume", "--json"], capsys)
-    assert code == 0
+    out = printed_text([*words, "--resume", "--json"], capsys)
     assert json.loads(out)["runs"] == {"complete": 2, "failed": 0, "refused": 2, "defect": 0, "lost": 0}
     after = journal.rows()
     assert all(after[key].seconds == row.seconds for key, row in before.items())
@@ -264,9 +247,7 @@ def _runs(pid: int) -> bool:
         return False
 
 
-def test_a_defect_stops_its_own_run_alone_and_shows_its_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_defect_stops_its_own_run_alone_and_shows_its_place(tmp_path, monkeypatch, capsys):
     def broken(file: Any, *_: Any, **__: Any) -> Any:
         if f"{FRICTION}=0.2" in file.overrides:
             return [][1]

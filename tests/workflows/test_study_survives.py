@@ -1,7 +1,5 @@
 """A study on an engine of another process: workers and the scheduler are killed in the middle, and nothing is lost."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -21,18 +19,11 @@ from tribodyn.workflows.studies.many.study_table import Journal
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.faults
 
-KEYS = {
-    "loads.static.press.value": ["15 kN", "18 kN", "20 kN"],
-    "contact.friction": [0.3, 0.5],
-}
+KEYS = {"loads.static.press.value": ["15 kN", "18 kN", "20 kN"], "contact.friction": [0.3, 0.5]}
 SET = [
-    "harmonics.kept=[0, 1]",
-    "geometry.n_patch=3",
-    "geometry.n_length=3",
-    "geometry.n_height=1",
-    "response.points=8",
+    "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "response.points=8",
     "wear=",
-]
+]  # fmt: skip
 TABLES: dict[str, Any] = {"study": {"scene": "beam", "design": "grid", "set": SET}, "vary": KEYS}
 RUNS = 6
 PATIENCE = 60.0

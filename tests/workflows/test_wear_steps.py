@@ -1,8 +1,7 @@
 """The trade of the wear step on a small beam, and what its table says."""
 
-from __future__ import annotations
-
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -11,10 +10,7 @@ from proof import wear_steps
 from tests.helpers.coarse_scenes import BEAM
 from tribodyn.workflows.command import main as cli
 
-SMALL = (
-    *BEAM,
-    "harmonics.samples=16",
-)
+SMALL = (*BEAM, "harmonics.samples=16")
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +41,7 @@ def test_text_and_records_hold_every_row(table: wear_steps.WearStepTable) -> Non
     text = wear_steps.as_text(table)
     assert text.count("thesis  ") >= 2
     assert "extrapolated" in text
-    records = json.loads(json.dumps(wear_steps.as_records(table)))
+    records = json.loads(json.dumps([asdict(row) for row in table.rows]))
     keys = {"rule", "step", "hbm_solves", "wear_steps", "seconds"}
     keys |= {"depth_m", "depth_error", "life", "life_error"}
     assert all(keys <= set(record) for record in records)

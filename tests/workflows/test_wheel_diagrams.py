@@ -1,17 +1,14 @@
 """Pictures of the field: what an engine order excites, where it meets a mode, lives on Weibull paper."""
 
-from __future__ import annotations
-
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from proof.cases.blade.few_sectors import FEW_SECTORS
+from tests.helpers.command import printed_record, refusal
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
-from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.pictures import loop_plots, maps, wheel_diagrams
 
 
@@ -70,10 +67,7 @@ def test_a_campbell_diagram_has_each_wave_once(orders: tuple[int, ...]) -> None:
 def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     changes = [word for text in (*FEW_SECTORS, "geometry.n_span=3") for word in ("--set", text)]
     speeds = ["--from", "3000rpm", "--to", "9000rpm", "--speeds", "2", "--families", "2", "--order", "1", "2"]
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["wheel", "modes", "blade", *changes, *speeds, "--out", str(tmp_path), "--json"])
-    assert stop.value.code == 0
-    record = json.loads(capsys.readouterr().out)
+    record = printed_record(["wheel", "modes", "blade", *changes, *speeds, "--out", str(tmp_path), "--json"], capsys)
     assert {Path(name).name for name in record["files"]} == {
         "nodal_diameters.csv", "nodal_diameters.png", "safe.png", "campbell.png",
     }  # fmt: skip
@@ -89,10 +83,7 @@ def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.C
 
 
 def test_a_part_without_a_wheel_has_no_diagrams(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["wheel", "modes", "beam"])
-    assert stop.value.code == 2
-    assert "has no [wheel]" in capsys.readouterr().err
+    assert "has no [wheel]" in refusal(["wheel", "modes", "beam"], capsys)
 
 
 def test_status_over_wear_and_loops_of_chosen_pairs() -> None:

@@ -1,7 +1,5 @@
 """The word `tribodyn cases`; it loads no solver, mesher or plots."""
 
-from __future__ import annotations
-
 from tribodyn.workflows.scene import scene_file
 
 

@@ -1,17 +1,13 @@
 """The words `tribodyn curve ...`."""
 
-from __future__ import annotations
-
 from cyclopts import App
 
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.curves.backbones import backbone
 from tribodyn.workflows.studies.curves.decay import ring_down
-from tribodyn.workflows.studies.curves.fold_study import folds
 from tribodyn.workflows.studies.curves.tracking import track
 
 app = App(name="curve")
 app.command(word(backbone, "curve backbone"))
 app.command(word(ring_down, "curve ring-down"))
-app.command(word(folds, "curve folds"))
 app.command(word(track, "curve track"))

@@ -1,7 +1,5 @@
 """The words `tribodyn new` and `tribodyn inspect`."""
 
-from __future__ import annotations
-
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.draft import draft
 from tribodyn.workflows.studies.inspection import inspect as inspect_source

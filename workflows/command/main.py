@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import cyclopts
 
+from tribodyn.output_file import printable
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.version import __version__
 
@@ -35,7 +36,7 @@ WORDS = {  # word -> where it is, its help on the page of all of them
     "verify": ("verify_word:verify", "Check a result against direct time integration."),
     "report": ("scene_words:report", "Write one HTML file that shows results."),
     "export": ("scene_words:export", "Write a result in the formats of other programs."),
-    "curve": ("curve_words:app", "Follow curves: backbone, ring-down, folds, track."),
+    "curve": ("curve_words:app", "Follow curves: backbone, ring-down, track."),
     "wheel": ("wheel_words:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
     "study": ("study_words:app", "Studies: grid, lives, optimise, identify, converge, asperities and more."),
 }  # fmt: skip
@@ -74,8 +75,7 @@ def guard(command: Callable[[], object]) -> None:
     """Run a command and leave with its exit code: 2 after bad input, 3 after a failed solve, 130 after Ctrl-C.
 
     Any other exception is a defect of the program: its traceback and 70. A reader that closes the pipe, as head does,
-    ends it in silence with 141.
-    """
+    ends it in silence with 141."""
     # a shell without job control starts background jobs with Ctrl-C ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.unraisablehook = _interrupt_again
@@ -113,7 +113,7 @@ def _interrupt_again(lost: UnraisableHookArgs) -> None:
 
 
 def _leave(code: int, sentence: str) -> NoReturn:
-    one_line = " ".join(sentence.split()).rstrip(".")
+    one_line = printable(" ".join(sentence.split()).rstrip("."))
     print(f"tribodyn: {one_line}{'' if one_line.endswith('?') else '.'}", file=sys.stderr)
     sys.exit(code)
 

@@ -1,7 +1,5 @@
 """The words of the command `tribodyn` on one scene or one result."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Callable, Sequence
@@ -10,6 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from tribodyn.output_file import printable
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.command.word import QUIET, Flag, Json, Overrides, make_room
 from tribodyn.workflows.report import text
@@ -62,8 +61,7 @@ def run(
     verbose
         Print sizes, the seconds of each stage, every number and every file too.
     log
-        File to which every line of progress is added, with its time.
-    """
+        File to which every line of progress is added, with its time."""
     make_room(out)
     progress = console_progress(quiet, log, verbose)
     file = scene_file.read(scene, overrides)
@@ -95,7 +93,7 @@ def _stop_message(path: Path, scene: str, overrides: Sequence[str]) -> str:
     return f"stopped, {store.load(path).state}, kept in {path}: resume with tribodyn run {shlex.join(words)} --resume"
 
 
-def plan(scene: str, *, overrides: Overrides = (), picture: Path | None = None) -> None:
+def plan(scene: str, *, overrides: Overrides = (), picture: Path | None = None, allow_scripts: Flag = False) -> None:
     """Show what a scene will model, and what it will cost, before running it.
 
     Parameters
@@ -104,15 +102,18 @@ def plan(scene: str, *, overrides: Overrides = (), picture: Path | None = None) 
         Name of a scene (see `tribodyn cases`) or a .toml file.
     picture
         A .png file to draw the scene in: bodies, contacts in colour, what is held, loads as arrows.
-    """
+    allow_scripts
+        Run a Python file or a drawing (.geo) that makes the part."""
     make_room(picture, (".png",))
-    print(*named_lines(front_door.plan(scene, overrides).lines()), sep="\n")
+    planned = front_door.plan(scene, overrides, allow_scripts=allow_scripts)
+    print(*map(printable, named_lines(planned.lines())), sep="\n")
     if picture is not None:
-        print(front_door.picture(scene, picture, overrides))
+        print(front_door.picture(scene, picture, overrides, allow_scripts=allow_scripts))
 
 
 def _print(result: Result, verbose: bool) -> None:
-    print(*text.brief(result), *(["", *named_lines(text.lines(result), 38)] if verbose else []), sep="\n", flush=True)
+    lines = [*text.brief(result), *(["", *named_lines(text.lines(result), 38)] if verbose else [])]
+    print(*map(printable, lines), sep="\n", flush=True)
 
 
 def show(result: Path, *, verbose: Verbose = False, as_json: Json = False) -> None:
@@ -125,8 +126,7 @@ def show(result: Path, *, verbose: Verbose = False, as_json: Json = False) -> No
     verbose
         Every number, and what each refinement changed.
     as_json
-        Print JSON for machines.
-    """
+        Print JSON for machines."""
     loaded = store.load(result)
     if as_json:
         print(json.dumps(loaded.summary(), indent=2))
@@ -163,8 +163,7 @@ def draw(
     images
         Images of a film, at the most.
     out
-        Folder of pictures and films; pictures/ beside the result by default.
-    """
+        Folder of pictures and films; pictures/ beside the result by default."""
     make_room(out)
     if dpi is not None and not 20 <= dpi <= 2400:
         raise Refusal(f"--dpi {dpi}: give 20 to 2400 dots per inch")
@@ -199,15 +198,16 @@ def report(*result: Path, out: Path | None = None) -> None:
     result
         Folders or files of results; several are shown side by side, with differences from the first.
     out
-        The .html file; report.html beside the first result by default.
-    """
+        The .html file; report.html beside the first result by default."""
     if not result:
         raise Refusal("report: give the folder or file of a result")
     make_room(out, (".html",))
     print(front_door.report(result, out or store.result_file(result[0]).parent / "report.html"))
 
 
-def export(result: Path, *, to: Targets, out: Path | None = None, mesh_ending: str = ".xdmf") -> None:
+def export(
+    result: Path, *, to: Targets, out: Path | None = None, mesh_ending: str = ".xdmf", allow_scripts: Flag = False
+) -> None:
     """Write a result in the formats of other programs.
 
     Parameters
@@ -221,7 +221,9 @@ def export(result: Path, *, to: Targets, out: Path | None = None, mesh_ending: s
         Folder, in which each format gets a folder of its own; export/ beside the result by default.
     mesh_ending
         Format of the mesh by its ending, such as .vtu, .exo, .msh or .bdf.
-    """
+    allow_scripts
+        Run Python files and drawings (.geo) that the scene of the result names, to make its matrices again."""
     make_room(out)
-    for written in front_door.export(result, to, out or store.result_file(result).parent / "export", mesh_ending):
-        print(written)
+    folder = out or store.result_file(result).parent / "export"
+    for written in front_door.export(result, to, folder, mesh_ending, allow_scripts=allow_scripts):
+        print(printable(written))

@@ -1,7 +1,5 @@
 """The words `tribodyn wheel ...`."""
 
-from __future__ import annotations
-
 from cyclopts import App
 
 from tribodyn.workflows.command.word import word

@@ -1,8 +1,7 @@
 """A word of the command line, made from a study: its options from the parameters, its help from the docstring.
 
 A study is a function with one result type, which has `record()` for machines, `lines()` for people and, where there are
-tables or pictures, `write(folder)`. A parameter that is marked with a quantity takes a text with a unit.
-"""
+tables or pictures, `write(folder)`. A parameter that is marked with a quantity takes a text with a unit."""
 
 from __future__ import annotations
 
@@ -19,6 +18,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from cyclopts import Parameter
 
+from tribodyn.output_file import printable
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run.failure import SolveFailed
@@ -43,8 +43,7 @@ class Option:
     """A parameter of a study as an option of its word.
 
     by_position : whether the study takes it by position; unit : of a quantity, None for what is none
-    is_repeated : whether it takes several values, by name where `by_name`
-    """
+    is_repeated : whether it takes several values, by name where `by_name`"""
 
     name: str
     hint: Any
@@ -123,8 +122,7 @@ def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Ca
 
     words : such as "curve track", printed in the command that resumes
     into : default folder of tables and pictures where --out is not given: results/NAME, the folder of the result, its
-        pictures/, the folder of the file, or none
-    """
+        pictures/, the folder of the file, or none"""
     hints = get_type_hints(study, include_extras=True)
     parameters = inspect.signature(study).parameters
     options = [Option.of(p, hints[name]) for name, p in parameters.items() if name not in SUPPLIED]
@@ -202,7 +200,7 @@ def print_result(result: StudyResult, files: Sequence[Path] = (), as_json: bool 
             record = {**record, "files": [str(path) for path in files]}
         print(json.dumps(record, indent=2))
     else:
-        print(*result.lines(), *files, sep="\n")
+        print(*map(printable, (*result.lines(), *files)), sep="\n")
     if failure := getattr(result, "failure", ""):
         raise SolveFailed(failure)
     if result.defects:
@@ -268,8 +266,7 @@ def quantity(name: str, text: str, unit: str) -> float:
 def make_room(out: Path | None, endings: Sequence[str] = ()) -> None:
     """Check, before long work, that --out can be written: a folder, or a file with one of these endings.
 
-    Raises  Refusal
-    """
+    Raises  Refusal"""
     if out is None:
         return
     if endings and out.suffix.lower() not in endings:

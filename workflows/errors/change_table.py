@@ -1,25 +1,27 @@
-"""The table of measured changes: one state of the scene followed from its own model to a finer one, step by step.
+"""The table of measured changes: one state of the scene solved again with one setting after the other refined.
 
-Modes, then mesh and contact grid, then harmonics are refined, each on top of the one before, so that the rows of single
-refinements sum, with their signs, to the combined one. A refinement that meets a limit is not measured. Matrices have
-no mesh: modes and harmonics, and the steps of wear, are all that can be refined in them.
-"""
+Harmonics are refined on the scene's own mesh by what its contact force requires; modes, and on top of them mesh and
+contact grid, with the harmonics of the scene. A refinement that meets a limit is not measured. Matrices have no mesh:
+modes and harmonics, and the steps of wear, are all that can be refined in them."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, StatedQuantity, WearQuantity, with_error
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.quantity import CycleQuantity, ErrorKind, names_with_error, of_wear_with_error
 from tribodyn.hbm.wear import wear_rule
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.steady_motion import untaken_periodic_share
 from tribodyn.refusal import Refusal, SolverFailure
-from tribodyn.workflows.errors import operating_states, refine, wear_values
+from tribodyn.workflows.errors import operating_states, refine
 from tribodyn.workflows.errors.operating_states import OperatingState, Values, relative_change
 from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimits
-from tribodyn.workflows.errors.sampling_error import sampling_error
+from tribodyn.workflows.result.answers import worn_contact
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import MeasuredChange, Refinement
 from tribodyn.workflows.run import modelling, wear_run
@@ -31,229 +33,243 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 NOT_SOLVED = (Refusal, SolverFailure)
 """What a finer model may answer instead of a value; anything else is a defect of the program and ends the run."""
 
+FINER = 8  # times the samples, for a law that cannot locate its transitions: the error falls with their square
+CONVERGED_SHARE = 1e-2  # residual over that of the start: a step alone is half of the way where few samples are far off
+FEWEST_SAMPLES = 128
+
 
 @dataclass
 class ChangeTable:
-    """Rows as they are measured.
+    """Rows of a finished result as they are measured; say : called with what is refined next.
 
     first : state of the scene before wear, None without one, as `reason` says
     ratio : of the refined mesh, None where that was not solved; worn_ratio : of the mesh of the refined wear run
-    last : the state of the combined refinement on that mesh
-    """
+    last : the state on that mesh; wear_harmonics : of the refined wear run
+    in_time : values of the state before wear along a motion in time that contradicts it, empty where none does"""
 
+    file: SceneFile
+    model: Model
+    result: Result
+    say: Callable[[str], None]
+    limits: RefinementLimits
     rows: list[MeasuredChange] = field(default_factory=list)
     first: OperatingState | None = None
     reason: str = ""
     ratio: float | None = None
     worn_ratio: float | None = None
     last: OperatingState | None = None
+    wear_harmonics: tuple[int, ...] = ()
+    in_time: Values = field(default_factory=dict)
 
-    def add(self, refinement: Refinement, values: Values, refined: Values, text: str) -> None:
-        """What a refinement changed."""
+    @property
+    def names_of_wear(self) -> tuple[str, ...]:
+        """Names of the quantities of the whole wear whose errors are stated."""
+        return tuple(quantity.name for quantity in of_wear_with_error(worn_contact(self.result)))
+
+    def of(self, quantity: str) -> list[MeasuredChange]:
+        """Rows of a quantity."""
+        return [row for row in self.rows if row.quantity == quantity]
+
+    def take_motion(self, values: Values, scatter: Values, refined: Values | None = None, text: str = "") -> None:
+        """Put values in time in place of those of the balance, whose harmonics and samples then do not matter.
+
+        scatter : relative, of means and time steps; refined : values in time on another mesh, None where not measured
+        """
+        balance = {Refinement.HARMONICS, Refinement.SAMPLES}
+        balance |= {Refinement.MODES, Refinement.MESH} if refined else set()
+        self.rows = [row for row in self.rows if row.quantity not in values or row.refinement not in balance]
+        self.in_time = values
+        for name, relative in scatter.items():
+            self.estimate(Refinement.MOTION, [name], relative, "means in time and their steps")
+        if refined:
+            self.add(Refinement.COMBINED, values, refined, text)
+
+    def add(
+        self, refinement: Refinement, values: Values, refined: Values, text: str, remaining: Values | None = None
+    ) -> None:
+        """What a refinement changed; remaining : relative changes that it leaves out."""
         for name, value in values.items():
-            change = relative_change(value, refined[name])
+            change = relative_change(value, refined[name]) + (remaining or {}).get(name, 0.0)
             self.rows.append(MeasuredChange(refinement, name, value, refined[name], change, text))
 
-    def refuse(self, refinement: Refinement, reason: str, kind: type[StatedQuantity] = CycleQuantity) -> None:
-        """A refinement that was not measured, for all quantities of a kind."""
-        self.rows += [MeasuredChange(refinement, q.name, None, None, None, reason) for q in with_error(kind)]
+    def estimate(self, refinement: Refinement, quantities: Iterable[str], relative: float | None, text: str) -> None:
+        """A relative change that was estimated without a second solution; None: not measured, as the text says."""
+        self.rows += [MeasuredChange(refinement, name, None, None, relative, text) for name in quantities]
 
-    def estimate(
-        self, refinement: Refinement, quantities: Sequence[StatedQuantity], relative: float, text: str
-    ) -> None:
-        """A relative change that was estimated without a second solution."""
-        self.rows += [MeasuredChange(refinement, q.name, None, None, relative, text) for q in quantities]
+    @contextmanager
+    def refusals(self, refinement: Refinement, text: str = "", names: Sequence[str] = ()) -> Iterator[None]:
+        """A refinement is not measured where its model has no solution; text : before the reason."""
+        try:
+            yield
+        except NOT_SOLVED as refusal:
+            self.estimate(refinement, names or names_with_error(CycleQuantity), None, f"{text}{refusal}")
+
+    def refine_harmonics(self, first: OperatingState) -> None:
+        """The harmonics that the contact force requires, on the mesh of the scene."""
+        self.say("harmonics that the contact force requires")
+        harmonics = first.balance.basis.harmonics
+        self.wear_harmonics = tuple(range(harmonics[0], max(harmonics[-1] + 3, 6)))
+        with self.refusals(Refinement.HARMONICS):
+            state, remaining = operating_states.refine_harmonics(first, self.limits)
+            text = f"harmonics {', '.join(map(str, state.balance.basis.harmonics))}, and what they leave out"
+            self.add(Refinement.HARMONICS, first.values, state.values, text, remaining)
+
+    def refine_modes(self, first: OperatingState) -> OperatingState:
+        """The first state with more modes, followed from its own solution; itself without more of them."""
+        if (finer := refine.modes(self.file, self.limits.modes)) is None:
+            return first
+        self.say("more modes")
+        wear, state = self.file.scene.wear, first
+        with self.refusals(Refinement.MODES):
+            model = modelling.build(finer, Progress(), first.balance.basis.harmonics)
+            balance = model.balance.with_load(1.0 if wear is None else wear.duties[0].load)
+            point = first.site.solve_near(balance, first.point.state.omega, first.point.state.x)
+            state = operating_states.require_solved(replace(first, balance=balance, point=point))
+            self.add(Refinement.MODES, first.values, state.values, f"{self.limits.modes} times as many modes")
+        return state
+
+    def finer_scene(self, first: OperatingState) -> tuple[SceneFile | None, float, str]:
+        """The scene with more elements and modes as far as the limits allow, its ratio, and why there is none.
+
+        Where no finer mesh is allowed, one coarser than that of the scene stands in for it, with a ratio below 1"""
+        reason, limits = "", self.limits
+        for ratio in (*limits.ratios, 1 / limits.coarser):
+            try:
+                finer, actual = refine.mesh(self.file, ratio)
+            except refine.NoMesh as refusal:
+                return None, 1.0, str(refusal)
+            if ratio < 1 <= actual:
+                break  # an imported mesh can only be cut
+            dofs, unknowns = actual**3 * self.result.facts.full_dofs, actual**2 * first.balance.n_unknown
+            if dofs > limits.max_dofs:
+                reason = f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {limits.max_dofs:g}"
+            elif unknowns > limits.max_unknowns:
+                reason = f"the refined balance has some {unknowns:.2g} unknowns, above the limit of "
+                reason += f"{limits.max_unknowns:g}"
+            else:
+                return refine.modes(finer, limits.modes) or finer, actual, ""
+        return None, 1.0, reason
+
+    def refine_mesh(self, finer: SceneFile, ratio: float, state: OperatingState) -> None:
+        """Another mesh and contact grid, on top of more modes."""
+        text = f"{ratio:.3g} times the elements along every edge"
+        self.say(text)
+        with self.refusals(Refinement.MESH, f"{text}: "):
+            model = modelling.build(finer, Progress(), state.balance.basis.harmonics)
+            self.last = operating_states.unworn_state(finer, model, state.site)
+            self.ratio = ratio
+            self.add(Refinement.MESH, state.values, self.last.values, text)
+
+    def add_estimates(self, first: OperatingState) -> None:
+        """What the contact law, the wear rule and its motions in time estimate of themselves."""
+        file, worn = self.file, self.result.wear
+        error = sampling_error(first.balance, first.point.state.omega, first.point.state.x)
+        sampled = [name for name in first.values if name != operating_states.place_of_peak()]
+        self.estimate(Refinement.SAMPLES, sampled, error, "estimate: located transitions")
+        if file.scene.wear is None or worn is None or not self.result.wear_steps:
+            return
+        rule = wear_rule.load(file.scene.wear.rule_name).Rule
+        steps = rule.error(worn, wear_run.rule_settings(file.scene, self.result.facts.delta_max or np.nan))
+        durations = [q.name for q in of_wear_with_error(worn_contact(self.result)) if q.error is ErrorKind.DURATION]
+        for name in self.names_of_wear:
+            relative = float(steps.cycles if name in durations else steps.depth)
+            self.estimate(Refinement.WEAR_STEPS, [name], relative, "estimate of the wear rule")
+        if worn.in_time.any():  # scatter changes the cycles, not the depth of a contact that is worn through
+            self.estimate(Refinement.MOTION, durations, worn.scatter, "standard error of means in time")
+            problem = wear_run.wear_problem(file.scene, file.folder, self.model.balance)
+            difference = abs(untaken_periodic_share(problem, worn, self.limits.searched_rows))
+            text = "periodic motions that the irregular one did not take"
+            self.estimate(Refinement.OTHER_MOTION, durations, difference, text)
+
+    def refine_wear(self, finer: SceneFile | None, reason: str, first: OperatingState, wear: WearHistory) -> None:
+        """Quantities of the whole wear on another mesh, with more modes, harmonics and wear steps.
+
+        The refined mesh is taken where the work allows it, else one coarser than that of the scene, whose run takes
+        about as much work as the run of the scene. Matrices, which have no mesh, are worn as they are."""
+        values = operating_states.worn_values(worn_contact(self.result))
+        if values is None:
+            self.estimate(Refinement.COMBINED, self.names_of_wear, None, "no life has ended")
+            return
+        file, limits, harmonics = self.file, self.limits, self.wear_harmonics
+        periods = 0 if wear.periods is None else wear.periods.sum()  # steps go without harmonics
+        work = float(wear.solves.sum() * (2 * len(harmonics) - 1) + periods) * first.balance.contact.stiffness.size
+        no_mesh = isinstance(file.scene, MatrixScene)
+        ratio = 1.0 if no_mesh else self.ratio or limits.ratios[0]
+        if no_mesh and work > limits.max_wear:
+            text = f"finer wear takes work above the limit of {limits.max_wear:g}"
+            self.estimate(Refinement.COMBINED, self.names_of_wear, None, text)
+            return
+        if no_mesh:
+            finer = refine.modes(file, limits.modes) or file
+        elif finer is None or (ratio > 1 and work * ratio**2 > limits.max_wear):
+            finer, ratio = refine.mesh(file, 1 / limits.coarser)
+            if ratio >= 1:
+                text = reason or "the mesh is imported and can only be cut"
+                self.estimate(Refinement.COMBINED, self.names_of_wear, None, text)
+                return
+            finer = refine.modes(finer, limits.modes) or finer
+        steps = limits.wear_steps if ratio >= 1 else 1.0
+        refined = refine.wear(refine.harmonics(finer, harmonics), steps)
+        text = "" if no_mesh else f"{ratio:.3g} times the elements along every edge, "
+        text += f"more modes, harmonics {', '.join(map(str, harmonics))}"
+        text += f", {steps:g} times the wear steps" if steps > 1 else ""
+        with self.refusals(Refinement.COMBINED, f"{text}: ", self.names_of_wear):
+            start = self.last if ratio == self.ratio else None
+            worn = operating_states.worn_by(refined, modelling.build(refined, Progress()), start)
+            self.add(Refinement.COMBINED, values, operating_states.values_through(worn), text)
+            self.worn_ratio = None if no_mesh else ratio
+            if self.in_time:
+                self.take_motion(self.in_time, {}, operating_states.values_before(worn), text)
 
 
 def measure_changes(
     file: SceneFile, model: Model, result: Result, say: Callable[[str], None], limits: RefinementLimits = DEFAULT
 ) -> ChangeTable:
     """All rows of a finished result; say : called with what is refined next."""
-    table = ChangeTable()
+    table = ChangeTable(file, model, result, say, limits)
     try:
         first = table.first = operating_states.first_state(file, model.balance, result)
     except NOT_SOLVED as refusal:
         table.reason = str(refusal)
         return table
-    finer, ratio, reason = finer_scene(file, first, result, limits)
-    if finer is None:
-        _refine_without_mesh(file, first, reason, table, say)
-    else:
-        _refine_step_by_step(file, finer, ratio, first, table, say)
-    _add_estimates(file, model, first, table, result, limits)
-    if result.wear_steps and file.scene.wear is not None:
-        _refine_wear(file, finer, reason, first, table, result, limits)
+    table.refine_harmonics(first)
+    state = table.refine_modes(first)
+    finer, ratio, reason = table.finer_scene(first)
+    if finer is not None:
+        table.refine_mesh(finer, ratio, state)
+    elif not isinstance(file.scene, MatrixScene):
+        table.estimate(Refinement.MESH, names_with_error(CycleQuantity), None, reason)
+    table.add_estimates(first)
+    worn = worn_contact(result)
+    if worn is not None and worn.history.in_time[:1].any():
+        values = operating_states.values_before(worn)
+        if any(relative_change(first.values[name], value) > limits.floor for name, value in values.items()):
+            table.take_motion(values, dict.fromkeys(values, worn.history.scatter))
+    if result.wear is not None and result.wear_steps and file.scene.wear is not None:
+        table.refine_wear(finer, reason, first, result.wear)
     return table
 
 
-def finer_scene(
-    file: SceneFile, first: OperatingState, result: Result, limits: RefinementLimits
-) -> tuple[SceneFile | None, float, str]:
-    """The scene with more elements and modes as far as the limits allow, its ratio, and why there is none.
+def sampling_error(balance: HarmonicBalance, omega: float, x: np.ndarray) -> float:
+    """Estimated relative error of the vibration of the worst output, caused by sampled contact forces.
 
-    Where no finer mesh is allowed, one coarser than that of the scene stands in for it, with a ratio below 1
-    """
-    contact = first.balance.contact.stiffness.size
-    coefficients = 2 * first.refined_top(limits) + 1
-    reason = ""
-    for ratio in (*limits.ratios, 1 / limits.coarser):
-        try:
-            finer, actual = refine.mesh(file, ratio)
-        except refine.NoMesh as refusal:
-            return None, 1.0, str(refusal)
-        if ratio < 1 <= actual:
-            break  # an imported mesh can only be cut
-        dofs, unknowns = actual**3 * result.facts.full_dofs, actual**2 * contact * coefficients
-        if dofs > limits.max_dofs:
-            reason = f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {limits.max_dofs:g}"
-        elif unknowns > limits.max_unknowns:
-            reason = f"the refined balance has some {unknowns:.2g} unknowns, above the limit of {limits.max_unknowns:g}"
-        else:
-            return refine.modes(finer, limits.modes) or finer, actual, ""
-    return None, 1.0, reason
-
-
-def _refine_step_by_step(
-    file: SceneFile, finer: SceneFile, ratio: float, first: OperatingState, table: ChangeTable,
-    say: Callable[[str], None],
-) -> None:  # fmt: skip
-    """Modes, mesh, harmonics, each on top of the one before; the last is the combined refinement."""
-    values = (_with_more_modes(file, first, table, say) or first).values
-    say(f"a mesh with {ratio:.2g} times the elements")
-    text = f"{ratio:.3g} times the elements along every edge"
-    harmonics = first.balance.basis.harmonics
-    try:
-        state = operating_states.unworn_state(finer, modelling.build(finer, Progress(), harmonics), first.site)
-    except NOT_SOLVED as refusal:
-        table.refuse(Refinement.MESH, f"{text}: {refusal}")
-        table.refuse(Refinement.COMBINED, f"{text}: {refusal}")
-        return
-    table.add(Refinement.MESH, values, state.values, text)
-    last = _with_more_harmonics(state, table, say)
-    if last is None:
-        table.refuse(Refinement.COMBINED, table.rows[-1].description)
-        return
-    table.ratio, table.last = ratio, last
-    text += f", more modes, harmonics 0 to {first.refined_top()}"
-    table.add(Refinement.COMBINED, first.values, last.values, text)
-
-
-def _refine_without_mesh(
-    file: SceneFile, first: OperatingState, reason: str, table: ChangeTable, say: Callable[[str], None]
-) -> None:
-    """What can be refined where the mesh cannot, as `reason` says: all that there is of a scene of matrices."""
-    last = _with_more_harmonics(_with_more_modes(file, first, table, say) or first, table, say)
-    if last is None or not isinstance(file.scene, MatrixScene):
-        table.refuse(Refinement.COMBINED, reason if last else table.rows[-1].description)
-    else:
-        text = f"more modes, harmonics 0 to {first.refined_top()}"
-        table.add(Refinement.COMBINED, first.values, last.values, text)
-
-
-def _with_more_modes(
-    file: SceneFile, first: OperatingState, table: ChangeTable, say: Callable[[str], None]
-) -> OperatingState | None:
-    """The first state with more modes, followed from its own solution; None where the scene has no number of modes."""
-    finer = refine.modes(file, DEFAULT.modes)
-    if finer is None:
-        return None
-    say("more modes")
-    wear = file.scene.wear
-    try:
-        model = modelling.build(finer, Progress(), first.balance.basis.harmonics)
-        balance = model.balance.with_load(1.0 if wear is None else wear.duties[0].load)
-        point = first.site.solve_near(balance, first.point.state.omega, first.point.state.x)
-        if not point.solution.converged:
-            raise SolverFailure(str(point.solution.outcome))
-    except NOT_SOLVED as refusal:
-        table.refuse(Refinement.MODES, str(refusal))
-        return None
-    state = replace(first, balance=balance, point=point)
-    table.add(Refinement.MODES, first.values, state.values, f"{DEFAULT.modes} times as many modes")
-    return state
-
-
-def _with_more_harmonics(
-    state: OperatingState, table: ChangeTable, say: Callable[[str], None]
-) -> OperatingState | None:
-    """A state with more harmonics, followed from its own solution."""
-    text = f"harmonics 0 to {state.refined_top()}"
-    say(text)
-    try:
-        refined = operating_states.with_more_harmonics(state, state.refined_top())
-    except NOT_SOLVED as refusal:
-        table.refuse(Refinement.HARMONICS, f"{text}: {refusal}")
-        return None
-    table.add(Refinement.HARMONICS, state.values, refined.values, text)
-    return refined
-
-
-def _add_estimates(
-    file: SceneFile, model: Model, first: OperatingState, table: ChangeTable, result: Result, limits: RefinementLimits
-) -> None:
-    """What the contact law, the wear rule and its motions in time estimate of themselves."""
-    error = sampling_error(first.balance, first.point.state.omega, first.point.state.x)
-    sampled = [q for q in with_error(CycleQuantity) if q.error is not ErrorKind.UNSAMPLED_CYCLE]
-    table.estimate(Refinement.SAMPLES, sampled, error, "estimate: located transitions")
-    wear = file.scene.wear
-    if wear is None or result.wear is None or not result.wear_steps:
-        return
-    rule = wear_rule.load(wear.rule_name).Rule
-    steps = rule.error(result.wear, wear_run.rule_settings(file.scene, result.facts.delta_max or np.nan))
-    durations = [q for q in with_error(WearQuantity) if q.error is ErrorKind.DURATION]
-    for quantity in with_error(WearQuantity):
-        relative = steps.cycles if quantity in durations else steps.depth
-        table.estimate(Refinement.WEAR_STEPS, [quantity], float(relative), "estimate of the wear rule")
-    if result.wear.in_time.any():  # scatter changes the cycles, not the depth of a contact that is worn through
-        table.estimate(Refinement.MOTION, durations, result.wear.scatter, "standard error of means in time")
-        problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
-        difference = abs(untaken_periodic_share(problem, result.wear, limits.searched_rows))
-        text = "periodic motions that the irregular one did not take"
-        table.estimate(Refinement.OTHER_MOTION, durations, difference, text)
-
-
-def _refine_wear(
-    file: SceneFile, finer: SceneFile | None, reason: str, first: OperatingState, table: ChangeTable, result: Result,
-    limits: RefinementLimits,
-) -> None:  # fmt: skip
-    """Quantities of the whole wear on another mesh, with more modes, harmonics and wear steps.
-
-    The refined mesh is taken where the work allows it, else one coarser than that of the scene, whose run takes about
-    as much work as the run of the scene. Matrices, which have no mesh, are worn as they are.
-    """
-    wear = result.wear
-    assert wear is not None
-    values = wear_values.values_of_result(result)
-    if values is None:
-        table.refuse(Refinement.COMBINED, "no life has ended", WearQuantity)
-        return
-    top = first.refined_top(limits)
-    periods = 0 if wear.periods is None else wear.periods.sum()  # marched with as many steps, whatever the harmonics
-    work = float(wear.solves.sum() * (2 * top + 1) + periods) * first.balance.contact.stiffness.size
-    no_mesh = isinstance(file.scene, MatrixScene)
-    ratio = 1.0 if no_mesh else table.ratio or limits.ratios[0]
-    if no_mesh and work > limits.max_wear:
-        text = f"finer wear takes work above the limit of {limits.max_wear:g}"
-        table.refuse(Refinement.COMBINED, text, WearQuantity)
-        return
-    if no_mesh:
-        finer = refine.modes(file, limits.modes) or file
-    elif finer is None or (ratio > 1 and work * ratio**2 > limits.max_wear):
-        finer, ratio = refine.mesh(file, 1 / limits.coarser)
-        if ratio >= 1:
-            text = reason or "the mesh is imported and can only be cut"
-            table.refuse(Refinement.COMBINED, text, WearQuantity)
-            return
-        finer = refine.modes(finer, limits.modes) or finer
-    steps = limits.wear_steps if ratio >= 1 else 1.0
-    refined = refine.wear(refine.harmonics(finer, top), steps)
-    text = "" if no_mesh else f"{ratio:.3g} times the elements along every edge, "
-    text += f"more modes, harmonics 0 to {top}" + (f", {steps:g} times the wear steps" if steps > 1 else "")
-    try:
-        start = table.last if ratio == table.ratio else None
-        refined_values = wear_values.wear_through(refined, modelling.build(refined, Progress()), start)
-    except NOT_SOLVED as refusal:
-        table.refuse(Refinement.COMBINED, f"{text}: {refusal}", WearQuantity)
-        return
-    table.worn_ratio = None if no_mesh else ratio
-    table.add(Refinement.COMBINED, values, refined_values, text)
+    balance : solved at omega [rad/s] by x (n_pair, n_component, n_coeff) [m]
+    The solution is put into a balance that locates its transitions, on more samples, and solved again. The error is
+    relative to the vibration there, inf where Newton finds none, from rest neither."""
+    n_samples = max(FINER * balance.basis.n_samples, FEWEST_SAMPLES)
+    fine = balance.with_samples(n_samples, balance.contact.is_event_based)
+    state, start = balance.evaluate(omega, x, jacobian=False), fine.evaluate(omega, x, jacobian=False)
+    residual = newton.relative_residual(start, fine.x_lin(omega))
+    options = NewtonOptions()
+    loose = replace(options, tolerance=max(CONVERGED_SHARE * residual, newton.CRITERION.least_tolerance))
+    solution = newton.solve(fine, omega, x, loose)
+    if not solution.converged and solution.history[-1] > options.tolerance:  # too far off to be a start
+        solution = newton.solve_from_rest(fine, omega)
+        if not solution.converged:
+            return float("inf")
+    dynamic = balance.basis.order > 0
+    vibration = fine.outputs(solution.state)[:, dynamic]
+    change = vibration - balance.outputs(state)[:, dynamic]
+    sizes, changes = (np.linalg.norm(y, axis=1) for y in (vibration, change))
+    floor = 1e-2 * sizes.max(initial=0.0)  # a quiet output is measured against the liveliest one
+    return float((changes / np.maximum(sizes, floor)).max()) if floor > 0 else 0.0

@@ -1,13 +1,13 @@
-"""The settings of a scene that trade speed for accuracy: ladders of overrides from coarse to fine."""
-
-from __future__ import annotations
+"""Settings of a scene that trade speed for accuracy, ladders from coarse to fine, and where their answers tend to."""
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Self
 
+import numpy as np
 from pydantic import Field, model_validator
+from scipy.optimize import brentq
 
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
@@ -24,6 +24,10 @@ CUTOFFS = (0.25, 0.5, 1, 2)  # over that of the scene
 RANKS = (3, 6, 12, 24)
 WEAR_TOLERANCES = (0.3, 0.1, 0.03, 0.01, 0.003)
 EXACT = float("nan")  # size of a setting that leaves no error
+ORDERS = (0.5, 4.0)  # slower is not taken for settling; faster is not relied on
+SAFETY = 0.25  # of the extrapolated remainder that stays in doubt (Roache: a factor of 1.25 on three grids)
+SMALLEST = 1e-3  # size of a setting that leaves all out
+ROUNDING = 1e-9  # relative difference that means nothing
 
 
 @dataclass(frozen=True)
@@ -45,8 +49,7 @@ class Ladder:
     """Settings of one thing, from coarse to fine; equal sizes are other placements of the nodes.
 
     base : overrides under which it is measured, None for those of the study
-    worn_up_to : size up to which depth and life are measured too
-    """
+    worn_up_to : size up to which depth and life are measured too"""
 
     name: str
     settings: tuple[Setting, ...]
@@ -72,18 +75,12 @@ class LadderInput(Table):
             raise Refusal('a ladder needs sizes = [1, 2] and as many set = [["section.key=value"], []]')
         return self
 
-    def named(self, name: str) -> Ladder:
-        """The ladder with its name."""
-        settings = (Setting(size, overrides) for size, overrides in zip(self.sizes, self.set, strict=True))
-        return Ladder(name, tuple(settings), self.base, self.worn_up_to)
-
 
 class Study(Table):
     """How a scene is refined.
 
     base : overrides that make it affordable; ladders : that only its geometry has, or with settings of its own
-    unworn : ladders whose depth and life are not measured, because that takes too long
-    """
+    unworn : ladders whose depth and life are not measured, because that takes too long"""
 
     base: tuple[str, ...] = ()
     ladders: dict[str, LadderInput] = Field(default_factory=dict)
@@ -99,9 +96,11 @@ def study_of(file: SceneFile) -> Study:
 def ladders_of(scene: Scene, study: Study, names: Sequence[str] = ()) -> tuple[Ladder, ...]:
     """The ladders of a scene by name, all where none is named: those of its study, then what any scene has.
 
-    Raises  ValueError for one that the scene does not have
-    """
-    available = {name: table.named(name) for name, table in study.ladders.items()}
+    Raises  ValueError for one that the scene does not have"""
+    available = dict[str, Ladder]()
+    for name, table in study.ladders.items():
+        settings = [Setting(size, overrides) for size, overrides in zip(table.sizes, table.set, strict=True)]
+        available[name] = Ladder(name, tuple(settings), table.base, table.worn_up_to)
     for name, settings in _of_any(scene):
         if len(settings) > 1:
             up_to = WORN_TOP if name == "harmonics" else math.inf
@@ -148,3 +147,68 @@ def _of_harmonics(scene: Scene) -> Iterator[tuple[str, list[Setting]]]:
 
 def _numbers(key: str, values: Sequence[float]) -> list[Setting]:
     return [Setting(value, (f"{key}={value:g}",)) for value in values]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where values tend to.
+
+    order : observed, nan where they do not settle monotonically or are too few
+    doubt : how far off the limit itself may be, relative to it"""
+
+    value: float
+    order: float
+    doubt: float
+
+
+def limit_of(size: Sequence[float], value: Sequence[float]) -> Limit:
+    """The limit of values whose error falls with a power of the size, judged by the three finest sizes.
+
+    size : rising, nan at the end where that setting is exact; equal ones are other placements of the same nodes, of
+        which the first counts
+    value : the last one not 0
+    Three that settle monotonically are extrapolated with their observed order, if the last step is above the scatter of
+    the finest size with several placements. Three that alternate and come closer have their limit between the last two.
+    Else the last one stands, with the spread of all values on the three as its doubt. Two are taken to be of first
+    order; one says nothing about itself, which is an infinite doubt.
+    Source  Roache, J. Fluids Eng. 116, 1994"""
+    last = value[-1]
+    if not np.isfinite(size[-1]):
+        return Limit(last, float("nan"), 0.0)
+    sizes = list(dict.fromkeys(size))[-3:]
+    groups = [[v for s, v in zip(size, value, strict=True) if s == group_size] for group_size in sizes]
+    scatter = next((float(np.ptp(group)) for group in reversed(groups) if len(group) > 1), 0.0)
+    v = np.array([group[0] for group in groups])
+    last = float(v[-1])
+    if len(v) == 1:
+        return Limit(last, float("nan"), float("inf"))
+    h = 1 / np.maximum(sizes, SMALLEST)
+    steps = np.diff(v)
+    is_constant = np.abs(steps) <= ROUNDING * abs(last)
+    if is_constant[-1] and (is_constant.all() or len(v) == 3) and not scatter:
+        return Limit(last, float("nan"), float(abs(steps[-1] / last)))
+    if len(v) == 2:
+        return Limit(last, float("nan"), float(abs(steps[0] / last) * h[1] / (h[0] - h[1])))
+    if abs(steps[1]) > scatter:
+        ratio = steps[0] / steps[1]
+        if ratio > 0 and (order := _order(h, ratio)) >= ORDERS[0]:
+            p = min(order, ORDERS[1])
+            remainder = steps[1] * h[2] ** p / (h[1] ** p - h[2] ** p)
+            return Limit(float(last + remainder), order, float(SAFETY * abs(remainder / (last + remainder))))
+        if ratio < -1:
+            return Limit(last, float("nan"), float(abs(steps[1] / last)))
+    return Limit(last, float("nan"), float(np.ptp(np.concatenate(groups)) / abs(last)))
+
+
+def _order(h: np.ndarray, ratio: float) -> float:
+    """p with (h0^p - h1^p) / (h1^p - h2^p) = ratio, nan below 0.01."""
+    low, high = 0.01, 60.0
+
+    def excess(p: float) -> float:
+        # in powers of h0, so that fine tolerances do not underflow
+        a, b = (h[1] / h[0]) ** p, (h[2] / h[0]) ** p
+        return float((1 - a) / max(a - b, 1e-300) - ratio)
+
+    if excess(low) > 0:
+        return float("nan")
+    return high if excess(high) < 0 else float(brentq(excess, low, high, xtol=1e-14))

@@ -1,26 +1,36 @@
-"""States of a contact that errors are measured at, and the values of quantities there."""
+"""States of a contact that errors are measured at, and the values of quantities there and of a whole wear run."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.operating_condition import OperatingCondition
-from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
 from tribodyn.hbm.continuation.peak_refinement import NoPeak
+from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.quantity import CycleQuantity, SolvedCycle, with_error
+from tribodyn.hbm.quantity import (
+    CycleQuantity,
+    ErrorKind,
+    SolvedCycle,
+    WornContact,
+    of_wear_with_error,
+    with_error,
+)
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.refusal import Refusal, SolverFailure
-from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimits
+from tribodyn.workflows.errors.refinement_limits import RefinementLimits
+from tribodyn.workflows.result.answers import EVENT_SAMPLES
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import modelling, response_curve, settings
+from tribodyn.workflows.run import modelling, response_curve, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
@@ -33,8 +43,7 @@ Values = dict[str, float]
 class OperatingState:
     """A solved state of the contact.
 
-    cycles : passed; balance : at its depth of wear; point : its solution; site : how it is found
-    """
+    cycles : passed; balance : at its depth of wear; point : its solution; site : how it is found"""
 
     cycles: float
     balance: HarmonicBalance
@@ -44,21 +53,21 @@ class OperatingState:
     @property
     def values(self) -> Values:
         """Values of the quantities of a cycle whose errors are stated."""
-        cycle = SolvedCycle.of(self.balance, self.point.state, settings.OUTPUT)
-        values = {quantity.name: quantity.value(cycle) for quantity in with_error(CycleQuantity)}
-        return {name: value for name, value in values.items() if value is not None}
+        return values_of(self.balance, self.point.state)
 
-    def refined_top(self, limits: RefinementLimits = DEFAULT) -> int:
-        """Highest harmonic of the refined balance."""
-        return max(limits.harmonics, self.balance.basis.harmonics[-1] + 2)
+
+def values_of(balance: HarmonicBalance, state: State) -> Values:
+    """Values of the quantities of a cycle whose errors are stated."""
+    cycle = SolvedCycle.of(balance, state, settings.OUTPUT)
+    values = {quantity.name: quantity.value(cycle) for quantity in with_error(CycleQuantity)}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 @dataclass(frozen=True)
 class PeakOfCurve:
     """The highest point of a response curve that turns back.
 
-    It may be a fold, whose neighbours a search at fixed frequencies does not see: the curve is followed again.
-    """
+    It may be a fold, whose neighbours a search at fixed frequencies does not see: the curve is followed again."""
 
     scene: Scene
 
@@ -67,6 +76,8 @@ class PeakOfCurve:
         branch = response_curve.follow_response(self.scene, balance)
         if not branch.converged[-1]:
             raise SolveFailed(f"the frequency response {branch.end}")
+        if reason := branch.no_peak(settings.OUTPUT):
+            raise NoPeak(f"no peak: {reason}")
         return highest_point(branch, balance)
 
     def solve_near(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
@@ -75,18 +86,10 @@ class PeakOfCurve:
 
 
 def highest_point(branch: Branch, balance: HarmonicBalance) -> OperatingPoint:
-    """The highest point of a response curve, as it is; raises NoPeak where that is an end of it."""
-    best = _peak(branch)
+    """The highest point of a response curve, as it is."""
+    best = branch.highest(settings.OUTPUT)
     state = balance.evaluate(float(branch.omega[best]), balance.shaped(branch.contact[best]))
-    height = branch.amplitude(branch.output_names[0])
-    return OperatingPoint.of(balance, Solution(state, CONVERGED, 0, 0, ()), branch.output_names[0], len(height))
-
-
-def _peak(branch: Branch) -> int:
-    best = branch.peak(branch.output_names[0])
-    if best is None:
-        raise NoPeak(f"no peak: {branch.no_peak(branch.output_names[0])}")
-    return best
+    return OperatingPoint.of(balance, Solution(state, CONVERGED, 0, 0, ()), settings.OUTPUT, len(branch.omega))
 
 
 def turns_back(branch: Branch) -> bool:
@@ -98,8 +101,7 @@ def turns_back(branch: Branch) -> bool:
 def first_state(file: SceneFile, balance: HarmonicBalance, result: Result) -> OperatingState:
     """The state of a result before wear: where it begins to wear, or the peak of its response.
 
-    Raises  NoPeak; Refusal where there is no contact; SolverFailure where no solution is found
-    """
+    Raises  Refusal where there is no contact or no response; SolverFailure where no solution is found"""
     if not balance.contact.n_pair:
         raise Refusal("there is no contact")
     wear = result.wear
@@ -111,12 +113,14 @@ def first_state(file: SceneFile, balance: HarmonicBalance, result: Result) -> Op
 
 
 def state_at_peak(scene: Scene, balance: HarmonicBalance, branch: Branch) -> OperatingState:
-    """The state at the peak of a response; raises NoPeak, or SolverFailure where no solution is found."""
-    if turns_back(branch):
-        return OperatingState(0.0, balance, PeakOfCurve(scene), highest_point(branch, balance))
-    best, site = _peak(branch), settings.peak_of(scene)
-    point = site.solve_near(balance, float(branch.omega[best]), balance.shaped(branch.contact[best]))
-    return _checked(OperatingState(0.0, balance, site, point))
+    """The state at the highest point of a response as it is; one that is no peak is found again at its frequency."""
+    point = highest_point(branch, balance)
+    site: OperatingCondition | PeakOfCurve = settings.peak_of(scene)
+    if branch.no_peak(settings.OUTPUT):
+        site = AtFrequency(settings.OUTPUT, point.state.omega, settings.newton_options(scene))
+    elif turns_back(branch):
+        site = PeakOfCurve(scene)
+    return OperatingState(0.0, balance, site, point)
 
 
 def worn_state(file: SceneFile, balance: HarmonicBalance, result: Result, row: int) -> OperatingState:
@@ -128,7 +132,7 @@ def worn_state(file: SceneFile, balance: HarmonicBalance, result: Result, row: i
     worn = balance.with_gap(balance.contact.gap + wear.depth[row]).with_load(duty.load)
     x = balance.shaped(basis.transfer(wear.displacement[row], balance.basis))
     point = duty.site.solve_near(worn, float(wear.omega[row]), x)
-    return _checked(OperatingState(float(wear.cycles[row]), worn, duty.site, point))
+    return require_solved(OperatingState(float(wear.cycles[row]), worn, duty.site, point))
 
 
 def later_rows(result: Result) -> list[int]:
@@ -147,35 +151,21 @@ def unworn_state(
 ) -> OperatingState:
     """The contact of a model before wear, its operating point searched from the start.
 
-    reference : how the state of the scene was found: the peak of a curve that turns back is searched on the curve
-    Raises  NoPeak, Refusal where it has no peak; SolverFailure where it has no solution
-    """
+    reference : how the state of the scene was found: the peak of a curve that turns back is searched on the curve, a
+        highest point that is no peak is solved for at its frequency
+    Raises  NoPeak, Refusal where it has no peak; SolverFailure where it has no solution"""
     scene = file.scene
-    site: OperatingCondition | PeakOfCurve = settings.peak_of(scene)
-    site = PeakOfCurve(scene) if isinstance(reference, PeakOfCurve) else site
+    site = PeakOfCurve(scene) if isinstance(reference, PeakOfCurve) else reference or settings.peak_of(scene)
     load = 1.0
     if scene.wear is not None:
         duty = settings.mission(scene)[0]
         site, load = duty.site, duty.load
     balance = model.balance.with_load(load)
-    return _checked(OperatingState(0.0, balance, site, site.solve(balance)))
+    return require_solved(OperatingState(0.0, balance, site, site.solve(balance)))
 
 
-def with_more_harmonics(state: OperatingState, top: int) -> OperatingState:
-    """A state with all harmonics up to `top`, followed from its own solution.
-
-    Raises  NoPeak; SolverFailure without a solution
-    """
-    wide = harmonic_choice.widened(state.balance, top, harmonic_choice.ROUGH)
-    wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top))
-    x = state.balance.basis.transfer(state.point.state.x, wide.basis)
-    point = state.site.solve_near(wide, state.point.state.omega, x)
-    if not point.solution.converged:  # no solution is near: the operating point is searched from the start
-        point = state.site.solve(wide)
-    return _checked(replace(state, balance=wide, point=point))
-
-
-def _checked(state: OperatingState) -> OperatingState:
+def require_solved(state: OperatingState) -> OperatingState:
+    """A state with its solution; raises SolverFailure where it has none."""
     if not state.point.solution.converged:
         raise SolverFailure(str(state.point.solution.outcome))
     return state
@@ -186,3 +176,113 @@ def relative_change(value: float, refined: float) -> float:
     if refined == 0:
         return 0.0 if value == 0 else 1.0
     return abs(value - refined) / abs(refined)
+
+
+def place_of_peak() -> str:
+    """Name of the quantity that says where a peak is: samples of the contact law do not move it."""
+    return next(q.name for q in with_error(CycleQuantity) if q.error is ErrorKind.UNSAMPLED_CYCLE)
+
+
+def worn_values(worn: WornContact | None) -> Values | None:
+    """Values of a contact worn through; None where a quantity has none, as where no life has ended."""
+    values = {q.name: None if worn is None else q.value(worn) for q in of_wear_with_error(worn)}
+    complete = {name: value for name, value in values.items() if value is not None}
+    return complete if len(complete) == len(values) else None
+
+
+def values_through(worn: WornContact) -> Values:
+    """The same of a contact that is worn through. Raises SolverFailure where no life ends."""
+    values = None if worn.history.ended.failed else worn_values(worn)
+    if values is None:
+        raise SolverFailure(str(worn.history.end))
+    return values
+
+
+def values_before(worn: WornContact) -> Values:
+    """Values of a cycle before wear, as a wear run begins with it, along its motion in time where it does so."""
+    cycle = SolvedCycle.at_row(worn.history, 0, worn.basis, {})
+    values = {q.name: q.value(cycle) for q in with_error(CycleQuantity) if q.error is not ErrorKind.UNSAMPLED_CYCLE}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def worn_by(file: SceneFile, model: modelling.Model, start: OperatingState | None = None) -> WornContact:
+    """The contact of a scene worn as it says; start : state of its mesh before wear, None where it is searched."""
+    wear, interface = file.scene.wear, model.balance.model.interface
+    assert wear is not None
+    basis, place = model.balance.basis, None
+    if start is not None:
+        place = start.point.state.omega, start.balance.basis.transfer(start.point.state.x, basis)
+    return WornContact(
+        wear_run.worn_out(file, model, wear.lost_below, place), interface.area, interface.gap, interface.components,
+        HarmonicBasis(basis.harmonics, max(EVENT_SAMPLES, 2 * basis.harmonics[-1] + 1)), model.reduced.joints,
+        wear.lost_below or LIFE_SHARE, wear.lost_of == "any", wear.split, places=model.balance.places,
+        shares=tuple(duty.share for duty in wear.duties),
+    )  # fmt: skip
+
+
+def refine_harmonics(state: OperatingState, limits: RefinementLimits) -> tuple[OperatingState, Values]:
+    """Take in what the contact force of a state requires, as many harmonics as the limits allow.
+
+    Evaluated with many harmonics it has a part at those that the balance leaves out. Sent through the compliance at
+    these frequencies, it changes the response: one Newton step tells by how much. Those that matter are taken in and
+    the state is solved again, until what is left out changes no quantity by more than the least error that is stated.
+
+    Where they matter much another peak may be the highest: the response is scanned for it
+    Returns the state with them, and relative changes that the others would still make, by quantity
+    Raises  NoPeak; SolverFailure where there is no solution with the first of them"""
+    components, refined = state.balance.contact.stiffness.size, state
+    highest = int(min(limits.highest, max(5, 2 * limits.max_unknowns / components)))
+    rounds = 1 if isinstance(state.site, PeakOfCurve) else limits.harmonic_rounds
+    for repeat in range(rounds + 1):
+        estimate, remaining = _estimated(refined, highest)
+        required = estimate.required(limits.harmonic_share * limits.floor, highest)
+        if repeat == 0:
+            error = estimate.error
+        if repeat == rounds or max(remaining.values()) <= limits.floor or not required:
+            break
+        try:
+            refined = with_harmonics(refined, (*refined.balance.basis.harmonics, *required), highest)
+        except (Refusal, SolverFailure):
+            if refined is state:
+                raise
+            break
+    is_small = 4 * refined.balance.n_unknown <= limits.max_unknowns
+    if error > limits.searched and isinstance(state.site, AtPeak) and is_small:
+        with suppress(Refusal, SolverFailure):
+            higher = state.site.dominant_peak(refined.balance, refined.point).point
+            if higher is not None and higher.amplitude > refined.point.amplitude:
+                refined = replace(refined, point=higher)
+                _, remaining = _estimated(refined, highest)
+    return refined, remaining
+
+
+def with_harmonics(state: OperatingState, harmonics: tuple[int, ...], highest: int = 0) -> OperatingState:
+    """A state with other harmonics, followed from its own solution; highest : of the states to come.
+
+    Raises  NoPeak; SolverFailure without a solution"""
+    balance = _widened(state, max(highest, *harmonics)).with_harmonics(tuple(sorted(set(harmonics))))
+    x = state.balance.basis.transfer(state.point.state.x, balance.basis)
+    point = state.site.solve_near(balance, state.point.state.omega, x)
+    if not point.solution.converged:  # no solution is near: the operating point is searched from the start
+        point = state.site.solve(balance)
+    return require_solved(replace(state, balance=balance, point=point))
+
+
+def _widened(state: OperatingState, highest: int) -> HarmonicBalance:
+    """The balance of a state with all harmonics to half as many again as `highest`, and samples enough for them."""
+    basis = state.balance.basis
+    balance = state.balance.with_samples(max(basis.n_samples, 6 * highest), basis.transitions == "located")
+    return harmonic_choice.widened(balance, highest, harmonic_choice.ROUGH)
+
+
+def _estimated(state: OperatingState, highest: int) -> tuple[harmonic_choice.Estimate, Values]:
+    """What the harmonics left out would change, and that as relative changes of the quantities.
+
+    The step is one at a fixed frequency: that of a peak is taken to move by as much as the response changes"""
+    wide, point, values = _widened(state, highest), state.point.state, state.values
+    estimate = harmonic_choice.estimate(wide, state.balance.basis.harmonics, point.omega, point.x)
+    changed = values_of(wide, wide.evaluate(point.omega, estimate.x, jacobian=False))
+    remaining = {name: relative_change(value, changed[name]) for name, value in values.items()}
+    if not isinstance(state.site, AtFrequency):
+        remaining[place_of_peak()] = estimate.error
+    return estimate, remaining

@@ -1,25 +1,22 @@
 """The engine of refinement: a scene with a finer mesh, more modes, more harmonics, more samples or finer wear steps.
 
-Three views use it: the table of changes of a verdict, the rounds to a requested accuracy, and ladders of settings.
-"""
+Three views use it: the table of changes of a verdict, the rounds to a requested accuracy, and ladders of settings."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from tribodyn.geometry import parts
-from tribodyn.geometry.sources import cad
+from tribodyn.geometry.sources import cad, foreign_process
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.verdict import Refinement
 from tribodyn.workflows.scene.part_tables import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.structure_tables import BodyTable, DeckTable
-from tribodyn.workflows.scene.wear import Wear, WearStepLimit
+from tribodyn.workflows.scene.wear import WearStepLimit
 
 WEAR_FACTOR = 3.0  # finer wear steps of another round
 HALVED = 2.0  # ratio of element sizes where every element of an imported mesh is cut into eight
@@ -31,19 +28,14 @@ class NoMesh(Refusal):
     """A scene whose mesh cannot be refined."""
 
 
-class ImportedMesh(Refusal):
-    """A mesh that was imported, whose elements can only be cut."""
-
-
 def overrides_of(file: SceneFile, refinement: str, factor: float) -> tuple[str, ...]:
     """Overrides that refine a scene in one respect; none where it cannot be refined.
 
-    refinement : a Refinement; factor : on elements along every edge and on modes
-    """
+    refinement : a Refinement; factor : on elements along every edge and on modes"""
     top = max(file.scene.harmonics.kept, default=1)
     finer_wear = partial(wear, file, WEAR_FACTOR)  # its tolerance decides on the scatter of means in time too
     refinements: dict[str, Callable[[], SceneFile | None]] = {
-        Refinement.HARMONICS: lambda: harmonics(file, top + 2),
+        Refinement.HARMONICS: lambda: harmonics(file, range(top + 3)),
         Refinement.MESH: lambda: mesh(file, factor)[0],
         Refinement.MODES: lambda: modes(file, factor),
         Refinement.SAMPLES: lambda: file.changed(f"harmonics.samples={2 * file.scene.harmonics.samples}"),
@@ -63,16 +55,22 @@ def mesh(file: SceneFile, ratio: float) -> tuple[SceneFile, float]:
 
     Counts are whole numbers that the part accepts; the elements of an imported mesh are cut in halves.
 
-    Raises  NoMesh
-    """
-    tables = _meshed(file)
-    try:
-        rescaled = [_rescaled(key, table, file.folder, ratio) for key, table in tables.items()]
-    except ImportedMesh:
-        return file.changed(*(f"{key}.halved={table.halved + 1}" for key, table in tables.items())), HALVED
-    return file.changed(*(text for texts, _ in rescaled for text in texts)), 1 / float(
-        np.mean([size for _, size in rescaled])
-    )
+    Raises  NoMesh"""
+    scene = file.scene
+    if not isinstance(scene, MeshScene):
+        raise NoMesh("matrices come without a mesh")
+    tables: dict[str, Mesh] = {f"bodies.{name}": body for name, body in scene.bodies.items()}
+    tables |= {f"decks.{name}": deck for name, deck in scene.decks.items()}
+    if scene.geometry is not None:
+        tables = {"geometry": scene.geometry}
+    changes, sizes = list[str](), list[float]()
+    for key, table in tables.items():
+        rescaled = _rescaled(key, table, file.folder, ratio)
+        if rescaled is None:
+            return file.changed(*(f"{name}.halved={table.halved + 1}" for name, table in tables.items())), HALVED
+        changes += rescaled[0]
+        sizes.append(rescaled[1])
+    return file.changed(*changes), 1 / float(np.mean(sizes))
 
 
 def modes(file: SceneFile, factor: float) -> SceneFile | None:
@@ -85,11 +83,11 @@ def modes(file: SceneFile, factor: float) -> SceneFile | None:
     return file.changed(f"reduction.cutoff={factor * reduction.cutoff!r}")
 
 
-def harmonics(file: SceneFile, top: int) -> SceneFile:
-    """The scene with all harmonics up to one, and samples enough for them."""
-    first = 0 if 0 in file.scene.harmonics.kept or file.scene.harmonics.automatic else 1
-    samples = max(file.scene.harmonics.samples, 16 * top)
-    return file.changed(f"harmonics.kept={list(range(first, top + 1))}", f"harmonics.samples={samples}")
+def harmonics(file: SceneFile, numbers: Sequence[int]) -> SceneFile:
+    """The scene with harmonics, 0 among them where it keeps it, and samples enough for them."""
+    static = 0 in file.scene.harmonics.kept or file.scene.harmonics.automatic
+    samples = max(file.scene.harmonics.samples, 16 * max(numbers))
+    return file.changed(f"harmonics.kept={[h for h in numbers if h or static]}", f"harmonics.samples={samples}")
 
 
 def wear(file: SceneFile, factor: float) -> SceneFile:
@@ -97,45 +95,30 @@ def wear(file: SceneFile, factor: float) -> SceneFile:
     table = file.scene.wear
     if table is None:
         return file
-    finer = [_finer(table, key, factor) for key in table.accuracy_keys]
-    return file.changed(f"wear.max_steps={round(2 * factor * table.max_steps)}", *finer)
+    changes = [f"wear.max_steps={round(2 * factor * table.max_steps)}"]
+    for key in table.accuracy_keys:
+        value, unit = table.parameters.get(key, table.tolerance), ""
+        if key == "step":
+            step = table.step or WearStepLimit()
+            value, unit = (step.depth or 0.0, " m") if step.share is None else (step.share, "")
+        changes.append(f"wear.{key}={value / factor!r}{unit}")
+    return file.changed(*changes)
 
 
-def _finer(table: Wear, key: str, factor: float) -> str:
-    """Override that divides a key of the accuracy of wear steps by a factor."""
-    value, unit = table.parameters.get(key, table.tolerance), ""
-    if key == "step":
-        step = table.step or WearStepLimit()
-        value, unit = (step.depth or 0.0, " m") if step.share is None else (step.share, "")
-    return f"wear.{key}={value / factor!r}{unit}"
-
-
-def _meshed(file: SceneFile) -> dict[str, Mesh]:
-    """The tables of a scene that give a mesh, by their keys; raises NoMesh without one."""
-    scene = file.scene
-    if not isinstance(scene, MeshScene):
-        raise NoMesh("matrices come without a mesh")
-    if scene.geometry is not None:
-        return {"geometry": scene.geometry}
-    tables: dict[str, Mesh] = {f"bodies.{name}": body for name, body in scene.bodies.items()}
-    return tables | {f"decks.{name}": deck for name, deck in scene.decks.items()}
-
-
-def _rescaled(key: str, table: Mesh, folder: Path, ratio: float) -> tuple[list[str], float]:
+def _rescaled(key: str, table: Mesh, folder: Path, ratio: float) -> tuple[list[str], float] | None:
     """Overrides that give a body so many times its elements along every edge, and their mean size over its own.
 
-    Raises  ImportedMesh where there are none
-    """
+    None for a mesh without counts and sizes, as an imported one, whose elements can only be cut"""
     if not isinstance(table, DeckTable) and table.part_name is not None:
         part = parts.load(table.part_name)
         numbers = part.Parameters(**table.parameters)
         counts = parts.rescaled(part, numbers, ratio)
         if not counts:
-            raise ImportedMesh(f"the part of [{key}] lists no counts of elements in MESH")
+            return None
         size = float(np.mean([getattr(numbers, name) / count for name, count in counts.items()]))
         return [f"{key}.{name}={count}" for name, count in counts.items()], size
     if not isinstance(table, BodyTable) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
-        raise ImportedMesh(f"the mesh of [{key}] is imported")
-    edge = table.size or table.unit * cad.default_size(folder / str(table.mesh))
+        return None
+    edge = table.size or table.unit * foreign_process.call("cad", "default_size", folder / str(table.mesh))
     faces = ", ".join(f'"{name}" = {face / ratio:.6g}' for name, face in table.face_sizes.items())
     return [f"{key}.size={edge / ratio:.6g}", *([f"{key}.face_sizes={{{faces}}}"] if faces else [])], 1 / ratio

@@ -1,7 +1,5 @@
 """The formats that `tribodyn export` knows, by name; the reduced model for other solvers is written here."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -23,8 +21,7 @@ from tribodyn.workflows.run.progress import Progress
 def reduced_model(result: Result) -> ReducedModel:
     """The reduced model that a result was computed with, made again from its scene.
 
-    Raises  ValueError where its parts are not there any more
-    """
+    Raises  ValueError where its parts are not there any more"""
     from tribodyn.workflows.result.provenance import rebuilt
 
     return modelling.build(rebuilt(result), Progress(), result.harmonics).reduced
@@ -96,8 +93,7 @@ def write_abaqus(result: Result, folder: Path) -> list[Path]:
     """reduced_M.inp, reduced_K.inp, reduced_C.inp as *MATRIX INPUT reads them, and reduced.inp that assembles them.
 
     Coordinate i of the model is degree of freedom 1 of node i + 1; the lower triangle of a symmetric matrix is written.
-    Raises  ValueError for the complex matrices of a wheel
-    """
+    Raises  ValueError for the complex matrices of a wheel"""
     model, written, called = reduced_model(result), [], []
     matrices = _symmetric(arrays(model))
     if np.iscomplexobj(matrices["K"]):
@@ -143,8 +139,7 @@ FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
 def write(result: Result, names: Sequence[str], folder: Path, mesh_ending: str = ".xdmf") -> list[Path]:
     """Write a result in some formats, each into a folder of its name; returns the files to open.
 
-    Raises  ValueError: a format that is not known, or that cannot hold this result
-    """
+    Raises  ValueError: a format that is not known, or that cannot hold this result"""
     for name in names:
         if name not in FORMATS:
             raise Refusal(f"--to {name}: no such format; there are {', '.join(FORMATS)}")

@@ -1,7 +1,5 @@
 """Every curve of a result as a table of named columns, and as files: CSV, MATLAB, universal files (dataset 58)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from enum import IntEnum
 from pathlib import Path
@@ -10,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from tribodyn.extras import package
+from tribodyn.hbm.continuation.branch import Branch, unit_of
 from tribodyn.hbm.quantity import StatedQuantity
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.answers import histories_of
 from tribodyn.workflows.result.number_format import write_columns
-from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.result import Loops, Patch, Result
 
 Table = Mapping[str, np.ndarray]
 """column name -> (n,) values; the name ends with the unit, as in "frequency_Hz"."""
@@ -67,8 +67,7 @@ def write_uff(result: Result, folder: Path) -> list[Path]:
     Of a displacement a cos(hwt) + b sin(hwt) the complex value a - ib is written, with exp(+ihwt) understood. Where the
     scene is driven by one force in harmonic 1, harmonic 1 is a frequency response function, displacement over force.
     The format has abscissas in single precision.
-    Raises  ValueError where pyuff is missing
-    """
+    Raises  ValueError where pyuff is missing"""
     pyuff = package("pyuff")
     path = folder / "result.uff"
     path.unlink(missing_ok=True)
@@ -160,7 +159,7 @@ def tables(result: Result) -> dict[str, Table]:
     """The tables that a result has data for, by name; columns of a table have one length."""
     tables_by_name: dict[str, Table] = {}
     if result.response is not None:
-        tables_by_name["response"] = response(result)
+        tables_by_name["response"] = response(result, result.response)
     if result.references is not None:
         r = result.references
         tables_by_name["references"] = {"frequency_Hz": r.omega / (2 * np.pi), "free_m": r.free, "stuck_m": r.stuck}
@@ -173,8 +172,8 @@ def tables(result: Result) -> dict[str, Table]:
         }
     tables_by_name["pairs"] = pairs(result)
     if result.wear is not None and len(result.wear.cycles):
-        tables_by_name["wear"] = wear(result)
-        tables_by_name["wear_of_pairs"] = wear_of_pairs(result)
+        tables_by_name["wear"] = wear(result, result.wear)
+        tables_by_name["wear_of_pairs"] = wear_of_pairs(result.wear, result.patch)
     if result.worn is not None:
         count = result.worn.omega.shape[1]
         flat = {
@@ -185,21 +184,20 @@ def tables(result: Result) -> dict[str, Table]:
         is_solved = np.isfinite(flat["frequency_Hz"])
         tables_by_name["worn_responses"] = {name: column[is_solved] for name, column in flat.items()}
     if result.loops is not None:
-        tables_by_name["loops"] = loops(result)
+        tables_by_name["loops"] = loops(result.loops, result.patch)
     return tables_by_name
 
 
-def response(result: Result) -> Table:
+def response(result: Result, frf: Branch) -> Table:
     """The response curve point by point: amplitude and Fourier coefficients of every output."""
-    frf = result.response
-    assert frf is not None
     columns: dict[str, np.ndarray] = {"frequency_Hz": frf.frequency}
     if frf.parameter_name != "frequency":
         columns[frf.parameter_name.replace(" ", "_")] = frf.parameter
     for position, name in enumerate(frf.output_names):
-        columns[f"{name}_amplitude_m"] = frf.amplitude(name)
+        unit = unit_of(name) or "1"
+        columns[f"{name}_amplitude_{unit}"] = frf.amplitude(name)
         for k, term in enumerate(terms(result.harmonics)):
-            columns[f"{name}_{term}_m"] = frf.response[:, position, k]
+            columns[f"{name}_{term}_{unit}"] = frf.response[:, position, k]
     columns |= {"load_factor": frf.load_factor}
     if result.driving_force is not None:
         columns |= {"force_N": abs(result.driving_force) * frf.load_factor}
@@ -239,10 +237,8 @@ def pairs(result: Result) -> Table:
     return columns | {"area_m2": patch.area, "gap_m": patch.gap, "free_deflection_m": patch.free_deflection}
 
 
-def wear(result: Result) -> Table:
+def wear(result: Result, history: WearHistory) -> Table:
     """The wear history row by row, each row the state that a wear step starts from."""
-    history = result.wear
-    assert history is not None
     columns = {
         "row": np.arange(len(history.cycles)),
         "cycles": history.cycles,
@@ -256,14 +252,12 @@ def wear(result: Result) -> Table:
     names = [] if result.response is None else list(result.response.output_names)
     for position, name in enumerate(names[: history.response.shape[1]]):
         for k, term in enumerate(terms(result.harmonics)):
-            columns[f"{name}_{term}_m"] = history.response[:, position, k]
+            columns[f"{name}_{term}_{unit_of(name) or '1'}"] = history.response[:, position, k]
     return columns
 
 
-def wear_of_pairs(result: Result) -> Table:
+def wear_of_pairs(history: WearHistory, patch: Patch) -> Table:
     """The wear history pair by pair, one line for each row and pair."""
-    history, patch = result.wear, result.patch
-    assert history is not None
     n_row, n_pair = history.depth.shape
     return {
         "row": np.repeat(np.arange(n_row), n_pair),
@@ -278,10 +272,8 @@ def wear_of_pairs(result: Result) -> Table:
     }
 
 
-def loops(result: Result) -> Table:
+def loops(stored: Loops, patch: Patch) -> Table:
     """Hysteresis loops, one line for each kept state, pair, component and instant."""
-    stored, patch = result.loops, result.patch
-    assert stored is not None
     shape = stored.displacement.shape
     at, pair, component, sample = (index.ravel() for index in np.indices(shape))
     return {

@@ -14,6 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from tribodyn.extras import package
+from tribodyn.fem.stress import COMPONENTS
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.view import cycle, grid_of, polygons, swing
@@ -28,13 +29,14 @@ KIND = {"triquadratic_hexahedron": "hexahedron27", "quadratic_tetra": "tetra10"}
 WITH_FIELDS = (".xdmf", ".vtu", ".vtk", ".msh", ".exo", ".e", ".med")
 MESH_ONLY = (".bdf", ".nas", ".inp", ".unv", ".mesh", ".cgns")
 INSTANTS = 32  # of a period
+VOIGT = [COMPONENTS.index(name) for name in ("xx", "yy", "zz", "xy", "yz", "xz")]  # the order of VTK
+FULL = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # of components in that order, a tensor
 
 
 def write_mesh(result: Result, path: Path) -> list[Path]:
     """The part as worn in the last state that is shown, in the format that the ending of a file names.
 
-    Raises  ValueError where the result has no mesh or the format cannot hold it
-    """
+    Raises  ValueError where the result has no mesh or the format cannot hold it"""
     import meshio
 
     if result.part is None:
@@ -62,8 +64,7 @@ def _plain(values: np.ndarray) -> np.ndarray:
 def write_vtk(result: Result, folder: Path) -> list[Path]:
     """wear/ and cycle_N/ with their files, and one .pvd for each series; returns the .pvd files.
 
-    Raises  ValueError where the result has neither faces of its contact nor a mesh
-    """
+    Raises  ValueError where the result has neither faces of its contact nor a mesh"""
     if not len(result.patch.faces) and result.part is None:
         raise Refusal("vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it")
     written: list[Path] = []
@@ -130,8 +131,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
     row : of the wear history or the response, among `result.fields.row`; the last of them by default
     Point data: vibration (n_node, 3), displacement from the mean position at the largest swing; amplitude (n_node,),
     largest distance from there over the cycle [m]
-    Raises  ValueError where the result keeps no mesh or no field at the row
-    """
+    Raises  ValueError where the result keeps no mesh or no field at the row"""
     if result.part is None or result.fields is None:
         raise Refusal("the result keeps no fields on a mesh: its scene needs a part, [wear] and pictures.renders")
     rows = result.fields.row.tolist()
@@ -147,8 +147,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
 def patch_fields(result: Result, row: int | None = None) -> pv.PolyData:
     """The faces of the contact as `contact_surface` has them in point_data and cell_data, at a wear row, else the last.
 
-    Raises  ValueError where the result has no worn patch with faces
-    """
+    Raises  ValueError where the result has no worn patch with faces"""
     wear = result.wear
     if wear is None or not len(wear.cycles) or not len(result.patch.faces):
         raise Refusal("the result holds no worn patch with faces")
@@ -163,7 +162,9 @@ def part_grid(result: Result, state: ContactState) -> Any:
 
     Point data: worn_off (n_node, 3) [m]; depth_on_this_face [m]; face, of the contact, 1, 2 or 0; Fourier coefficients
     displacement_a0, ... (n_node, 3) where the state keeps them [m]
-    """
+    With stress [Pa]: tensors (n_node, 6) of xx, yy, zz, xy, yz, xz, as ParaView has them: stress_mean over the cycle,
+    stress_at_largest at the instant of largest_von_mises, and of that principal_stress (n_node, 3) from the largest
+    and hydrostatic_pressure, minus a third of their sum; utilisation, nan where the strength is not known"""
     part = result.part
     assert part is not None
     meetings = meetings_of(result)
@@ -182,6 +183,15 @@ def part_grid(result: Result, state: ContactState) -> Any:
         for k, order in enumerate(basis.order):
             letter = "b" if k and basis.order[k - 1] == order else "a"
             grid.point_data[f"displacement_{letter}{order}"] = terms[..., k]
+    stress = None if result.stress_field is None else result.stress_field.of(state.number)
+    if stress is not None:
+        mean, largest = np.moveaxis(stress.tensor[..., VOIGT], 1, 0)
+        principal = np.linalg.eigvalsh(largest[:, FULL])[:, ::-1]
+        grid.point_data["stress_mean"], grid.point_data["stress_at_largest"] = mean, largest
+        grid.point_data["principal_stress"] = principal
+        grid.point_data["hydrostatic_pressure"] = -principal.mean(axis=1)
+        grid.point_data["largest_von_mises"] = stress.largest
+        grid.point_data["fatigue_utilisation"] = stress.utilisation
     grid.field_data["frequency_Hz"] = [state.omega / (2 * np.pi)]
     grid.field_data["cycles"] = [state.cycles]
     return grid
@@ -191,8 +201,7 @@ def contact_surface(result: Result, state: ContactState) -> Any:
     """Body 1's face of the contact as a pyvista surface: fields at its pairs and their means on its faces.
 
     depth, gap with it [m]; area [m2]; pressure [Pa], mean over the cycle; energy_per_cycle [J]; normal; status, bits of
-    hbm.contact.contact_law (1 sticks, 2 slips, 4 separates)
-    """
+    hbm.contact.contact_law (1 sticks, 2 slips, 4 separates)"""
     pv = package("pyvista")
 
     patch = result.patch

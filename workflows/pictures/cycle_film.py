@@ -1,7 +1,5 @@
 """Film of a part and its contact over one cycle."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib as mpl
@@ -30,8 +28,7 @@ class CycleFilm:
     row : of the wear history, or point of the response; that whose contact works most where None
     count : of images, evenly over the period
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
-    Raises  Refusal where nothing is kept of the cycle
-    """
+    Raises  Refusal where nothing is kept of the cycle"""
 
     def __init__(
         self, result: Result, row: int | None, count: int, deformation: float | None = None, wear: float | None = None

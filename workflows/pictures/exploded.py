@@ -1,7 +1,5 @@
 """Bodies drawn apart, each moved off the one it touches along the normal of their faces: the exploded view."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,8 +25,7 @@ class Explosion:
     one_way : of the area of touching faces; a smaller sum of their normals is a bore, which has no direction
     touch : of the size of the smaller body; faces nearer than this touch
     flat : width over height from which on two views stand one above the other
-    rise : slope that the bodies are looked at with, from above and from below
-    """
+    rise : slope that the bodies are looked at with, from above and from below"""
 
     gap: float = 0.8
     one_way: float = 0.3

@@ -1,7 +1,5 @@
 """What all figures share: axes in the common style, headings with the scene's name, units that read well, files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +14,7 @@ from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from tribodyn.hbm.contact.contact_law import SEPARATES
+from tribodyn.output_file import replacing
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures.theme import FORMATS, LAYOUT, RED, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
@@ -73,9 +72,15 @@ def save(figure: Figure, stem: Path, formats: Sequence[str] = ("png",), dpi: int
             if name not in FORMATS:
                 raise Refusal(f'no picture format "{name}": take one of {", ".join(FORMATS)}')
             path = stem.with_name(f"{stem.name}.{name}")
-            figure.savefig(path, dpi=dpi or LAYOUT.dpi)
-            written.append(path)
+            written.append(write_figure(figure, path, dpi=dpi or LAYOUT.dpi))
     return written
+
+
+def write_figure(figure: Figure, path: Path, **options: Any) -> Path:
+    """Write a figure as a whole or not at all; its path."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=path.suffix.removeprefix("."), **options)
+    return path
 
 
 def length_unit(largest: float) -> tuple[str, float]:

@@ -1,10 +1,7 @@
 """Films of a result: its contact over wear, and its part and contact over one cycle of a state.
 
 Camera, factors of exaggeration and colour scales are the same in all images of a film. MP4 is written by the encoder
-that comes with imageio-ffmpeg, GIF by Pillow.
-"""
-
-from __future__ import annotations
+that comes with imageio-ffmpeg, GIF by Pillow."""
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
@@ -58,8 +55,7 @@ def film(
     row : of the wear history, or point of the response, whose cycle is shown; that whose contact works most by default
     dpi : dots per inch; a film is 12.8 by 7.2 inches
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
-    Raises  Refusal: the result has nothing of the kind to show; RenderingUnavailable
-    """
+    Raises  Refusal: the result has nothing of the kind to show; RenderingUnavailable"""
     if images < 2:
         raise Refusal(f"a film of {images} images: ask for 2 at least")
     if not 20 <= dpi <= 400:
@@ -90,8 +86,7 @@ def encode(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str]) -> 
     """Write a film in some formats, each image drawn once.
 
     images : (height, width, 3), 8 bits a colour, all of one size
-    Returns the paths. Raises Refusal: a format that is not known, or no encoder for MP4
-    """
+    Returns the paths. Raises Refusal: a format that is not known, or no encoder for MP4"""
     for name in formats:
         if name not in FORMATS:
             raise Refusal(f'no film format "{name}": take {" or ".join(FORMATS)}')

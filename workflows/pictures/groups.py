@@ -1,7 +1,5 @@
 """The bodies of a file or scene with their groups in colour, and a scene before it is run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Loops of pairs: force over displacement in the kept states."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,8 +18,7 @@ def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
     """Loops in chosen states (columns) of some pairs (rows), those with the largest loops by default.
 
     Of a contact without friction normal force over approach.
-    Raises  Refusal where no loops are kept, or for a pair that there is not
-    """
+    Raises  Refusal where no loops are kept, or for a pair that there is not"""
     loops, patch = result.loops, result.patch
     if loops is None:
         raise Refusal("the result holds no hysteresis loops: its scene needs a contact and pictures.plots = true")
@@ -69,8 +66,7 @@ def has_friction(result: Result) -> bool:
 def loop_size(result: Result) -> np.ndarray:
     """Size of the loops of every state, pair and component (n_field, n_pair, n_component).
 
-    The work of the loop [J] where there is friction, 0 of its normal component; else the swing of the force [N]
-    """
+    The work of the loop [J] where there is friction, 0 of its normal component; else the swing of the force [N]"""
     loops, patch = present(result.loops), result.patch
     if not has_friction(result):
         return np.asarray(np.ptp(loops.force, axis=-1))

@@ -1,7 +1,5 @@
 """Maps of contact patches in their own plane: depth, status and pressure; slide, gap and friction work of a cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,8 +37,7 @@ def patch_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -
     """Depth, status over the cycle and mean pressure, one column for each state, each map with its own scale.
 
     rows : of the wear history, or points of a response that does not wear; those of the result by default
-    Raises  Refusal where the patch has no faces
-    """
+    Raises  Refusal where the patch has no faces"""
     patch = _with_faces(result)
     states = shown_states(result) if rows is None else [state_of(result, int(row)) for row in rows]
     fields: list[Row] = []
@@ -61,8 +58,7 @@ def patch_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -
 def status_maps(result: Result, count: int = 8) -> Figure:
     """Status over the cycle at up to `count` wear steps, evenly chosen among the rows that curves show.
 
-    Raises  Refusal where nothing was worn or the patch has no faces
-    """
+    Raises  Refusal where nothing was worn or the patch has no faces"""
     patch, wear = _with_faces(result), result.wear
     if wear is None or not result.wear_steps:
         raise Refusal("the result holds no worn patch with faces to draw a map on")
@@ -86,8 +82,7 @@ def status_maps(result: Result, count: int = 8) -> Figure:
 def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -> Figure:
     """What the pairs of a worn contact do in a cycle at wear rows, the first, a middle and the last by default.
 
-    Raises  Refusal where nothing was worn or the patch has no faces
-    """
+    Raises  Refusal where nothing was worn or the patch has no faces"""
     patch, wear = _with_faces(result), result.wear
     if wear is None or not result.wear_steps:
         raise Refusal("the result holds no worn patch with faces to draw a map on")
@@ -106,8 +101,7 @@ def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) 
 def backbone_maps(balance: HarmonicBalance, mode: Backbone, scene: str = "", columns: int = 4) -> Figure | None:
     """The same at some converged points of a backbone, evenly spaced in the logarithm of the amplitude.
 
-    Returns None where the contact is no face or has no friction; scene : its name, for the title
-    """
+    Returns None where the contact is no face or has no friction; scene : its name, for the title"""
     i = balance.model.interface
     good = np.flatnonzero(mode.converged)
     if not len(i.faces) or not {"t1", "t2"} & set(i.components) or not len(good):
@@ -138,8 +132,7 @@ def slide_and_gap(
     """What the pairs do in a cycle x (n_pair, n_component, n_coeff) [m], gap (n_pair,) [m].
 
     Returns the largest distance from the mean place along the face (n_pair,) [m], and the largest gap (n_pair,) [m],
-    negative where the faces stay in touch, -inf where the contact has no normal component
-    """
+    negative where the faces stay in touch, -inf where the contact has no normal component"""
     motion = basis.to_time(x)
     tangential = [c for c, name in enumerate(components) if name != "n"]
     slide = motion[:, tangential] - x[:, tangential, :1] * basis.has_static

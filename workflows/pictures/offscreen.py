@@ -1,7 +1,5 @@
 """Whether this machine can draw without a screen, tried once before pyvista is used."""
 
-from __future__ import annotations
-
 import faulthandler
 import os
 import subprocess
@@ -26,8 +24,7 @@ def check() -> None:
 
     On Linux that process is a child which need not load pyvista again; this one draws with it next, anyway.
 
-    Raises  RenderingUnavailable, also where pyvista is not installed
-    """
+    Raises  RenderingUnavailable, also where pyvista is not installed"""
     try:
         package("pyvista")
     except Refusal as missing:
@@ -56,8 +53,7 @@ def _works(probe: str) -> bool:
 def _works_in_child(probe: str, patience: float = 30.0) -> bool:
     """Whether it ends well in a child within so many seconds.
 
-    That can fail for another reason too: this process has drawn before, or may have no children.
-    """
+    That can fail for another reason too: this process has drawn before, or may have no children."""
     child = get_context("fork").Process(target=_run_in_silence, args=(probe,), daemon=True)
     try:
         child.start()

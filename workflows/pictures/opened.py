@@ -1,7 +1,6 @@
 """A contact opened like a book: both faces side by side, seen from where they met, in the axes t1, t2, n of the patch.
 
-Body 1 is not moved; body 2, or the ground where that is not meshed, is turned by half a turn about an edge.
-"""
+Body 1 is not moved; body 2, or the ground where that is not meshed, is turned by half a turn about an edge."""
 
 from __future__ import annotations
 
@@ -30,8 +29,7 @@ class OpenedContact:
     contact : with its pairs and faces; part : of the result; split : share of the depth on body 1
     flat : (n_pair, 2) along t1, t2 [m]; size : of the patch [m]
     fold_axis : which of t1, t2 the book opens along, hinge : the place of its hinge there [m]
-    bounds : lowest and highest t1, t2 of what is shown [m]
-    """
+    bounds : lowest and highest t1, t2 of what is shown [m]"""
 
     contact: Meeting
     part: PartMesh | None

@@ -1,7 +1,5 @@
 """Curves of a result, drawn with matplotlib: each function draws one figure, `draw` writes all that can be drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -28,11 +26,16 @@ def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
     candidates: list[tuple[str, Callable[[Result], Figure], bool]] = [
         ("frf", response, result.response is not None or result.wear is not None),
         ("control", controlled, result.response is not None and result.response.controlled),
-        ("outputs", output_amplitudes, result.response is not None and len(result.response.output_names) > 1),
+        ("outputs", output_amplitudes, result.response is not None and len(result.response.displacements) > 1),
         *((name, draw, worn) for name, draw in COURSES.items()),
         ("hysteresis", hysteresis, result.loops is not None and has_friction(result)),
         ("normal", hysteresis, result.loops is not None and not has_friction(result)),
         ("patch", maps.patch_maps, mapped),
         ("status_maps", maps.status_maps, mapped and worn),
     ]
-    return {name: function for name, function, possible in candidates if possible}
+    drawn = {name: function for name, function, possible in candidates if possible}
+    if result.stress_field is not None:
+        from tribodyn.workflows.pictures import fatigue_pictures  # only results that hold stress need it
+
+        drawn |= fatigue_pictures.figures(result)
+    return drawn

@@ -1,7 +1,5 @@
 """Pictures of the part in three dimensions: vibrating in its states, and its worn contact opened."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -41,8 +39,7 @@ def draw(
     """Write every picture that the result has data for; returns their paths.
 
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
-    Raises  RenderingUnavailable
-    """
+    Raises  RenderingUnavailable"""
     pictures = figures(result, deformation, wear)
     if pictures:
         offscreen.check()
@@ -58,6 +55,10 @@ def figures(
     pictures: dict[str, Callable[[], Figure]] = {}
     if result.part is not None and result.fields is not None:
         pictures["part"] = partial(part_picture, result, deformation, wear)
+    if result.part is not None and result.fields is not None and result.stress_field is not None:
+        from tribodyn.workflows.pictures import stress_pictures  # only results that hold stress need it
+
+        pictures["stress"] = lambda: stress_pictures.stress_picture(MovingPart(result, deformation, wear))
     for contact in book.contacts(result):
         name = f"contact_{contact.name}" if contact.name else "contact"
         pictures[name] = partial(contact_picture, result, contact, wear)
@@ -153,8 +154,7 @@ def _painted(
 class MovingPart:
     """The worn part of a result in motion, and one camera for all its states.
 
-    deformation, wear : factors of displacement and depth, by size where None
-    """
+    deformation, wear : factors of displacement and depth, by size where None"""
 
     def __init__(self, result: Result, deformation: float | None = None, wear: float | None = None):
         part, patch, self.fields = present(result.part), result.patch, present(result.fields)
@@ -179,8 +179,7 @@ class MovingPart:
     def marked(self, image: np.ndarray, points: np.ndarray) -> np.ndarray:
         """An image of this camera with the outline of the contact, hidden or not, ringed where it is small.
 
-        points : (n_node, 3) as drawn
-        """
+        points : (n_node, 3) as drawn"""
         size = image.shape[1], image.shape[0]
         corner = self.patch.faces
         if not len(corner):
@@ -222,10 +221,12 @@ class MovingPart:
             self.part.points + static + motion + self.wear * worn_off(self.meetings, state.depth, len(static))
         )
 
-    def view(self, points: np.ndarray, values: np.ndarray, limits: tuple[float, float]) -> View:
+    def view(
+        self, points: np.ndarray, values: np.ndarray, limits: tuple[float, float], colors: str = MOTION_MAP
+    ) -> View:
         """The part with its nodes at points (n_node, 3), coloured by values of the nodes."""
         grid = drawing.grid_of(self.part, points)
         grid.point_data["shown"] = values
         body = drawing.surface(grid, LAYOUT.smooth)
-        layers = [Layer(body, values=np.asarray(body.point_data["shown"]), map=MOTION_MAP, limits=limits)]
+        layers = [Layer(body, values=np.asarray(body.point_data["shown"]), map=colors, limits=limits)]
         return View(layers, [self.outline])

@@ -1,9 +1,6 @@
 """Pictures of a wheel, drawn off-screen with pyvista: all blades, each with its phase, or its own motion if mistuned.
 
-A wave repeats every blade one phase later, in its own turned frame: what one blade does, the others do.
-"""
-
-from __future__ import annotations
+A wave repeats every blade one phase later, in its own turned frame: what one blade does, the others do."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -30,8 +27,7 @@ from tribodyn.workflows.result.result import PartMesh, Result
 class BladeSurface:
     """All blades of a wheel as one surface, seen nearly along its axis.
 
-    nodes : (n_point,) of the part on its surface; size : largest distance of the part from the axis [m]
-    """
+    nodes : (n_point,) of the part on its surface; size : largest distance of the part from the axis [m]"""
 
     def __init__(self, wheel: Around, part: PartMesh):
         shell = drawing.surface(drawing.grid_of(part))
@@ -83,8 +79,7 @@ def _bar(figure: Figure, axes: Any, largest: float) -> None:
 def instants(wheel: Around, harmonics: tuple[int, ...], displacement: np.ndarray) -> Iterator[np.ndarray]:
     """Vibration (n_node, 3) [m] of every blade in its own frame, at the instant when blade 0 begins its period.
 
-    displacement : (n_node, 3, n_coeff) of blade 0 [m]
-    """
+    displacement : (n_node, 3, n_coeff) of blade 0 [m]"""
     basis = HarmonicBasis(harmonics, 2 * harmonics[-1] + 1)
     functions = basis.functions(np.zeros(1))[0] * (basis.order > 0)
     for n in range(wheel.sectors):
@@ -109,8 +104,7 @@ class MistunedWheelFilm:
     """A film over one cycle: a column for each state, the wheel above, amplitude and wear of every blade below.
 
     count : instants, evenly over the period, the first one that of the largest swing
-    Colours and factor of exaggeration are the same in all. Raises  RenderingUnavailable
-    """
+    Colours and factor of exaggeration are the same in all. Raises  RenderingUnavailable"""
 
     name = "mistuned_wheel"
 

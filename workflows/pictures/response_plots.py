@@ -1,7 +1,5 @@
 """Frequency responses of a result: unworn, worn, under control, of every output."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib as mpl
@@ -122,7 +120,7 @@ def output_amplitudes(result: Result) -> Figure:
     frf = present(result.response)
     good = frf.converged
     with axes_of() as (figure, axes):
-        heights = {name: np.where(good, frf.amplitude(name), np.nan) for name in frf.output_names}
+        heights = {name: np.where(good, frf.amplitude(name), np.nan) for name in frf.displacements}
         unit, scale = length_unit(float(np.nanmax(list(heights.values()))))
         for name, color, style in zip(heights, CYCLE * 3, ["-"] * 6 + ["--"] * 6 + [":"] * 6, strict=False):
             axes.plot(frf.frequency, scale * heights[name], style, color=color, label=name.replace("_", " "))

@@ -1,10 +1,7 @@
 """Single views of surfaces, drawn off-screen with pyvista and returned as images, and their axes drawn by matplotlib.
 
 A coloured surface is drawn without shading, so that its colours are those of its scale; edges show its shape. The axes
-of a view stand in a corner of the image that is empty. pyvista is imported by the functions here.
-"""
-
-from __future__ import annotations
+of a view stand in a corner of the image that is empty. pyvista is imported by the functions here."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -23,8 +20,7 @@ OF_AXES = (RED, GREEN, BLUE)
 class Layer:
     """A surface of a view: in one colour and shaded, or coloured by values (n_point,) and unshaded.
 
-    edges : whether its sharp edges are drawn; flat : unshaded though in one colour
-    """
+    edges : whether its sharp edges are drawn; flat : unshaded though in one colour"""
 
     mesh: Any
     color: str = BODY
@@ -39,8 +35,7 @@ class Layer:
 class Camera:
     """Parallel view of what lies within reach of a point.
 
-    centre : (3,) [m]; towards : (3,) from there to the camera; up : (3,); reach : half the height of the view [m]
-    """
+    centre : (3,) [m]; towards : (3,) from there to the camera; up : (3,); reach : half the height of the view [m]"""
 
     centre: np.ndarray
     towards: np.ndarray
@@ -129,8 +124,7 @@ def place(camera: Camera, point: np.ndarray, size: tuple[int, int]) -> tuple[flo
 def with_room(images: Sequence[np.ndarray]) -> tuple[list[np.ndarray], tuple[float, float]]:
     """Images of one size with an empty corner for the axes, a strip added below where they have none.
 
-    Returns the images and the middle of the corner's box [pixels]
-    """
+    Returns the images and the middle of the corner's box [pixels]"""
     box = room(images[0])
     ink = np.any([image.min(axis=2) < 250 for image in images], axis=0)
     height, width = ink.shape
@@ -157,8 +151,7 @@ def show(axes: Any, image: np.ndarray, camera: Camera, names: Sequence[str], cor
 def draw_axes(axes: Any, camera: Camera, names: Sequence[str], middle: tuple[float, float], box: float) -> None:
     """Draw the axes of a view on its image; one that is seen from its end is a dot.
 
-    names : of the three axes; middle, box : where they stand, and how much room they have [pixels]
-    """
+    names : of the three axes; middle, box : where they stand, and how much room they have [pixels]"""
     right, towards = np.cross(camera.up, camera.towards), np.asarray(camera.towards)
     projected = np.column_stack([right, -np.asarray(camera.up)])  # pixels count downwards
     length = np.linalg.norm(projected, axis=1)[:, None]

@@ -1,10 +1,7 @@
 """Colours, fonts and sizes that all pictures share: change them here.
 
 Line and status colours are those of Okabe and Ito (2008),
-maps are viridis and cividis: readable with any colour vision.
-"""
-
-from __future__ import annotations
+maps are viridis and cividis: readable with any colour vision."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -48,8 +45,7 @@ class Layout:
     ringed : of the width of a view, below which a contact is ringed
     smooth : subdivisions of the faces of curved elements
     lift : of the size of a contact, by which colours lie above it
-    sunk : of the thinnest body, by which bodies that slide are drawn into each other at most
-    """
+    sunk : of the thinnest body, by which bodies that slide are drawn into each other at most"""
 
     dpi: int = 200
     font: float = 10.0

@@ -1,9 +1,6 @@
 """What the pictures in three dimensions share: motion over a cycle, factors of exaggeration, surfaces.
 
-pyvista is imported by the functions here and nowhere else.
-"""
-
-from __future__ import annotations
+pyvista is imported by the functions here and nowhere else."""
 
 from typing import Any
 
@@ -24,8 +21,7 @@ def swing(displacement: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
     """Vibration at the instant when the part is farthest from its mean position.
 
     displacement : (n_node, 3, n_coeff) on these harmonics [m]
-    Returns (n_node, 3) [m]
-    """
+    Returns (n_node, 3) [m]"""
     dynamic = cycle(displacement, harmonics)
     farthest = int(np.argmax(np.sum(dynamic**2, axis=(0, 1))))
     return np.asarray(dynamic[..., farthest])
@@ -47,8 +43,7 @@ def rest_scale(static: np.ndarray, points: np.ndarray, body: np.ndarray) -> floa
     """Factor that draws displacements at rest (n_state, n_node, 3), by which bodies hardly enter each other.
 
     Bodies (n_node,) that slide along each other at points (n_node, 3), as a bolt through its nut, do so by no more than
-    a share of the thinnest
-    """
+    a share of the thinnest"""
     scale, each = deformation_scale(static, float(np.ptp(points, axis=0).max())), range(int(body.max()) + 1)
     means = np.stack([static[:, body == b].mean(axis=1) for b in each])
     spread = float(np.linalg.norm(means[:, None] - means[None], axis=-1).max())

@@ -1,7 +1,5 @@
 """Film of a contact over its wear."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib as mpl
@@ -36,8 +34,7 @@ class WearFilm:
 
     images : wear states at the most, evenly chosen among the rows that curves show
     wear : factor by which the depth is exaggerated, chosen by size where None
-    Raises  Refusal where the result has no worn contact with faces
-    """
+    Raises  Refusal where the result has no worn contact with faces"""
 
     def __init__(self, result: Result, images: int, wear: float | None = None):
         patch, history = result.patch, result.wear

@@ -1,7 +1,5 @@
 """Wear of a result against its cycles: depth, peak, preload, energy, status."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -29,8 +27,7 @@ from tribodyn.workflows.result.result import Result
 def wear(result: Result, quantity: str = "depth") -> Figure:
     """Course of the wear against cycles: depth, peak, preload, energy or status, or the cycles_per_step.
 
-    Raises  Refusal where nothing was worn, or for another word
-    """
+    Raises  Refusal where nothing was worn, or for another word"""
     if not result.wear_steps:
         raise Refusal("the result holds no wear steps: its scene needs [wear] with max_steps above 0")
     if quantity not in COURSES:
@@ -107,8 +104,7 @@ def depth_against_cycles(result: Result) -> Figure:
 def worn_area(depth: np.ndarray, area: np.ndarray) -> np.ndarray:
     """(n_row,) area of the pairs that have worn a thousandth of the depth that is largest in the end [m2].
 
-    depth : (n_row, n_pair) [m]; area : (n_pair,) [m2]
-    """
+    depth : (n_row, n_pair) [m]; area : (n_pair,) [m2]"""
     return (depth > 1e-3 * depth[-1].max()) @ area
 
 

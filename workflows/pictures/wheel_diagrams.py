@@ -3,10 +3,7 @@
 The SAFE diagram (Singh, Vargo, Schiffer and Dello, Texas A&M Turbomachinery Symposium, 1988) shows whether an engine
 order meets a mode in frequency and in shape: a wave of engine order k excites the nodal diameter |k - N round(k/N)| of
 N sectors alone. An excitation that stands in space runs against the rotation, and so does what it excites up to N/2
-diameters; seen through the sectors, orders from N/2 to N run with it. Coriolis forces part the two.
-"""
-
-from __future__ import annotations
+diameters; seen through the sectors, orders from N/2 to N run with it. Coriolis forces part the two."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -36,8 +33,7 @@ AGAINST = ", against"  # of a state: waves against the rotation, where they are 
 class Crossing:
     """An engine order that excites a mode in the range of speeds.
 
-    speed : at which it does so [Hz]; frequency : of the mode [Hz]
-    """
+    speed : at which it does so [Hz]; frequency : of the mode [Hz]"""
 
     engine_order: int
     diameter: int
@@ -64,8 +60,7 @@ def crossings(
 
     frequency : (n_diameter, family) of the nodal diameters from 0 on [Hz], taken as the same at all speeds of the range
     slow, fast : ends of the range [Hz], slow above 0; highest : engine order, None for any
-    against : the same for waves against the rotation, where they differ
-    """
+    against : the same for waves against the rotation, where they differ"""
     matches: list[Crossing] = []
     if np.isnan(frequency).all():
         return matches
@@ -126,8 +121,7 @@ def campbell(
     speeds : (n_speed,) [Hz]; found : "free" and "stuck" (n_speed, n_order, family) [Hz], as studies.wheel.campbell, and
         "stuck, against" of the waves that run the other way, where these differ
     critical : engine order -> speeds [Hz] at which it meets its stuck frequencies
-    scene : its name, for the title
-    """
+    scene : its name, for the title"""
     with axes_of(7.2, 4.8) as (figure, axes):
         rpm = 60 * speeds
         free = frequencies["free"][:, 0]
@@ -166,8 +160,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
     """SAFE diagram: modes over nodal diameters, and what the engine orders reach in a range of speeds.
 
     slow, fast : ends of the range of speeds [Hz]; modes that an engine order meets there are ringed
-    scene : its name, for the title
-    """
+    scene : its name, for the title"""
     if not 0 < slow < fast:
         raise Refusal(f"a SAFE diagram from {slow:g} to {fast:g} Hz: give two speeds above 0, the lower one first")
     max_diameter = max(len(values) for values in families.values()) - 1

@@ -1,7 +1,5 @@
 """What the scripts of a page draw, as plain data: curves as plotly figures, the worn part as surfaces to turn."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -76,7 +74,7 @@ def _response(results: Sequence[tuple[str, Result]]) -> Chart:
                 data.append(_line(f"{name}: {label}", hertz, 1e3 * height, line=style, **options))
         if frf is not None:
             good = frf.converged
-            for k, output in enumerate(frf.output_names):
+            for k, output in enumerate(frf.displacements):
                 height = np.where(good, 1e3 * frf.amplitude(output), np.nan)
                 options = {"line": {"color": color}} if k == 0 else {"visible": "legendonly"}
                 data.append(_line(f"{name}: {output}", frf.frequency, height, **options))
@@ -135,8 +133,7 @@ def solid(result: Result) -> dict[str, Any] | None:
 
     body : x, y, z, i, j, k of the surface of the mesh, and how far each vertex moves when the bodies are drawn apart
     sides : for each face of each contact its pairs, i, j, k over these, and how far it moves with its body
-    states : label, for each state moved vertices of the body, positions of the sides, and fields of the pairs
-    """
+    states : label, for each state moved vertices of the body, positions of the sides, and fields of the pairs"""
     patch, part = result.patch, result.part
     if not len(patch.faces):
         return None

@@ -1,13 +1,11 @@
 """The page of one or several results: one HTML file with everything in it, that opens from disk without a network."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import io
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -18,17 +16,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.extras import package
+from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
 from tribodyn.version import __version__
 from tribodyn.workflows.pictures import offscreen, plots, render
 from tribodyn.workflows.pictures.theme import STYLE
 from tribodyn.workflows.report import text
 from tribodyn.workflows.report.charts import charts, solid
+from tribodyn.workflows.result import store
 from tribodyn.workflows.result.answers import answers_of
 from tribodyn.workflows.result.result import Result
 
 HEADING = "part"  # the picture that heads the page
-DPI = 110  # of the figures on the page
 LARGEST = 15e6  # bytes of a page
 FOLDER = Path(__file__).parent
 
@@ -36,8 +35,7 @@ FOLDER = Path(__file__).parent
 def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
     """The HTML of results: name, result and its file, None where it has none.
 
-    Raises  ValueError where plotly is missing
-    """
+    Raises  ValueError where plotly is missing"""
     named = [(name, result) for name, result, _ in results]
     data: dict[str, Any] = {"charts": charts(named), "solids": [solid(result) for _, result in named]}
     title = ", ".join(name for name, _ in named)
@@ -89,8 +87,7 @@ def write(results: Sequence[tuple[str, Result, Path | None]], path: Path) -> Pat
     size = len(html.encode())
     if size > LARGEST:
         raise Refusal(f"the report would have {size / 1e6:.0f} MB: report fewer results at once")
-    path.write_text(html, encoding="utf-8")
-    return path
+    return write_text(path, html)
 
 
 def _chart_holder(title: str) -> str:
@@ -235,7 +232,7 @@ def _figures(result: Result) -> str:
     return '<div class="grid">' + "".join(elements) + "</div>"
 
 
-def embedded(name: str, make: Callable[[], Figure], dpi: int = DPI) -> str:
+def embedded(name: str, make: Callable[[], Figure], dpi: int = 110) -> str:
     """A figure as an element of a page."""
     with mpl.rc_context(STYLE):
         buffer = io.BytesIO()
@@ -266,13 +263,6 @@ def _viewer(number: int) -> str:
     )
 
 
-def _files(provenance: Mapping[str, str]) -> list[Path]:
-    """The files beside a scene that its text or its changes name, as far as they still are there."""
-    folder = Path(provenance.get("folder", "."))
-    named = re.findall(r'"([^"\n]+)"', f"{provenance['scene_text']}\n{provenance.get('overrides', '')}")
-    return [folder / name for name in sorted(set(named)) if "." in name and (folder / name).is_file()]
-
-
 def _provenance(result: Result, path: Path | None) -> str:
     record = result.provenance
     changes = "".join(f" --set {json.dumps(text)}" for text in record.get("overrides", "").split("\n") if text)
@@ -280,7 +270,7 @@ def _provenance(result: Result, path: Path | None) -> str:
     rows.append(("SHA-256 of the scene", hashlib.sha256(record["scene_text"].encode()).hexdigest()))
     if path is not None:
         rows.append((f"SHA-256 of {path.name}", hashlib.sha256(path.read_bytes()).hexdigest()))
-    rows += [(f"SHA-256 of {file.name}", hashlib.sha256(file.read_bytes()).hexdigest()) for file in _files(record)]
+    rows += [(f"SHA-256 of {name} begins with", digest) for name, digest in store.file_digests(result).items()]
     rows += [
         (key, record[key]) for key in ("versions", "python", "platform", "seed", "threads", "started") if key in record
     ]

@@ -1,11 +1,11 @@
 """A result in words: the summary that heads `run`, `show` and the report, and every number of it below."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from tribodyn.fem.singularities import KINDS
 from tribodyn.hbm.quantity import CurveQuantity, StatedQuantity, WearQuantity, quantity_named
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.answers import FIRST, LAST, PEAK, STABLE, Answer, answers_of, cycles_of, wears_at_peak
 from tribodyn.workflows.result.model_facts import Stage
 from tribodyn.workflows.result.number_format import UNKNOWN, digits, measured, rounded
@@ -32,7 +32,8 @@ def brief(result: Result) -> list[str]:
     lines = [f"{result.provenance['scene_name']}: {state}, {result.facts.seconds:.0f} s"]
     for name, group in groups.items():
         lines += [f"{name if at == 0 else '':9} {line}".rstrip() for at, line in enumerate(group)]
-    return lines + [f"warning   {warning}" for warning in warnings(result)]
+    lines += [f"warning   {warning}" for warning in warnings(result)]
+    return lines + [f"note      {note}" for note in result.facts.notes]
 
 
 def _model_lines(result: Result) -> list[str]:
@@ -84,6 +85,7 @@ def _cycle_lines(result: Result, answers: Sequence[Answer]) -> list[str]:
             continue
         frequency, *following = cycle_answers
         is_fixed = word == "operating point"
+        word = "highest point" if frequency.reason else word
         head = f"{frequency.value:g} {frequency.quantity.unit}" if is_fixed else _value(frequency)
         values = [head, *(f"{answer.quantity.label} {_value(answer)}" for answer in following)]
         if (order := order_of_line(result)) is not None and frequency.value is not None:
@@ -139,14 +141,14 @@ def _error_lines(statements: Mapping[str, Statement]) -> list[str]:
         if statement.stated:
             value = _number(quantity, statement.value, statement)
             by = TOGETHER if statement.dominated_by == Refinement.COMBINED else statement.dominated_by
-            lines.append(f"{quantity.label:15} {value:19} {percent(statement.error or 0.0):8} {by or statement.reason}")
+            lines.append(f"{quantity.label:19} {value:19} {percent(statement.error or 0.0):8} {by or statement.reason}")
             continue
         unknown = statement.status == Status.NOT_KNOWN
         value = _number(quantity, statement.value, statement) if unknown else "not reported"
-        lines.append(f"{quantity.label:15} {value:19} {'unknown' if unknown else ''}".rstrip())
+        lines.append(f"{quantity.label:19} {value:19} {'unknown' if unknown else ''}".rstrip())
         status_text = "" if unknown else f"{statement.status.removeprefix('not reported ').strip('()')}; "
         reasons.setdefault(f"{status_text}{statement.reason}".strip("; "), []).append(quantity.label)
-    head = [f"{'':15} {'value':19} {'error':8} dominated by"] if lines else []
+    head = [f"{'':19} {'value':19} {'error':8} dominated by"] if lines else []
     return head + lines + [f"{', '.join(labels)}: {reason}" for reason, labels in reasons.items() if reason]
 
 
@@ -157,13 +159,22 @@ def warnings(result: Result) -> Iterator[str]:
         yield f"this run is not complete: {result.state}"
     if table["peak_at_end"] and curve is not None:
         yield f"no peak: {curve.no_peak(curve.output_names[0])}"
+    marks = result.stability
+    if marks is not None and curve is not None and (count := int((curve.converged & ~marks.known).sum())):
+        yield f"whether {count} points of the response are stable is not known: Hill's method and time do not decide"
     if table["jumped"]:
         yield 'the sweep jumped: behind the fold its peak may be higher; see response.method "arc_length"'
     if table["peak_is_stable"] is False and not result.wear_steps:
         stable = any(answer.moment == STABLE for answer in answers_of(result))
         yield f"this peak is unstable, no vibration remains there{'' if stable else '; no point is stable'}"
+    if curve is not None and (table["jumped"] or curve.folds):
+        yield "the response has folds or jumps: curves of other motions, detached from it, were not searched for"
     if result.wear is not None:
-        yield from _wear_warnings(result)
+        yield from _wear_warnings(result, result.wear)
+    stress = result.stress_field
+    if stress is not None and len(stress.row) and stress.spot_kind[-1].any():
+        spots = [f"{spot} ({KINDS[kind]})" for spot, kind in enumerate(stress.spot_kind[-1].tolist(), 1) if kind]
+        yield f"stress grows with every finer mesh at hot spot {', '.join(spots)}"
     cycles = cycles_of(result)
     highest = max((cycles[moment][0].amplitude for moment in (FIRST, LAST) if moment in cycles), default=0.0)
     if highest > LARGEST_BEND * size_of(result):
@@ -173,9 +184,7 @@ def warnings(result: Result) -> Iterator[str]:
         )
 
 
-def _wear_warnings(result: Result) -> Iterator[str]:
-    wear = result.wear
-    assert wear is not None
+def _wear_warnings(result: Result, wear: WearHistory) -> Iterator[str]:
     if wear.in_time[:1].any():
         height, work = measured(wear.amplitude[0], "m", 2), measured(wear.energy[0].sum(), "J", 2)
         yield f"the steady state before wear is unstable: the response goes to {height} and {work} a cycle on average"
@@ -219,4 +228,4 @@ def _text(value: Any) -> str:
 
 def percent(error: float) -> str:
     """A relative error for people."""
-    return f"{100 * error:.2g} %" if error >= 1e-4 else "below 0.01 %"
+    return f"{rounded(100 * error, 2)} %" if error >= 1e-4 else "below 0.01 %"

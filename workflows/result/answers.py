@@ -1,12 +1,11 @@
 """Answers: every number that a result states, with its error and what a reader should know of it.
 
-Summary, JSON, text, report, exports and the tables of studies are loops over them.
-"""
+Summary, JSON, text, report, exports and the tables of studies are loops over them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isclose
 from typing import TYPE_CHECKING
 
@@ -42,11 +41,10 @@ EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 class Answer:
     """One number of a result.
 
-    joint : named contact that it is of, empty for the whole; moment : FIRST, LAST, PEAK, STABLE or RUN
+    joint : named contact or place that it is of, empty for the whole; moment : FIRST, LAST, PEAK, STABLE or RUN
     value : None where there is none; error : what the verdict says of it, None without
     derivative : key of the scene -> d value / d key, where these were computed
-    reason : what a reader should know, such as where a life ends, or why this is no peak; empty for nothing
-    """
+    reason : what a reader should know, such as where a life ends, or why this is no peak; empty for nothing"""
 
     quantity: StatedQuantity
     joint: str
@@ -92,9 +90,9 @@ def cycles_of(result: Result) -> dict[str, tuple[SolvedCycle, str]]:
     cycles: dict[str, tuple[SolvedCycle, str]] = {}
     if curve is not None:
         output = curve.output_names[0]
-        best, basis = int(np.argmax(curve.height(output))), _basis(result)
+        best, basis = curve.highest(output), _basis(result)
         no_peak = curve.no_peak(output) if curve.parameter_name == FREQUENCY else ""
-        peak = SolvedCycle.at_point(curve, best, basis)
+        peak = _with_stress(result, SolvedCycle.at_point(curve, best, basis, result.facts.places), best)
     if wear is not None and len(wear.omega):
         if curve is not None and not no_peak and not wears_at_peak(result):
             cycles[PEAK] = peak, ""
@@ -105,7 +103,8 @@ def cycles_of(result: Result) -> dict[str, tuple[SolvedCycle, str]]:
     if curve is not None and result.stability is not None:
         height = np.where(curve.converged & result.stability.stable, curve.amplitude(output), -1.0)
         if height.max() >= 0:
-            cycles[STABLE] = SolvedCycle.at_point(curve, int(np.argmax(height)), basis), ""
+            best = int(np.argmax(height))
+            cycles[STABLE] = SolvedCycle.at_point(curve, best, basis, result.facts.places), ""
     return cycles
 
 
@@ -125,6 +124,7 @@ def worn_contact(result: Result, row: int | None = None) -> WornContact | None:
         wear, result.patch.area, result.patch.gap, result.patch.components, HarmonicBasis(result.harmonics, samples),
         result.facts.joints, (0.0 if table is None else table.lost_below) or LIFE_SHARE,
         table is not None and table.lost_of == "any", result.facts.share_of_body_1, row=row,
+        places=result.facts.places, shares=() if table is None else tuple(duty.share for duty in table.duties),
     )  # fmt: skip
 
 
@@ -158,8 +158,11 @@ def _of_cycles(result: Result) -> Iterator[Answer]:
                 yield Answer(quantity, "", moment, value, error, reason=cycles[moment][1])
         for joint in _joints(result) if quantity.by_joint else ():
             for moment in (FIRST, LAST):
-                if moment in cycles and cycles[moment][0].joints is not None:
+                if moment in cycles and cycles[moment][0].joints:
                     yield Answer(quantity, joint, moment, quantity.value(cycles[moment][0].of_joint(joint)))
+        for place in result.facts.places if quantity.by_place and len(result.facts.places) > 1 else ():
+            for moment, (cycle, reason) in cycles.items():
+                yield Answer(quantity, place.name, moment, quantity.value(cycle.of_place(place.name)), reason=reason)
 
 
 def _of_wear(result: Result) -> Iterator[Answer]:
@@ -173,10 +176,10 @@ def _of_wear(result: Result) -> Iterator[Answer]:
 
 
 def _of_curve(result: Result) -> Iterator[Answer]:
-    spread = None if result.bounds is None else result.bounds.spread
+    spread, branch = None if result.bounds is None else result.bounds.spread, result.response
+    curve = None if branch is None else SolvedCurve(branch, spread, _basis(result), result.facts.places)
     for quantity in quantities_of(CurveQuantity):
-        value = None if result.response is None else quantity.value(SolvedCurve(result.response, spread))
-        yield Answer(quantity, "", RUN, value)
+        yield Answer(quantity, "", RUN, None if curve is None else quantity.value(curve))
 
 
 def _joints(result: Result) -> list[str]:
@@ -198,4 +201,11 @@ def _basis(result: Result) -> HarmonicBasis:
 
 
 def _cycle_at(result: Result, wear: WearHistory, row: int) -> SolvedCycle:
-    return SolvedCycle.at_row(wear, row, _basis(result), result.facts.joints)
+    cycle = SolvedCycle.at_row(wear, row, _basis(result), result.facts.joints, result.facts.places)
+    return _with_stress(result, cycle, row)
+
+
+def _with_stress(result: Result, cycle: SolvedCycle, number: int) -> SolvedCycle:
+    """The cycle of a row or point with the stress of the whole part, where the result holds it."""
+    stress = None if result.stress_field is None else result.stress_field.of(number)
+    return cycle if stress is None else replace(cycle, whole=lambda: stress)

@@ -23,8 +23,7 @@ class ContactState:
     label : what a reader calls it; number : row of the wear history, or point of the response curve
     omega : [rad/s]; cycles : before this state
     depth : (n_pair,) total wear [m]; status : (n_pair,) bits over the cycle; pressure : (n_pair,) mean [Pa]
-    field : which of result.fields and result.loops belongs to it, None for none
-    """
+    field : which of result.fields and result.loops belongs to it, None for none"""
 
     label: str
     number: int
@@ -104,8 +103,7 @@ def counted(number: float) -> str:
 def slip_limits(result: Result, normal: np.ndarray) -> np.ndarray:
     """Tangential force (n_pair, n_sample) [N] at which pairs slip under a normal force, nan where no law has a limit.
 
-    normal : (n_pair, n_sample) [N]
-    """
+    normal : (n_pair, n_sample) [N]"""
     limit = np.full(normal.shape, np.nan)
     for name, contact in result.scene.joints.items():
         friction, force = (contact.number(role) for role in SLIP_LIMITS)
@@ -118,8 +116,7 @@ def slip_limits(result: Result, normal: np.ndarray) -> np.ndarray:
 def instant_status(result: Result, at: int) -> np.ndarray:
     """(n_pair, n_sample) whether each pair sticks, slips or is separated at the instants of a kept loop.
 
-    A closed pair slips where its tangential force is at the limit of its law; without a limit it counts as sticking
-    """
+    A closed pair slips where its tangential force is at the limit of its law; without a limit it counts as sticking"""
     loops, patch = result.loops, result.patch
     assert loops is not None
     force = loops.force[at]
@@ -146,8 +143,7 @@ def over_a_cycle(result: Result, at: int, count: int) -> tuple[np.ndarray, np.nd
     """Displacement of the nodes at equal instants of a period.
 
     at : which of result.fields
-    Returns phase (count,) [rad], displacement (count, n_node, 3) [m], static part included
-    """
+    Returns phase (count,) [rad], displacement (count, n_node, 3) [m], static part included"""
     assert result.fields is not None
     phase = 2 * np.pi * np.arange(count) / count
     basis = HarmonicBasis(result.harmonics, max(2 * result.harmonics[-1] + 1, 3))

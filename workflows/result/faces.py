@@ -1,9 +1,6 @@
 """The two faces of every contact on the mesh of its parts, and what wear takes off each of them.
 
-The mesh of body 2 need not match that of body 1: a node between pairs wears as the polygon of pairs around it does.
-"""
-
-from __future__ import annotations
+The mesh of body 2 need not match that of body 1: a node between pairs wears as the polygon of pairs around it does."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,8 +17,7 @@ class Near:
     """When a node of the mesh belongs to a face of pairs.
 
     plane : how far above or below the plane of a polygon of pairs it may lie, of its size; inside : outside its edges
-    none : a weight below this is none
-    """
+    none : a weight below this is none"""
 
     plane: float = 0.05
     inside: float = 1e-4
@@ -40,8 +36,7 @@ class Face:
     nodes : (n_node,) nodes of the mesh on this side, those between the pairs too
     weights : (n_node, n_pair) by which what pairs have is interpolated at the nodes, sparse, rows add up to one
     share : of the total wear depth that is worn off this side
-    turn : (3, 3) rotation by which the face meets body 1's, points @ turn, where its blade is not body 1's own
-    """
+    turn : (3, 3) rotation by which the face meets body 1's, points @ turn, where its blade is not body 1's own"""
 
     points: np.ndarray
     outward: np.ndarray
@@ -62,8 +57,7 @@ class Meeting:
     """Two faces that touch: a named contact, or the only one.
 
     name : of the contact, empty for the only one; pairs : of the result that are its own; patch : of these alone
-    faces : body 1's, then body 2's where it is meshed too
-    """
+    faces : body 1's, then body 2's where it is meshed too"""
 
     name: str
     pairs: slice
@@ -125,8 +119,7 @@ def _nodes(
 ) -> tuple[np.ndarray, csr_matrix] | None:
     """Nodes of the mesh in the polygons of pairs at points that have elements behind the normals, without those taken.
 
-    Returns the nodes and their weights (n_node, n_pair) of the pairs, None where there are no such nodes
-    """
+    Returns the nodes and their weights (n_node, n_pair) of the pairs, None where there are no such nodes"""
     polygons = patch.faces
     corner = points[polygons]
     middle, normal = corner.mean(axis=1), outward[polygons].mean(axis=1)
@@ -163,8 +156,7 @@ def _of_one_body(
 ) -> dict[int, tuple[int, np.ndarray]]:
     """Without nodes of the other body, whose elements reach behind the face at its edges.
 
-    part_of : (n_face,) connected part of the patch that each polygon belongs to
-    """
+    part_of : (n_face,) connected part of the patch that each polygon belongs to"""
     body_of_part: dict[int, int] = {}
     for number in set(part_of.tolist()):
         bodies_of_face = [body[node] for node, (face, _) in face_of_node.items() if part_of[face] == number]
@@ -185,8 +177,7 @@ def _elements(part: PartMesh, nodes: np.ndarray) -> dict[int, np.ndarray]:
 def _wachspress(corner: np.ndarray, points: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Coordinates (n, n_corner) of points in a convex polygon, linear along its edges; nan for those outside.
 
-    Source  Wachspress, A Rational Finite Element Basis, 1975, multiplied through by the areas at all edges
-    """
+    Source  Wachspress, A Rational Finite Element Basis, 1975, multiplied through by the areas at all edges"""
     after = np.roll(corner, -1, axis=0)
     edge = after - corner
     area = np.einsum("ex,nex->ne", np.cross(normal, edge), points[:, None] - corner)  # twice that at each edge

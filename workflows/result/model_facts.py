@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
+from tribodyn.hbm.fatigue import StressPlace
 from tribodyn.hbm.outcome import End
 
 
@@ -20,6 +21,9 @@ class Stage(End):
     WEARING = "unfinished"
     FAILED = "failed"
     COMPLETE = "complete"
+
+
+TABLES = ("around", "joints", "places")  # facts that are no single numbers
 
 
 @dataclass(frozen=True)
@@ -59,8 +63,9 @@ class ModelFacts:
     delta_max : depth at which the static loads can close the contact no longer; wear_split : share of body 1
     around : the wheel of a part that is a sector
     joints : named contact -> its pairs; empty where the scene names none
+    places : of the part whose stress is observed
     harmonics_error, harmonics_choice : estimated truncation error of chosen harmonics, and how they were chosen
-    """
+    notes : what of the scene is to be doubted, sentences"""
 
     full_dofs: int = 0
     model_dofs: int = 0
@@ -87,6 +92,8 @@ class ModelFacts:
     harmonics_error: float | None = None
     harmonics_choice: str | None = None
     joints: Mapping[str, slice] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    places: tuple[StressPlace, ...] = ()
 
     @property
     def share_of_body_1(self) -> float:
@@ -95,23 +102,40 @@ class ModelFacts:
 
     def table(self) -> dict[str, Any]:
         """name -> value of all that applies, those of the wheel among them: what a result file and exports keep."""
-        values = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in ("around", "joints")}
+        values = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in TABLES}
         values["harmonics"] = np.array(self.harmonics, dtype=np.int64)
+        values["notes"] = "\n".join(self.notes) or None
         if self.around is not None:
             values |= vars(self.around)
         if self.joints:
             values["joints"] = json.dumps({name: [pairs.start, pairs.stop] for name, pairs in self.joints.items()})
+        if self.places:
+            values["places"] = json.dumps([asdict(place) for place in self.places])
         return {name: value for name, value in values.items() if value is not None}
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> ModelFacts:
-        """The facts in a table as of `table`; what else is in it is ignored."""
+        """The facts in a table as of `table`; others are ignored. Raises TypeError: one is of another kind"""
         plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in table.items()}
         values = {item.name: plain[item.name] for item in fields(cls) if item.name in plain}
         if "harmonics" in values:
             values["harmonics"] = tuple(int(h) for h in np.atleast_1d(values["harmonics"]))
+        values["notes"] = tuple(str(plain.get("notes", "")).splitlines())
+        if "places" in values:
+            values["places"] = tuple(map(StressPlace.of, json.loads(values["places"])))
         for name in {"open_frequencies", "stuck_frequencies"} & values.keys():
-            values[name] = np.atleast_1d(values[name])
+            values[name] = np.atleast_1d(values[name]).astype(float)
+        for name, kinds in _KINDS.items():
+            if name in values and not isinstance(values[name], kinds):
+                raise TypeError(f"{name} is {values[name]!r}")
         if "sectors" in plain:
             values["around"] = Around(plain["sectors"], plain["engine_order"], np.asarray(plain["axis"], float))
         return cls(**values)
+
+
+# fact -> what it may be, of those that are single numbers or texts
+_KINDS = {
+    item.name: str if "str" in str(item.type) else int | float if "float" in str(item.type) else int
+    for item in fields(ModelFacts)
+    if str(item.type).removesuffix(" | None") in ("int", "float", "str")
+}

@@ -1,13 +1,13 @@
 """Numbers for readers, with a prefix and as many digits as their error allows; columns with all digits, as a file."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from tribodyn.output_file import cell, replacing
 
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 COUNTED = {9: " billion", 6: " million", 0: ""}
@@ -21,10 +21,10 @@ UNKNOWN, DEFAULT_DIGITS, LARGEST_DIGITS = (
 
 def write_columns(columns: Mapping[str, Any], path: Path) -> None:
     """Write columns (n,) of the same length under their names, numbers with all their digits."""
-    with path.open("w", newline="", encoding="utf-8") as stream:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         table = csv.writer(stream)
-        table.writerow(columns)
-        table.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
+        table.writerow(map(cell, columns))
+        table.writerows(zip(*(map(cell, np.asarray(column).tolist()) for column in columns.values()), strict=True))
 
 
 def named_lines(values: Iterable[tuple[str, str]], width: int = 14) -> list[str]:
@@ -51,8 +51,7 @@ def rounded(value: float, count: int = DEFAULT_DIGITS) -> str:
 def measured(value: float, unit: str, count: int = DEFAULT_DIGITS) -> str:
     """A quantity in SI with a prefix: 0.951 mm, 796 Hz, 7.38 kN, 2240 mm³, 22 million cycles.
 
-    unit : m, m2 and m3 are given in mm, mm² and mm³, small lengths in µm; Hz without a prefix below 10 kHz
-    """
+    unit : m, m2 and m3 are given in mm, mm² and mm³, small lengths in µm; Hz without a prefix below 10 kHz"""
     if unit == "cycles":
         power = next((power for power in COUNTED if abs(value) >= 10.0**power), 0)
         return f"{rounded(value / 10.0**power, count)}{COUNTED[power]} cycles"

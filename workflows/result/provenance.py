@@ -1,7 +1,5 @@
 """The scene that a result was computed from."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

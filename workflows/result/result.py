@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.fatigue import StressOverCycle
 from tribodyn.hbm.stability.branch_stability import BranchStability
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.model_facts import ModelFacts, Stage
@@ -35,8 +36,7 @@ class PartMesh:
 
     kind : VTK cell type name, such as "triquadratic_hexahedron"
     points : (n_node, 3) [m]
-    cells : (n_cell, n_corner) node indices in VTK order
-    """
+    cells : (n_cell, n_corner) node indices in VTK order"""
 
     kind: str
     points: np.ndarray
@@ -50,8 +50,7 @@ class Patch:
     components : contact components in the order of the history's rows
     nodes : (n_pair,) node of the part at each pair, -1 where there is no mesh
     points, frames, area, gap, faces : as in fem.interface.ContactInterface
-    free_deflection : (n_pair,) normal approach under the static loads with body 2 absent, nan without wear [m]
-    """
+    free_deflection : (n_pair,) normal approach under the static loads with body 2 absent, nan without wear [m]"""
 
     components: tuple[str, ...]
     nodes: np.ndarray
@@ -66,8 +65,7 @@ class Patch:
     def flat(self) -> np.ndarray:
         """(n_pair, 2) positions in the mean tangential plane, from the middle of the patch [m].
 
-        Faces that do not look the same way are each drawn in their own plane, one above the other along t2.
-        """
+        Faces that do not look the same way are each drawn in their own plane, one above the other along t2."""
         if self.in_one_plane:
             return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
         positions, top, of = np.zeros((len(self.points), 2)), 0.0, self.face_of
@@ -113,8 +111,7 @@ class Patch:
         """Cut every face into one quadrangle for each of its corners, to show what has one value for each pair.
 
         points : (n_pair, d) where the pairs are drawn
-        Returns (n_share, 4, d) corners of the quadrangles, and (n_share,) the pair each belongs to
-        """
+        Returns (n_share, 4, d) corners of the quadrangles, and (n_share,) the pair each belongs to"""
         corner = points[self.faces]
         before, after = np.roll(corner, 1, axis=1), np.roll(corner, -1, axis=1)
         middle = np.broadcast_to(corner.mean(1, keepdims=True), corner.shape)
@@ -128,8 +125,7 @@ class References:
 
     omega : (n_reference,) [rad/s]
     free : (n_reference,) amplitude with the contact absent [m]
-    stuck : (n_reference,) amplitude with every contact closed and sticking [m]
-    """
+    stuck : (n_reference,) amplitude with every contact closed and sticking [m]"""
 
     omega: np.ndarray
     free: np.ndarray
@@ -142,8 +138,7 @@ class ShearBounds:
 
     amplitude_low, amplitude_high : (n_point,) range of the first output's amplitude [m]
     energy_low, energy_high : (n_point,) range of the friction work per cycle [J]
-    stuck : (n_point,) share of the tangential directions that stick all the time; failed : extreme starts not solved
-    """
+    stuck : (n_point,) share of the tangential directions that stick all the time; failed : extreme starts not solved"""
 
     amplitude_low: np.ndarray
     amplitude_high: np.ndarray
@@ -163,11 +158,40 @@ class Fields:
     """Full displacement of the part in chosen states.
 
     row : (n_field,) rows of the wear history, points of the response curve where nothing wears
-    displacement : (n_field, n_node, 3, n_coeff) Fourier coefficients [m]
-    """
+    displacement : (n_field, n_node, 3, n_coeff) Fourier coefficients [m]"""
 
     row: np.ndarray
     displacement: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stress:
+    """Stress of the part in the same states as the fields.
+
+    row : (n_field,) rows of the wear history, points of the response curve where nothing wears
+    largest, utilisation, mean, amplitude, tensor : (n_field, n_node, ...) as in hbm.fatigue.StressOverCycle
+    spot, spot_point : (n_field, n_spot) nodes of the hot spots, the hottest first, (n_field, n_spot, 3) [m]
+    spot_kind : (n_field, n_spot) what stands there, as numbers of fem.singularities.KINDS: other than 0 the exact
+        stress is infinite"""
+
+    row: np.ndarray
+    largest: np.ndarray
+    utilisation: np.ndarray
+    mean: np.ndarray
+    amplitude: np.ndarray
+    tensor: np.ndarray
+    spot: np.ndarray
+    spot_point: np.ndarray
+    spot_kind: np.ndarray
+
+    def of(self, number: int) -> StressOverCycle | None:
+        """The stress in the state of a row; None where it was not computed there."""
+        at = np.flatnonzero(self.row == number)
+        return (
+            StressOverCycle(**{f.name: getattr(self, f.name)[at[0]] for f in fields(StressOverCycle)})
+            if len(at)
+            else None
+        )
 
 
 @dataclass(frozen=True)
@@ -175,8 +199,7 @@ class Loops:
     """Periodic contact displacement and force over one cycle, in the same states as the fields.
 
     row : (n_field,) rows of the wear history, points of the response curve where nothing wears
-    displacement, force : (n_field, n_pair, n_component, n_sample) [m], [N]
-    """
+    displacement, force : (n_field, n_pair, n_component, n_sample) [m], [N]"""
 
     row: np.ndarray
     displacement: np.ndarray
@@ -189,8 +212,7 @@ class WornResponses:
 
     row : (n_curve,) rows of the wear history whose depth the curves have
     omega, amplitude : (n_curve, n_curve_point) [rad/s], of the first output [m]; nan after the end of a curve and where
-        a point did not converge
-    """
+        a point did not converge"""
 
     row: np.ndarray
     omega: np.ndarray
@@ -205,8 +227,7 @@ class Result:
     facts : what was modelled and how long it took
     stage : how far the run came; `state` is its sentence
     verdict : its errors, None where none was asked for
-    response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them
-    """
+    response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them"""
 
     provenance: Mapping[str, str]
     scene: Scene
@@ -221,6 +242,7 @@ class Result:
     wear: WearHistory | None = None
     worn: WornResponses | None = None
     fields: Fields | None = None
+    stress_field: Stress | None = None
     loops: Loops | None = None
     verdict: Verdict | None = None
 
@@ -262,8 +284,7 @@ class Result:
     def shown_rows(self) -> np.ndarray:
         """What pictures show: rows of the wear history, or points of the response curve where nothing wears.
 
-        Those of the fields; else the first, the middle and the last row, or the highest peaks of the curve
-        """
+        Those of the fields; else the first, the middle and the last row, or the highest peaks of the curve"""
         if self.fields is not None:
             return self.fields.row
         if self.wear is not None and len(self.wear.cycles):
@@ -280,15 +301,10 @@ class Result:
             return None
         return complex(loads[0].value * np.exp(1j * loads[0].phase))
 
-    def depth_after(self, row: int) -> np.ndarray:
-        """(n_pair,) wear depth when the step of a row is done [m]."""
-        assert self.wear is not None
-        return np.asarray(self.wear.depth[row] + self.wear.worn[row])
-
 
 def peaks(frf: Branch, count: int = PEAKS) -> np.ndarray:
     """Points of the highest local maxima of a curve's first output, by frequency; else the highest point."""
     height = frf.height(frf.output_names[0])
     inner = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]) & (height[1:-1] > 0)) + 1
-    best = inner[np.argsort(-height[inner])][:count] if len(inner) else np.array([int(np.argmax(height))])
+    best = inner[np.argsort(-height[inner])][:count] if len(inner) else np.array([frf.highest(frf.output_names[0])])
     return np.asarray(best[np.argsort(frf.omega[best])])

@@ -28,12 +28,12 @@ def summary(result: Result) -> dict[str, Any]:
     wear_steps, solves : steps taken and balance solves spent on wear; wear_end : why the wear ended
     peak_at_end : whether the peak is no peak, but an end of the response or a point whose peak was not found
     jumped : whether the response is a sweep that jumped at a fold, so that the curve may have a higher peak
-    peak_is_stable : whether the peak of the response is stable, None where this was not asked for
+    peak_is_stable : whether the peak of the response is stable, None where this was not asked for or is not known
     seconds : of computing, interrupted runs included
     joints : named contact -> pairs, area [m2], and its own quantities; empty where the scene names none
     verdict : quantity -> value, error, dominated_by, status, reason, stated, see result.verdict.Statement; None without
-    changes : what each refinement changed, see result.verdict.Change
-    """
+    notes : what of the scene is to be doubted, such as unusual numbers, in sentences
+    changes : what each refinement changed, see result.verdict.Change"""
     return {name: plain(value) for name, value in numbers(result).items()}
 
 
@@ -63,6 +63,7 @@ def numbers(result: Result) -> dict[str, Any]:
         "stuck_frequencies": facts.stuck_frequencies.tolist(),
         "verdict": {name: asdict(statement) | {"stated": statement.stated} for name, statement in statements.items()}
         or None,
+        "notes": list(facts.notes),
         "changes": [] if verdict is None else [asdict(change) for change in verdict.changes],
     }
 
@@ -92,10 +93,10 @@ def _curve(result: Result) -> dict[str, Any]:
     table["fold_frequencies"] = [float(curve.frequency[i]) for i in curve.folds]
     if marks is None:
         return table | dict.fromkeys(names[3:])
-    best = int(np.argmax(np.where(curve.converged, curve.amplitude(output), -1.0)))
     changes = zip(marks.omega / (2 * np.pi), marks.kinds, strict=True)
-    table["peak_is_stable"] = bool(marks.stable[best])
-    table["unstable_points"] = int(np.sum(curve.converged & ~marks.stable))
+    highest, is_known = curve.highest(output), marks.known
+    table["peak_is_stable"] = bool(marks.stable[highest]) if is_known[highest] else None
+    table["unstable_points"] = int(np.sum(is_known & ~marks.stable))
     table["bifurcations"] = [{"frequency": float(hertz), "kind": kind} for hertz, kind in changes]
     return table
 

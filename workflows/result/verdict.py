@@ -1,13 +1,9 @@
 """How far the numbers of a result may be off: what refinements of its scene changed, and the total error that follows.
 
-Data and its words alone; `tribodyn.workflows.errors` measures them.
-"""
-
-from __future__ import annotations
+Data and its words alone; `tribodyn.workflows.errors` measures them."""
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 
 class Refinement(StrEnum):
@@ -31,6 +27,7 @@ class Status(StrEnum):
     TOO_LARGE = "not reported (error above 50 %)"
     UNSTABLE = "not reported (the steady state is unstable)"
     CONTRADICTED = "not reported (time integration contradicts it)"
+    UNBOUNDED = "not reported (it grows without bound on finer meshes)"
     UNSETTLED = "not reported (the motion in time is not stationary)"
     ABSENT = "none"
 
@@ -41,8 +38,7 @@ class MeasuredChange:
 
     value, refined : of the quantity, in its unit, before and after the refinement; None where there is none
     relative : change over the refined value, or an estimate of it; None where it was not measured
-    description : what was refined, or why it was not measured
-    """
+    description : what was refined, or why it was not measured"""
 
     refinement: str
     quantity: str
@@ -58,8 +54,7 @@ class Statement:
 
     value : in the unit of the quantity, None where there is none
     error : total and relative, None where it is not known
-    dominated_by : the refinement that changed most; status : a Status; reason : in words
-    """
+    dominated_by : the refinement that changed most; status : a Status; reason : in words"""
 
     value: float | None
     error: float | None
@@ -80,18 +75,10 @@ class Verdict:
     statements : by name of the quantity; changes : rows of the table
     ratio : elements along every edge of the refined mesh over those of the scene, None where that was not solved
     worn_ratio : the same of the mesh that was worn beside it
-    seconds : of one processor, for information alone
-    """
+    seconds : of one processor, for information alone"""
 
     statements: dict[str, Statement]
     changes: tuple[MeasuredChange, ...]
     ratio: float | None
     seconds: float
     worn_ratio: float | None = None
-
-    @classmethod
-    def of(cls, table: dict[str, Any]) -> Verdict:
-        """A verdict from its fields as plain data, as `dataclasses.asdict` gives them."""
-        statements = {name: Statement(**item) for name, item in table["statements"].items()}
-        changes = tuple(MeasuredChange(**item) for item in table["changes"])
-        return cls(**table | {"statements": statements, "changes": changes})

@@ -1,14 +1,11 @@
 """Checkpoints: what is kept of a run on its way, and which kept result a scene can resume."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from filelock import FileLock, Timeout
 
@@ -87,8 +84,7 @@ class Keeper:
 def earlier(path: Path, file: SceneFile) -> Result | None:
     """The result at `path` for a scene to resume from, None where there is none yet.
 
-    Raises  ValueError where it is the result of another scene
-    """
+    Raises  ValueError where it is the result of another scene"""
     if not path.exists():
         return None
     result = store.load(path)
@@ -113,12 +109,9 @@ def is_complete(result: Result, scene: Scene) -> bool:
 def same_problem(first: Scene, second: Scene) -> str:
     """Empty where one scene's result can be resumed by the other, else the first key that differs.
 
-    What is drawn or reported may differ, and the fields that are marked as resumable.
-    """
-    before, after = (_values_of_problem(scene) for scene in (first, second))
+    What is drawn or reported may differ, and the fields that are marked as resumable."""
+    before, after = (
+        {entry.key: entry.value for entry in scene_values(scene) if entry.stage < DRAW and not entry.is_resumable}
+        for scene in (first, second)
+    )
     return next((key for key in before | after if before.get(key, _ABSENT) != after.get(key, _ABSENT)), "")
-
-
-def _values_of_problem(scene: Scene) -> dict[str, Any]:
-    """Key -> value of what two scenes must share for one to resume the result of the other."""
-    return {entry.key: entry.value for entry in scene_values(scene) if entry.stage < DRAW and not entry.is_resumable}

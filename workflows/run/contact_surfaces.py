@@ -1,7 +1,5 @@
 """From measured or made-up faces to the gap of every node pair."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy
 
@@ -22,8 +20,7 @@ def surface_gap(file: SceneFile, interface: ContactInterface) -> tuple[np.ndarra
     Returns it with a sentence for each thing that was changed in a height map
 
     Raises  ValueError where the patch is not flat, or where a height map or the mating height cannot be what the scene
-        gives
-    """
+        gives"""
     surfaces = file.mesh_scene.surfaces
     assert surfaces is not None
     nodes = patch_coordinates(interface, surfaces.axes)
@@ -50,8 +47,7 @@ def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> n
     """Opening (k,) of some pairs of an interface from points in space, their least one taken off [m].
 
     rows : (n, 4) x, y, z, opening [m], seen along the mean normal of the pairs: linear between the points, that of the
-        nearest one outside
-    """
+        nearest one outside"""
     tangents = interface.frames[pairs].mean(axis=0)[:2]
     points = interface.points[pairs] if interface.nodes is None else interface.nodes.points
     at, targets = rows[:, :3] @ tangents.T, points @ tangents.T
@@ -65,8 +61,7 @@ def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> n
 def patch_coordinates(interface: ContactInterface, axes: tuple[str, str]) -> np.ndarray:
     """Pairs (n_pair, 2) in the plane of a flat patch along signed components, from the middle of its extent [m].
 
-    Raises  ValueError where the patch is not flat
-    """
+    Raises  ValueError where the patch is not flat"""
     frame = interface.frames.mean(axis=0)
     directions = np.stack(
         [(-1.0 if name.startswith("-") else 1.0) * frame[COMPONENTS.index(name[-2:])] for name in axes]

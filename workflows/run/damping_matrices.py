@@ -1,7 +1,5 @@
 """The damping matrix of a scene."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Materials of a deck; materials of the scene replace them by name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -15,12 +13,17 @@ from tribodyn.workflows.scene.structure_tables import DeckTable as Table
 
 
 def material(
-    source: deck.Deck, name: str, mesh: Any, table: Table, materials: Mapping[str, AnyMaterial], deck_name: str = "NAME"
+    source: deck.Deck,
+    name: str,
+    mesh: Any,
+    table: Table,
+    materials: Mapping[str, AnyMaterial],
+    form: str,
+    deck_name: str = "NAME",
 ) -> Any:
-    """Material of a body of a deck, or volume group -> material where it has several.
+    """Material of a body of a deck, or volume group -> material where it has several. form : of its elements
 
-    Raises  Refusal where an element has none or two
-    """
+    Raises  Refusal where an element has none or two"""
     material_of_group: dict[str, AnyMaterial] = {}
     count = np.zeros(mesh.nelements, dtype=int)
     for deck_material in source.materials:
@@ -31,8 +34,9 @@ def material(
     if (count > 1).any():
         n_overlap = int((count > 1).sum())
         raise Refusal(f"the sections of body '{name}' overlap in {n_overlap} elements: correct them")
-    if table.elements == "linear_reduced":
-        material_of_group = {group: _reduced(deck_material, name) for group, deck_material in material_of_group.items()}
+    material_of_group = {
+        group: replace(of_group, elements=form or of_group.elements) for group, of_group in material_of_group.items()
+    }
     if (count == 1).all():
         return material_of_group if len(material_of_group) > 1 else next(iter(material_of_group.values()))
     if table.material is None:
@@ -41,16 +45,8 @@ def material(
             f'name one of the scene with decks.{deck_name}.material = "name"'
         )
     if not material_of_group:
-        scene_material = materials[table.material]
-        return _reduced(scene_material, name) if table.elements == "linear_reduced" else scene_material
+        return replace(materials[table.material], elements=form or materials[table.material].elements)
     raise Refusal(f"the deck gives a part of body '{name}' no material: give all its elements a section")
-
-
-def _reduced(source_material: AnyMaterial, body: str) -> Material:
-    """A material whose elements are linear with reduced integration."""
-    if not isinstance(source_material, Material):
-        raise Refusal(f"elements = \"linear_reduced\" is for isotropic materials, and body '{body}' has another")
-    return replace(source_material, linear_reduced=True)
 
 
 def _solid(deck_material: deck.DeckMaterial, group: str, materials: Mapping[str, AnyMaterial]) -> AnyMaterial:

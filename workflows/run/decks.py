@@ -1,14 +1,10 @@
 """A deck of another FE program as part of a structure: its bodies, materials, constraints, supports and loads.
 
 What cannot be carried over and would change the structure is refused. What changes nothing, such as a support of a
-point that nothing moves, is named among what is not used.
-"""
-
-from __future__ import annotations
+point that nothing moves, is named among what is not used."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +22,7 @@ from tribodyn.geometry.sources import added_nodes, deck, face_rules, foreign_fil
 from tribodyn.geometry.sources.directions import Directions
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run.deck_materials import material
+from tribodyn.workflows.run.deck_source import elements_of, notes_of, source, with_elements
 from tribodyn.workflows.scene.structure_tables import EVERYTHING, DeckTable as Table
 
 UNITS = {metres: name for name, (metres, _) in foreign_file.UNITS.items()}
@@ -35,7 +32,8 @@ ALL_AXES = (0, 1, 2, 3, 4, 5)
 @dataclass
 class CarriedDeck:
     """What a deck brings into a scene. points : name -> (3,) of its reference points [m]; load : all its loads
-    notes : sentences on its conversion, and on its unused content"""
+    notes : sentences on its conversion, and on its unused content
+    tabulated : material -> its cards of several temperatures, of which the initial one is taken"""
 
     bodies: list[Body]
     points: dict[str, np.ndarray] = field(default_factory=dict)
@@ -45,6 +43,7 @@ class CarriedDeck:
     masses: list[Mass] = field(default_factory=list)
     load: Sum = field(default_factory=lambda: Sum(()))
     notes: list[str] = field(default_factory=list)
+    tabulated: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def load_name(deck_name: str) -> str:
@@ -56,8 +55,7 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
     """What the deck of a table brings.
 
     materials : of the scene; they replace materials of the deck with the same name; folder : of the scene
-    Raises  Refusal, one sentence: the deck cannot be read, lacks a material, or has what cannot be carried over
-    """
+    Raises  Refusal, one sentence: the deck cannot be read, lacks a material, or has what cannot be carried over"""
     path = folder / table.file
     if table.unit not in UNITS:
         raise Refusal(f"decks.{name}.unit: expected one of {', '.join(foreign_file.UNITS)}")
@@ -68,36 +66,16 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
         raise Refusal(clause if clause.startswith("decks.") else f"decks.{name}: {clause}") from None
 
 
-def source(path: Path, unit: str) -> foreign_file.Source:
-    """What a file holds, read once as long as it does not change; raises Refusal as `read.read` does."""
-    return _read(path, unit, path.stat().st_mtime_ns if path.is_file() else 0)
-
-
-@lru_cache(maxsize=4)
-def _read(path: Path, unit: str, stamp: int) -> foreign_file.Source:
-    return foreign_file.read(path, unit)
-
-
-def notes_of(source: foreign_file.Source, table: Table) -> tuple[str, ...]:
-    """Sentences on the conversion of a deck."""
-    corners = ("its hexahedra are computed on their eight corners, with reduced integration",)
-    return (*(corners if table.elements == "linear_reduced" else source.order_notes), *source.notes)
-
-
-def with_elements(mesh: Any, node_sets: dict[str, np.ndarray], table: Table, body: str) -> tuple[Any, Any]:
-    """Mesh and node sets of a body in the elements that its table asks for.
-
-    Raises  Refusal, which names the body, where it has others than those can stand for
-    """
-    return subdivision.first_order(mesh, node_sets, body) if table.elements == "linear_reduced" else (mesh, node_sets)
-
-
 class _DeckConversion:
     """Converts one deck into parts of a structure."""
 
     def __init__(self, name: str, table: Table, materials: Mapping[str, AnyMaterial], source: foreign_file.Source):
-        if table.elements != "linear_reduced" and "equations" in table.use:
-            source = added_nodes.with_added_nodes(source)
+        forms = {body: elements_of(source, table, body) for body in source.bodies}
+        if not all(forms.values()) and "equations" in table.use:
+            bodies = {
+                name: replace(body, added=() if forms[name] else body.added) for name, body in source.bodies.items()
+            }
+            source = added_nodes.with_added_nodes(replace(source, bodies=bodies))
         self.name, self.table, self.source, self.deck = name, table, source, source.deck
         self.materials = materials
         self.faces: dict[str, list[str]] = {}  # group of the deck -> its names in the assembly
@@ -124,12 +102,19 @@ class _DeckConversion:
         ignored = [f"{self.source.refused[name]}, by ignore" for name in self.table.ignore]
         unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes, *ignored)]
         notes = (*notes_of(self.source, self.table), *unused)
+        self.content.tabulated = {
+            entry.name: entry.tabulated
+            for entry in self.source.deck.materials
+            if entry.tabulated and entry.name not in self.materials
+        }
         self.content.notes = [f"decks.{self.name}: {sentence}" for sentence in notes]
         return self.content
 
     def _refuse(self) -> None:
         """Raise Refusal where the deck has what is not carried over, unless the scene ignores it."""
-        refused, ignore = self.source.refused, self.table.ignore
+        refused, ignore = dict(self.source.refused), self.table.ignore
+        if "supports" not in self.table.use:
+            refused.pop(foreign_file.DISPLACED, None)
         if unknown := [name for name in ignore if name not in refused]:
             listed = ", ".join(refused) or "nothing"
             raise Refusal(f"ignore: '{unknown[0]}' is not refused, {listed} is: correct the name")
@@ -152,8 +137,9 @@ class _DeckConversion:
                 rules[face] = rule.rule
         mesh, node_sets = face_rules.add_faces(solid.mesh, solid.node_sets, rules)
         mesh, node_sets = subdivision.subdivide(mesh, node_sets, self.table.halved)
-        mesh, node_sets = with_elements(mesh, node_sets, self.table, name)
-        body_material = material(self.deck, name, mesh, self.table, self.materials, self.name)
+        form = elements_of(self.source, self.table, name)
+        mesh, node_sets = with_elements(mesh, node_sets, form, name)
+        body_material = material(self.deck, name, mesh, self.table, self.materials, form, self.name)
         for group in {*node_sets, *(mesh.boundaries or {})}:
             names_of = self.faces if group in (mesh.boundaries or {}) else self.sets
             place = group_name(name, group, node_sets)
@@ -319,8 +305,7 @@ def _point_clamps(point: str, axes: set[int]) -> list[Clamp]:
 def part(name: str, table: Table, materials: Mapping[str, AnyMaterial], folder: Path) -> Part:
     """All that a deck says as one part: bodies, what joins and holds them, its loads.
 
-    Raises  Refusal as `structure` does
-    """
+    Raises  Refusal as `structure` does"""
     content = structure(name, table, materials, folder)
     assembly = Assembly(content.bodies, {point: list(place) for point, place in content.points.items()})
     material_of = {body.name: body.material for body in assembly.bodies}

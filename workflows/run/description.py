@@ -1,7 +1,5 @@
 """What a result holds before anything is solved: provenance, sizes, patch and mesh."""
 
-from __future__ import annotations
-
 import json
 import platform
 from dataclasses import replace
@@ -37,9 +35,15 @@ SEED = 0  # of every random start vector and probe in the packages used
 
 
 def described(
-    file: SceneFile, part: Part | None, balance: HarmonicBalance, choice: HarmonicChoice | None = None
+    file: SceneFile,
+    part: Part | None,
+    balance: HarmonicBalance,
+    choice: HarmonicChoice | None = None,
+    notes: tuple[str, ...] = (),
 ) -> Result:
-    """The result before anything was solved: where it comes from and what is modelled; part None for matrices."""
+    """The result before anything was solved: where it comes from and what is modelled; part None for matrices.
+
+    notes : what of the scene is to be doubted"""
     reduced, i = balance.model, balance.model.interface
     nodes = np.full(i.n_pair, -1) if part is None else part.nodes
     wears = file.scene.wear is not None
@@ -56,6 +60,8 @@ def described(
         compliance_error=balance.compliance.error,
         prestress_residual=reduced.accuracy().get("prestress_residual"),
         prestress_rotation=reduced.accuracy().get("prestress_rotation"),
+        notes=notes,
+        places=balance.places,
     )
     if part is not None:
         worst = min(mesh_reader.quality(piece.mesh).scaled_jacobian for piece in pieces(part.mesh))

@@ -1,7 +1,5 @@
 """Full displacement of the part and hysteresis loops of the contact, at rows of a wear history or points of a curve."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,7 +10,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.result.result import Fields, Loops, Result
-from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 
 @dataclass(frozen=True)
@@ -20,8 +18,7 @@ class SolvedState:
     """A solved state of the contact: what it shares with a WearRow.
 
     omega : [rad/s]; depth : (n_pair,) worn off [m]; displacement, force : (n_contact, n_coeff) [m], [N]
-    load_factor : on the vibrating loads
-    """
+    load_factor : on the vibrating loads"""
 
     omega: float
     depth: np.ndarray
@@ -36,40 +33,40 @@ States = Sequence[SolvedState | WearRow]
 def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Part | None) -> Result:
     """The result with the fields and loops that its pictures show, and no others.
 
-    balance : the unworn problem under the load that the states of the result come from
-    """
-    result = replace(result, fields=None, loops=None)
+    balance : the unworn problem under the load that the states of the result come from"""
+    result = replace(result, fields=None, loops=None, stress_field=None)
     numbers = result.shown_rows()
     if not len(numbers) or balance.contact.n_pair == 0:  # loops and states of a contact that is not there
         return result
-    states: list[SolvedState | WearRow]
+    states: list[SolvedState | WearRow] = []
     if result.wear is not None:
         rows = result.wear.rows()
-        states = [rows[i] for i in numbers]
-    else:
-        assert result.response is not None
-        frf = result.response
+        states += [rows[i] for i in numbers]
+    elif (frf := result.response) is not None:
         loaded = [balance.with_load(float(frf.load_factor[i])) for i in numbers]
-        states = [_of_point(b, frf.omega[i], frf.contact[i]) for b, i in zip(loaded, numbers, strict=True)]
-    if scene.pictures.renders and part is not None:
-        result = replace(result, fields=displacement_fields(balance, part, states, numbers))
+        n_pair = balance.contact.n_pair
+        for b, i in zip(loaded, numbers, strict=True):
+            omega, x = float(frf.omega[i]), frf.contact[i]
+            state = b.evaluate(omega, x.reshape(n_pair, -1, b.basis.n_coeff), jacobian=False)
+            states.append(SolvedState(omega, np.zeros(n_pair), x, state.cycle.force.reshape(x.shape), b.load_factor))
+    if part is not None and (scene.pictures.renders or balance.stress is not None):
+        fields = displacement_fields(balance, part, states, numbers)
+        result = replace(result, fields=fields if scene.pictures.renders else None)
+        if balance.stress is not None and isinstance(scene, MeshScene) and scene.stress is not None:
+            from tribodyn.workflows.run.stresses import stress_state  # only scenes that ask for stress need it
+
+            spots = scene.stress.hot_spots
+            stress = stress_state(balance.stress, part.points, fields, balance.basis, spots)
+            result = replace(result, stress_field=stress)
     if scene.pictures.plots:
         result = replace(result, loops=hysteresis_loops(balance, states, numbers))
     return result
 
 
-def _of_point(balance: HarmonicBalance, omega: float, x: np.ndarray) -> SolvedState:
-    """The state of a point of the response of the unworn contact."""
-    n_pair = balance.contact.n_pair
-    state = balance.evaluate(float(omega), x.reshape(n_pair, -1, balance.basis.n_coeff), jacobian=False)
-    return SolvedState(float(omega), np.zeros(n_pair), x, state.cycle.force.reshape(x.shape), balance.load_factor)
-
-
 def displacement_fields(balance: HarmonicBalance, part: Part, states: States, numbers: np.ndarray) -> Fields:
     """Displacement of every node in solved states.
 
-    balance : the unworn problem under the load that the states come from; numbers : (n_field,) rows or points
-    """
+    balance : the unworn problem under the load that the states come from; numbers : (n_field,) rows or points"""
     loaded = [balance.with_load(s.load_factor) if isinstance(s, SolvedState) else balance for s in states]
     fields = [
         part.field(full_displacement(b, s.displacement, s.force, s.omega)) for b, s in zip(loaded, states, strict=True)

@@ -1,7 +1,5 @@
 """The motion that a scene gives to the ground behind a contact."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tribodyn.fem.interface import COMPONENTS
@@ -14,8 +12,7 @@ from tribodyn.workflows.scene.schema import MeshScene
 def ground_motion(scene: MeshScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
     """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
 
-    Raises  Refusal where a face has no contact or a harmonic is not kept
-    """
+    Raises  Refusal where a face has no contact or a harmonic is not kept"""
     if not scene.motion:
         return None
     i = part.interface

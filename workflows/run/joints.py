@@ -1,7 +1,5 @@
 """From the tables of a scene to its joints with their laws and springs, and to what excites the model."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -65,8 +63,7 @@ def joint_stiffness(scene: Scene, contact: ContactTable) -> tuple[float, float]:
 def elastic(scene: Scene, face: str) -> tuple[float, float]:
     """Young's modulus [Pa] and Poisson's ratio of the body that a face belongs to.
 
-    Raises  ValueError where it is orthotropic or of several materials
-    """
+    Raises  ValueError where it is orthotropic or of several materials"""
     assert isinstance(scene, MeshScene)
     solid = None if scene.material is None else scene_assembly.make_material(scene.material)
     if scene.material is None:

@@ -1,7 +1,5 @@
 """From a scene with matrices to its reduced model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +22,7 @@ Take = Callable[[Variable], np.ndarray]
 
 def read(files: MatrixFiles, folder: Path) -> ForeignMatrices:
     """The matrices of a scene; names of files begin in `folder`. raises Refusal for files that cannot be used."""
-    named = {key: folder / name for key in ("mass", "stiffness", "damping", "mapping") if (name := getattr(files, key))}
+    named = {key: folder / name for key, name in files if isinstance(name, str) and key != "file"}
     path = None if files.file is None else folder / files.file
     return read_matrices(path, **named, names=files.names, scale=files.scale)
 
@@ -40,8 +38,7 @@ def lines(matrices: ForeignMatrices) -> list[str]:
 def make(scene: MatrixScene, folder: Path) -> ReducedModel:
     """The model of a scene, with the damping of its files.
 
-    Raises  Refusal: files, variables or DOFs that cannot be used
-    """
+    Raises  Refusal: files, variables or DOFs that cannot be used"""
     matrices, contact, response = read(scene.model, folder), scene.contact, scene.response
 
     def take(variable: Variable) -> np.ndarray:

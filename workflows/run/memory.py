@@ -1,7 +1,5 @@
 """The memory that this process has needed at most."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -13,17 +13,10 @@ import numpy as np
 
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import NoMeanRotation
-from tribodyn.fem.elements import coordinates
 from tribodyn.fem.load_vectors import (
-    BodyForce,
-    Centrifugal,
-    Heating,
     Load,
-    Moment,
     NodalForce,
-    Pressure,
     Sum,
-    temperature_at,
 )
 from tribodyn.fem.part import Part, unbalanced_load
 from tribodyn.hbm.balance import HarmonicBalance
@@ -43,6 +36,7 @@ from tribodyn.workflows.run import (
     part_reduction,
     response_curve,
     scene_assembly,
+    scene_loads,
     settings,
 )
 from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
@@ -51,11 +45,9 @@ from tribodyn.workflows.run.ground_motion import ground_motion
 from tribodyn.workflows.run.preloaded_state import preloaded
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.sanity_checks import check_size
-from tribodyn.workflows.scene.load_tables import StaticLoad
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, Scene
-from tribodyn.workflows.scene.solution_tables import HIGHEST
+from tribodyn.workflows.scene.schema import MeshScene, Scene, has_wheel
 
 if TYPE_CHECKING:
     from tribodyn.fem.bolts import Bolt
@@ -67,8 +59,7 @@ Kind = TypeVar("Kind", bound=ReducedModel)
 class Model:
     """The nonlinear problem of a scene with what it was made from; no part where it came as matrices.
 
-    choice : of harmonics, where the scene leaves it
-    """
+    choice : of harmonics, where the scene leaves it"""
 
     part: Part | None
     reduced: ReducedModel
@@ -79,8 +70,7 @@ class Model:
 def build(file: SceneFile, progress: Progress, chosen: tuple[int, ...] = ()) -> Model:
     """The nonlinear problem of a scene, stage by stage.
 
-    chosen : harmonics of an earlier run, for a scene that leaves the choice
-    """
+    chosen : harmonics of an earlier run, for a scene that leaves the choice"""
     scene = file.scene
     part = None
     if isinstance(scene, MatrixScene):
@@ -95,7 +85,7 @@ def build(file: SceneFile, progress: Progress, chosen: tuple[int, ...] = ()) -> 
             reduced = part_reduction.with_prescribed(file.mesh_scene, part, damped(scene, plain))
     with progress.stage("choice of harmonics" if scene.harmonics.automatic and not chosen else "contact compliance"):
         try:
-            model = make_model(scene, part, reduced, chosen)
+            model = make_model(scene, part, reduced, chosen, file.folder)
         except UnbalancedLoad as unbalanced:
             if part is None or reduced.is_wave or not isinstance(reduced.origin, ReductionBasis):
                 raise
@@ -142,20 +132,17 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
 
 def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path | None = None) -> Part:
     """Mass, stiffness, loads, outputs and contact of the mesh, held as the scene asks; its files are in `folder`."""
-    if scene.wheel is not None:
+    if has_wheel(scene):
         from tribodyn.workflows.run import sector  # only wheels need it
 
-        sector.check_sectors(scene)
-    material = part_reduction.material(scene, mesh)
-    loads = {
-        name: make_load(load, mesh, material, folder or Path())
-        for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()
-    }
-    if scene.wheel is not None and scene.wheel.speed:
-        loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
+        sector.check_faces(scene, mesh, node_sets)
     joined = scene_assembly.connections(scene, folder or Path())
-    loads |= joined.loads
+    loads = scene_loads.loads_on(scene, mesh, folder or Path(), joined)
     rods = shanks(scene, mesh, node_sets)
+    if rods:
+        from tribodyn.workflows.run.bolt_tightening import heated  # only bolts need it
+
+        loads = {name: heated(load, rods, mesh, node_sets) for name, load in loads.items()}
     loads |= rods
     turning = None if scene.geometry is None else scene.geometry.no_turning
     if joined.masses and scene.wheel is not None and scene.wheel.speed:
@@ -163,10 +150,15 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
             f"wheel.speed: there is a lumped mass at {joined.masses[0].at}, whose spin softening and Coriolis forces "
             "are not modelled: make it a body, or leave wheel.speed out"
         )
+    stress_rows = dict[str, Load]()
+    if scene.stress_places or scene.gauges:
+        from tribodyn.workflows.run import stresses  # only scenes that ask for stress need it
+
+        stress_rows = stresses.outputs(scene, mesh)
     return fem_part.build(
         mesh,
         node_sets,
-        material,
+        part_reduction.material(scene, mesh),
         joined.clamps,
         part_reduction.contacts(scene),
         loads,
@@ -174,6 +166,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
             name: NodalForce(output.group, output.direction)
             for name, output in {settings.OUTPUT: scene.response, **scene.response.others}.items()
         }
+        | stress_rows
         | {f"{part_reduction.BOLTS}{name}": Sum(((rod, -1.0),)) for name, rod in rods.items()},
         springs=[*joined.springs, *(rod for rod in rods.values() if rod.stiffness)],
         held_motions=[] if turning is None else [NoMeanRotation(turning)],
@@ -207,29 +200,9 @@ def with_surfaces(file: SceneFile, part: Part) -> tuple[Part, tuple[str, ...]]:
     return replace(part, interface=replace(part.interface, gap=part.interface.gap + gap)), repairs
 
 
-def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
-    """The load of a table of a scene, per unit of its amplitude; its file is in `folder`."""
-    if load.pressure is not None:
-        return Pressure(load.group)
-    if load.direction is None:
-        values = None if load.field is None else temperature_at(folder / load.field, coordinates(mesh))
-        return Heating(material, load.bodies, values)
-    if load.acceleration is not None or load.base_acceleration is not None:
-        sign = 1.0 if load.acceleration is not None else -1.0
-        return BodyForce([sign * c for c in load.direction])
-    if load.speed is not None:
-        return Centrifugal(load.direction, load.point)
-    if load.moment is not None:
-        return Moment(load.group, load.direction)
-    force = NodalForce(load.group, load.direction, load.shared)
-    if load.opposite is not None:  # a couple
-        return Sum(((force, 1.0), (replace(force, nodes=load.opposite), -1.0)))
-    return force
-
-
 def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, not damped, nothing prescribed; of a wheel one wave."""
-    if scene.wheel is not None:
+    if has_wheel(scene):
         from tribodyn.workflows.run import sector  # only wheels need it
 
         return sector.along_speed(scene, part) if scene.wheel.along_speed else sector.at_one_speed(scene, part)
@@ -250,8 +223,7 @@ def damped(scene: Scene, reduced: Kind) -> Kind:
 class Problem:
     """What the balance of a scene is made of, whatever harmonics it keeps.
 
-    bolts : force that each bolt is tightened by [N]
-    """
+    bolts : force that each bolt is tightened by [N]"""
 
     scene: Scene
     part: Part | None
@@ -269,7 +241,9 @@ class Problem:
             bolts_alone = bolt_tightening.BoltsAlone(
                 reduced, joints_of_scene, scene.harmonics.samples, settings.highest_frequency(scene)
             )
-            bolts = bolt_tightening.tightened(scene, shanks(scene, part.mesh, part.node_sets), bolts_alone)
+            rods = shanks(scene, part.mesh, part.node_sets)
+            remarks = bolt_tightening.leaning(scene, rods, part.mesh, part.node_sets)
+            bolts = bolt_tightening.tightened(scene, rods, bolts_alone, remarks)
         return cls(scene, part, reduced, joints_of_scene, bolts)
 
     def balance(self, harmonics: tuple[int, ...], previous: HarmonicBalance | None = None) -> HarmonicBalance:
@@ -292,24 +266,40 @@ class Problem:
         bare = HarmonicBalance.of(self.reduced, self.joints, basis, excitation, top, previous=previous)
         return preloaded(scene, self.reduced, bare) if scene.preload.frictionless else bare
 
-    def choice(self) -> HarmonicChoice:
-        """Harmonics chosen at the resonance, beginning with those of the loads."""
-        settings_of_harmonics = self.scene.harmonics
-        options = ChoiceOptions(
-            highest=settings_of_harmonics.highest or HIGHEST, newton=settings.newton_options(self.scene)
+    def choice(self) -> HarmonicChoice | None:
+        """Harmonics chosen at the resonance and where the contact wears; None without a contact or a solution there."""
+        scene, harmonics = self.scene, self.scene.harmonics
+        options = ChoiceOptions(highest=harmonics.top, newton=settings.newton_options(scene))
+        if harmonics.tolerance is not None:
+            options = replace(options, tolerance=harmonics.tolerance)
+        if not self.reduced.interface.n_pair:
+            return None
+        duties = () if scene.wear is None else scene.wear.duties
+        worn_at = [2 * np.pi * duty.at.frequency for duty in duties if duty.at.frequency is not None]
+        return response_curve.choose_harmonics(
+            self.balance(self.loaded_harmonics), settings.peak_of(scene), options, worn_at
         )
-        if settings_of_harmonics.tolerance is not None:
-            options = replace(options, tolerance=settings_of_harmonics.tolerance)
-        first = self.balance(tuple(sorted({0, 1} | {load.harmonic for load in self.scene.loads.harmonic.values()})))
-        return response_curve.choose_harmonics(first, settings.peak_of(self.scene), options)
+
+    @property
+    def loaded_harmonics(self) -> tuple[int, ...]:
+        """Those of the loads, with 0 and 1."""
+        return tuple(sorted({0, 1} | {load.harmonic for load in self.scene.loads.harmonic.values()}))
 
 
-def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: tuple[int, ...] = ()) -> Model:
-    """The harmonic balance of the scene; harmonics are those it names, else `chosen`, else chosen here."""
+def make_model(
+    scene: Scene, part: Part | None, reduced: ReducedModel, chosen: tuple[int, ...] = (), folder: Path | None = None
+) -> Model:
+    """The harmonic balance of the scene; harmonics are those it names, else `chosen`, else chosen here.
+
+    folder : of the files of the scene"""
     problem = Problem.of(scene, part, reduced)
     choice = problem.choice() if scene.harmonics.automatic and not chosen else None
-    harmonics = scene.harmonics.kept or chosen or (choice.harmonics if choice else ())
+    harmonics = scene.harmonics.kept or chosen or (choice.harmonics if choice else problem.loaded_harmonics)
     final = model_cache.cached_balance(lambda previous: problem.balance(harmonics, previous))
+    if part is not None and isinstance(scene, MeshScene) and scene.stress is not None:
+        from tribodyn.workflows.run import stresses  # only scenes that ask for stress need it
+
+        final = stresses.with_stress(scene, part, final, folder or Path())
     if part is not None and isinstance(scene, MeshScene) and scene.other_speeds:
         final = replace(final, at_speed=_at_speeds(scene, part, harmonics))
     return Model(part, final.model, final, choice)

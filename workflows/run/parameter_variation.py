@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -24,17 +23,17 @@ from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.sensitivity import Sensitivity
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import joints, matrix_model, modelling, part_reduction, scene_assembly
+from tribodyn.workflows.run.part_changes import difference, moves_evenly, scaled
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.contact import ContactTable
+from tribodyn.workflows.run.scene_numbers import is_loaded_alike, is_seen_by_contact, moves_nodes, with_value
 from tribodyn.workflows.scene.load_tables import SpringTable, Vibrates
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
-from tribodyn.workflows.scene.part_tables import Meshed, SolidMaterial
+from tribodyn.workflows.scene.part_tables import Meshed
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.scene_values import SceneValue, smooth_numbers
-from tribodyn.workflows.scene.schema import MeshScene, Scene
+from tribodyn.workflows.scene.scene_values import smooth_numbers
+from tribodyn.workflows.scene.schema import MeshScene, Scene, has_wheel
 from tribodyn.workflows.scene.stages import CONTACT, REDUCTION
 from tribodyn.workflows.scene.structure_tables import BoltTable
-from tribodyn.workflows.scene.wheel_tables import WheelTable
 
 if TYPE_CHECKING:
     from tribodyn.reduction.sector_reduction import ReducedSector
@@ -47,21 +46,6 @@ REBUILT = 1e-3  # the same of a number of the structure, whose rounding is large
 # rotations elsewhere; a model is reduced anew by 4 times as much. By 10 times a harmonic beside its own resonance takes
 # the coarse blade's preload by its span 4e-5 off; by 1, rounding the coarse rig's amplitude by its height
 NODES = 1e-4
-
-
-def keys(scene: Scene) -> dict[str, float]:
-    """The numbers of a scene that its response depends on smoothly, without lengths and angles of its parts, by key."""
-    return {key: number.value for key, number in smooth_numbers(scene).items() if not moves_nodes(number)}
-
-
-def geometry_keys(scene: Scene) -> dict[str, float]:
-    """The lengths and angles of the parts of a scene by their keys, SI units; zeros are left out."""
-    return {key: number.value for key, number in smooth_numbers(scene).items() if moves_nodes(number)}
-
-
-def moves_nodes(number: SceneValue) -> bool:
-    """Whether a number is a length or an angle of a part."""
-    return isinstance(number.table, Meshed)
 
 
 class ParameterVariation:
@@ -80,7 +64,7 @@ class ParameterVariation:
             plain = matrix_model.make(self.scene, file.folder)
             reduced = self._damped = modelling.damped(self.scene, plain)
         self.part, self.plain = part, plain
-        self.model = modelling.make_model(self.scene, part, reduced)
+        self.model = modelling.make_model(self.scene, part, reduced, folder=file.folder)
         self.base = BalanceInputs.of(self.model.balance)
         self.numbers = smooth_numbers(self.scene)
         self._directions: dict[str, SecondOrderSystem] = {}  # key -> what the reduced model moves by where it doubles
@@ -103,7 +87,7 @@ class ParameterVariation:
         if self._has_preload_steps or (needs_reduction and number.stage <= REDUCTION):
             far = self.inputs(key, value + 2 * step), self.inputs(key, value - 2 * step)
         touching = None
-        if (needs_reduction or linear) and not self._has_preload_steps and _is_seen_by_contact(number):
+        if (needs_reduction or linear) and not self._has_preload_steps and is_seen_by_contact(number):
             small = self.step * abs(value)
             up, down = (replace(self.base, contact=self._contact(key, value + side)) for side in (small, -small))
             touching = ParameterChange(key, small, up, down)
@@ -112,9 +96,9 @@ class ParameterVariation:
     def _changed(self, key: str, value: float) -> SceneFile:
         """The scene with another value of a key; read again only where other numbers follow from it."""
         number = self.numbers[key]
-        if isinstance(number.table, (WheelTable, Meshed)) or number.name == "temperature":
+        if number.path[0] == "wheel" or isinstance(number.table, Meshed) or number.name == "temperature":
             return self.file.changed(f"{key}={value!r}")
-        return replace(self.file, scene=_with(self.scene, number.path, value))
+        return replace(self.file, scene=with_value(self.scene, number.path, value))
 
     def _contact(self, key: str, value: float) -> JointSet:
         """The contact with another value of a key."""
@@ -128,7 +112,7 @@ class ParameterVariation:
         file = self._changed(key, value)
         scene, part, plain, number = file.scene, self.part, self.plain, self.numbers[key]
         if self._scales(key):
-            plain = _scaled(plain, number.name, value / number.value)
+            plain = scaled(plain, number.name, value / number.value)
         elif self.is_linear(key):
             plain = self._changed_model(key, value)
             if part is not None and moves_nodes(number):
@@ -139,7 +123,7 @@ class ParameterVariation:
         if plain is not self.plain or self._damps(scene, plain):
             ratio, reference = value / number.value, self._damped
             if self._scales(key) and scene.damping.modal is not None and scene.damping.state != "stuck":
-                ratio, reference = ratio**0.5, _scaled(reference, number.name, ratio)  # as all frequencies go
+                ratio, reference = ratio**0.5, scaled(reference, number.name, ratio)  # as all frequencies go
             if key == "damping.modal" or reference is not self._damped:  # the same modes
                 reduced = reference.with_damping(lambda system, _: ratio * np.asarray(system.damping))
             else:
@@ -153,9 +137,7 @@ class ParameterVariation:
         base = None
         if isinstance(scene, MeshScene) and part is not None:
             base = modelling.ground_motion(scene, part, self.model.balance.basis)
-        contact = (
-            self._contact(key, value) if _is_seen_by_contact(number) and plain is self.plain else self.base.contact
-        )
+        contact = self._contact(key, value) if is_seen_by_contact(number) and plain is self.plain else self.base.contact
         loads = self.base.excitation if number.stage is CONTACT else joints.excite(scene, base)
         return BalanceInputs(reduced, contact, loads, self.base.memory, same_coordinates=self.is_linear(key))
 
@@ -231,7 +213,7 @@ class ParameterVariation:
         number, following, scene = self.numbers[key], self._sensitivity, self.file.mesh_scene
         share = value / number.value - 1
         assert following is not None
-        if key == "material.young" and _loaded_alike(scene):  # all stiffness but that of the springs
+        if key == "material.young" and is_loaded_alike(scene):  # all stiffness but that of the springs
             springs = [spring for spring, number in self.numbers.items() if isinstance(number.table, SpringTable)]
             changed_model = following.model_at([(self._direction(spring), -share) for spring in springs], share)
         else:
@@ -240,7 +222,7 @@ class ParameterVariation:
         if moves_nodes(number):
             moved_parts = self.nodes_moved(key)[int(share < 0)]
             rows = [(self._coordinates(moved_parts)[1].B, self._base_coordinates[1].B)]
-            if wave is not None:
+            if wave is not None and has_wheel(scene):
                 from tribodyn.workflows.run import sector
 
                 rows.append(
@@ -271,7 +253,7 @@ class ParameterVariation:
             assert self._sensitivity is not None
             if moves_nodes(self.numbers[key]):
                 up, down = (self._coordinates(moved_part)[0] for moved_part in self.nodes_moved(key))
-                change = _between(up, down, 1 / (2 * NODES))
+                change = difference(up, down, 1 / (2 * NODES))
             else:
                 change = self._doubled(key)
                 change = change if self._base_coordinates[2] is None else change.projected(self._base_coordinates[2])
@@ -285,8 +267,7 @@ class ParameterVariation:
     def nodes_moved(self, key: str) -> tuple[Part, Part]:
         """The part with its nodes moved to a length or angle above and below.
 
-        Raises  NoDerivative where the mesh or what meets at the contact is another one there, or none
-        """
+        Raises  NoDerivative where the mesh or what meets at the contact is another one there, or none"""
         if key not in self._moved_parts:
             assert self.part is not None
             value, reach = self.numbers[key].value, self._reach(key)
@@ -294,7 +275,7 @@ class ParameterVariation:
                 up, down = (self._part(self._changed(key, value * side)) for side in (1 + reach, 1 - reach))
             except Refusal as reason:
                 raise NoDerivative(f"beside {key} = {value:g}: {reason}") from None
-            if not _smooth(up, self.part, down):
+            if not moves_evenly(up, self.part, down):
                 raise NoDerivative(f"beside {key} = {value:g} its mesh or what meets at the contact is another one")
             self._moved_parts[key] = up, down
         return self._moved_parts[key]
@@ -325,14 +306,14 @@ class ParameterVariation:
             change = part.restricted(spring.matrix(part.mesh, part.node_sets))
             still = {kind: {name: 0 * v for name, v in getattr(own, kind).items()} for kind in ("loads", "outputs")}
             return SecondOrderSystem(csr_matrix(own.mass.shape), change, None, **still)
-        return _between(self._part(self._changed(key, 2 * number.value)).system, own)
+        return difference(self._part(self._changed(key, 2 * number.value)).system, own)
 
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""
         scene = self.scene
         if key not in ("material.young", "material.density") or not isinstance(scene, MeshScene) or self._is_spinning:
             return False
-        return _loaded_alike(scene) and not (scene.springs and key == "material.young")
+        return is_loaded_alike(scene) and not (scene.springs and key == "material.young")
 
     def _damps(self, scene: Scene, plain: ReducedModel) -> bool:
         """Whether the damping of a scene is another one."""
@@ -340,57 +321,3 @@ class ParameterVariation:
             return True
         springs_before, springs = (joints.contact_stiffness(scene_, plain) for scene_ in (self.scene, scene))
         return scene.damping.given and scene.damping.state == "stuck" and not np.array_equal(springs_before, springs)
-
-
-def _with(table: Any, path: Sequence[str], value: float) -> Any:
-    """A table of a scene with another value at the end of a path of keys."""
-    name, *inner_path = path
-    inside = isinstance(table, dict)
-    changed = _with(table[name] if inside else getattr(table, name), inner_path, value) if inner_path else value
-    return {**table, name: changed} if inside else table.model_copy(update={name: changed})
-
-
-def _between(upper: SecondOrderSystem, lower: SecondOrderSystem, factor: float = 1.0) -> SecondOrderSystem:
-    """The difference of two systems times a factor."""
-    moves = {
-        kind: {name: factor * (v - getattr(lower, kind)[name]) for name, v in getattr(upper, kind).items()}
-        for kind in ("loads", "outputs")
-    }
-    return SecondOrderSystem(
-        factor * (upper.mass - lower.mass), factor * (upper.stiffness - lower.stiffness), None, **moves
-    )
-
-
-def _smooth(up: Part, base: Part, down: Part) -> bool:
-    """Whether two parts to both sides of one have its mesh and its pairs, and all of it moves evenly."""
-    if any(part.points.shape != base.points.shape or not np.array_equal(part.free, base.free) for part in (up, down)):
-        return False
-    names, parts = ("area", "gap", "frames", "B"), (up, base, down)
-    shapes = ((part.points, *(getattr(part.interface, name) for name in names)) for part in parts)
-    for above, middle, lower in zip(*shapes, strict=True):
-        if not above.shape == middle.shape == lower.shape:
-            return False
-        if abs(above + lower - 2 * middle).max() > 0.1 * abs(above - lower).max() + 1e-12 * abs(middle).max():
-            return False
-    return True
-
-
-def _is_seen_by_contact(number: SceneValue) -> bool:
-    """Whether the law of a contact may depend on a number."""
-    if number.name == "density":
-        return False
-    return isinstance(number.table, (ContactTable, SolidMaterial, Meshed)) or number.name == "temperature"
-
-
-def _loaded_alike(scene: MeshScene) -> bool:
-    """Whether no load depends on what the part is made of, and no lumped mass or bolt stands beside it."""
-    if scene.masses or scene.bolts:
-        return False
-    loads = {**scene.loads.static, **scene.loads.harmonic}.values()
-    return all(load.value is not None or load.pressure is not None for load in loads)
-
-
-def _scaled(plain: ReducedModel, name: str, factor: float) -> ReducedModel:
-    """The model with its stiffness or mass times a factor, as Young's modulus or the density of all of it make it."""
-    matrix = {"young": "stiffness", "density": "mass"}[name]
-    return plain.with_systems(lambda system, B: replace(system, **{matrix: factor * getattr(system, matrix)}))

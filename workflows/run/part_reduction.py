@@ -1,7 +1,5 @@
 """From a part to its reduced model: masters, relative coordinates, prescribed displacement."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -71,15 +69,20 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     if options.relative:
         relative_dofs = body_1_dofs(interface).ravel()
         system, interface, back = relative(system, interface)
-    # a shank sees the whole static shape of the faces that it pulls at, which no few modes have
+    # a shank stays physical: a joint that slides is told by it
     shanks = [np.flatnonzero(row) for name, row in part.system.outputs.items() if name.startswith(BOLTS)]
     extra = np.concatenate([[], *prescribed_dofs, *shanks]).astype(int)
-    solver_option: dict[str, Any] = {} if options.solver == "direct" else {"solver": options.solver}
+    held_rows = part.held_rows if back is None else part.held_rows @ back
+    solver = None if options.solver == "direct" else options.solver
+
+    def reduced_on(masters: np.ndarray) -> ReducedModel:
+        return craig_bampton(system, interface, options.modes, options.cutoff, masters, solver, held_rows)
+
     try:
-        reduced = craig_bampton(system, interface, options.modes, options.cutoff, extra, **solver_option)
+        reduced = reduced_on(extra)
     except SingularStiffness:  # a body that no support, joint or load has a master on
         extra = np.union1d(extra, anchors(part, relative_dofs))
-        reduced = craig_bampton(system, interface, options.modes, options.cutoff, extra, **solver_option)
+        reduced = reduced_on(extra)
     if options.interface_modes is not None:
         masters = reduced.origin.masters
         touched = np.flatnonzero(np.abs(np.asarray(reduced.interface.B)[:, : len(masters)]).max(axis=0))
@@ -98,8 +101,7 @@ def without_masters(scene: MeshScene, contact_dofs: int, has_constraints: bool) 
     """Whether the contact DOFs are no coordinates: as the scene asks, else where there are thousands of them.
 
     held : whether motions are held besides the clamps
-    Raises  Refusal where the scene asks for it and has what needs them
-    """
+    Raises  Refusal where the scene asks for it and has what needs them"""
     method = scene.reduction.method
     needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": has_constraints}
     needed = [name for name, is_present in needs.items() if is_present]
@@ -113,8 +115,7 @@ def without_masters(scene: MeshScene, contact_dofs: int, has_constraints: bool) 
 def anchors(part: Part, relative_dofs: np.ndarray) -> np.ndarray:
     """Free DOFs of three nodes far apart on every body, without which it cannot move rigidly.
 
-    relative_dofs : free DOFs that have become relative displacements, which hold nothing
-    """
+    relative_dofs : free DOFs that have become relative displacements, which hold nothing"""
     dofs = []
     moves = np.full(3 * len(part.points), -1)
     moves[part.free] = np.arange(len(part.free))

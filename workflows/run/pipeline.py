@@ -1,7 +1,5 @@
 """From a scene to a result: model, response, what the scene asks about it, wear, worn responses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +11,7 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.stability.branch_stability import stability_along
 from tribodyn.hbm.threads import limited
-from tribodyn.workflows.result import store
+from tribodyn.output_file import set_aside
 from tribodyn.workflows.result.model_facts import Stage
 from tribodyn.workflows.result.number_format import measured
 from tribodyn.workflows.result.result import Result
@@ -43,20 +41,22 @@ def run(
     earlier : an unfinished result of the same scene to resume
     row_only : without linear references and notes of progress, which the row of a study does not hold
     judge : measures the errors of the finished result, where the scene wants them
-    Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
-    """
+    Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept"""
     scene, clock = file.scene, Clock(earlier)
     settings.check_names(scene)
     keep = Keeper(None if folder is None else folder / "result.h5", clock)
     with alone_in(folder), limited(scene.solver.threads):
         model = modelling.build(file, progress, () if earlier is None else earlier.harmonics)
         for line in () if progress.silent else sanity_checks.lines(file, model):
-            (progress.say if line.startswith("warning: ") else progress.detail)(line)
-        result = earlier or described(file, model.part, model.balance, model.choice)
+            progress.detail(line)
+        notes = () if row_only else tuple(sanity_checks.remarks(file, model))
+        for note in notes:
+            progress.say(f"warning: {note}")
+        result = earlier or described(file, model.part, model.balance, model.choice, notes)
         if scene.wears:
             # raises before anything long is begun
             settings.depth_scale(scene, result.patch.free_deflection, result.patch.area)
-        previous = None if earlier or keep.path is None else store.set_aside(keep.path)
+        previous = None if earlier or keep.path is None else set_aside(keep.path)
         if previous:
             progress.say(f"the result that was here is now {previous}")
         keep(result)
@@ -69,12 +69,12 @@ def run(
                     start, stop = (2 * np.pi * f for f in scene.response.references or scene.response.range)
                     linear = references.linear_references(model.balance, settings.OUTPUT, start, stop)
             result = keep(replace(result, response=frf, references=linear, stage=Stage.RESPONSE))
-        branch = result.response
-        check_branch(branch)
-        if scene.wears and branch is not None and (peak := branch.peak(settings.OUTPUT)) is not None:
-            at, height = branch.omega[peak] / (2 * np.pi), float(branch.amplitude(settings.OUTPUT)[peak])
-            progress.say(f"response: peak {measured(at, 'Hz', 4)}, {measured(height, 'm')}, unworn")
-        result = keep(judged(scene, model.balance, result, progress))
+        if (branch := result.response) is not None:
+            check_branch(branch)
+            if scene.wears and (peak := branch.peak(settings.OUTPUT)) is not None:
+                at, height = branch.omega[peak] / (2 * np.pi), float(branch.amplitude(settings.OUTPUT)[peak])
+                progress.say(f"response: peak {measured(at, 'Hz', 4)}, {measured(height, 'm')}, unworn")
+            result = keep(judged(scene, model.balance, result, branch, progress))
         if scene.wears:
             with progress.track("wear") as advance:
                 result = wear_run.wear_down(file, model, result, keep, advance)
@@ -94,10 +94,8 @@ def run(
         return keep(replace(result, stage=Stage.COMPLETE))
 
 
-def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Progress) -> Result:
+def judged(scene: Scene, balance: HarmonicBalance, result: Result, frf: Branch, progress: Progress) -> Result:
     """The result with what the scene asks about its response curve and is not there yet."""
-    frf = result.response
-    assert frf is not None
     if scene.response.stability and result.stability is None:
         with progress.track("stability") as advance:
             marks = stability_along(balance, frf, on_point=lambda done, of: advance(done / of, ""))
@@ -109,7 +107,7 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Pro
     return result
 
 
-def check_branch(branch: Branch | None) -> None:
+def check_branch(branch: Branch) -> None:
     """Raise SolveFailed where a response curve did not come to its end."""
-    if branch is not None and (not branch.converged[-1] or branch.ended is BranchEnd.ENDED):
+    if not branch.converged[-1] or branch.ended is BranchEnd.ENDED:
         raise SolveFailed(f"the frequency response {branch.end}")

@@ -1,25 +1,25 @@
 """What a scene will model and what it will cost, from its mesh alone: nothing is assembled, factorised or solved.
 
-The costs are rules of thumb, good to a factor of about three: they distinguish seconds from hours.
-"""
-
-from __future__ import annotations
+The costs are rules of thumb, good to a factor of about three: they distinguish seconds from hours."""
 
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from math import prod
 from pathlib import Path
+from types import ModuleType
 from typing import Any, cast
 
 import numpy as np
 
 from tribodyn.fem.constraints import find_group, free_dofs
 from tribodyn.fem.couplings import Tie
+from tribodyn.geometry import parts
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear import wear_rule
 from tribodyn.hbm.wear.wear_rule import StepCost
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.relative import body_1_dofs
-from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import matrix_model, memory as memory_use, scene_assembly
 from tribodyn.workflows.run.modelling import make_mesh
 from tribodyn.workflows.run.part_reduction import components, contacts, without_masters
@@ -29,7 +29,6 @@ from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, Scene
 from tribodyn.workflows.scene.user_files import is_user_file
-from tribodyn.workflows.scene.wear import Wear
 
 
 @dataclass(frozen=True)
@@ -40,14 +39,15 @@ class Costs:
     dense : seconds for each cubed coordinate of the reduced model, all eigenvalue problems together
     solve : seconds of a balance solve for each squared contact coordinate and harmonic coefficient
     sparse : the same with residual flexibility, for each DOF and harmonic coefficient
-    harmonics : where a scene leaves the choice
-    """
+    largest : product of two numbers of elements of a part up to which its mesh is made, in some ten seconds
+    harmonics : where a scene leaves the choice"""
 
     factor: float = 2e-7
     back: float = 1.5e-7
     dense: float = 3e-9
     solve: float = 6e-8
     sparse: float = 1.7e-6
+    largest: float = 2e4
     harmonics: tuple[int, ...] = tuple(range(8))
 
 
@@ -58,8 +58,7 @@ COSTS = Costs()
 class Plan:
     """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it is not known, 0 without wear.
 
-    remarks : on faces that are glued or rub and lie apart
-    """
+    remarks : on faces that are glued or rub and lie apart"""
 
     elements: int
     nodes: int
@@ -85,7 +84,7 @@ class Plan:
             ("mesh", f"{self.elements} elements, {self.nodes} nodes" if self.elements else "none: matrices"),
             ("full model", f"{self.full_dofs} DOFs"),
             ("contact", f"{self.contact_pairs} node pairs"),
-            ("reduced model", f"{self.model_dofs} DOFs"),
+            ("reduced model", f"{self.model_dofs} DOFs without static shapes"),
             ("unknowns", f"{self.unknowns} in each balance solve"),
             ("memory", f"about {self.memory / 1e9:.1g} GB"),
             ("reduction", f"about {_time(self.reduction_seconds)}"),
@@ -101,33 +100,21 @@ def plan(file: SceneFile) -> Plan:
     """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
     scene = file.scene
     check_names(scene, own_files=False)
-    elements = nodes = groups = 0
-    sparse = False
-    remarks: list[str] = []
+    groups, sparse = 0, False
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
-        pairs, masters = reduced.interface.n_pair, reduced.system.n_dof
-        full = reduced.n_full
+        sizes = ModelSizes(0, 0, reduced.n_full, reduced.interface.n_pair, reduced.system.n_dof)
         modes: int | None = 0
     else:
         built = file.mesh_scene
-        tables = built.bodies.values() if built.geometry is None else [built.geometry]
-        for part in (table.part for table in tables):
-            if part is not None and is_user_file(part):
-                raise Refusal(f'part = "{part}" is a file of your own, which a plan does not run: run the scene')
-        with tempfile.TemporaryDirectory() as folder:
-            mesh, node_sets = make_mesh(file, Path(folder))
-        elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
-        joined = scene_assembly.connections(built, file.folder)
-        remarks = _openings(built, mesh, node_sets, joined)
-        free = free_dofs(3 * nodes, joined.clamps, node_sets)
-        full = len(free)
-        pairs, masters = _contact(built, mesh, node_sets, free)
+        largest = _largest_counts(file)
+        sizes = _extrapolated(file, largest) if largest > COSTS.largest else _measured(file)
         groups = int(built.geometry is not None and built.geometry.no_turning is not None)
         modes, cutoff = built.reduction.modes, built.reduction.cutoff
-        sparse = without_masters(built, pairs * len(components(scene)), groups > 0)
+        sparse = without_masters(built, sizes.pairs * len(components(scene)), groups > 0)
         if sparse:
-            masters = LIMITS.clusters * len(components(scene)) + 5
+            sizes = replace(sizes, masters=LIMITS.clusters * len(components(scene)) + 5)
+    full, pairs, masters = sizes.full, sizes.pairs, sizes.masters
     basis = HarmonicBasis(scene.harmonics.kept or COSTS.harmonics, scene.harmonics.samples)
     n_component = len(components(scene))
     contact = pairs * n_component
@@ -143,8 +130,8 @@ def plan(file: SceneFile) -> Plan:
     reduction = COSTS.factor * full**1.5 + COSTS.back * full * model + 4 * COSTS.dense * model**3
     steps, solves = _wear(scene)
     return Plan(
-        elements=elements,
-        nodes=nodes,
+        elements=sizes.elements,
+        nodes=sizes.nodes,
         full_dofs=full,
         contact_pairs=pairs,
         model_dofs=str(model) if modes is not None else f"{masters} and the modes up to {cutoff:g} Hz",
@@ -156,8 +143,70 @@ def plan(file: SceneFile) -> Plan:
         wear_solves=solves,
         solve_seconds=5e-3 + basis.n_coeff * (COSTS.sparse * full if sparse else COSTS.solve * contact**2),
         verdict=scene.verdict.enabled and scene.response.control == "force",
-        remarks=tuple(remarks),
+        remarks=sizes.remarks,
     )
+
+
+@dataclass(frozen=True)
+class ModelSizes:
+    """Numbers of elements, nodes, free DOFs, contact pairs and masters of a scene; remarks : see `Plan`"""
+
+    elements: int
+    nodes: int
+    full: int
+    pairs: int
+    masters: int
+    remarks: tuple[str, ...] = ()
+
+
+def _measured(file: SceneFile) -> ModelSizes:
+    """Sizes of a scene by its mesh."""
+    scene = file.mesh_scene
+    with tempfile.TemporaryDirectory() as folder:
+        mesh, node_sets = make_mesh(file, Path(folder))
+    joined = scene_assembly.connections(scene, file.folder)
+    remarks = _openings(scene, mesh, node_sets, joined)
+    free = free_dofs(3 * mesh.doflocs.shape[1], joined.clamps, node_sets)
+    pairs, masters = _contact(scene, mesh, node_sets, free)
+    return ModelSizes(int(mesh.nelements), mesh.doflocs.shape[1], len(free), pairs, masters, tuple(remarks))
+
+
+def _parts(file: SceneFile) -> Iterator[tuple[str, ModuleType, Any]]:
+    """Key of the table, part and its parameters, of every body that is made from a part."""
+    scene = file.mesh_scene
+    tables = {f"bodies.{name}": table for name, table in scene.bodies.items()}
+    for key, table in (tables if scene.geometry is None else {"geometry": scene.geometry}).items():
+        if table.part_name is not None:
+            part = parts.load(table.part_name)
+            yield key, part, part.Parameters(**table.parameters)
+
+
+def _largest_counts(file: SceneFile) -> float:
+    """Largest product of two numbers of elements or nodes that a part takes, about that of columns of its mesh."""
+    products = [prod(sorted(getattr(of, n) for n in getattr(part, "MESH", ()))[-2:]) for _, part, of in _parts(file)]
+    return float(max(products, default=0))
+
+
+def _extrapolated(file: SceneFile, largest: float) -> ModelSizes:
+    """Sizes of a scene whose mesh is too large to be made for a plan, by a power law through those of two coarser ones.
+
+    largest : see `_largest_counts`"""
+    ratios = np.sqrt(COSTS.largest / largest) / np.array([2.0, 4.0])
+    coarse = []
+    for ratio in ratios:
+        texts = [
+            f"{key}.{name}={count}"
+            for key, part, of in _parts(file)
+            for name, count in parts.rescaled(part, of, ratio).items()
+            if getattr(of, name) > 2 / ratio  # small counts, such as those through a thickness, stay
+        ]
+        sizes = _measured(file.changed(*texts))
+        coarse.append([getattr(sizes, item.name) for item in fields(ModelSizes)[:-1]])
+    first, second = np.maximum(np.array(coarse, float), 1.0)
+    power = np.log(first / second) / np.log(ratios[0] / ratios[1])
+    remark = "the mesh is too large to be made for a plan: its sizes are extrapolated from two coarser ones"
+    elements, nodes, full, pairs, masters = np.rint(first * ratios[0] ** -power).astype(int).tolist()
+    return ModelSizes(elements, nodes, full, pairs, masters, (remark,))
 
 
 def _openings(
@@ -165,18 +214,17 @@ def _openings(
 ) -> list[str]:
     """Remarks on tied faces, and on those in contact whose gap is that of the geometry, that lie apart.
 
-    Raises  ValueError for constraints that the run refuses
-    """
+    Raises  ValueError for constraints that the run refuses"""
     pairs = [
         Tie(f"contacts.{name}", face, contact.opposite, contact.reach)
         for name, contact in scene.joints.items()
         for face in contact.groups
         if contact.opposite is not None and contact.gap is None and (scene.wheel is None or not contact.meets_next)
     ]
-    for one in joined.constraints:
-        one.build(mesh, node_sets)
-        if isinstance(one, Tie):
-            pairs.append(one)
+    for constraint in joined.constraints:
+        constraint.build(mesh, node_sets)
+        if isinstance(constraint, Tie):
+            pairs.append(constraint)
     remarks = []
     for pair in pairs:
         first, _, shared = pair.meeting(mesh)
@@ -215,7 +263,9 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
     """Wear steps and balance solves to expect."""
     if scene.wear is None or scene.wear.max_steps == 0:
         return 0, 0
-    step_limit, cost = scene.wear.max_steps, _step_cost(scene.wear)
+    step_limit, cost = scene.wear.max_steps, None
+    if not is_user_file(scene.wear.rule):  # a file beside the scene, which a plan does not run, states nothing
+        cost = cast("StepCost | None", wear_rule.load(scene.wear.rule_name).Rule.COST)
     share = scene.wear.accuracy_share
     likely = step_limit if share is None or cost is None else round(cost.steps * (share / cost.accuracy) ** cost.power)
     steps = min(step_limit, likely)
@@ -223,11 +273,6 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
     for place in (duty.at for duty in scene.wear.duties):
         solves += steps if place.peak is None else steps * (cost.at_peak if cost else 1) + scene.response.points
     return (None if share is None else steps), solves
-
-
-def _step_cost(wear: Wear) -> StepCost | None:
-    """What its rule states of its cost; a file beside the scene, which a plan does not run, states nothing."""
-    return None if is_user_file(wear.rule) else cast("StepCost | None", wear_rule.load(wear.rule_name).Rule.COST)
 
 
 def _time(seconds: float) -> str:

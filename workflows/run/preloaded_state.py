@@ -1,7 +1,5 @@
 """A balance that begins at its preloaded state, which it reaches without friction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 
@@ -18,8 +16,7 @@ from tribodyn.workflows.scene.schema import Scene
 def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> HarmonicBalance:
     """The balance resting in its preload, to which it has come without friction.
 
-    Joints whose springs follow from their own numbers have those of this state, and so has the damping of its modes.
-    """
+    Joints whose springs follow from their own numbers have those of this state, and so has the damping of its modes."""
     x = rest.displacement(balance, settings.newton_options(scene))
     resting = replace(balance, memory=rest.memory(balance, x), at_rest=x)
     tangent_springs = rest.tangents(resting, x)

@@ -1,7 +1,5 @@
 """Progress of a run for its user, with the time left on long work."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -13,6 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress as Bar, TaskProgressColumn, TextColumn
 
+from tribodyn.output_file import printable
 from tribodyn.refusal import Refusal
 
 Advance = Callable[..., None]  # called with the share of long work that is done, a note, and the point it has come to
@@ -74,13 +73,15 @@ class Progress:
                 last = now
                 wait *= 1 if self._details else 2
                 remaining = time_left(share, start, compiling)
-                line = f"{name}: {min(share, 1.0):.0%}{', ' if remaining else ''}{remaining}; {note}".rstrip("; ")
+                done = f"{share:.0%}" if share <= 1.0 else "longer than estimated"
+                line = f"{name}: {done}{', ' if remaining else ''}{remaining}; {note}".rstrip("; ")
                 (self.say if on_console else self._write)(line)
 
         return advance
 
     def say(self, text: str) -> None:
         """One line."""
+        text = printable(text)
         if self._console is not None:
             self._console.print(text, highlight=False, soft_wrap=True, markup=False)
         if self._log is not None:
@@ -102,10 +103,9 @@ class Progress:
 def time_left(share: float, start: float, compiling: float) -> str:
     """Seconds left when a share of the work is done, compiling apart, since it happens once.
 
-    start : of the work, as of time.perf_counter; compiling : seconds spent on it since then
-    """
+    start : of the work, as of time.perf_counter; compiling : seconds spent on it since then"""
     steady = max(time.perf_counter() - start - compiling, 0.0)
-    remaining = f"{steady * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""
+    remaining = f"{steady * (1 / share - 1):.0f} s left" if FORESEEN <= share <= 1.0 else ""
     compilation = f"(compiled for {compiling:.0f} s, once)" if compiling >= 1 else ""
     return " ".join(filter(None, [remaining, compilation]))
 
@@ -164,8 +164,7 @@ def console_progress(quiet: bool = False, log: Path | None = None, details: bool
     """Progress on standard output, none of it where quiet; standard error is kept for what goes wrong.
 
     details : with sizes and the seconds of each stage
-    log : file to add every line to; raises ValueError where it cannot be written
-    """
+    log : file to add every line to; raises ValueError where it cannot be written"""
     if log is not None:
         try:
             log.parent.mkdir(parents=True, exist_ok=True)

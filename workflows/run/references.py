@@ -1,7 +1,5 @@
 """Linear references of a nonlinear response: the contact absent, and the contact closed and stuck."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +7,8 @@ import scipy.linalg as sla
 
 from tribodyn.fem.factor import SINGULAR, softest_residual
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.harmonics import amplitude
+from tribodyn.hbm.linear.resonances import linear_resonances
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.result.result import References
 from tribodyn.workflows.scene.schema import MeshScene, Scene
@@ -22,8 +21,7 @@ class LinearOptions:
     points : frequencies of a curve; between : beside the resonances themselves, to find the largest amplitude
     speeds : of an operating line at which they are computed, linear between
     modes : that are summed; block : frequencies solved at once
-    rigid : of the square of the mean frequency, below which an eigenvalue is that of a motion as a rigid body
-    """
+    rigid : of the square of the mean frequency, below which an eigenvalue is that of a motion as a rigid body"""
 
     points: int = 401
     between: int = 41
@@ -49,7 +47,7 @@ def highest_linear(balance: HarmonicBalance, output: str, start: float, stop: fl
         speeds = [balance.model.at_frequency(float(omega)) for omega in np.linspace(start, stop, LINEAR.speeds)]
         return max(highest_linear(replace(balance, model=model_there), output, start, stop) for model_there in speeds)
     states = (None, balance.contact.stiffness)
-    resonances = np.concatenate([_resonances(balance, springs) for springs in states])
+    resonances = np.concatenate([linear_resonances(balance, springs, LINEAR.modes) for springs in states])
     if (resonances < np.sqrt(LINEAR.rigid) * (start + stop) / 2).any():
         return np.inf  # between free and stuck a part can have any resonance
     omega = np.unique(np.clip(np.concatenate([np.linspace(start, stop, LINEAR.between), resonances]), start, stop))
@@ -60,25 +58,10 @@ def delta_max(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
     """The depth that wear steps are a share of: largest approach of the pairs without their contact [m].
 
     approach : (n_pair,) as `free_deflection`; area : (n_pair,) [m2]
-    Of a wheel: mean over the area of the displacement of one face, half the approach of two (Tamatam 2021, 4.3.1)
-    """
+    Of a wheel: mean over the area of the displacement of one face, half the approach of two (Tamatam 2021, 4.3.1)"""
     if isinstance(scene, MeshScene) and scene.wheel is not None:
         return float(0.5 * approach @ area / area.sum())
     return float(approach.max())
-
-
-def _resonances(balance: HarmonicBalance, springs: np.ndarray | None) -> np.ndarray:
-    """Frequencies at which a loaded harmonic meets a mode, free or stuck [rad/s]."""
-    resonances = [np.zeros(0)]
-    orders = {order for order, _ in balance.excitation.loads}
-    if balance.excitation.base is not None:
-        orders.update(balance.basis.harmonics)
-    for h in sorted(orders - {0}):
-        system, B = balance.model.at_harmonic(h)
-        stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
-        lam = sla.eigvalsh(stiffness, system.mass, subset_by_index=(0, min(LINEAR.modes, system.n_dof) - 1))
-        resonances.append(np.sqrt(np.maximum(lam, 0.0)) / h)
-    return np.concatenate(resonances)
 
 
 def _on_line(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
@@ -98,8 +81,7 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
     """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that.
 
     Of a part that can move rigidly the remainder is that of K + s M, s the mean (h w)^2, which has none.
-    springs : (n_pair, n_component) stuck contact [N/m], through which a moving body 2 pulls, or None for no contact
-    """
+    springs : (n_pair, n_component) stuck contact [N/m], through which a moving body 2 pulls, or None for no contact"""
     basis = balance.basis
     base = None if balance.excitation.base is None else basis.to_complex(balance.excitation.base)
     amplitudes = np.zeros((len(omega), len(basis.harmonics)), complex)
@@ -129,15 +111,14 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
             dynamic = np.diag(lam) + s**2 * np.eye(len(lam)) + s * damping
             modal_amplitudes = np.linalg.solve(dynamic, modal[:, None])[..., 0]
             amplitudes[start : start + LINEAR.block, position] = remainder + modal_amplitudes @ (row @ phi)
-    return amplitude(basis.to_real(amplitudes))
+    return amplitude(basis.to_real(amplitudes), basis.harmonics)
 
 
 def free_deflection(balance: HarmonicBalance) -> np.ndarray:
     """Normal approach of the pairs (n_pair,) under the static loads with body 2 absent [m].
 
     Of a cyclic part: approach of neighbours. It is nan where the part is unconstrained without its contact, or where
-    the normal direction or harmonic 0 is not modelled.
-    """
+    the normal direction or harmonic 0 is not modelled."""
     interface = balance.model.interface
     missing = np.full(interface.n_pair, np.nan)
     if "n" not in interface.components or not balance.basis.has_static:

@@ -1,8 +1,6 @@
 """The response curve of a scene and what it may ask about it: harmonics, stability, bounds of residual shear, wear."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +8,16 @@ import numpy as np
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import control, curve_peaks, harmonic_choice, residual_shear
-from tribodyn.hbm.continuation.branch import Branch, BranchPoint, amplitude
+from tribodyn.hbm.continuation.branch import Branch, BranchPoint
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
+from tribodyn.hbm.continuation.peak_refinement import NoPeak
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
+from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.refusal import SolverFailure
 from tribodyn.workflows.result.number_format import measured, sparkline
 from tribodyn.workflows.result.result import Result, ShearBounds, WornResponses
 from tribodyn.workflows.run import settings
@@ -30,8 +31,7 @@ def follow_response(
     """The response curve of the unworn contact by the scene's continuation method, its highest peaks solved.
 
     folds : whether a curve on which a sweep jumps is followed round its folds, where its highest peak may be; not where
-        the scene itself names a method that sweeps, such as `method = "natural"`
-    """
+        the scene itself names a method that sweeps, such as `method = "natural"`"""
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
     request = scene.response
@@ -46,7 +46,7 @@ def follow_response(
 
     def report(done: int, total: int, point: BranchPoint) -> None:
         assert advance is not None
-        seen.append((point.omega, float(amplitude(point.response[at]))))
+        seen.append((point.omega, float(amplitude(point.response[at], balance.basis.harmonics))))
         hertz, height = measured(point.omega / (2 * np.pi), "Hz", 4), measured(seen[-1][1], "m")
         advance(done / total, f"{sparkline(*np.array(seen).T)} {hertz}, {height}", seen[-1])
 
@@ -76,26 +76,32 @@ def choose_harmonics(
     balance: HarmonicBalance,
     peak: AtPeak,
     options: harmonic_choice.ChoiceOptions,
+    worn_at: Sequence[float] = (),
     n_choices: int = 3,
     same_peak: float = 1e-3,
-) -> HarmonicChoice:
-    """Harmonics that make the response of every output right to the tolerance of the options at its resonance.
+) -> HarmonicChoice | None:
+    """Harmonics that make the response of every output right to the tolerance of the options where it matters.
 
-    The harmonics chosen move the resonance: it is searched again with them, and they are chosen anew there.
-    peak : where the resonance is searched, with the harmonics of the balance at first
-    most : times that harmonics are chosen; same : relative distance of two peaks that counts as none
-    Raises  harmonic_choice.NotSolved
-    """
-    before = 0.0
+    The harmonics chosen move the resonance: it is searched again with them, and they are chosen anew there. Without a
+    peak they are chosen at the ends of its range and in the middle.
+    peak : where the resonance is searched, with the harmonics of the balance at first; worn_at : other frequencies
+        [rad/s]; n_choices : times that harmonics are chosen; same_peak : relative distance that counts as none
+    Returns the last choice, None where no solution was found to choose by: the response says where and why"""
+    choice, previous = None, 0.0
     for _ in range(n_choices):
-        point = peak.solve(balance)
-        if not point.solution.converged:
-            raise harmonic_choice.NotSolved(f"harmonics cannot be chosen: no peak was found: {point.solution.outcome}")
-        omega = point.state.omega
-        if abs(omega - before) <= same_peak * omega:
+        try:
+            point = peak.solve(balance)
+            resonance = [point.state.omega] if point.solution.converged else []
+        except (NoPeak, SolverFailure):
+            resonance = []
+        frequencies = [*(resonance or np.linspace(peak.start, peak.stop, 3).tolist()), *worn_at]
+        if choice is not None and abs(frequencies[0] - previous) <= same_peak * frequencies[0]:
             break
-        choice = harmonic_choice.choose(balance, [omega], options)
-        balance, before = choice.balance, omega
+        try:
+            choice = harmonic_choice.choose(balance, frequencies, options)
+        except harmonic_choice.NotSolved:
+            break
+        balance, previous = choice.balance, frequencies[0]
     return choice
 
 
@@ -104,8 +110,7 @@ def shear_bounds(
 ) -> ShearBounds:
     """Range of amplitude and energy at every point of a curve, over the two extreme starts of the friction memory.
 
-    Raises  ValueError where the law has no friction memory or harmonic 0 is not kept
-    """
+    Raises  ValueError where the law has no friction memory or harmonic 0 is not kept"""
     n = len(branch.omega)
     low, high = np.full((2, n), np.nan), np.full((2, n), np.nan)
     stuck, failed = np.zeros(n), np.zeros(n, int)
@@ -132,8 +137,7 @@ def worn_responses(
 ) -> WornResponses:
     """Response curves of the contact as worn as at `count` rows, evenly spread over what is worn, the last included.
 
-    balance : of the unworn contact; follow : what makes a curve of a balance
-    """
+    balance : of the unworn contact; follow : what makes a curve of a balance"""
     assert result.wear is not None
     wear, patch = result.wear, result.patch
     volume = wear.depth @ patch.area

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,10 +10,10 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.sparse import issparse
 
-from tribodyn.fem.assembly import materials_of
+from tribodyn.fem.assembly import Body, materials_of
 from tribodyn.fem.elasticity import densities
 from tribodyn.fem.factor import SingularStiffness, factorise
-from tribodyn.fem.material import Material
+from tribodyn.fem.material import AnyMaterial
 from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
@@ -22,7 +22,9 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.result.summary import LARGEST_BEND
 from tribodyn.workflows.run import matrix_model, part_reduction, scene_assembly
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
+from tribodyn.workflows.scene.part_tables import SolidMaterial
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.scene_values import unusual_values, usual_range
 from tribodyn.workflows.scene.schema import MeshScene
 
 if TYPE_CHECKING:
@@ -33,22 +35,20 @@ if TYPE_CHECKING:
 class Usual:
     """What a structure usually is; what lies outside is mentioned, never refused.
 
-    size : of the whole [m]; density : from foams to the heaviest metals [kg/m3]; young : from rubber to diamond [Pa]
+    size : of the whole [m]
     bent : largest displacement over the size that a linear model describes
     rigid : of the largest squared frequency, below which the lowest one is rounding
-    modes : whose resonance is checked; line_error : of frequencies between the speeds of an operating line
-    """
+    modes : whose resonance is checked; line_error : of frequencies between the speeds of an operating line"""
 
     size: tuple[float, float] = (1e-4, 20.0)
-    density: tuple[float, float] = (50.0, 30_000.0)
-    young: tuple[float, float] = (1e6, 2e12)
     bent: float = LARGEST_BEND
-    rigid: float = 1e-12
+    rigid: float = 1e-10
     modes: int = 6
     line_error: float = 1e-4
 
 
 TYPICAL = Usual()
+ELASTIC = {"young": "E", "poisson": "nu", "density": "rho", "expansion": "expansion"}  # key -> of a `Material`
 LARGEST_OPENING = 0.005  # of the length of a face: an opening or overlap from which on a pair is remarked
 
 
@@ -62,11 +62,9 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
     scene = file.mesh_scene
     names = [body.name for body in part.mesh.bodies]
     material = part_reduction.material(scene, part.mesh)
-    found, plain, counts = [], {}, []
-    for name, (piece, scene_text) in zip(names, materials_of(part.mesh, material), strict=True):
-        found.append(facts(piece.mesh, densities(piece.mesh, scene_text)))
-        if isinstance(scene_text, Material):
-            plain[name or file.name] = scene_text
+    found, counts = [], []
+    for name, (piece, piece_material) in zip(names, materials_of(part.mesh, material), strict=True):
+        found.append(facts(piece.mesh, densities(piece.mesh, piece_material)))
         kind = "hexahedra" if piece.mesh.t.shape[0] == 8 else "tetrahedra"
         counts.append(f"{name}: {piece.mesh.nelements} {kind}" if name else f"{piece.mesh.nelements} {kind}")
     size = np.max([one.high for one in found], axis=0) - np.min([one.low for one in found], axis=0)
@@ -80,20 +78,88 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
         if gap.size:
             yield f"gap of {name}: {1e6 * gap.min():.4g} to {1e6 * gap.max():.4g} um"
     yield from notes(file, part)
-    remarks = [*check_size(size, "scale the mesh to metres"), *check_materials(plain)]
+
+
+def remarks_on_part(file: SceneFile, part: Part) -> list[str]:
+    """What of a scene and its part is to be doubted before it is reduced, a sentence each."""
+    scene = file.mesh_scene
+    doubts = [*unusual_values(scene), *check_size(np.ptp(part.points, axis=0), "scale the mesh to metres")]
+    doubts += [*check_decks(file, part), *check_places(scene), *check_heat(scene, part)]
+    if scene.bolts:
+        from tribodyn.workflows.run import bolt_tightening  # only bolts need it
+
+        shanks = bolt_tightening.rods(scene, part.mesh, part.node_sets)
+        doubts += bolt_tightening.leaning(scene, shanks, part.mesh, part.node_sets)
+    return doubts
+
+
+def remarks(file: SceneFile, model: Model) -> list[str]:
+    """The same with what its model shows; a result keeps them as its notes."""
+    part = model.part
+    if part is None:
+        return unusual_values(file.scene)
+    scene, doubts = file.mesh_scene, remarks_on_part(file, part)
+    size = np.ptp(part.points, axis=0)
     if model.reduced.has_one_system:
         reduced = model.reduced
-        remarks += check_deflection(
+        doubts += check_deflection(
             scene, reduced.system, lambda q: part.largest(reduced.reconstruct(q)), float(np.linalg.norm(size))
         )
-    remarks += check_speed(scene, model.reduced.accuracy().get("line_error"))
+    doubts += check_speed(scene, model.reduced.accuracy().get("line_error"))
     if model.reduced.at_harmonic(1)[0].damping is None:
-        remarks.append("there is no damping but that of friction: give [damping]")
+        doubts.append("there is no damping but that of friction: give [damping]")
     if _unpressed(model.balance, 2 * np.pi * max(scene.response.range)):
-        remarks.append(
+        doubts.append(
             "nothing presses the contact together at rest, so that it rubs by chance: give [loads.static.NAME]"
         )
-    yield from (f"warning: {remark}" for remark in remarks)
+    return doubts
+
+
+def check_decks(file: SceneFile, part: Part) -> list[str]:
+    """Remarks on the materials and places of bodies that decks bring, which stand in no table of the scene."""
+    scene = file.mesh_scene
+    if not scene.decks:
+        return []
+    bodies = [body for body in part.mesh.bodies if body.name not in scene.bodies]
+    heats = [f"loads.static.{name}" for name, load in scene.loads.static.items() if load.kind == "temperature"]
+    tables = [
+        f"{' and '.join(cards)} of material '{name}' of decks.{deck} at the initial temperature of the deck, which "
+        f"{heats[0]} changes: give [materials.{name}] at the temperature that is meant"
+        for deck, carried in (scene_assembly.carried_decks(scene, file.folder) if heats else {}).items()
+        for name, cards in carried.tabulated.items()
+    ]
+    return [*check_materials(bodies), *scene_assembly.overlaps(part.mesh.bodies), *tables]
+
+
+def check_heat(scene: MeshScene, part: Part) -> list[str]:
+    """Remarks on bodies and shanks that a static load heats and that do not expand."""
+    heats = [load for load in scene.loads.static.values() if load.kind == "temperature"]
+    heated = [body for body in part.mesh.bodies if any(not load.bodies or body.name in load.bodies for load in heats)]
+    materials: dict[str, Any] = {f"body '{body.name}'": of for body in heated for of in materials_in(body)}
+    tables = {f"bolts.{name}": scene.materials.get(bolt.material or "") for name, bolt in scene.bolts.items()}
+    materials |= {name: of for name, of in tables.items() if heats and of is not None}
+    rigid = [name for name, of in materials.items() if not np.any(of.expansion)]
+    return [f"{' and '.join(rigid)} is heated and does not expand: give its material an expansion"] if rigid else []
+
+
+def check_modes(frequencies: Sequence[float]) -> list[str]:
+    """A remark on natural frequencies [Hz] that are zero though the structure is held."""
+    count = sum(frequency == 0.0 for frequency in frequencies)
+    if not count:
+        return []
+    return [f"{count} of the modes are at 0 Hz: without contact nothing holds the bodies; hold or join them"]
+
+
+def check_places(scene: MeshScene) -> list[str]:
+    """Remarks on places of wear that the response does not reach."""
+    if scene.response.frequency is None:
+        return []
+    low, high = scene.response.frequency
+    return [
+        f"wear is taken at {duty.at.frequency:g} Hz, outside response.frequency, {low:g} to {high:g} Hz: extend it"
+        for duty in (scene.wear.duties if scene.wear is not None and scene.wears else ())
+        if duty.at.frequency is not None and not low <= duty.at.frequency <= high
+    ]
 
 
 def _unpressed(balance: HarmonicBalance, omega: float) -> bool:
@@ -139,23 +205,22 @@ def check_size(size: np.ndarray, cure: str) -> list[str]:
     return []
 
 
-def check_materials(materials: Mapping[str, Material]) -> list[str]:
-    """Remarks on materials, body -> material, whose numbers are not usual."""
-    remarks = []
-    for name, material in materials.items():
-        if not TYPICAL.density[0] <= material.rho <= TYPICAL.density[1]:
-            unit = "g/cm3" if 0.1 < material.rho < TYPICAL.density[0] else "another unit"
-            remarks.append(
-                f"the density of {name} is {material.rho:.4g} kg/m3, as a value in {unit} without its unit would be: "
-                'write it with its unit, such as "7.86 g/cm3"'
-            )
-        if not TYPICAL.young[0] <= material.E <= TYPICAL.young[1]:
-            unit = "GPa" if material.E < 2e3 else "MPa" if TYPICAL.young[0] > material.E else "another unit"
-            remarks.append(
-                f"Young's modulus of {name} is {material.E:.4g} Pa, as a value in {unit} without its unit would be: "
-                'write it with its unit, such as "210 GPa"'
-            )
-    return remarks
+def materials_in(body: Body) -> list[AnyMaterial]:
+    """The materials that a body is made of."""
+    return [*body.material.values()] if isinstance(body.material, Mapping) else [body.material]
+
+
+def check_materials(bodies: Iterable[Body]) -> list[str]:
+    """Remarks on numbers of the materials of bodies that are outside the usual ranges of a scene's [materials]."""
+    remarks = [
+        remark
+        for body in bodies
+        for material in materials_in(body)
+        for key, attribute in ELASTIC.items()
+        if (usual := usual_range(SolidMaterial.model_fields[key])) is not None
+        for remark in usual.remarks(f"{key} of body '{body.name}'", getattr(material, attribute, None))
+    ]
+    return list(dict.fromkeys(remarks))
 
 
 def check_speed(scene: MeshScene, line_error: float | None) -> list[str]:
@@ -193,8 +258,7 @@ def check_deflection(
 
     Static loads by their static deflection; harmonic ones by the resonances in the range of the response, with the
     modal damping of the scene. A structure that contact alone holds is not checked.
-    system : full or reduced, without contact; largest : of its coordinates -> largest displacement [m]; size : [m]
-    """
+    system : full or reduced, without contact; largest : of its coordinates -> largest displacement [m]; size : [m]"""
     displacement: dict[str, tuple[float, str]] = {}
     try:
         solve = _solver(system.stiffness)

@@ -1,8 +1,6 @@
 """From the bodies of a scene to one assembly: meshes, places, materials, and what joins and holds them."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
 from pathlib import Path
@@ -46,10 +44,8 @@ def _read(table: Meshed, folder: Path, path: Path, sizes: cad.Sizes | None = Non
 def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
     """All bodies of a scene in place, with the points of its couplings; files are read in `folder`, kept in `scratch`.
 
-    Raises  ValueError, naming the body, for a mesh that cannot be read or a volume it lacks
-    """
-    if scene.geometry is not None:
-        assert scene.material is not None
+    Raises  ValueError, naming the body, for a mesh that cannot be read or a volume it lacks"""
+    if scene.geometry is not None and scene.material is not None:
         mesh, node_sets, notes = _read(scene.geometry, folder, scratch / "mesh.msh")
         mesh, node_sets = subdivision.subdivide(mesh, node_sets, scene.geometry.halved)
         bodies = [Body("", mesh, node_sets, make_material(scene.material), notes)]
@@ -62,7 +58,8 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
                 bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), remarks))
             except Refusal as trouble:
                 raise Refusal(f"bodies.{name}: {trouble}") from None
-        _refuse_overlap(bodies)
+        for sentence in overlaps(bodies):
+            raise Refusal(f"bodies.{sentence}")
     brought = carried_decks(scene, folder)
     bodies += [body for deck in brought.values() for body in deck.bodies]
     points = {name: list(place) for deck in brought.values() for name, place in deck.points.items()}
@@ -74,16 +71,19 @@ def assembly(scene: MeshScene, folder: Path, scratch: Path) -> Assembly:
     return Assembly(bodies, points) if points else structure
 
 
-def _refuse_overlap(bodies: Sequence[Body]) -> None:
-    """Raise ValueError where a body of a scene lies in another one."""
+def overlaps(bodies: Sequence[Body]) -> Iterator[str]:
+    """A sentence on each body that lies in another one."""
+    overlapping: set[frozenset[str]] = set()
     for body, other in permutations(bodies, 2):
-        overlap_at = overlap(body.mesh, other.mesh)
-        if overlap_at is not None:
-            share, (x, y, z) = overlap_at
-            raise Refusal(
-                f"bodies.{body.name} overlaps bodies.{other.name}: {share:.0%} of its elements lie in it, about "
-                f"({x:.4g}, {y:.4g}, {z:.4g}) m: move one of them, or correct its unit"
-            )
+        pair = frozenset((body.name, other.name))
+        if pair in overlapping or (overlap_at := overlap(body.mesh, other.mesh)) is None:
+            continue
+        overlapping.add(pair)
+        share, (x, y, z) = overlap_at
+        yield (
+            f"{body.name} overlaps {other.name}: {share:.0%} of its elements lie in it, about "
+            f"({x:.4g}, {y:.4g}, {z:.4g}) m: move one of them, or correct its unit"
+        )
 
 
 def carried_decks(scene: MeshScene, folder: Path) -> dict[str, decks.CarriedDeck]:
@@ -109,8 +109,7 @@ def _placed_mesh(table: structure_tables.BodyTable, folder: Path, path: Path) ->
 def _sizes(table: structure_tables.BodyTable) -> cad.Sizes | None:
     """Sizes of elements in the unit of a CAD file, of which only the body's own solid is meshed; None for others.
 
-    Raises  ValueError where sizes are asked of a file that is a mesh already
-    """
+    Raises  ValueError where sizes are asked of a file that is a mesh already"""
     if table.mesh is None:
         return None
     if Path(table.mesh).suffix.lower() not in cad.ENDINGS:
@@ -137,8 +136,8 @@ def make_material(table: SolidMaterial) -> AnyMaterial:
         return Orthotropic(table.young, table.poisson, table.shear, table.density, axes, along)
     assert isinstance(table.poisson, float)
     assert isinstance(table.expansion, float)
-    reduced = table.elements == "linear_reduced"
-    return Material(table.young, table.poisson, table.density, table.expansion, reduced)
+    form = table.elements if table.elements == "linear_reduced" else ""
+    return Material(table.young, table.poisson, table.density, table.expansion, form)
 
 
 def _middle(structure: Assembly, table: structure_tables.CouplingTable) -> list[float]:

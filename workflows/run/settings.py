@@ -1,7 +1,5 @@
 """What a scene asks of the solver: frequency range, continuation and Newton options, places, mission, wear step."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from typing import Any
 
@@ -27,8 +25,7 @@ OUTPUT = "response"
 def check_names(scene: Scene, own_files: bool = True) -> None:
     """Raise ValueError where a law or a method of a scene does not fit it, before anything is built.
 
-    own_files : run files beside the scene for it, which a plan must not do
-    """
+    own_files : run files beside the scene for it, which a plan must not do"""
     for contact in scene.joints.values():
         if own_files or not is_user_file(contact.law):
             contact_law.require_components(contact.law_name, contact.components)
@@ -73,10 +70,8 @@ def peak_of(scene: Scene) -> AtPeak:
 def mission(scene: Scene, highest: float = np.inf) -> tuple[Duty, ...]:
     """Where the cycles that wear are taken: the scene's one place, or the duties of its mission.
 
-    highest : amplitude of the largest linear response, see `AtPeak` [m]
-    """
-    assert scene.wear is not None
-    return tuple(Duty(site_of(scene, duty.at, highest), duty.share, duty.load) for duty in scene.wear.duties)
+    highest : amplitude of the largest linear response, see `AtPeak` [m]"""
+    return tuple(Duty(site_of(scene, duty.at, highest), duty.share, duty.load) for duty in scene.wear_table.duties)
 
 
 def site_of(scene: Scene, place: Place, highest: float = np.inf) -> AtFrequency | AtPeak | AtPeakRatio:
@@ -92,10 +87,8 @@ def depth_scale(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
     """Depth that errors of wear are measured by and steps are a share of, delta_max [m]; nan where none is needed.
 
     approach : (n_pair,) by which the static loads press the faces into each other without contact [m]; area : [m2]
-    Raises  Refusal where delta_max is needed and the scene has none
-    """
-    assert scene.wear is not None
-    if not scene.wear.needs_depth_scale:
+    Raises  Refusal where delta_max is needed and the scene has none"""
+    if scene.wear_table.accuracy_share is None:  # its steps do not depend on delta_max
         return float("nan")
     delta_max = references.delta_max(scene, approach, area)
     if not (np.isfinite(delta_max) and delta_max > 0):

@@ -1,7 +1,5 @@
 """The wear of a run: from the unworn problem until contact is lost, every step kept as soon as it is done."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
@@ -36,8 +34,7 @@ KEEPING = 0.01  # share of the time that goes into writing steps: a kill loses a
 def wear_down(file: SceneFile, model: Model, result: Result, keep: Keeper, advance: Advance) -> Result:
     """Wear until contact is lost; steps are kept as they are done, as far as that takes little of the time."""
     scene = file.scene
-    assert scene.wear is not None
-    patch, wear = result.patch, scene.wear
+    patch, wear = result.patch, scene.wear_table
     rows = rows_to_resume(result.wear)
     to_wear = float(patch.area @ patch.free_deflection)
 
@@ -88,10 +85,8 @@ def worn_out(
 ) -> WearHistory:
     """Wear by the scene's rule until a share `left` of the preload is left; nothing is stored.
 
-    start : peak that its duties there begin at, as `Duty.start` has it
-    """
-    wear, balance = file.scene.wear, model.balance
-    assert wear is not None
+    start : peak that its duties there begin at, as `Duty.start` has it"""
+    wear, balance = file.scene.wear_table, model.balance
     problem = _start(wear_problem(file.scene, file.folder, balance, left, wear.end_at == "at_rest"), start)
     scale = settings.depth_scale(file.scene, references.free_deflection(balance), problem.area)
     return evolve(rule_of(file.scene, problem, scale, with_growth=False), wear.max_steps)
@@ -102,16 +97,15 @@ def wear_problem(
 ) -> WearProblem:
     """What a scene wears, by its law and mission; folder : of the scene.
 
-    lost_below : share of the first preload at which the run ends, of that at rest where `at_rest`
-    """
-    assert scene.wear is not None
-    of_all = JointWear.of(scene.wear.law_name, **scene.wear.numbers)
+    lost_below : share of the first preload at which the run ends, of that at rest where `at_rest`"""
+    table = scene.wear_table
+    of_all = JointWear.of(table.law_name, **table.numbers)
     own = {name: c.wear for name, c in scene.joints.items() if isinstance(c, NamedContact) and c.wear is not None}
-    by_name = {name: JointWear.of(table.law_name, **table.numbers) for name, table in own.items()}
+    by_name = {name: JointWear.of(t.law_name, **t.numbers) for name, t in own.items()}
     wear = dict.fromkeys(scene.joints, of_all) | by_name if own else of_all
     area = balance.model.interface.area
     vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
-    any_joint = scene.wear.lost_of == "any"
+    any_joint = table.lost_of == "any"
     return WearProblem(balance, _mission(scene, balance), wear, area, vibrating, resting, any_joint)
 
 
@@ -139,7 +133,6 @@ def law_numbers(scene: Scene) -> dict[str, tuple[float, str, tuple[str, ...], st
 
 def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
     """The duties of a scene, those at another speed of the wheel with the problem there."""
-    assert scene.wear is not None
 
     def highest(balance_at_speed: HarmonicBalance) -> float:
         return references.highest_linear(balance_at_speed, settings.OUTPUT, *settings.response_range(scene))
@@ -148,7 +141,7 @@ def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
     if not balance.at_speed:
         return duties
     mission = []
-    for duty, table in zip(duties, scene.wear.duties, strict=True):
+    for duty, table in zip(duties, scene.wear_table.duties, strict=True):
         balance_at_speed = None if table.speed is None else balance.at_speed.get(table.speed)
         if balance_at_speed is not None:
             site = settings.site_of(scene, table.at, highest(balance_at_speed))
@@ -159,11 +152,10 @@ def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
 
 def rule_of(scene: Scene, problem: WearProblem, scale: float, with_growth: bool = True) -> WearRule:
     """The wear rule of a scene, at work on a problem; scale : of `settings.depth_scale` [m]."""
-    assert scene.wear is not None
-    return wear_rule.build(scene.wear.rule_name, problem, rule_settings(scene, scale, with_growth))
+    return wear_rule.build(scene.wear_table.rule_name, problem, rule_settings(scene, scale, with_growth))
 
 
 def rule_settings(scene: Scene, scale: float, with_growth: bool = True) -> RuleSettings:
     """What the wear rule of a scene is built from; scale : delta_max [m], nan where unknown."""
-    assert scene.wear is not None
-    return RuleSettings(scene.wear.rule_numbers(scale), scale, scene.wear.motion, with_growth)
+    wear = scene.wear_table
+    return RuleSettings(wear.rule_numbers(scale), scale, wear.motion, with_growth)

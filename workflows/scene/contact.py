@@ -12,7 +12,8 @@ from pydantic import ConfigDict, Field, StrictBool, StrictInt, ValidationInfo, f
 from tribodyn import declarations
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table, quantity
+from tribodyn.text_file import text_of
+from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table, TemperatureChange
 from tribodyn.workflows.scene.stages import CONTACT, PART, SMOOTH, SceneStage
 from tribodyn.workflows.scene.user_files import LawTable, folder_of, is_user_file, user_file
 
@@ -20,26 +21,22 @@ from tribodyn.workflows.scene.user_files import LawTable, folder_of, is_user_fil
 def rows_of(path: Path) -> list[list[float]]:
     """The rows of a file of comma-separated numbers."""
     try:
-        rows: list[list[float]] = np.loadtxt(path, delimiter=",", ndmin=2).tolist()
+        rows: list[list[float]] = np.loadtxt(text_of(path).splitlines(), delimiter=",", ndmin=2).tolist()
     except ValueError as error:
         raise Refusal(f"'{path.name}' is no table of comma-separated numbers ({error})") from None
     return rows
-
-
-Change = Annotated[float, quantity("K")]
 
 
 class ByTemperature(Table, stage=CONTACT):
     """Numbers of a contact at several changes of temperature, linear between them; refused beyond their ends.
 
     Numbers of the contact's law, such as its coefficient of friction, are further keys, each with a value for every
-    temperature.
-    """
+    temperature."""
 
     model_config = ConfigDict(extra="allow")
     NUMBERS_STAGE: ClassVar[SceneStage] = CONTACT
 
-    temperature: Annotated[tuple[Change, ...], Field(min_length=1)]
+    temperature: Annotated[tuple[TemperatureChange, ...], Field(min_length=1)]
     """Changes of temperature, ascending, counted as those of the loads."""
     tangential_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
     """Tangential stiffness of the contact at each."""
@@ -177,7 +174,7 @@ class FaceContact(ContactTable, stage=PART):
     """Sides of a rectangular punch along t1 and t2, from which the contact stiffness is calculated instead of given
     numbers."""
 
-    temperature: Annotated[Change | None, CONTACT, SMOOTH] = None
+    temperature: Annotated[TemperatureChange | None, CONTACT, SMOOTH] = None
     """Change of temperature of the contact, for `by_temperature`; by default the mean over its two bodies of what
     static loads heat them by."""
     by_temperature: ByTemperature | None = None

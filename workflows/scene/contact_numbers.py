@@ -13,8 +13,8 @@ from tribodyn import declarations
 from tribodyn.declarations import Role
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.contact import ByTemperature, Change, ContactTable, Surfaces
-from tribodyn.workflows.scene.fields import Table, unknown_key
+from tribodyn.workflows.scene.contact import ByTemperature, ContactTable, Surfaces
+from tribodyn.workflows.scene.fields import Table, TemperatureChange, unknown_key
 from tribodyn.workflows.scene.user_files import in_si, is_user_file
 
 if TYPE_CHECKING:  # most scenes name no faces and start sooner without
@@ -22,12 +22,12 @@ if TYPE_CHECKING:  # most scenes name no faces and start sooner without
 
 
 class _TemperatureKeys(Table):
-    temperature: Change | None = None
+    temperature: TemperatureChange | None = None
     by_temperature: ByTemperature
 
 
 class _HeatedLoad(Table):
-    temperature: Change
+    temperature: TemperatureChange
 
 
 def with_numbers_by_temperature(
@@ -37,8 +37,7 @@ def with_numbers_by_temperature(
 
     key : of the contact; static : the table of the static loads
     folder : of the scene, None for the scene of a result, whose numbers are in SI units
-    Raises  Refusal where its temperature is not known or a number is given twice
-    """
+    Raises  Refusal where its temperature is not known or a number is given twice"""
     table = {name: contact[name] for name in ("temperature", "by_temperature") if name in contact}
     if folder is not None and isinstance(table["by_temperature"], Mapping):
         table["by_temperature"] = _in_si(f"{key}.by_temperature", table["by_temperature"], contact, folder)
@@ -132,8 +131,7 @@ def needs_asperities(contact: Any) -> bool:
 def with_asperities(contact: Mapping[str, Any], surfaces: Surfaces, folder: Path) -> dict[str, Any]:
     """A contact as it stands in the file with the table and, where it has none, the radius of the measured faces.
 
-    Raises  Refusal where the faces have no asperities to count
-    """
+    Raises  Refusal where the faces have no asperities to count"""
     try:
         radius, table = _asperities(surfaces, folder)
     except (Refusal, OSError) as error:

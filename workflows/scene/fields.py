@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.stages import PART, SceneStage, stage_of
@@ -25,8 +25,7 @@ class Table(BaseModel):
     it from the source: to let pydantic do so costs every command half a second.
 
     Every field of a scene declares the stage that reads it first: `key: Annotated[Length, CONTACT]`. A class keyword,
-    `class Surfaces(Table, stage=CONTACT)`, marks all fields that declare none. Fields that hold tables need none.
-    """
+    `class Surfaces(Table, stage=CONTACT)`, marks all fields that declare none. Fields that hold tables need none."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
@@ -46,6 +45,11 @@ class Table(BaseModel):
     @property
     def numbers(self) -> dict[str, Any]:
         """The numbers that a law or a part declares as its own."""
+        return {}
+
+    @property
+    def usual_ranges(self) -> dict[str, UsualRange]:
+        """The usual range of each of these numbers that declares one."""
         return {}
 
     @model_validator(mode="before")
@@ -91,11 +95,34 @@ def quantity(unit: str) -> Quantity:
     return Quantity(in_unit, unit=unit)
 
 
+@dataclass(frozen=True)
+class UsualRange:
+    """Mark of a field whose numbers usually lie between low and high, in its unit: one outside is noted.
+
+    What cannot be at all is refused by the limits of the field itself."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+    def remarks(self, key: str, value: Any) -> list[str]:
+        """A sentence where a number, or an entry of a tuple of numbers, lies outside; key : what has the value."""
+        entries = value if isinstance(value, list | tuple) else [value]
+        outside = [entry for entry in entries if isinstance(entry, float) and not self.low <= entry <= self.high]
+        if not outside:
+            return []
+        unit = f" {self.unit}" if self.unit else ""
+        usual = f"{self.low:g} to {self.high:g}{unit}"
+        return [f"{key} = {outside[0]:.4g}{unit} is unusual ({usual}): check it and its unit"]
+
+
 Length = Annotated[float, quantity("m")]
-Force = Annotated[float, quantity("N")]
-Pressure = Annotated[float, quantity("Pa")]
+Force = Annotated[float, quantity("N"), UsualRange(-1e9, 1e9, "N")]
+Pressure = Annotated[float, quantity("Pa"), UsualRange(-1e10, 1e10, "Pa")]
 Stiffness = Annotated[float, quantity("N/m")]
-Frequency = Annotated[float, quantity("Hz")]
+Frequency = Annotated[float, quantity("Hz"), Field(lt=1e8), UsualRange(0.0, 1e6, "Hz")]
+TemperatureChange = Annotated[float, quantity("K"), UsualRange(-500.0, 2000.0, "K")]
+Acceleration = Annotated[float, quantity("m/s2"), UsualRange(-1e5, 1e5, "m/s2")]
 Angle = Annotated[float, quantity("rad")]
 Number = Annotated[float, quantity("")]
 

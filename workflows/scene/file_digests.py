@@ -1,7 +1,5 @@
 """What a result depends on beyond the words of its scene: contents of the files that are named, code that computes."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 from functools import cache

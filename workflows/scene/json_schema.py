@@ -1,7 +1,5 @@
 """The JSON schema of scenes, for editors that complete and check keys: made from the declarations that read a scene."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import sys
@@ -22,13 +20,14 @@ from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.solution_tables import PartResponse
 from tribodyn.workflows.scene.structure_tables import NamedContact
 from tribodyn.workflows.scene.user_files import LawTable
+from tribodyn.workflows.scene.wheel_scene import WheelScene
 
 OWN_FILE = r"\.py$"
 
 
 def json_schema() -> dict[str, Any]:
     """The schema of every kind of scene, draft 7: tables, keys, defaults, meanings, own numbers of parts and laws."""
-    kinds: Any = MeshScene | MatrixScene
+    kinds: Any = MeshScene | WheelScene | MatrixScene
     schema = TypeAdapter(kinds).json_schema(schema_generator=_Generator)
     return {"$schema": "http://json-schema.org/draft-07/schema#", "title": "tribodyn scene"} | _plain(schema)
 

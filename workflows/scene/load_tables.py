@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, Generic, Literal, TypeVar
 
+import numpy as np
 from pydantic import Field, StrictInt, model_validator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import (
+    Acceleration,
     Angle,
     Direction,
     Force,
@@ -17,6 +19,7 @@ from tribodyn.workflows.scene.fields import (
     Pressure,
     Stiffness,
     Table,
+    TemperatureChange,
     quantity,
 )
 from tribodyn.workflows.scene.stages import LOADS, PART, REDUCTION, SMOOTH
@@ -68,15 +71,16 @@ class StaticLoad(Table, stage=PART):
     """How a force is shared on a face: "area" by tributary area, "nodes" equally by its nodes."""
     moment: Annotated[float, quantity("N m"), LOADS, SMOOTH] | None = None
     """Moment about the direction, on the point of a coupling."""
-    acceleration: Annotated[float, quantity("m/s2"), LOADS, SMOOTH] | None = None
+    acceleration: Annotated[Acceleration, LOADS, SMOOTH] | None = None
     """Gravity or another acceleration field along the direction, on all mass."""
-    base_acceleration: Annotated[float, quantity("m/s2"), LOADS, SMOOTH] | None = None
+    base_acceleration: Annotated[Acceleration, LOADS, SMOOTH] | None = None
     """Acceleration of the ground along the direction; displacements are then those relative to the ground."""
     speed: Annotated[Frequency | None, LOADS, SMOOTH] = None
-    """Speed of rotation about an axis along the direction through `point`, whose centrifugal force acts."""
+    """Speed of rotation about an axis along the direction through `point`, of which the centrifugal force acts alone: a
+    [wheel] with its speed is stiffened by its stress too."""
     point: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
     """Point on the axis of rotation."""
-    temperature: Annotated[float, quantity("K"), LOADS, SMOOTH] | None = None
+    temperature: Annotated[TemperatureChange, LOADS, SMOOTH] | None = None
     """Change of temperature."""
     bodies: tuple[str, ...] = ()
     """Bodies that are heated; all by default."""
@@ -114,6 +118,15 @@ class StaticLoad(Table, stage=PART):
             return (2 * math.pi * self.speed) ** 2
         size: float | None = getattr(self, self.kind)
         return 1.0 if size is None else size
+
+    def fault_in_wheel(self, axis: tuple[float, float, float]) -> str:
+        """Why it cannot act on every sector of a wheel about an axis alike, with the cure; empty where it can."""
+        if self.speed is not None:
+            return "a wheel turns at wheel.speed, with stress stiffening, spin softening and Coriolis forces: give that"
+        is_field = self.acceleration is not None or self.base_acceleration is not None
+        if is_field and self.direction is not None and abs(np.dot(self.direction, axis)) < 1 - 1e-9:
+            return "an acceleration across wheel.axis would turn from sector to sector: give one along the axis"
+        return ""
 
 
 class Vibrates(Table, stage=LOADS):

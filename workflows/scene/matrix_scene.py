@@ -1,8 +1,7 @@
 """A scene whose model is matrices from a file: no geometry, no mesh; contacts, loads and responses are DOF lists.
 
 A DOF is a number from 0, or [node, component] where the file carries labels. What is long may stand in the file with
-the matrices (.npz, .mat): {variable = "name"} in place of a list.
-"""
+the matrices (.npz, .mat): {variable = "name"} in place of a list."""
 
 from __future__ import annotations
 

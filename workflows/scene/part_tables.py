@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr, StrictInt, ValidationInfo, model_valida
 from tribodyn.declarations import read
 from tribodyn.geometry import parts
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Direction, Number, Table, quantity, refuse_slips
+from tribodyn.workflows.scene.fields import Direction, Number, Table, UsualRange, quantity, refuse_slips
 from tribodyn.workflows.scene.stages import PART, SMOOTH
 from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers, optional_user_file, user_file
 
@@ -19,8 +19,7 @@ from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers
 class Meshed(Table, stage=PART):
     """A part of geometry/ or a mesh file, and the groups that are held fixed.
 
-    All other keys of the table are parameters of the part; those left out have the part's own defaults.
-    """
+    All other keys of the table are parameters of the part; those left out have the part's own defaults."""
 
     KEY: ClassVar[str] = "geometry."
     """What stands before its keys in a sentence."""
@@ -74,8 +73,7 @@ class Meshed(Table, stage=PART):
 class Geometry(Meshed, stage=PART):
     """A part of geometry/ or a mesh file, and the groups that are held fixed.
 
-    All other keys of the table are parameters of the part; those left out have the part's own defaults.
-    """
+    All other keys of the table are parameters of the part; those left out have the part's own defaults."""
 
     no_turning: Direction | None = None
     """Axis about which the part as a whole cannot turn."""
@@ -87,8 +85,7 @@ def part_parameters(
     """Parameters of a part in SI units: all of them, or those given to a file of one's own, which is not run here.
 
     given : key -> number or text with a unit; folder : of the scene; kind : of the table, which has general keys too
-    Raises  ValueError: no such part, unknown key, or a value that the part refuses
-    """
+    Raises  ValueError: no such part, unknown key, or a value that the part refuses"""
     general = [name for name in kind.model_fields if name != "parameters"]
     if is_user_file(part):
         if folder is None:
@@ -98,8 +95,10 @@ def part_parameters(
     return asdict(parts.load(part).Parameters(**values))
 
 
-Modulus = Annotated[float, quantity("Pa"), Field(gt=0)]
-Expansion = Annotated[float, quantity("1/K")]
+Modulus = Annotated[float, quantity("Pa"), Field(gt=0), UsualRange(1e9, 1.3e12, "Pa")]
+Expansion = Annotated[float, quantity("1/K"), UsualRange(-1e-5, 3e-4, "1/K")]
+Poisson = Annotated[Number, UsualRange(0.0, 0.5)]
+Density = Annotated[float, quantity("kg/m3"), Field(gt=0), UsualRange(100.0, 23_000.0, "kg/m3")]
 
 
 class SolidMaterial(Table, stage=PART):
@@ -107,12 +106,12 @@ class SolidMaterial(Table, stage=PART):
 
     young: Annotated[Modulus | tuple[Modulus, Modulus, Modulus], SMOOTH]
     """Young's modulus; three along the axes of an orthotropic material."""
-    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number] = 0.3
+    poisson: Annotated[Poisson, Field(gt=-1, lt=0.5)] | tuple[Poisson, Poisson, Poisson] = 0.3
     """Poisson's ratio; nu12, nu13, nu23 of an orthotropic material, the strain along the second axis when it is pulled
     along the first."""
     shear: tuple[Modulus, Modulus, Modulus] | None = None
     """Shear moduli G12, G13, G23 of an orthotropic material."""
-    density: Annotated[float, quantity("kg/m3"), Field(gt=0), SMOOTH]
+    density: Annotated[Density, SMOOTH]
     """Density."""
     axes: tuple[Direction, Direction] | None = None
     """First and second axis of an orthotropic material; x and y by default."""

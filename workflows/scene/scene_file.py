@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from tribodyn.refusal import Refusal
+from tribodyn.text_file import text_of
 from tribodyn.workflows.scene.fields import UnknownKey, unknown_key
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import MeshScene, Scene
@@ -35,8 +36,7 @@ class SceneFile:
     name : file name without its ending
     text : the TOML text as it stands in the file
     overrides : "section.key=value" texts in the order they were applied
-    folder : where relative file names of the scene begin
-    """
+    folder : where relative file names of the scene begin"""
 
     name: str
     text: str
@@ -84,8 +84,12 @@ def title(name: str) -> str:
 def find(name: str) -> Path:
     """File of a scene: one that comes with the program, or a path to a .toml file; raises SceneError."""
     path = _shipped().get(name, Path(name))
-    if path.is_file():
+    if path.is_file() and (path.suffix == ".toml" or not path.suffix):
         return path
+    if path.is_file():
+        from tribodyn.geometry.sources.foreign_file import ENDINGS  # not needed to read a scene
+
+        raise SceneError(f'"{name}" is no scene: scenes end in .toml; inspect and new open {", ".join(ENDINGS)}')
     if path.suffix == ".toml":
         raise SceneError(f'there is no scene file "{name}"')
     raise SceneError(f'there is no scene "{name}": the scenes are {", ".join(names())}, or give a path to a .toml file')
@@ -96,8 +100,7 @@ def read(name: str, overrides: Sequence[str] = ()) -> SceneFile:
 
     name : name of a scene that comes with the program, or path of a .toml file
     overrides : texts "section.key=value", the value as TOML or, failing that, as it stands
-    Raises  SceneError: one sentence that names the file, the key and what is expected
-    """
+    Raises  SceneError: one sentence that names the file, the key and what is expected"""
     path = find(name)
     return parse(_text(path, "scene"), path.name, overrides, path.resolve().parent)
 
@@ -109,8 +112,8 @@ def tables(path: Path, kind: str) -> dict[str, Any]:
 
 def _text(path: Path, kind: str) -> str:
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        return text_of(path)
+    except OSError as error:
         raise SceneError(f'the {kind} file "{path}" cannot be read as text ({error})') from None
 
 
@@ -133,8 +136,7 @@ def parse(text: str, label: str, overrides: Sequence[str] = (), folder: Path = C
 def checked(kind: type[Kind], data: dict[str, Any], label: str, folder: Path | None = None) -> Kind:
     """The data of a file as a table of a kind; raises SceneError that names the file `label` and the keys.
 
-    folder : of a scene, where the laws and parts of one's own that it names lie
-    """
+    folder : of a scene, where the laws and parts of one's own that it names lie"""
     try:
         return kind.model_validate(data, context=None if folder is None else {"folder": folder})
     except ValidationError as error:
@@ -144,8 +146,14 @@ def checked(kind: type[Kind], data: dict[str, Any], label: str, folder: Path | N
 
 
 def kind_of(data: dict[str, Any]) -> type[Scene]:
-    """A scene with a [model] is one of matrices, another one has a mesh."""
-    return MatrixScene if "model" in data else MeshScene
+    """A scene with a [model] is one of matrices, another one has a mesh, perhaps of one sector of a wheel."""
+    if "model" in data:
+        return MatrixScene
+    if isinstance(data, dict) and all(data.get(name) is None for name in ("wheel", "mistuning", "flow")):
+        return MeshScene
+    from tribodyn.workflows.scene.wheel_scene import WheelScene  # only wheels need it
+
+    return WheelScene
 
 
 def from_json(text: str) -> Scene:

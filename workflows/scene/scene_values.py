@@ -1,13 +1,13 @@
 """The values of a scene one by one, each with its key and the stage that reads it first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tribodyn.workflows.scene.fields import PARAMETERS, Table
-from tribodyn.workflows.scene.stages import RESUMABLE, SMOOTH, SOLVE, SceneStage, has_mark, stage_of
+from pydantic.fields import FieldInfo
+
+from tribodyn.workflows.scene.fields import PARAMETERS, Table, UsualRange
+from tribodyn.workflows.scene.stages import RESUMABLE, SMOOTH, SOLVE, SceneStage, marks_of, stage_of
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class SceneValue:
     table : that it stands in
     stage : that reads it first
     is_resumable, is_smooth : see `stages.Mark`
-    """
+    usual : range in which its numbers usually lie, None where its field declares none"""
 
     path: tuple[str, ...]
     value: Any
@@ -26,6 +26,7 @@ class SceneValue:
     stage: SceneStage
     is_resumable: bool = False
     is_smooth: bool = False
+    usual: UsualRange | None = None
 
     @property
     def key(self) -> str:
@@ -46,8 +47,9 @@ def scene_values(table: Table, path: tuple[str, ...] = ()) -> Iterator[SceneValu
         value, stage = getattr(table, name), stage_of(field)
         inner = list(_tables_inside(value, (*path, name)))
         if stage is not None and not inner:
-            marks = has_mark(field, RESUMABLE), has_mark(field, SMOOTH)
-            inner = [SceneValue((*path, name), value, table, stage, *marks)]
+            marks = marks_of(field)
+            smooth, usual = SMOOTH in marks, usual_range(field)
+            inner = [SceneValue((*path, name), value, table, stage, RESUMABLE in marks, smooth, usual)]
         yield from inner
     for name, number in (getattr(table, PARAMETERS, {}) | table.numbers).items():
         yield SceneValue((*path, name), number, table, table.NUMBERS_STAGE, is_smooth=isinstance(number, float))
@@ -77,3 +79,18 @@ def smooth_numbers(scene: Table) -> dict[str, SceneValue]:
         for entry in scene_values(scene)
         if entry.is_smooth and entry.stage <= SOLVE and isinstance(entry.value, float) and entry.value != 0.0
     }
+
+
+def usual_range(field: FieldInfo) -> UsualRange | None:
+    """The range in which the numbers of a field usually lie, the outermost of several, None where it declares none."""
+    return next((mark for mark in reversed(marks_of(field)) if isinstance(mark, UsualRange)), None)
+
+
+def unusual_values(table: Table) -> list[str]:
+    """A sentence on each number of a scene that lies outside its usual range."""
+    return [
+        remark
+        for entry in scene_values(table)
+        if (usual := entry.usual or entry.table.usual_ranges.get(entry.name)) is not None
+        for remark in usual.remarks(entry.key, entry.value)
+    ]

@@ -1,14 +1,14 @@
 """The scene: what one TOML file asks for, checked and in SI units.
 
 Every key of the file is a field below, or of a table in the modules beside this one; a key that is not there is an
-error. What a scene leaves out is not modelled.
-"""
+error. What a scene leaves out is not modelled."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from types import NoneType
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
@@ -30,7 +30,8 @@ from tribodyn.workflows.scene.solution_tables import (
     Solver,
     VerdictOptions,
 )
-from tribodyn.workflows.scene.stages import DRAW, LOADS, REDUCTION, SceneStage
+from tribodyn.workflows.scene.stages import DRAW, REDUCTION, SceneStage
+from tribodyn.workflows.scene.stress_tables import FatigueTable, GaugeTable, StressPlaceTable, StressTable
 from tribodyn.workflows.scene.structure_tables import (
     GROUND,
     BodyTable,
@@ -44,7 +45,12 @@ from tribodyn.workflows.scene.structure_tables import (
 )
 from tribodyn.workflows.scene.user_files import folder_of
 from tribodyn.workflows.scene.wear import Wear
-from tribodyn.workflows.scene.wheel_tables import FlowTable, Mistuning, WheelTable, operating_line
+
+if TYPE_CHECKING:
+    from tribodyn.workflows.scene.wheel_scene import WheelScene
+    from tribodyn.workflows.scene.wheel_tables import FlowTable, Mistuning, WheelTable
+else:  # a scene without a wheel has none of them: see WheelScene in wheel_scene
+    FlowTable = Mistuning = WheelTable = NoneType
 
 CENTRIFUGAL = "centrifugal"
 MODES = 20  # of a scene that says nothing of its reduction
@@ -100,9 +106,21 @@ class Scene(Table, ABC):
         return self
 
     @property
+    def wear_table(self) -> Wear:
+        """[wear], of a scene that has it."""
+        if self.wear is None:
+            raise RuntimeError("the scene has no [wear]")
+        return self.wear
+
+    @property
     def wears(self) -> bool:
         """Whether wear steps are asked for."""
         return self.wear is not None and self.wear.max_steps > 0
+
+
+def has_wheel(scene: MeshScene) -> TypeGuard[WheelScene]:
+    """Whether the part of a scene is one sector of a wheel."""
+    return scene.wheel is not None
 
 
 class MeshScene(Scene):
@@ -152,6 +170,12 @@ class MeshScene(Scene):
     """Lumped masses by name."""
     bolts: dict[str, BoltTable] = Field(default_factory=dict)
     """Bolts by name."""
+    stress: StressTable | None = None
+    """Stress: places where it is observed, and hot spots; left out, it is not computed."""
+    gauges: dict[str, GaugeTable] = Field(default_factory=dict)
+    """Strain gauges by name."""
+    fatigue: dict[str, FatigueTable] = Field(default_factory=dict)
+    """What the materials endure, by the name of the material, "material" where there is one; or of a body."""
 
     @property
     def joints(self) -> dict[str, FaceContact]:
@@ -200,21 +224,20 @@ class MeshScene(Scene):
             return data
         return {**data, **({"contacts": {**contacts, **completed}} if named_contacts is contacts else completed)}
 
-    @model_validator(mode="before")
-    @classmethod
-    def _operating_line(cls, data: Any) -> Any:
-        """A wheel whose speed goes with the frequency has the speed in the middle for its own."""
-        wheel, response = (data.get(name) if isinstance(data, dict) else None for name in ("wheel", "response"))
-        if not isinstance(wheel, dict) or not isinstance(response, dict):
-            return data
-        return {**data, **operating_line(wheel, response)}
+    @property
+    def stress_places(self) -> dict[str, StressPlaceTable]:
+        """The places whose stress is observed, by name."""
+        return {} if self.stress is None else self.stress.places
 
     @property
     def other_speeds(self) -> tuple[float, ...]:
         """Speeds of the wheel [Hz] in duties of the mission, without that of the wheel itself."""
-        own = 0.0 if self.wheel is None else self.wheel.speed
-        mission = () if self.wear is None else self.wear.mission
-        return tuple(sorted({duty.speed for duty in mission if duty.speed is not None} - {own}))
+        return ()
+
+    @property
+    def reduced_through(self) -> SceneStage:
+        """The last stage whose fields the reduced model depends on."""
+        return REDUCTION
 
     @property
     def operating_range(self) -> tuple[float, float]:
@@ -223,52 +246,16 @@ class MeshScene(Scene):
         frequencies = [*self.response.range, *(duty.at.frequency for duty in duties if duty.at.frequency)]
         return min(frequencies), max(frequencies)
 
-    @property
-    def reduced_through(self) -> SceneStage:
-        """The last stage whose fields the reduced model depends on: the stress of a wheel that turns is that of its
-        contact at rest under the loads."""
-        return LOADS if self.wheel is not None and self.wheel.speed > 0 else REDUCTION
-
     @model_validator(mode="after")
-    def _speeds_of_a_wheel(self) -> MeshScene:
-        if self.other_speeds and (self.wheel is None or not self.wheel.speed):
-            raise Refusal("wear.mission has a speed: give the speed of the wheel too, in wheel.speed")
-        if self.other_speeds and self.wheel is not None and self.wheel.along_speed:
-            raise Refusal(
-                "wear.mission has a speed, but along an operating line the speed follows from the frequency of the "
-                'duty: leave it out, or set wheel.sweep = "frequency"'
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _what_a_sector_is(self) -> MeshScene:
-        for name, contact in self.joints.items():
-            if self.wheel is None and contact.sector is not None:
-                raise Refusal(f"{name}: sector is for a [wheel], and the scene has none: leave it out")
-        if self.wheel is None:
-            for name, table in (("mistuning", self.mistuning), ("flow", self.flow)):
-                if table is not None:
-                    raise Refusal(f"{name} is for a [wheel], and the scene has none: leave it out")
+    def _sectors_are_of_a_wheel(self) -> MeshScene:
+        """Refuse keys that mean something in a wheel alone."""
+        if self.wheel is not None:
             return self
-        if self.flow is not None:
-            self.flow.coefficients(self.wheel.sectors)
-        for contact in self.joints.values():
-            outward = contact.meets_next or self.geometry is not None
-            if outward and (contact.opposite is None or not isinstance(contact.group, str)):
-                raise Refusal("wheel: the contact needs one group, the right face, and its opposite, the left one")
-        for key, has in (
-            ("contact.plane", any(contact.plane is not None for contact in self.joints.values())),
-            ("motion", bool(self.motion)),
-            ("geometry.no_turning", self.geometry is not None and self.geometry.no_turning is not None),
-            ("prescribed", bool(self.prescribed)),
-            ("reduction.relative", self.reduction.relative),
-            ("reduction.solver", self.reduction.solver != "direct"),
-            ("reduction.interface_modes", self.reduction.interface_modes is not None),
-        ):
-            if has:
-                raise Refusal(f"{key} has no meaning for a sector of a wheel: leave it out")
-        if CENTRIFUGAL in (*self.loads.static, *self.loads.harmonic):
-            raise Refusal(f"loads: {CENTRIFUGAL} is the load that wheel.speed makes: give yours another name")
+        for name, contact in self.joints.items():
+            if contact.sector is not None:
+                raise Refusal(f"{name}: sector is for a [wheel], and the scene has none: leave it out")
+        if self.wear is not None and any(duty.speed is not None for duty in self.wear.mission):
+            raise Refusal("wear.mission has a speed: give the speed of the wheel too, in wheel.speed")
         return self
 
     @model_validator(mode="after")
@@ -307,6 +294,10 @@ class MeshScene(Scene):
         for where, material in made_of:
             if material not in self.materials:
                 raise Refusal(f"{where}: {unknown_key(f'materials.{material}', [*self.materials])}")
+        solids = [*self.materials, *self.bodies] if has_bodies else ["material"]
+        for name in self.fatigue:
+            if name not in solids and not self.decks:
+                raise Refusal(unknown_key(f"fatigue.{name}", [f"fatigue.{solid}" for solid in solids]))
         load_names = [*self.loads.static, *self.loads.harmonic]
         for name in self.bolts:
             if name in load_names or name == CENTRIFUGAL:

@@ -21,7 +21,7 @@ from pydantic import (
 from tribodyn.declarations import read
 from tribodyn.hbm import continuation
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table, quantity
+from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table, UsualRange, quantity
 from tribodyn.workflows.scene.stages import DRAW, PART, REDUCTION, RESUMABLE, SMOOTH, SOLVE, STUDY
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers, optional_user_file, user_file
@@ -209,13 +209,14 @@ def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]
 class Harmonics(Table, stage=SOLVE):
     """Harmonics of the response that are kept, and time samples of one cycle."""
 
-    kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = (0, 1)
-    """Rising harmonic numbers, or "auto": as many as the response needs at the peak of the unworn contact, so that
-    what is left out changes it by less than `tolerance`, up to `highest`."""
+    kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = ()
+    """Rising harmonic numbers; by default, "auto", those that the contact force requires at the peak of the unworn
+    contact and where it wears, so that what is left out changes the response by less than `tolerance`, up to
+    `highest`."""
     tolerance: Annotated[Number, Field(gt=0, ge=1e-10, lt=1)] | None = None
     """Relative change allowed by kept = "auto"."""
     highest: Annotated[StrictInt, Field(ge=1)] | None = None
-    """Highest harmonic that kept = "auto" may keep; 15 by default."""
+    """Highest harmonic that kept = "auto" may keep; 15 by default, or what the samples allow."""
     samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
     """Time samples of one cycle."""
     transitions: Literal["auto", "sampled", "located"] = "auto"
@@ -228,6 +229,11 @@ class Harmonics(Table, stage=SOLVE):
         """Whether harmonics are chosen."""
         return not self.kept
 
+    @property
+    def top(self) -> int:
+        """Highest harmonic that may be kept; the choice looks at half as many again."""
+        return max(self.kept, default=self.highest or min(HIGHEST, max((self.samples - 1) // 3 - 1, 1)))
+
     @field_serializer("kept")
     def _auto(self, kept: tuple[int, ...]) -> tuple[int, ...] | str:
         return kept or "auto"
@@ -237,7 +243,7 @@ class Harmonics(Table, stage=SOLVE):
         for name in ("tolerance", "highest"):
             if not self.automatic and getattr(self, name) is not None:
                 raise Refusal(f'expected {name} only with kept = "auto"')
-        top = 3 * ((self.highest or HIGHEST) + 1) // 2 if self.automatic else max(self.kept)
+        top = 3 * (self.top + 1) // 2 if self.automatic else self.top
         if self.samples <= 2 * top:
             raise Refusal(f"expected more than {2 * top} samples for harmonic {top}, got {self.samples}")
         return self
@@ -246,7 +252,7 @@ class Harmonics(Table, stage=SOLVE):
 class Damping(Table, stage=SOLVE):
     """Structural damping: a ratio for every mode, or Rayleigh's two coefficients."""
 
-    modal: Annotated[Number, Field(ge=0, lt=1), SMOOTH] | None = None
+    modal: Annotated[Number, Field(ge=0, lt=1), UsualRange(0.0, 0.2), SMOOTH] | None = None
     """Damping ratio of every mode."""
     state: Literal["free", "stuck"] = "free"
     """Whose modes these are: "free" without the contact, or "stuck" with every pair closed."""

@@ -1,7 +1,5 @@
 """Scenes as a caller gives them: by name, path, tables or read before, with changes of keys."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -30,8 +28,7 @@ def read_scene(source: Source, overrides: Overrides = (), *, folder: str | PathL
     source : name, path of a .toml file, tables as a dict, or a scene that was read before
     overrides : keys to change, on top of those that the scene has
     folder : where relative file names of a dict begin, the current folder by default
-    Raises  SceneError: one sentence that names the key and what is expected
-    """
+    Raises  SceneError: one sentence that names the key and what is expected"""
     texts = override_texts(overrides)
     if isinstance(source, SceneFile):
         return scene_file.parse(source.text, f"{source.name}.toml", (*source.overrides, *texts), source.folder)

@@ -1,9 +1,6 @@
 """The stage of a run that reads a field of a scene first, and the other marks that a field carries in its metadata.
 
-Cached parts and reductions, resumption, derivatives and parameter variation follow from these marks.
-"""
-
-from __future__ import annotations
+Cached parts and reductions, resumption, derivatives and parameter variation follow from these marks."""
 
 from enum import Enum, IntEnum
 from typing import Any, get_args
@@ -28,8 +25,7 @@ class Mark(Enum):
     """What else a field may say of itself.
 
     RESUMABLE : a run may be resumed with another value
-    SMOOTH : the response depends on it smoothly, so that it has derivatives
-    """
+    SMOOTH : the response depends on it smoothly, so that it has derivatives"""
 
     RESUMABLE = "resumable"
     SMOOTH = "smooth"
@@ -41,15 +37,11 @@ RESUMABLE, SMOOTH = Mark
 
 def stage_of(field: FieldInfo) -> SceneStage | None:
     """The stage in the metadata of a field; None for one that holds tables, whose fields have theirs."""
-    return next((mark for mark in _metadata(field) if isinstance(mark, SceneStage)), None)
+    return next((mark for mark in marks_of(field) if isinstance(mark, SceneStage)), None)
 
 
-def has_mark(field: FieldInfo, mark: Mark) -> bool:
-    """Whether a field carries a mark."""
-    return mark in _metadata(field)
-
-
-def _metadata(field: FieldInfo) -> list[Any]:
+def marks_of(field: FieldInfo) -> list[Any]:
+    """All that a field carries in its metadata."""
     return [*field.metadata, *_inner_metadata(field.annotation)]
 
 

@@ -1,7 +1,6 @@
 """Tables of a scene about its bodies, what they are made from and what joins them.
 
-Groups of a body are named "body.group".
-"""
+Groups of a body are named "body.group"."""
 
 from __future__ import annotations
 
@@ -13,7 +12,7 @@ from pydantic import BeforeValidator, Field, StrictInt, model_validator
 from tribodyn.geometry.sources.face_rules import FacetRule
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import FaceContact
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table, quantity, refuse_slips
+from tribodyn.workflows.scene.fields import Angle, Direction, Force, Length, Stiffness, Table, quantity, refuse_slips
 from tribodyn.workflows.scene.part_tables import Meshed
 from tribodyn.workflows.scene.stages import LOADS, PART, SMOOTH
 from tribodyn.workflows.scene.units import to_si
@@ -27,8 +26,7 @@ Point = tuple[Length, Length, Length]
 class FaceRule(Table, stage=PART):
     """A face of a body: the facets of its boundary that satisfy all that is given.
 
-    Places are those of the file or part, before the body is moved, in metres unless a unit is given.
-    """
+    Places are those of the file or part, before the body is moved, in metres unless a unit is given."""
 
     box: tuple[Point, Point] | None = None
     """Two corners of a box within which the whole facets lie."""
@@ -89,9 +87,10 @@ class DeckTable(Table, stage=PART):
     """Material of the scene for elements to which the deck gives none."""
     halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0
     """How many times every element of its bodies is cut into eight of half the size, its shape kept."""
-    elements: Literal["quadratic", "linear_reduced"] = "quadratic"
-    """How its hexahedra of first order are computed: raised to second order, or as they are with reduced integration
-    and hourglass stiffness (C3D8R), which is softer and has an eighth of the nodes."""
+    elements: Literal["deck", "quadratic", "linear_bbar", "linear_reduced"] = "deck"
+    """How its hexahedra of first order are computed: in the formulation that the deck names (C3D8, C3D8I, C3D8R ...);
+    raised to second order, with about eight times the nodes; with the mean dilatation of each element; or with reduced
+    integration and hourglass stiffness."""
     fixed: tuple[str, ...] = ()
     """Groups "body.group" that are clamped besides."""
     fixed_axes: dict[str, str] = Field(default_factory=dict)
@@ -114,8 +113,7 @@ class Rotation(Table, stage=PART):
 class BodyTable(Meshed, stage=PART):
     """A body: a part of geometry/ or a mesh file, where it stands, what it is made of and what holds it.
 
-    All other keys of the table are parameters of the part; those left out have the part's own defaults.
-    """
+    All other keys of the table are parameters of the part; those left out have the part's own defaults."""
 
     KEY: ClassVar[str] = ""
 
@@ -253,21 +251,25 @@ class BoltTable(Table, stage=PART):
     """Face under the head."""
     second: str
     """Face under the nut."""
-    preload: Annotated[float, quantity("N"), Field(ge=0), LOADS, SMOOTH]
+    preload: Annotated[Force, Field(ge=0), LOADS, SMOOTH]
     """Force in the shank when it is tightened, all other loads away."""
     state: Literal["locked", "constant"] = "locked"
     """"locked": the shank keeps its length after tightening, so that its force follows the structure; "constant": the
     force stays what it is."""
+    axis: Direction | None = None
+    """Direction of the shank, in either sense, through the middle of the smaller of its faces; by default from the
+    middle of one face to the middle of the other."""
     diameter: Annotated[Length, Field(gt=0)] | None = None
     """Diameter of the shank."""
     material: str | None = None
-    """Its material."""
+    """Its material, which also says how the shank expands where it is heated, by the mean temperature of its faces."""
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
-    """Stiffness along the shank instead of diameter and material."""
+    """Stiffness along the shank instead of its diameter."""
 
     @model_validator(mode="after")
     def _stiff(self) -> BoltTable:
-        shank = self.diameter is not None and self.material is not None
-        if self.state == "locked" and shank == (self.stiffness is not None):
+        if self.state != "locked":
+            return self
+        if (self.diameter is None) == (self.stiffness is None) or (self.diameter and self.material is None):
             raise Refusal("a locked bolt needs either diameter and material of its shank, or its stiffness")
         return self

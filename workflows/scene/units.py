@@ -2,10 +2,7 @@
 
 A quantity is a bare number in the SI unit of its key, or a text such as "470 N/um", "2e3 um3/J", "1 %".
 Angles are a dimension of their own, so that "400 Hz" and "2513 rad/s" are the same frequency and neither is 1/s.
-Factors are exact fractions, so that "2e3 um3/J" is 2e-15 to the last bit.
-"""
-
-from __future__ import annotations
+Factors are exact fractions, so that "2e3 um3/J" is 2e-15 to the last bit."""
 
 import math
 import re
@@ -22,12 +19,16 @@ PREFIXES = {name: Fraction(10) ** power for name, power in dict(n=-9, u=-6, m=-3
 # name -> (SI factor, dimension, prefixes that may stand before it)
 UNITS: dict[str, tuple[Fraction, Dimension, str]] = {
     "m": (Fraction(1), (0, 1, 0, 0, 0), "numck"),
+    "in": (Fraction("0.0254"), (0, 1, 0, 0, 0), ""),
+    "ft": (Fraction("0.3048"), (0, 1, 0, 0, 0), ""),
     "g": (Fraction(1, 1000), (1, 0, 0, 0, 0), "umk"),
     "t": (Fraction(1000), (1, 0, 0, 0, 0), ""),
     "s": (Fraction(1), (0, 0, 1, 0, 0), "num"),
     "min": (Fraction(60), (0, 0, 1, 0, 0), ""),
     "h": (Fraction(3600), (0, 0, 1, 0, 0), ""),
     "N": (Fraction(1), (1, 1, -2, 0, 0), "numkMG"),
+    "lbf": (Fraction("4.4482216152605"), (1, 1, -2, 0, 0), ""),
+    "gn": (Fraction("9.80665"), (0, 1, -2, 0, 0), ""),  # standard gravity; g is a gram
     "Pa": (Fraction(1), (1, -1, -2, 0, 0), "kMG"),
     "J": (Fraction(1), (1, 2, -2, 0, 0), "numkM"),
     "Hz": (Fraction(1), (0, 0, -1, 1, 0), "mkM"),
@@ -42,7 +43,8 @@ NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)
 LARGEST = 1e25  # in SI units: above it products of quantities overflow, and no structure has it
 SMALLEST = 1e-60  # and what is meant to be zero: its square, or another number over it, leaves the range of numbers
 CACHE_SIZE = 4096  # texts that were converted: a study reads its scene thousands of times
-FACTOR = re.compile(r"(%|[A-Za-z]+)(?:\^?(-?\d))?$")
+OUTSIDE = r"(?![^()]*\))"  # of brackets
+FACTOR = re.compile(r"(%|[A-Za-z]+|\([^()]+\))(?:\^?(-?\d))?$")
 
 
 @dataclass(frozen=True)
@@ -57,32 +59,32 @@ class Unit:
 def parse_unit(text: str) -> Unit:
     """Read a unit expression such as "N/um", "um3/J", "kg/m^3" or "" (dimensionless).
 
-    Factors are separated by "*", "·" or a blank; everything after a "/" up to the next "/" divides.
-    Raises  ValueError: a factor is not a known unit
-    """
+    Factors are separated by "*", "·" or a blank; everything after a "/" up to the next "/" divides; a factor may stand
+    in brackets.
+    Raises  ValueError: a factor is not a known unit"""
     factor, dimension = Fraction(1), [0, 0, 0, 0, 0]
     plain = text.replace("µ", "u").replace("μ", "u").replace("³", "3").replace("²", "2")
-    for position, group in enumerate(plain.split("/")):
+    for position, group in enumerate(re.split(rf"/{OUTSIDE}", plain)):
         sign = -1 if position else 1
-        for item in re.split(r"[*·\s]+", group.strip()):
+        for item in re.split(rf"[*·\s]+{OUTSIDE}", group.strip()):
             if item in ("", "1"):
                 continue
             match = FACTOR.match(item)
             if match is None:
                 raise Refusal(f'"{item}" is not a unit')
-            scale, exponents = _lookup(match[1])
+            unit_of_item = parse_unit(match[1][1:-1]) if match[1].startswith("(") else _lookup(match[1])
             power = sign * int(match[2] or 1)
-            factor *= scale**power
-            dimension = [d + power * e for d, e in zip(dimension, exponents, strict=True)]
+            factor *= unit_of_item.factor**power
+            dimension = [d + power * e for d, e in zip(dimension, unit_of_item.dimension, strict=True)]
     return Unit(factor, (dimension[0], dimension[1], dimension[2], dimension[3], dimension[4]))
 
 
-def _lookup(name: str) -> tuple[Fraction, Dimension]:
+def _lookup(name: str) -> Unit:
     if name in UNITS:
-        return UNITS[name][0], UNITS[name][1]
+        return Unit(*UNITS[name][:2])
     prefix, base = name[:1], name[1:]
     if base in UNITS and prefix in UNITS[base][2]:
-        return PREFIXES[prefix] * UNITS[base][0], UNITS[base][1]
+        return Unit(PREFIXES[prefix] * UNITS[base][0], UNITS[base][1])
     raise Refusal(f'"{name}" is not a unit')
 
 

@@ -1,10 +1,7 @@
 """Python files of a user beside his scene, and the numbers that laws, parts and continuations declare.
 
 A part, a contact law, a wear law, a wear rule and a continuation may each be a .py file in the folder of the scene.
-Reading, planning and showing a scene read the text of such a file and never run it; running the scene does.
-"""
-
-from __future__ import annotations
+Reading, planning and showing a scene read the text of such a file and never run it; running the scene does."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,7 +12,7 @@ from pydantic import ConfigDict, PrivateAttr, ValidationInfo, model_validator
 
 from tribodyn.declarations import Number, Role, name_of, read
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Table, unknown_key
+from tribodyn.workflows.scene.fields import Table, UsualRange, unknown_key
 from tribodyn.workflows.scene.units import to_si
 
 ANY_UNIT = ("m", "rad", "")  # units that a number without a declared unit may have
@@ -29,8 +26,7 @@ def is_user_file(name: str) -> bool:
 def user_file(folder: Path, name: str, key: str) -> Path:
     """The user's file that a scene names; refuses one that is not in the folder of the scene.
 
-    folder : of the scene; key : of the scene, such as "contact.law", for the sentence
-    """
+    folder : of the scene; key : of the scene, such as "contact.law", for the sentence"""
     path = Path(name)
     resolved = (folder / path).resolve()
     if path.is_absolute() or len(path.parts) != 1 or resolved.parent != folder.resolve():
@@ -46,8 +42,7 @@ def numbers(
     """The numbers of a law, a part or a continuation from a table of a scene, in SI units.
 
     table : its key with a dot, such as "contact."; given : what the table has besides `others`, its general keys
-    Raises  Refusal: one is unknown, missing, not in its unit or out of its limits; lists those that there are
-    """
+    Raises  Refusal: one is unknown, missing, not in its unit or out of its limits; lists those that there are"""
     by_name = {number.name: number for number in declared}
     result: dict[str, int | float] = {}
     for name, value in values.items():
@@ -136,11 +131,20 @@ class LawTable(Table):
         """Name of the law for hbm: that of a shipped law, or the path of the user's file."""
         return self.law if self._user_file is None else str(self._user_file)
 
+    @property
+    def _declared(self) -> tuple[Number, ...]:
+        """What the law declares; nothing where it is a user's file that is not beside this result."""
+        is_absent = is_user_file(self.law) and self._user_file is None
+        return () if is_absent else read(self.LAWS.file_of(self.law_name))
+
     def number(self, role: Role) -> float | None:
-        """The law's number with a role, None where it has none, or is a user's file that is not beside this result."""
-        if is_user_file(self.law) and self._user_file is None:
-            return None
-        return self.numbers.get(name_of(role, read(self.LAWS.file_of(self.law_name))) or "")
+        """The law's number with a role, None where it has none."""
+        return self.numbers.get(name_of(role, self._declared) or "")
+
+    @property
+    def usual_ranges(self) -> dict[str, UsualRange]:
+        """The usual range of each number of the law that declares one."""
+        return {number.name: UsualRange(*number.usual, number.unit or "") for number in self._declared if number.usual}
 
     @property
     def numbers(self) -> dict[str, float]:

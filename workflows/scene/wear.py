@@ -47,7 +47,7 @@ def _step(value: object) -> object:
 class Place(Table, stage=WEAR):
     """Where the cycle that wears is taken: a frequency [Hz], or a ratio to the frequency of the resonance peak."""
 
-    frequency: Annotated[float, Field(gt=0)] | None = None
+    frequency: Annotated[Frequency, Field(gt=0)] | None = None
     """Frequency."""
     peak: Annotated[float, Field(gt=0)] | None = None
     """Ratio to the frequency of the resonance peak."""
@@ -62,12 +62,12 @@ class Place(Table, stage=WEAR):
 def _place(value: object) -> object:
     if isinstance(value, (Place, dict)):
         return value
-    share, of, peak = value.partition("of peak") if isinstance(value, str) else ("", "", "")
+    share, of, remainder = value.partition("of peak") if isinstance(value, str) else ("", "", "")
+    if value == "peak":
+        return {"peak": 1.0}
     try:
-        if value == "peak":
-            return Place(peak=1.0)
-        return Place(peak=to_si(share, "")) if of and not peak else Place(frequency=to_si(value, "Hz"))
-    except (Refusal, ValidationError):
+        return {"peak": to_si(share, "")} if of and not remainder else {"frequency": to_si(value, "Hz")}
+    except Refusal:
         raise Refusal(
             f'expected "peak", a share of its frequency such as "98 % of peak", or a frequency such as "410 Hz", '
             f"got {value!r}"
@@ -191,11 +191,6 @@ class Wear(JointWearTable, stage=WEAR):
         return tuple(n.name for n in wear_rule.declared(self.rule_name) if n.role == Role.ACCURACY)
 
     @property
-    def needs_depth_scale(self) -> bool:
-        """Whether its steps depend on delta_max."""
-        return self.accuracy_share is not None
-
-    @property
     def accuracy_share(self) -> float | None:
         """Tolerance of its steps, or their share of delta_max; None where its rule counts in another way."""
         if "tolerance" in self.accuracy_keys:
@@ -244,6 +239,6 @@ class Wear(JointWearTable, stage=WEAR):
             raise Refusal(f"expected shares of the mission that sum to 1, got {total:g}")
         if self.lost_of == "any" and self.end_at == "at_rest":
             raise Refusal('expected lost_of = "any" only with end_at = "vibrating"')
-        if self.mission and "at" in self.model_fields_set:
+        if self.mission and self.at != type(self).model_fields["at"].default:  # which a result holds beside a mission
             raise Refusal("expected either at or mission, and not both")
         return self

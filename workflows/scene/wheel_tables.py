@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, StrictBool, StrictInt, TypeAdapter, ValidationError, model_validator
 
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table
+from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table, UsualRange
 from tribodyn.workflows.scene.stages import PART, REDUCTION, SMOOTH, STUDY
 
 
@@ -16,8 +16,7 @@ class WheelTable(Table, stage=REDUCTION):
     """Identical sectors about an axis through the origin, under a wave that travels round.
 
     A contact with the next sector has the right face as its first one, the left one as its second. Static loads act on
-    every sector alike, harmonic loads on each sector one phase later than on its right neighbour.
-    """
+    every sector alike, harmonic loads on each sector one phase later than on its right neighbour."""
 
     sectors: Annotated[StrictInt, Field(ge=2), PART]
     """Number of sectors."""
@@ -28,7 +27,7 @@ class WheelTable(Table, stage=REDUCTION):
     """Axis of the wheel; positive rotation leads to the left."""
     seam: tuple[str, str] | None = None
     """Right and left face where sectors are one piece; left out where only the contact couples them."""
-    speed: Annotated[Frequency, Field(ge=0), PART, SMOOTH] = 0.0
+    speed: Annotated[Frequency, Field(ge=0), UsualRange(0.0, 3000.0, "Hz"), PART, SMOOTH] = 0.0
     """Speed of rotation: its centrifugal force is a static load, its stress stiffens, its frame softens and turns."""
     sweep: Literal["speed", "frequency"] | None = None
     """What the response is followed along: "speed", an operating line on which the frequency is the engine order times
@@ -47,8 +46,7 @@ def operating_line(wheel: dict[str, Any], response: dict[str, Any]) -> dict[str,
     """The tables [wheel] and [response] of a scene, not checked yet, with what an operating line fills in.
 
     The frequency follows from `response.speed`, or the speeds from the frequency; the wheel's own speed is the one in
-    the middle. Raises ValueError where they contradict each other
-    """
+    the middle. Raises ValueError where they contradict each other"""
     order, speed, frequency = wheel.get("engine_order"), response.get("speed"), response.get("frequency")
     sweep = wheel.get("sweep") or ("frequency" if speed is None else "speed")
     if sweep != "speed":
@@ -88,17 +86,16 @@ Spread = Annotated[Number, Field(ge=0, le=0.3)]
 class Mistuning(Table, stage=STUDY):
     """Blades that differ: what is drawn for `tribodyn wheel patterns`, blade by blade and pattern by pattern.
 
-    All deviations are normally distributed and cut off at three standard deviations.
-    """
+    All deviations are normally distributed and cut off at three standard deviations."""
 
     frequency: Spread = 0.0
-    """Standard deviation of the blades' own frequencies, relative: the stiffness of a sector goes with their square."""
+    """Standard deviation of the blades' own frequencies at rest, relative; elastic stiffness goes with its square."""
     friction: Spread = 0.0
     """Standard deviation of the coefficient of friction of every blade's contacts, relative."""
     gap: Annotated[Length, Field(ge=0)] = 0.0
     """Standard deviation of the gap of every blade's contacts."""
     body: str | None = None
-    """Body whose stiffness deviates; the whole sector by default."""
+    """Body whose elastic stiffness deviates; the whole sector by default."""
     families: Annotated[StrictInt, Field(ge=1)] = 2
     """Modes of every nodal diameter in which a deviating stiffness acts, beside the static shapes of the loads."""
     left_out: Annotated[Number, Field(gt=0, lt=1)] = 1e-3
@@ -116,8 +113,7 @@ Influence = tuple[StrictInt, Number, Number]
 
 class FlowTable(Table, stage=STUDY):
     """Forces of a flow on the vibrating blades of the wheel, by coefficients of one family of modes; see the theory of
-    flutter.
-    """
+    flutter."""
 
     influence: tuple[Influence, ...] = ()
     """Rows [k, real, imaginary] of the influence coefficients: of the blade k places to the left on a blade."""

@@ -1,7 +1,5 @@
 """Exact derivatives at a point of a response, a mode or a life, by keys of a scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -23,7 +21,8 @@ from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.refusal import Refusal, SolverFailure
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import settings, wear_run
-from tribodyn.workflows.run.parameter_variation import ParameterVariation, moves_nodes
+from tribodyn.workflows.run.parameter_variation import ParameterVariation
+from tribodyn.workflows.run.scene_numbers import moves_nodes
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.wear import Place
 
@@ -102,8 +101,7 @@ def of_summary(
 ) -> dict[tuple[str, str], float]:
     """Derivatives of numbers of a finished run, of its first state and its life, by some keys of its scene.
 
-    Returns (number, key) -> d number / d key, SI units, as far as these are exact
-    """
+    Returns (number, key) -> d number / d key, SI units, as far as these are exact"""
     scene, response, worn, slopes = varying.scene, result.response, result.wear, dict[tuple[str, str], float]()
     scene_numbers = {key: number.value for key, number in varying.numbers.items()}
     in_wear = {key: value for key, (value, *_) in wear_run.law_numbers(scene).items()}

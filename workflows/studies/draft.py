@@ -1,7 +1,5 @@
 """A scene begun from a file: its bodies, its groups, faces that may touch, all that is guessed said so in a comment."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections import defaultdict
@@ -14,9 +12,11 @@ from typing import Any
 import numpy as np
 import scipy
 
+from tribodyn.consent import asks_consent
 from tribodyn.fem.assembly import group_name
 from tribodyn.geometry.sources import cad, foreign_file as sources
 from tribodyn.geometry.sources.face_rules import outline
+from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.json_schema import json_schema
 from tribodyn.workflows.scene.source import AnyPath
@@ -30,8 +30,7 @@ class Limits:
     """What is taken for a contact, and for a file in metres.
 
     distance : distance over the size of the whole; opposed : cosine of the normals; share : of the facets of a face
-    longest : of a part in metres [m], beyond which a file is taken to be in millimetres
-    """
+    longest : of a part in metres [m], beyond which a file is taken to be in millimetres"""
 
     distance: float = 0.01
     opposed: float = -0.7
@@ -46,8 +45,7 @@ LIMITS = Limits()
 class Candidate:
     """Two faces that may touch: "body.face" of each, least distance [m], share of the smaller one that is near.
 
-    normal : of the first face, outward; declared : whether the deck has them as a contact pair; friction : of it
-    """
+    normal : of the first face, outward; declared : whether the deck has them as a contact pair; friction : of it"""
 
     first: str
     second: str
@@ -63,8 +61,7 @@ class Draft(StudyResult):
     """A scene and what it is made of.
 
     text, name : of the scene; unit : of length in the file, unit_reason : where it comes from
-    candidates : pairs of faces that may touch, best first
-    """
+    candidates : pairs of faces that may touch, best first"""
 
     file: Path
     text: str
@@ -93,18 +90,19 @@ class Draft(StudyResult):
             raise Refusal(f"{scene} is there already: move it, or give another folder with --out")
         folder.mkdir(parents=True, exist_ok=True)
         place = Path(os.path.relpath(self.file, folder)).as_posix()
-        scene.write_text(self.text.replace(json.dumps(self.file.name), json.dumps(place)), encoding="utf-8")
-        schema.write_text(json.dumps(json_schema(), indent=1), encoding="utf-8")
+        write_text(scene, self.text.replace(json.dumps(self.file.name), json.dumps(place)))
+        write_text(schema, json.dumps(json_schema(), indent=1))
         return [scene, schema]
 
 
-def draft(file: AnyPath, *, unit: str | None = None) -> Draft:
+@asks_consent
+def draft(file: AnyPath, *, unit: str | None = None, allow_scripts: bool = False) -> Draft:
     """Write a commented scene that begins from a mesh, a deck or a CAD file, and the schema of scenes for editors.
 
     file : file of a mesh, a deck or a CAD program
     unit : unit of length of the file: m, mm, cm, um, in, ft; guessed and said by default
-    Raises  Refusal: the file cannot be read, one sentence
-    """
+    allow_scripts : run a drawing (.geo)
+    Raises  Refusal: the file cannot be read, one sentence"""
     path = Path(file)
     if path.suffix.lower() not in sources.ENDINGS:
         raise Refusal(f'"{file}" is no mesh, deck or CAD file: its ending is none of {", ".join(sources.ENDINGS)}')
@@ -142,28 +140,37 @@ def _candidates(source: Any) -> Iterator[Candidate]:
         wide = np.linalg.norm(np.ptp(corners, axis=1), axis=0)
         for name, facets_of_group in (solid.mesh.boundaries or {}).items():
             of = np.isin(facets, facets_of_group)
-            if of.sum() < len(facets):  # a group of the whole skin says nothing
-                faces.append((body, name, {*facets[of].tolist()}, centre[of], normal[of], wide[of]))
-    declared = {frozenset((first.slave, first.master)): first.friction for first in source.deck.contacts}
-    pairs = []
+            if of.any():
+                faces.append((body, name, {*facets[of].tolist()}, centre[of], normal[of], wide[of], of.all()))
+    contacts = {frozenset((contact.slave, contact.master)): contact for contact in source.deck.contacts}
+    matches = []
     for first, second in combinations(faces, 2):
-        if first[0] != second[0] and (match := _meet(first[3:], second[3:], reach)) is not None:
+        contact, match = contacts.get(frozenset((first[1], second[1]))), _meet(first[3:6], second[3:6], reach)
+        is_guess = match is not None and first[0] != second[0] and not (first[6] or second[6])  # a whole skin is none
+        if contact is not None or is_guess:
+            matches.append((match, contact, first, second))
+    meeting = [contact for match, contact, *_ in matches if match is not None]
+    pairs = []
+    for match, contact, first, second in matches:
+        if match is None and contact not in meeting:  # where no two faces meet by these limits, all that the deck means
+            match = _meet(first[3:6], second[3:6], np.inf, 0.0)
+        if match is not None:
             names = [group_name(body, face, source.bodies[body].node_sets) for body, face, *_ in (first, second)]
-            faced = frozenset((first[1], second[1]))
-            pairs.append((Candidate(names[0], names[1], *match, faced in declared, declared.get(faced)), first, second))
+            friction = None if contact is None else contact.friction
+            pairs.append((Candidate(names[0], names[1], *match, contact is not None, friction), first, second))
     used_facets: dict[tuple[str, str], set[int]] = defaultdict(set)  # bodies that touch -> facets of the first one
     for pair, first, second in sorted(pairs, key=lambda p: (not p[0].declared, -round(p[0].share, 2), p[0].distance)):
         ends = ((used_facets[first[0], second[0]], first[2]), (used_facets[second[0], first[0]], second[2]))
-        if all(
-            used.isdisjoint(facets_of_group) for used, facets_of_group in ends
-        ):  # of groups that overlap the best one
-            for used, facets_of_group in ends:
+        if pair.declared or all(used.isdisjoint(facets_of_group) for used, facets_of_group in ends):
+            for used, facets_of_group in ends:  # groups that overlap it are no further guess
                 used |= facets_of_group
             yield pair
 
 
-def _meet(first: Any, second: Any, distance: float) -> tuple[float, float, Any] | None:
-    """Least distance of two faces [m], share of the smaller one near, normal there; None where they are apart."""
+def _meet(first: Any, second: Any, distance: float, least: float = LIMITS.share) -> tuple[float, float, Any] | None:
+    """Least distance of two faces [m], share of the smaller one near, normal there; None where they are apart.
+
+    least : share that must be near"""
     (centre, normal, wide), (places, normals, widths) = first, second
     _, at = scipy.spatial.cKDTree(places).query(centre)
     offset = places[at] - centre
@@ -175,8 +182,9 @@ def _meet(first: Any, second: Any, distance: float) -> tuple[float, float, Any] 
         & (sideways < np.maximum(wide, widths[at]))
     )
     share = good.sum() / min(len(centre), len(places))
-    if share < LIMITS.share:
+    if share < least:
         return None
+    good = good if good.any() else np.ones(len(centre), bool)
     mean = normal[good].mean(axis=0)
     return float(gap[good].min()), float(min(share, 1.0)), tuple((mean / np.linalg.norm(mean)).round(3).tolist())
 

@@ -1,12 +1,12 @@
 """Scenes from Python: read, plan, build, run, load. Files and what they hold are as for the command `tribodyn`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Literal
 
+from tribodyn.consent import asks_consent
+from tribodyn.output_file import set_aside
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.errors import accuracy as errors
 from tribodyn.workflows.errors.accuracy import ErrorBound
@@ -27,16 +27,20 @@ def scene_names() -> list[str]:
     return scene_file.names()
 
 
-def plan(source: Source, overrides: Overrides = ()) -> planning.Plan:
-    """What a scene will model and what it will cost, without solving anything."""
+@asks_consent
+def plan(source: Source, overrides: Overrides = (), *, allow_scripts: bool = False) -> planning.Plan:
+    """What a scene will model and what it will cost, without solving anything.
+
+    allow_scripts : run a Python file or a drawing (.geo) that makes the part"""
     return planning.plan(read_scene(source, overrides))
 
 
-def picture(source: Source, path: AnyPath, overrides: Overrides = ()) -> Path:
+@asks_consent
+def picture(source: Source, path: AnyPath, overrides: Overrides = (), *, allow_scripts: bool = False) -> Path:
     """Draw a scene before it is run: bodies, contacts in colour, what is held, loads as arrows; its path.
 
-    Raises  SceneError: the scene has no mesh, or asks for what cannot be; RenderingUnavailable
-    """
+    allow_scripts : as for `plan`
+    Raises  SceneError: the scene has no mesh, or asks for what cannot be; RenderingUnavailable"""
     from tribodyn.workflows.pictures import groups
 
     file = read_scene(source, overrides)
@@ -63,8 +67,7 @@ def run(
     pictures : draw what the scene wants drawn into folder/pictures
     progress : function (text, share): a sentence with None, or a stage with the share of it that is done
     resume : continue an unfinished result in the folder
-    Raises  Refusal: the scene asks for what cannot be; SolveFailed: folder keeps what was computed
-    """
+    Raises  Refusal: the scene asks for what cannot be; SolveFailed: folder keeps what was computed"""
     file = read_scene(source, overrides)
     if folder is None:
         if pictures or resume:
@@ -99,8 +102,7 @@ def run_to_accuracy(
     folder : where result.h5 of the last run is kept, and those of all runs in rounds/1, rounds/2, ...
     resume : take the runs that the folder holds already
     Returns the last result and its errors; `met` says whether all are below the bound
-    Raises  Refusal: the accuracy or the scene asks for what cannot be; SolveFailed: folder keeps what was computed
-    """
+    Raises  Refusal: the accuracy or the scene asks for what cannot be; SolveFailed: folder keeps what was computed"""
     file, report = read_scene(source, overrides), reporter(progress)
 
     def run_round(current: SceneFile, number: int) -> Result:
@@ -109,7 +111,7 @@ def run_to_accuracy(
 
     result, bound = errors.to_accuracy(file, accuracy, run_round, report.say)
     if folder is not None:
-        store.set_aside(Path(folder) / "result.h5")
+        set_aside(Path(folder) / "result.h5")
         store.save(Path(folder) / "result.h5", result)
     return result, bound
 
@@ -121,8 +123,7 @@ def draw(
 
     formats : of the pictures, "png", "pdf", "svg"; dpi : dots per inch of what has them
 
-    Returns the files, and a sentence where nothing can be rendered on this machine
-    """
+    Returns the files, and a sentence where nothing can be rendered on this machine"""
     from tribodyn.workflows.pictures import plots
 
     settings, missing = result.scene.pictures, ""
@@ -150,8 +151,7 @@ def animate(
 ) -> list[Path]:
     """Make a film of a result with the factors of exaggeration of its scene, see pictures.film; returns its files.
 
-    Raises  Refusal: the result has nothing of the kind to show; RenderingUnavailable
-    """
+    Raises  Refusal: the result has nothing of the kind to show; RenderingUnavailable"""
     from tribodyn.workflows.pictures.film import film
 
     settings = result.scene.pictures
@@ -159,11 +159,19 @@ def animate(
     return film(result, folder, over, row, formats, images, dpi, *factors)
 
 
-def export(result: ResultSource, to: Sequence[str], folder: AnyPath, mesh_ending: str = ".xdmf") -> list[Path]:
+@asks_consent
+def export(
+    result: ResultSource,
+    to: Sequence[str],
+    folder: AnyPath,
+    mesh_ending: str = ".xdmf",
+    *,
+    allow_scripts: bool = False,
+) -> list[Path]:
     """Write a result in the formats of other programs, each into a folder of its name; the files written.
 
     to : of vtk, csv, mat, uff, mesh, npz, matlab, op4, abaqus; mesh_ending : format of the mesh
-    """
+    allow_scripts : run Python files and drawings that the scene names, for matrices"""
     from tribodyn.workflows.export import formats
 
     return list(formats.write(store.result_of(result), to, Path(folder), mesh_ending))
@@ -172,8 +180,7 @@ def export(result: ResultSource, to: Sequence[str], folder: AnyPath, mesh_ending
 def report(results: Sequence[AnyPath], path: AnyPath) -> Path:
     """Write one HTML file that shows results and opens anywhere, without a network; its path.
 
-    results : folders or files; several are shown side by side, with differences from the first
-    """
+    results : folders or files; several are shown side by side, with differences from the first"""
     from tribodyn.workflows.report import page
 
     if not results:

@@ -1,7 +1,5 @@
 """What a file or a scene holds, before it is computed: sizes, masses, groups, gaps, free modes, sanity checks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -10,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from tribodyn.consent import asks_consent
 from tribodyn.fem.assembly import Assembly, Body, group_name
 from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
@@ -21,7 +20,7 @@ from tribodyn.geometry.sources.deck import Deck
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import groups as group_pictures
 from tribodyn.workflows.result.number_format import named_lines
-from tribodyn.workflows.run import deck_materials, decks, modelling, sanity_checks
+from tribodyn.workflows.run import deck_materials, deck_source, decks, modelling, sanity_checks, scene_assembly
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
@@ -106,6 +105,7 @@ class Inspection(StudyResult):
         return [folder / "groups.png"]
 
 
+@asks_consent
 def inspect(
     source: AnyPath,
     *,
@@ -115,7 +115,8 @@ def inspect(
     density: Annotated[float | None, quantity("kg/m3")] = None,
     modes: int = 0,
     free: bool = False,
-    elements: Literal["quadratic", "linear_reduced"] = "quadratic",
+    elements: Literal["deck", "quadratic", "linear_bbar", "linear_reduced"] = "deck",
+    allow_scripts: bool = False,
     overrides: Overrides = (),
     progress: Progress | None = None,
 ) -> Inspection:
@@ -128,9 +129,10 @@ def inspect(
     density : density likewise, such as "7860 kg/m3"
     modes : number of natural frequencies to compute, free of contact; what a deck or a scene says joins and holds
     free : of the bodies of a file by themselves, each free in space
-    elements : how hexahedra of first order of a file are computed: raised to second order, or with reduced integration
-    Raises  Refusal: what cannot be, one sentence
-    """
+    elements : how hexahedra of first order are computed: as a deck names them, raised to second order, with the mean
+        dilatation, or reduced
+    allow_scripts : run a drawing (.geo), or a Python file that makes the part of a scene
+    Raises  Refusal: what cannot be, one sentence"""
     if modes < 0:
         raise Refusal(f"--modes {modes}: give a number of modes, 0 for none")
     if (young is None) != (density is None):
@@ -138,28 +140,30 @@ def inspect(
     material = None if young is None or density is None else Material(young, poisson, density)
     if Path(source).suffix.lower() in sources.ENDINGS:
         return _of_file(Path(source), unit, elements, material, modes, free, progress or Progress())
-    if unit != "m" or material is not None or elements != "quadratic":
+    scene = read_scene(source, overrides)
+    if unit != "m" or material is not None or elements != "deck":
         raise Refusal("--unit, --young, --poisson, --density and --elements are for files: a scene has its own")
-    return _of_scene(read_scene(source, overrides), modes, progress or Progress())
+    return _of_scene(scene, modes, progress or Progress())
 
 
 def _of_file(
     path: Path, unit: str, elements: Any, material: Material | None, n_modes: int, free: bool, progress: Progress
 ) -> Inspection:
     with progress.stage("reading"):
-        source = decks.source(path, unit)
+        source = deck_source.source(path, unit)
     named = {"given": material} if material is not None else {}
     material_name = next(iter(named), None)
     table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=material_name, elements=elements)
     solids, lacking = [], ""
     for name, body in source.bodies.items():
-        mesh, node_sets = decks.with_elements(body.mesh, dict(body.node_sets), table, name)
+        form = deck_source.elements_of(source, table, name)
+        mesh, node_sets = deck_source.with_elements(body.mesh, dict(body.node_sets), form, name)
         try:
-            material_of_body = deck_materials.material(source.deck, name, mesh, table, named)
+            material_of_body = deck_materials.material(source.deck, name, mesh, table, named, form)
         except Refusal as sentence:  # no or no whole material
             material_of_body, lacking = {}, str(sentence)
         solids.append(Body(name, mesh, node_sets, material_of_body))
-    inspection = measured(solids, decks.notes_of(source, table), source.unused)
+    inspection = measured(solids, deck_source.notes_of(source, table), source.unused)
     pairs, separate, remarks = _pairs_of(source.deck, solids)
     ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
     inspection = replace(inspection, pairs=pairs, refused=(*ignored, *separate))
@@ -178,7 +182,10 @@ def _of_file(
                     inspection, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes)
                 )
     hint = 'give --unit mm (in a scene: unit = "mm")'
-    remarks += sanity_checks.check_size(inspection.size, hint) + _check_materials(solids)
+    remarks += [*sanity_checks.check_size(inspection.size, hint), *sanity_checks.check_materials(solids)]
+    remarks += scene_assembly.overlaps(solids)
+    if not free:
+        remarks += sanity_checks.check_modes(inspection.frequencies)
     return replace(inspection, remarks=tuple(remarks))
 
 
@@ -187,8 +194,7 @@ def _pairs_of(of: Deck, solids: Sequence[Body]) -> tuple[dict[str, dict[str, flo
 
     Returns for each pair the area that is shared and that of the first face [m2], the least and largest opening [m],
         negative where they overlap, the angle between them [degrees]; sentences on pairs that share nothing; remarks
-        on those that are an opening apart
-    """
+        on those that are an opening apart"""
     assembly = Assembly(solids)
     meetings: dict[str, dict[str, float]] = {}
     refused: list[str] = []
@@ -250,7 +256,9 @@ def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> I
     inspection = of_part(file, part)
     if n_modes:
         with progress.stage("modes"):
-            inspection = replace(inspection, frequencies=_frequencies(part.system.mass, part.system.stiffness, n_modes))
+            frequencies = _frequencies(part.system.mass, part.system.stiffness, n_modes)
+        remarks = (*inspection.remarks, *sanity_checks.check_modes(frequencies))
+        inspection = replace(inspection, frequencies=frequencies, remarks=remarks)
     return inspection
 
 
@@ -266,15 +274,10 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
         if gap[pairs].size
     }
     remarks = [
-        *sanity_checks.check_size(inspection.size, "scale the mesh to metres"),
-        *_check_materials(solids),
+        *sanity_checks.remarks_on_part(file, part),
         *sanity_checks.check_deflection(scene, part.system, part.largest, float(np.linalg.norm(inspection.size))),
     ]
     return replace(inspection, gaps=gaps, remarks=tuple(remarks))
-
-
-def _check_materials(solids: Sequence[Body]) -> list[str]:
-    return sanity_checks.check_materials({of.name: of.material for of in solids if isinstance(of.material, Material)})
 
 
 def _solids(file: scene_file.SceneFile, part: Any) -> list[Body]:

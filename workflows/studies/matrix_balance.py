@@ -1,7 +1,6 @@
 """One's own matrices: where they touch and by which law, reduced, balanced, followed, integrated and worn.
 
-Units are SI and frequencies in Hz, in what is given and in the `frequency` of what comes back.
-"""
+Units are SI and frequencies in Hz, in what is given and in the `frequency` of what comes back."""
 
 from __future__ import annotations
 
@@ -11,10 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tribodyn.hbm import continuation
+from tribodyn.hbm import continuation, harmonics
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import nonlinear_modes as modes
-from tribodyn.hbm.continuation.branch import Branch, amplitude as vibration
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.control import constant_response, driven, phase_resonance
 from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
 from tribodyn.hbm.continuation.operating_point import AtFrequency
@@ -39,8 +38,7 @@ HZ = 2 * np.pi  # rad/s of one Hz
 class Cycle:
     """One periodic vibration as the harmonic balance has it.
 
-    state : what was solved; outcome : why the solve ended; its text is a sentence
-    """
+    state : what was solved; outcome : why the solve ended; its text is a sentence"""
 
     problem: HarmonicBalance
     state: State
@@ -62,8 +60,8 @@ class Cycle:
         return dict(zip(self.problem.compliance.output_names, self.problem.outputs(self.state), strict=True))
 
     def amplitude(self, output: str) -> float:
-        """Square root of the sum over harmonics of a_h^2 + b_h^2 of an output [m]."""
-        return float(vibration(self.outputs[output]))
+        """Half the range of an output over the cycle [m]."""
+        return float(harmonics.amplitude(self.outputs[output], self.problem.basis.harmonics))
 
     @property
     def displacement(self) -> np.ndarray:
@@ -95,8 +93,7 @@ class Cycle:
 class HertzBalance:
     """A harmonic balance with frequencies in Hz: from `Structure.balance`, or `Balance(build(scene).balance)`.
 
-    problem : the same in rad/s, as the solver has it; newton : how exactly it is solved
-    """
+    problem : the same in rad/s, as the solver has it; newton : how exactly it is solved"""
 
     problem: HarmonicBalance
     newton: NewtonOptions = field(default_factory=NewtonOptions)
@@ -142,8 +139,7 @@ class HertzBalance:
         control : what the test holds: the force; the fundamental amplitude [m] of an output, the first by default; or
             its lag of a quarter of a cycle, while the amplitude goes from the first to the last of two and the mode at
             rest lies between the frequencies. The force is then the branch's `load_factor`
-        Raises  Refusal for methods and options that do not exist
-        """
+        Raises  Refusal for methods and options that do not exist"""
         if control == "phase":
             if not isinstance(amplitude, tuple):
                 raise Refusal("control of the phase: give the first and the last amplitude [m], as (1e-6, 1e-3)")
@@ -179,8 +175,7 @@ class HertzBalance:
     def integrate(self, frequency: float, start: Cycle | None = None, **options: Any) -> time.PeriodicMotion:
         """The periodic motion at a frequency [Hz] by integration in time, from a cycle of the balance or from rest.
 
-        options : of hbm.time.stepper.Options, such as steps=1024 a period
-        """
+        options : of hbm.time.stepper.Options, such as steps=1024 a period"""
         return time.integrate(self.problem, HZ * frequency, None if start is None else start.state, Options(**options))
 
     def verify(self, cycle: Cycle, **options: Any) -> verify.Verification:
@@ -207,8 +202,7 @@ class HertzBalance:
         at : frequency of the cycles [Hz], or the range (start, stop) whose resonance of `output` they follow
         step : largest depth of one explicit step [m]; or tolerance : local error of an implicit one, a share of the
             depth `scale` [m]
-        lost_below : share of the first preload at which the run ends; resume : history to continue
-        """
+        lost_below : share of the first preload at which the run ends; resume : history to continue"""
         name = self._output(output)
         if isinstance(at, tuple):
             site: AtPeak | AtFrequency = AtPeak(name, HZ * at[0], HZ * at[1], newton=self.newton)

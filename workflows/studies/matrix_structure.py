@@ -1,7 +1,5 @@
 """One's own matrices with the contacts that hold them, reduced or as they are. Units are SI, frequencies in Hz."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -32,8 +30,7 @@ class MatrixContact:
 
     name : unique in a structure; interface : what `Matrices.contact` or `Matrices.contact_rows` makes
     law : name of a contact law; numbers : the law's own, such as {"friction": 0.4}, scalar or (n_pair,)
-    tangential_stiffness, normal_stiffness : of the whole joint [N/m], shared by area, or (n_pair,) of each pair
-    """
+    tangential_stiffness, normal_stiffness : of the whole joint [N/m], shared by area, or (n_pair,) of each pair"""
 
     name: str
     interface: ContactInterface
@@ -61,8 +58,7 @@ class MatrixContact:
 class Structure:
     """Matrices with the contacts that hold them, reduced or as they are.
 
-    model : reduced model whose interface has the pairs of all contacts, one contact after the other
-    """
+    model : reduced model whose interface has the pairs of all contacts, one contact after the other"""
 
     model: ReducedModel
     contacts: tuple[MatrixContact, ...]
@@ -99,8 +95,7 @@ class Structure:
         static : load -> N; harmonic : order -> {load -> complex amplitude F of Re F exp(i order w t) [N]}
         samples : time samples of a cycle; transitions : "located" finds stick, slip and lift between them, "sampled"
             does not, "auto" does where every contact law can
-        Raises  Refusal for unknown loads, orders that are not kept, laws that do not fit
-        """
+        Raises  Refusal for unknown loads, orders that are not kept, laws that do not fit"""
         chosen = joint_transitions(self.joints) if transitions == "auto" else transitions
         basis = HarmonicBasis(tuple(harmonics), samples, chosen)
         loads = Excitation.of(static, harmonic)
@@ -111,8 +106,7 @@ class Structure:
 def wear_law(name: str, **numbers: float | np.ndarray) -> JointWear:
     """A wear law with its own numbers, such as wear_law("energy", coefficient=2e-15), in the units that it declares.
 
-    Raises  Refusal where there is no such law, or a number is missing or unknown
-    """
+    Raises  Refusal where there is no such law, or a number is missing or unknown"""
     return JointWear.of(name, **numbers)
 
 
@@ -131,8 +125,7 @@ def reduce(
     loads, outputs : name -> a DOF, {DOF: factor} or a vector (n,); an output is a displacement w^T q
     modes : fixed-interface modes kept, or cutoff : all up to this frequency [Hz]; neither keeps the matrices whole
     damping_ratio : of every mode without contact, where the matrices hold no damping; there may be none at all
-    Raises  Refusal for contacts of one name, DOFs that do not exist, two kinds of damping
-    """
+    Raises  Refusal for contacts of one name, DOFs that do not exist, two kinds of damping"""
     touching = (contacts,) if isinstance(contacts, MatrixContact) else tuple(contacts)
     if not touching:
         raise Refusal("a structure needs at least one contact")

@@ -1,7 +1,5 @@
 """What every number of a scene's response depends on: exact derivatives by every number of the scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,8 +20,9 @@ from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.theme import CYCLE, GREY
 from tribodyn.workflows.run import pipeline, response_curve, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.parameter_variation import STEP, ParameterVariation, geometry_keys, keys
+from tribodyn.workflows.run.parameter_variation import STEP, ParameterVariation
 from tribodyn.workflows.run.progress import Report, reporter
+from tribodyn.workflows.run.scene_numbers import geometry_keys, keys
 from tribodyn.workflows.scene.fields import Frequency, Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
@@ -48,8 +47,7 @@ class ResponseDerivatives(StudyResult):
     derivatives : by key of the scene; at : the values of the keys, SI units; joints : joint -> its pairs
     response_seconds, seconds : of one processor, of the response and of the derivatives
     reduced_keys : keys that need a new reduction of the model, which takes most of the time
-    without : keys without a derivative, each with the reason
-    """
+    without : keys without a derivative, each with the reason"""
 
     name: str
     derivatives: Derivatives
@@ -64,8 +62,7 @@ class ResponseDerivatives(StudyResult):
     def elasticities(self) -> dict[str, np.ndarray]:
         """Key -> (n_quantity,) d ln q / d ln p; of the phase d q / d ln p [rad]; the strongest on the amplitude first.
 
-        The gap of a joint, which is zero for most, counts by the micrometre: d ln q / d gap [%/um]
-        """
+        The gap of a joint, which is zero for most, counts by the micrometre: d ln q / d gap [%/um]"""
         f, size = self.derivatives, self._size
         rows = {key: f.slopes[:, i] * value / size for i, (key, value) in enumerate(self.at.items())}
         for joint, pairs in self.joints.items():
@@ -192,8 +189,7 @@ def derivatives(
         next to it; that of the largest amplitude by default
     amplitude : of the observed displacement in the mode, which stays; the last modal one of [backbone] by default
     only : keys of the scene to look at, such as contact.friction; all by default
-    Raises  SceneError for a key that is no such number; SolveFailed where there is no derivative, as at a fold
-    """
+    Raises  SceneError for a key that is no such number; SolveFailed where there is no derivative, as at a fold"""
     file, at = read_scene(scene, overrides), None if at is None else to_si(at, "Hz")
     amplitude = None if amplitude is None else to_si(amplitude, "m")
     numbers, moving = keys(file.scene), geometry_keys(file.scene)

@@ -1,7 +1,5 @@
 """The base of the results of all studies. It loads no plots, so that a run may import a study."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

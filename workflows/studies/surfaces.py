@@ -96,8 +96,7 @@ def asperities(
     lateral_unit : unit of lateral coordinates in text files, such as 1um
     height_unit : unit of heights in text files, such as 1um
     rows : rows of the table
-    Raises  Refusal: a map that cannot be one, heights in steps, too few summits
-    """
+    Raises  Refusal: a map that cannot be one, heights in steps, too few summits"""
     if spacing is not None and len(spacing) != 2:
         raise Refusal('--spacing: give two steps, along x and y, such as "1um, 1um"')
     for option, unit in (("--lateral-unit", lateral_unit), ("--height-unit", height_unit)):

@@ -1,20 +1,18 @@
 """A result beside direct time integration of the same reduced model, at one frequency, unworn or as worn in one row."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from tribodyn.consent import asks_consent
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.branch import amplitude
-from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.harmonics import HarmonicBasis, amplitude
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.stability.floquet import is_stable
 from tribodyn.hbm.threads import limited
@@ -24,20 +22,25 @@ from tribodyn.hbm.time.time_integration import FreeMotion, march_freely
 from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.errors.time_comparison import steps_of
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
+from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import settings
+from tribodyn.workflows.result.store import ResultSource, result_of
+from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Progress, Report, reporter
+from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
-STEPS, STEPS_PER_HARMONIC = 256, 32  # per period; per period of the highest harmonic kept
 TOLERANCE = 1e-6  # drift over a period, far below the differences that are looked for
 PERIODS = 150
+STABLE_WORDS = {True: "yes", False: "no: a machine leaves this motion", None: "not known"}
 LEFT_ALONE = 120  # periods of a plain march where the balance solution is unstable or nothing periodic was found
 STRIDE = 5e-3  # of the frequency, from the nearest solution to the one asked for
 
@@ -50,17 +53,18 @@ class TimeComparison(StudyResult):
     integration : the comparison; stable : whether the motion is stable, by `stability_method`
     steps : per period; seconds : spent
     left_alone : what a plain march does where that solution is unstable or nothing periodic was found, else None
-    """
+    rigid : whether time integration has the contact without its springs"""
 
     balance: HarmonicBalance
     solution: Solution
     integration: Verification
-    stable: bool
+    stable: bool | None
     stability_method: str
     row: int | None
     steps: int
     seconds: float
     left_alone: FreeMotion | None
+    rigid: bool = False
 
     @property
     def hertz(self) -> float:
@@ -70,13 +74,11 @@ class TimeComparison(StudyResult):
     def record(self) -> dict[str, Any]:
         """Numbers for machines: balance, time integration and the difference over the latter; nan is None."""
         state, integration, motion = self.solution.state, self.integration, self.integration.motion
-        ours = amplitude(self.balance.outputs(state))
-        swing = motion.outputs - motion.outputs.mean(axis=1, keepdims=True)
-        theirs = np.sqrt(2 * np.mean(swing**2, axis=1))
+        ours = amplitude(self.balance.outputs(state), self.balance.basis.harmonics)
         outputs = {
             name: {
                 "balance_m": float(ours[i]),
-                "time_m": float(theirs[i]),
+                "time_m": float(motion.amplitude[i]),
                 "difference": integration.amplitude[name],
                 "waveform_difference": integration.waveform[name],
                 "mean_difference": integration.mean[name],
@@ -88,6 +90,7 @@ class TimeComparison(StudyResult):
             "frequency_hz": self.hertz,
             "row": self.row,
             "harmonics": list(self.balance.basis.harmonics),
+            "law": "rigid" if self.rigid else "scene",
             "outputs": outputs,
             "energy": {
                 "balance_J": energy,
@@ -95,6 +98,7 @@ class TimeComparison(StudyResult):
                 "difference": integration.energy,
                 "largest_pair_difference": integration.energy_pairs,
             },
+            "work": {"loads_J": motion.supplied, "damping_J": motion.damped, "friction_J": float(motion.energy.sum())},
             "preload": {"balance_N": preload, "time_N": motion.preload, "difference": integration.preload},
             "mean_off_m": float(np.abs(motion.hold_error).max()) if motion.hold_error.size else None,
             "contact_difference": integration.contact,
@@ -127,7 +131,9 @@ class TimeComparison(StudyResult):
         worn = "unworn" if self.row is None else f"worn as in row {self.row}"
         harmonics = ", ".join(map(str, record["harmonics"]))
         shown = [("frequency", f"{self.hertz:.6g} Hz, {worn}, harmonics {harmonics}")]
-        shown += [("", f"{'balance':>14} {'time':>14} {'difference':>12}")]
+        if self.rigid:
+            shown += [("contact", "without springs in time: unilateral, planar Coulomb friction")]
+        shown += [("", f"{'balance':>14} {'rigid' if self.rigid else 'time':>14} {'difference':>12}")]
 
         def row(name: str, ours: float, theirs: float, difference: float, unit: str) -> None:
             shown.append((name, f"{ours:14.6g} {theirs:14.6g} {difference:12.2%} {unit}"))
@@ -142,9 +148,13 @@ class TimeComparison(StudyResult):
         shown.append(("contact", f"{self.integration.contact:.2%} at the worst pair and instant"))
         if (off := record["mean_off_m"]) is not None:
             shown.append(("mean held", f"to {off:.1g} m of what is prescribed"))
+        work = record["work"]
+        rest = work["loads_J"] - work["damping_J"] - work["friction_J"]
+        parts = "loads {loads_J:.6g} J, friction {friction_J:.6g} J, damping {damping_J:.6g} J".format(**work)
+        shown.append(("work", f"{parts}: {rest:.1e} J unbalanced"))
         error = "unknown" if record["step_error"] is None else f"{record['step_error']:.1e}"
         shown.append(("time steps", f"{self.steps} per period, their own error {error}"))
-        integration, stable = self.integration, "yes" if self.stable else "no: a machine leaves this motion"
+        integration, stable = self.integration, STABLE_WORDS[self.stable]
         periodic = f"{integration.outcome}, {integration.periods} periods, drift {integration.drift:.1e}"
         shown += [("periodic", periodic), ("stable", f"{stable}, by {self.stability_method}")]
         if (motion := self.left_alone) is not None:
@@ -197,6 +207,35 @@ class TimeComparison(StudyResult):
         return figure
 
 
+@asks_consent
+def verify(
+    result: ResultSource,
+    at: Frequency | None = None,
+    *,
+    row: int | None = None,
+    steps: int | None = None,
+    law: Literal["scene", "rigid"] = "scene",
+    overrides: Overrides = (),
+    allow_scripts: bool = False,
+    progress: Report = None,
+) -> TimeComparison:
+    """Check a result against direct time integration of the same model.
+
+    result : folder or file of a result
+    at : frequency such as 410Hz; the peak of the response, or the frequency of the row, by default
+    row : wear row whose depth the contact has; unworn by default
+    steps : time steps per period; 256 or 32 for each harmonic by default
+    law : of the contact in time: that of the scene, or without its springs (unilateral contact, Coulomb friction)
+    allow_scripts : run Python files and drawings (.geo) that its scene names
+    Raises  Refusal: the result has no such row or no solution to start from; SolveFailed: no balance solution"""
+    result, report = result_of(result), reporter(progress)
+    file = rebuilt(result, override_texts(overrides))
+    with limited(file.scene.solver.threads):
+        unworn = modelling.build(file, report, result.harmonics).balance
+    omega = None if at is None else 2 * np.pi * at
+    return held_against(result, file.scene, unworn, omega, row, steps, report, law == "rigid")
+
+
 def held_against(
     result: Result,
     scene: Scene,
@@ -205,8 +244,11 @@ def held_against(
     row: int | None,
     steps: int | None,
     progress: Progress,
+    rigid: bool = False,
 ) -> TimeComparison:
-    """The comparison with the model at hand: the scene of a result and its unworn problem; at : [rad/s]."""
+    """The comparison with the model at hand: the scene of a result and its unworn problem; at : [rad/s].
+
+    rigid : without the springs of the contact"""
     start = time.perf_counter()
     with limited(scene.solver.threads):
         balance, omega, x = _start(result, scene, unworn, at, row)
@@ -222,29 +264,15 @@ def held_against(
             raise SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
         steps = steps or steps_of(balance)
         with progress.stage("time integration"):
-            options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS)
+            options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS, rigid=rigid)
             integration = march.verify(balance, solution.state, options)
-            stable, reason = is_stable(balance, solution.state, integration, options)
+            with_springs = replace(options, rigid=False)
+            stable, reason = is_stable(balance, solution.state, None if rigid else integration, with_springs)
             free = None
-            if not stable or not integration.motion.periodic:
+            if not (stable or rigid) or not integration.motion.periodic:
                 free = march_freely(balance, target, solution.state, LEFT_ALONE, options)
-    return TimeComparison(balance, solution, integration, stable, reason, row, steps, time.perf_counter() - start, free)
-
-
-def march_alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> FreeMotion:
-    """What a plain march does from the motion that a wear run had in a row, also where that is no solution.
-
-    Raises  Refusal: the result has no such row, or its motion cannot be marched; IntegrationFailed
-    """
-    with limited(scene.solver.threads):
-        balance, omega, x = _start(result, scene, unworn, None, row)
-        options = Options(steps or steps_of(balance), tolerance=TOLERANCE)
-        return march_freely(balance, omega, balance.evaluate(omega, x, jacobian=False), LEFT_ALONE, options)
-
-
-def steps_of(balance: HarmonicBalance) -> int:
-    """Time steps per period that suit the harmonics of a balance."""
-    return max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])
+    seconds = time.perf_counter() - start
+    return TimeComparison(balance, solution, integration, stable, reason, row, steps, seconds, free, rigid)
 
 
 def _start(
@@ -264,8 +292,7 @@ def _start(
     good = [] if frf is None else np.flatnonzero(frf.converged).tolist()
     if frf is None or not good:
         raise Refusal("the result has no response curve to start from: run its scene first")
-    height = frf.amplitude(frf.output_names[0])
-    best = max(good, key=lambda i: height[i]) if at is None else min(good, key=lambda i: abs(frf.omega[i] - at))
+    best = frf.highest(frf.output_names[0]) if at is None else min(good, key=lambda i: abs(frf.omega[i] - at))
     return unworn, frf.omega[best], _carried(frf.contact[best], basis, unworn)
 
 

@@ -13,10 +13,7 @@ contact and slip begin is located, and a slider that is dragged on a leash of le
 so that the error is of second order in the sample spacing. Those of unequal springs step implicitly, of first order
 where the path turns.
 Source  Simo and Hughes 1998, chapter 3 (return mapping); Sanliturk and Ewins 1996 and Afzal et al. 2016 for k_1 = k_2;
-tractrix of a varying leash ours.
-"""
-
-from __future__ import annotations
+tractrix of a varying leash ours."""
 
 import math
 from dataclasses import dataclass
@@ -41,7 +38,7 @@ SIMPLER_LAW = "jenkins"
 class Parameters:
     """The law's own numbers."""
 
-    friction: float = number("", role="friction", low=0.0)
+    friction: float = number("", role="friction", low=0.0, usual=(0.0, 1.5))
     """Coulomb coefficient."""
 
 
@@ -129,8 +126,7 @@ def sampled_cycle(
     """The periodic cycle at the samples of the basis, the slider followed exactly along the chords between them.
 
     x : (n_pair, 3, n_coeff) [m]; memory : (n_pair, 2) slider positions at the start [m]
-    A pair that stays closed and below its limit at all samples is its springs
-    """
+    A pair that stays closed and below its limit at all samples is its springs"""
     samples, k = basis.to_time(x), parameters.stiffness
     pull = k[:, :2, None] * (samples[:, :2] - memory[..., None])
     load = k[:, 2:] * (samples[:, 2] - parameters.gap[:, None])
@@ -169,7 +165,9 @@ def chord(x, s, p, f, dfx, dfs, dsx, dss):
 
 @numba.njit(cache=True)
 def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss):
-    """One chord that ends in contact, the leash r (v - gap) [m]; arguments as of `chord`."""
+    """One chord that ends in contact, the leash r (v - gap) [m]; arguments as of `chord`.
+
+    A stretch that is longer than the leash is cut to it first, as no periodic cycle has it: a search for one does"""
     dx, dy, ax, ay = x[0] - s[2], x[1] - s[3], s[2] - s[0], s[3] - s[1]
     before, after = r * (s[4] - gap), r * (x[2] - gap)
     share = after / (after - before) if before <= 0.0 else 1.0  # of the chord, in contact
@@ -179,17 +177,28 @@ def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss):
         grows_x = (share, 0.0, dx * late, 0.0, 0.0, -share, 0.0, dx * early)
         grows_y = (0.0, share, dy * late, 0.0, 0.0, 0.0, -share, dy * early)
     else:
-        slips, where = _lets_go(ax, ay, dx, dy, before, after) if before > 0.0 else (True, 0.0)
-        if not slips:
+        slips, where, cut, size = True, 0.0, 1.0, math.hypot(ax, ay)
+        if before > 0.0:
+            cut = before / size if size * size > (1.0 + 1e-12) * before * before else 1.0
+            slips, where = _lets_go(cut * ax, cut * ay, dx, dy, before, after)
+        if not slips and cut == 1.0:
             for c in range(2):
                 f[c] = k * (x[c] - s[c])
                 dfx[c, c], dfs[c, c], dss[c, c] = k, -k, 1.0
             return STICKS
-        co, si, gx, gy, ex, ey, early, late = _tractrix(ax, ay, dx, dy, before, after, where)
-        bits, px, py = SLIPS, after * co, after * si
-        turns = (ex, ey, r * late, -gx, -gy, gx - ex, gy - ey, r * early)
-        grows_x = (0.0, 0.0, r * co, 0.0, 0.0, 0.0, 0.0, 0.0)
-        grows_y = (0.0, 0.0, r * si, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if slips:
+            cut = cut if where > 0.0 else 1.0
+            co, si, gx, gy, ex, ey, early, late = _tractrix(cut * ax, cut * ay, dx, dy, before, after, where)
+            bits, px, py = SLIPS, after * co, after * si
+            turns = (ex, ey, r * late, -gx, -gy, gx - ex, gy - ey, r * early)
+            grows_x = (0.0, 0.0, r * co, 0.0, 0.0, 0.0, 0.0, 0.0)
+            grows_y = (0.0, 0.0, r * si, 0.0, 0.0, 0.0, 0.0, 0.0)
+        else:
+            bits, px, py, turns = SLIPS, cut * ax + dx, cut * ay + dy, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            hx, hy = ax / size, ay / size
+            xx, xy, yy = cut * hy * hy, -cut * hx * hy, cut * hx * hx
+            grows_x = (1.0, 0.0, 0.0, -xx, -xy, xx - 1.0, xy, r * hx)
+            grows_y = (0.0, 1.0, 0.0, -xy, -yy, xy, yy - 1.0, r * hy)
     for q in range(8):  # directions: x, y, v at the end; w and x, y, v at the beginning
         tx, ty = grows_x[q] - py * turns[q], grows_y[q] + px * turns[q]
         if q < 3:
@@ -205,8 +214,7 @@ def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss):
 def _lets_go(ax, ay, dx, dy, before, after):
     """Whether a chord slips, and the share of it after which: stretch a + s d longer than before + s (after - before).
 
-    Once it slips it does so to the end, for the stretch only turns towards the motion
-    """
+    Once it slips it does so to the end, for the stretch only turns towards the motion"""
     fall, least = before - after, 1e-12 * before * before
     squared, rises = dx * dx + dy * dy - fall * fall, ax * dx + ay * dy + before * fall
     excess = ax * ax + ay * ay - before * before
@@ -225,8 +233,7 @@ def _tractrix(ax, ay, dx, dy, before, after, where):
     """Direction of the stretch at the end of a chord that slips from the share `where` on, or from where it touches.
 
     (ax, ay), (dx, dy) : stretch at the beginning and motion; leash from before to after
-    Returns its cosine and sine, and six derivatives of its angle: by that stretch, by the motion, by the leash
-    """
+    Returns its cosine and sine, and six derivatives of its angle: by that stretch, by the motion, by the leash"""
     far = math.hypot(dx, dy)
     if before <= 0.0:
         nx, ny = dx / far, dy / far

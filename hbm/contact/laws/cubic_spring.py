@@ -1,10 +1,7 @@
 """Cubic spring: the smooth reference law, f = k x + k_3 x^3 in every component on its own.
 
 No friction, no gap, no memory: what a smooth law should give (Duffing) can be checked against closed forms. The force
-of harmonics up to H is exact at more than 4 H samples.
-"""
-
-from __future__ import annotations
+of harmonics up to H is exact at more than 4 H samples."""
 
 from dataclasses import dataclass
 

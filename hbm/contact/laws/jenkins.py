@@ -1,10 +1,7 @@
 """Jenkins elements with variable normal load: one or two uncoupled tangential directions and a unilateral normal one.
 
 N = max(k_n (v - gap), 0); each tangential spring k_t drags a slider w that holds |T| <= mu N and lets go when N = 0.
-Source  Yang, Chu and Menq 1998; Tamatam 2021, eq. 3.24-3.28.
-"""
-
-from __future__ import annotations
+Source  Yang, Chu and Menq 1998; Tamatam 2021, eq. 3.24-3.28."""
 
 from dataclasses import dataclass
 
@@ -28,7 +25,7 @@ SIDE = np.array([0.0, 0.0, 1.0, -1.0])  # sign of T in slip
 class Parameters:
     """The law's own numbers."""
 
-    friction: float = number("", role="friction", low=0.0)
+    friction: float = number("", role="friction", low=0.0, usual=(0.0, 1.5))
     """Coulomb coefficient."""
 
 
@@ -87,8 +84,7 @@ def sampled_cycle(
 
     Between two transitions dT/du and dT/dv are known (stick: minus the instant the stick began; slip: mu k_n;
     separation: 0), so a block of the Jacobian is a difference of prefix sums of basis products.
-    x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_component - 1) slider positions at the start [m]
-    """
+    x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_component - 1) slider positions at the start [m]"""
     n_pair, n_comp, n_coeff = x.shape
     samples = basis.to_time(x)
     force, status = np.empty_like(samples), np.zeros(n_pair, np.int64)
@@ -113,8 +109,7 @@ def element(k, mu, gap, memory, x, phi, product, single, force, jac, kind, slide
     """The cycle of one element; writes its force (n_component, n_samples), adds to its Jacobian, returns the bits.
 
     k : (n_component,) [N/m]; memory : (n_component - 1,); x : (n_component, n_samples); an empty jac is not asked for
-    kind, slider : (n_samples,) to work on
-    """
+    kind, slider : (n_samples,) to work on"""
     n_comp, n_time = x.shape
     t = n_comp - 1
     want = jac.shape[0] > 0
@@ -164,8 +159,7 @@ def _march(kt, mu, w, u, N, T, kind, slider):
 
     The period map is a clamp, so the first cycle settles the memory; the second is marched until it meets the first.
     Returns the last sample of the first cycle that does not stick, which decides where the slider stands, and its kind;
-    -1 where the slider stands where the load path left it
-    """
+    -1 where the slider stands where the load path left it"""
     origin, sense = -1, OPEN
     for turn in range(2):
         for j in range(u.size):
@@ -193,8 +187,7 @@ def _march(kt, mu, w, u, N, T, kind, slider):
 def _add_tangential(kt, slope, kind, origin, sense, c, t, phi, product, single, want, jac):
     """The status bits of one slider and, if wanted, d T / d u and d T / d v, one segment after the other.
 
-    `origin` is the sample where the present stick began, `side` the slope of the slip before it (0: separation).
-    """
+    `origin` is the sample where the present stick began, `side` the slope of the slip before it (0: separation)."""
     n_time, m = phi.shape
     o, on = c * m, t * m
     if origin < 0:

@@ -1,10 +1,7 @@
 """Jenkins elements with a constant normal load: one or two uncoupled tangential directions.
 
 Each tangential spring k_t drags a slider w that holds |T| <= mu N_0; N_0 = 0 is no contact.
-Source  Griffin 1980; Tamatam 2021, eq. 3.26-3.28 with N constant.
-"""
-
-from __future__ import annotations
+Source  Griffin 1980; Tamatam 2021, eq. 3.26-3.28 with N constant."""
 
 from dataclasses import dataclass
 
@@ -24,7 +21,7 @@ LINEAR_WHERE_STUCK = True
 class Parameters:
     """The law's own numbers."""
 
-    friction: float = number("", role="friction", low=0.0)
+    friction: float = number("", role="friction", low=0.0, usual=(0.0, 1.5))
     """Coulomb coefficient."""
     normal_load: float = number("N", role="normal_load", low=0.0)
     """Constant normal load of every pair, 0 for no contact."""

@@ -18,8 +18,6 @@ Wear opens the gap: the mean planes part, the asperities keep the shape that the
 Source  Greenwood and Williamson 1966; Porter and Brake, MSSP 192 (2023) 110210; the bed of a whole rough face is ours
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba
@@ -45,7 +43,7 @@ FRICTION, POISSON = 4, 7  # places in a packed row
 class Parameters:
     """The law's own numbers."""
 
-    friction: float = number("", role="friction", low=0.0)
+    friction: float = number("", role="friction", low=0.0, usual=(0.0, 1.5))
     """Coulomb coefficient."""
     area: float = number("m2", role="area", default=1.0, above=0.0)
     """Area that a pair stands for; a scene gives each pair its own."""

@@ -1,10 +1,7 @@
 """Unilateral contact: a normal spring that pushes and never pulls, no tangential part and no memory.
 
 N = max(k_n (v - gap), 0).
-Source  Tamatam 2021, eq. 3.24 and chapter 6 (leaf seal).
-"""
-
-from __future__ import annotations
+Source  Tamatam 2021, eq. 3.24 and chapter 6 (leaf seal)."""
 
 import numba
 

@@ -3,8 +3,7 @@
 After each step the response extrapolated through the last four points is compared with the solved one. The difference
 gives the fourth derivative, hence the error of a cubic interpolation between the points; the step is chosen so that
 this error stays at the tolerance. A step that was too long is kept as a point further on. At a fold the sweep jumps,
-as a measured one does, and says where.
-"""
+as a measured one does, and says where."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder, OnPoint
-from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
+from tribodyn.hbm.continuation.methods.arc_length import beyond, solve_along_load
 from tribodyn.hbm.continuation.methods.natural import EXTRAPOLATION_DEGREE, extrapolate
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
@@ -37,8 +36,7 @@ class AdaptiveRules:
     snap_steps : steps ahead within which a point that was solved before, or the stop, is taken for the next one
     crawled : points in the shortest step that miss the tolerance: a response with so many of them is rough however
         close they lie, as where pairs come to rest anew at every point, and the shortest step is doubled
-    rejected_error : error estimate, over the tolerance, that takes a step back; one solve is worth a factor of two
-    """
+    rejected_error : error estimate, over the tolerance, that takes a step back; one solve is worth a factor of two"""
 
     least_error_share: float = 0.3
     jump_error: float = 1e3
@@ -91,8 +89,7 @@ def follow(
 
     start, stop : [rad/s] or in the unit of the parameter, either order
     on_point : called with points done, points expected at the present pace, and the last point
-    Returns a Branch; `end` says where it ends and why, and where the response jumped to another branch on the way
-    """
+    Returns a Branch; `end` says where it ends and why, and where the response jumped to another branch on the way"""
     options = options or Options()
     sweep = _begin(parameter.of(problem), start, stop, options)
     while (end := sweep.advance()) is None:
@@ -184,19 +181,18 @@ class _AdaptiveSweep:
 
     def _jump(self, origin: float) -> bool:
         """Continue behind a fold, small or large, where no solution follows on the one here; whether there is one."""
-        step = self._options.min_step
-        while step < self._options.max_step:
+        o, remaining = self._options, (self._stop - origin) / self._span
+        values, step = [], o.min_step
+        while step < o.max_step:
             step *= 10
-            value = origin + min(step, (self._stop - origin) / self._span) * self._span
-            place = self._path.place(value)
-            solution = newton.solve(*place, self.builder.x[-1], self._options.newton)
-            if not solution.converged and self._options.load_paths:
-                solution = solve_along_load(*place, self._options.newton)
-            if solution.converged:
-                self._ahead = [a for a in self._ahead if abs(a[0] - origin) > abs(value - origin)]
-                self._accept(value, solution, self._outputs(value, solution), jumped=True)
-                return True
-        return False
+            values.append(origin + min(step, remaining) * self._span)
+        result = beyond(self._path, self.builder.x[-1], values, o.newton, o.load_paths)
+        if result is None:
+            return False
+        value, solution = result
+        self._ahead = [a for a in self._ahead if abs(a[0] - origin) > abs(value - origin)]
+        self._accept(value, solution, self._outputs(value, solution), jumped=True)
+        return True
 
     def _factor(self, error: float) -> float:
         return float(np.clip(0.9 * max(error, 1e-12) ** (-1 / (EXTRAPOLATION_DEGREE + 1)), 0.2, 2.0))

@@ -7,11 +7,11 @@ for in the directions that the derivative there offers. A step whose chord is no
 shows whether it stays on its branch, and none is taken to a neighbouring one. A walk that comes back onto its own way
 took a wrong turn: it is rewound and resumes in shorter steps. Where all that fails, as where contacts impact and the
 curve has gaps, the parameter alone takes a short step over the place, and the branch says where.
-Source  Keller 1977 (pseudo arc length); step control and kinks ours.
-"""
+Source  Keller 1977 (pseudo arc length); step control and kinks ours."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -35,16 +35,15 @@ from tribodyn.refusal import Refusal
 class ArcLengthRules:
     """What a walk does where the curve ends, turns into itself or brings nothing; see docs/accuracy/ablations.md.
 
-    gap_steps : of the parameter over a gap in the curve, shares of its range, tried in turn; a longer one could miss a
-        peak
+    gap_steps : of the parameter over a gap in the curve, shares of its range, tried in turn; the last one, which could
+        miss a peak, along the load, too
     max_gaps : a curve with more is none
     max_rewinds : times that a walk which came back onto its own way goes back, to four times shorter steps
     headway : share of the range that `patience` waits for
     max_landings : times that it goes back from a bound where it lands on another branch
-    ramp_patience : points of a curve over the load that brings no more load; whole curves take 190 or so
-    """
+    ramp_patience : points of a curve over the load that brings no more load; whole curves take 190 or so"""
 
-    gap_steps: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3)
+    gap_steps: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
     max_gaps: int = 20
     max_rewinds: int = 4
     headway: float = 1e-3
@@ -58,8 +57,7 @@ class Options:
 
     bounds : values of the parameter between which the curve is followed, start and stop by default
     guess : (n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default
-    patience : points in which the curve has to come further from its start by `rules.headway`; any by default
-    """
+    patience : points in which the curve has to come further from its start by `rules.headway`; any by default"""
 
     step: float = number(default=0.05, above=0.0)
     """Arc length of the first step."""
@@ -109,34 +107,27 @@ def follow(
     start, stop : [rad/s] or in the unit of the parameter, either order
     on_point : called with points done, points expected at the present pace, and the last point
     Returns a Branch with its folds; its end says whether it reached the stop, came back, closed on itself or got stuck
-    Raises  ValueError where start and stop are the same or out of the bounds
-    """
+    Raises  Refusal where start and stop are the same or out of the bounds"""
     options = options or Options()
-    walk = _begin(parameter.of(problem), start, stop, options)
-    while (end := walk.advance()) is None:
-        walk.builder.tell(on_point, stop, options.max_points)
-    return walk.builder.finish(end)
-
-
-def _begin(path: Parameter, start: float, stop: float, options: Options) -> _Walk:
-    """The first point, from which to follow; raises ValueError as `follow` does."""
+    path, bounds = parameter.of(problem), options.bounds or (min(start, stop), max(start, stop))
     if start == stop:
         raise Refusal(f"start and stop are the same, {path.say(start)}: there is no curve to follow")
-    bounds = options.bounds or (min(start, stop), max(start, stop))
     if not bounds[0] <= start <= bounds[1]:
         raise Refusal(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
     if options.guess is not None:
         first = newton.solve(*path.place(start), options.guess, options.newton)
     else:
         first = first_on(path, start, options.newton)
-    return _Walk(path, options, first, start, stop, bounds)
+    walk = _Walk(path, options, first, start, stop, bounds)
+    while (end := walk.advance()) is None:
+        walk.builder.tell(on_point, stop, options.max_points)
+    return walk.builder.finish(end)
 
 
 def first_on(path: Parameter, value: float, options: NewtonOptions) -> Solution:
     """The first point of a path, without a neighbouring one: from rest, by other ways where that fails.
 
-    On a path over the load these ways would be the path itself
-    """
+    On a path over the load these ways would be the path itself"""
     solve = newton.solve_from_rest if path.name == parameter.LOAD else solve_along_load
     return solve(*path.place(value), options)
 
@@ -152,8 +143,7 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
     through no load to the opposite one, whose solution is that of half a period later if all loads have odd harmonics;
     where that ends too, friction falls from where all closed pairs stick, and then the contact is stiffened from soft
     springs
-    Returns a Solution; its outcome is the one from rest where no way leads to the load
-    """
+    Returns a Solution; its outcome is the one from rest where no way leads to the load"""
     options = options or NewtonOptions()
     if (simpler := balance.simpler()) is not None:
         simple_solution = solve_along_load(simpler, omega, options)
@@ -187,17 +177,24 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
     return alternative or first
 
 
+def beyond(
+    path: Parameter, x: np.ndarray, values: Sequence[float], options: NewtonOptions, load_paths: bool = True
+) -> tuple[float, Solution] | None:
+    """The first of some values that has a solution, near a neighbouring x or else along the load; None without one."""
+    for value in values:
+        solution = newton.solve(*path.place(value), x, options)
+        if not solution.converged and load_paths:
+            solution = solve_along_load(*path.place(value), options)
+        if solution.converged:
+            return value, solution
+    return None
+
+
 class _Walk:
     """Steps taken into a branch, and the reasons to end it."""
 
     def __init__(
-        self,
-        path: Parameter,
-        options: Options,
-        first: Solution,
-        start: float,
-        stop: float,
-        bounds: tuple[float, float],
+        self, path: Parameter, options: Options, first: Solution, start: float, stop: float, bounds: tuple[float, float]
     ):
         self._path, self._options, self._bounds = path, options, bounds
         self._start, self._reach = start, abs(stop - start)
@@ -245,8 +242,7 @@ class _Walk:
                 return self._land(part, bound)
             if part.turns:  # a fold that is a kink, right behind the last point
                 builder.mark_fold()
-            assert part.end.solution is not None
-            builder.add(part.end.value, part.end.solution, fold=part.end.fold)
+            builder.add(part.end.value, part.end.solved, fold=part.end.fold)
         self._rows.append(len(builder.value))
         return self._came_back(parts)
 
@@ -260,17 +256,19 @@ class _Walk:
     def _jump(self) -> bool:
         """Step over a gap in the curve, its parameter moving on as before; whether there is a solution behind."""
         origin, span, sense = self.builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
-        for share in self._options.rules.gap_steps if len(self._jumps) < self._options.rules.max_gaps else ():
-            value = origin + sense * share * span
-            if sense == 0 or not self._bounds[0] < value < self._bounds[1]:
-                break
-            solution = newton.solve(*self._path.place(value), self.builder.x[-1], self._options.newton)
-            if solution.converged:
-                self._jumps.append(value)
-                self.builder.add(value, solution)
-                self._stepper = CurveStepper(self._path, self._options, solution, value, value + sense * self._reach)
-                self._rows, self._first = [len(self.builder.value)], None
-                return True
+        o, path, x = self._options, self._path, self.builder.x[-1]
+        steps = [share * span for share in o.rules.gap_steps if len(self._jumps) < o.rules.max_gaps and sense]
+        values = [value for value in (origin + sense * s for s in steps) if self._bounds[0] < value < self._bounds[1]]
+        result = beyond(path, x, values[: len(o.rules.gap_steps) - 1], o.newton, load_paths=False)
+        if result is None and path.name != parameter.LOAD:
+            result = beyond(path, x, values[len(o.rules.gap_steps) - 1 :], o.newton)
+        if result is not None:
+            value, solution = result
+            self._jumps.append(value)
+            self.builder.add(value, solution)
+            self._stepper = CurveStepper(path, o, solution, value, value + sense * self._reach)
+            self._rows, self._first = [len(self.builder.value)], None
+            return True
         return False
 
     def _land(self, part: Segment, bound: float) -> Outcome[BranchEnd] | None:
@@ -299,17 +297,15 @@ class _Walk:
         if np.linalg.norm(builder.x[-1]) > growth * self._size > 0:
             reason = f"the response grows without bound, {growth:.0e} times that of the first point"
             return BranchEnd.ENDED.say(f" {place}: {reason}")
-        assert self._first is not None
-        history = self._stepper.segments
-        if len(history) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):
+        first, history = self._first, self._stepper.segments
+        if first and len(history) > 3 and any(p.passes(self._path, first, 1.0, newton_options) for p in parts):
             return BranchEnd.CLOSED.say(f": came back to its first point after {len(builder.value)} points")
         return self._lost(parts, place)
 
     def _lost(self, parts: list[Segment], place: str) -> Outcome[BranchEnd] | None:
         """Whether the walk is back on its own way: then it went wrong there, is rewound and continues in shorter steps.
 
-        Against its sense it turned where it should not; in its sense it left the curve for a closed one beside it.
-        """
+        Against its sense it turned where it should not; in its sense it left the curve for a closed one beside it."""
         history, newton_options = self._stepper.segments, self._options.newton
         for index in range(1, len(history) - 2):
             candidates = [p for p in parts if p.meets(history[index])]

@@ -1,10 +1,8 @@
 """Natural continuation: the parameter is stepped, the solution follows by extrapolation of its last points.
 
 A step that fails is halved. Where that does not help the curve is followed by arc length: if it has a fold there, the
-sweep jumps as a measured one does, to where the curve comes to the next value or else to what is found from rest.
-"""
-
-from __future__ import annotations
+sweep jumps as a measured one does, to where the curve comes to the next value or else to what is found from rest. A
+value without a solution is a gap: the sweep continues behind it, and comes back to it from there."""
 
 import math
 from collections.abc import Sequence
@@ -32,15 +30,12 @@ class NaturalRules:
 
     least_spacing : of the points extrapolated from, in steps: closer ones amplify what Newton leaves
     max_fold_points : by arc length on the way round folds, after which the sweep looks from rest
-    max_corner_points : the same where a contact law has a simpler one to begin with, as its curves have corners
     abrupt : miss of the extrapolation, in the longer of the last two steps of x, from which on a step is solved
         backwards: over a jump it does not lead back
-    same_point : distance, in steps of x, within which it has led back
-    """
+    same_point : distance, in steps of x, within which it has led back"""
 
     least_spacing: float = 0.5
     max_fold_points: int = 200
-    max_corner_points: int = 5
     abrupt: float = 0.5
     same_point: float = 1e-2
 
@@ -73,8 +68,7 @@ def follow(
     start, stop : [rad/s] or in the unit of the parameter, either order
     on_point : called with points done, points wanted, and the last point
     Returns a Branch; its end says at which folds the response jumped, and where and why a branch ends early. Points
-        of the branch that are folds are marked
-    """
+        of the branch that are folds are marked"""
     options = options or Options()
     sweep, end = _NaturalSweep(parameter.of(problem), start, stop, options), None
     while end is None:
@@ -99,9 +93,12 @@ class _NaturalSweep:
 
     @property
     def notes(self) -> str:
-        """At which folds the response jumped; empty where it did not."""
-        places = sorted({*self._jumps, *(self.builder.value[i] for i in self.builder.folds)})
-        return f"; the response jumped at {', '.join(map(self._path.say, places))}" if places else ""
+        """At which folds the response jumped, and where there is no solution; empty where neither is so."""
+        builder, say = self.builder, self._path.say
+        places = sorted({*self._jumps, *(builder.value[i] for i in builder.folds)})
+        gaps = [point.value for point in builder.points if point.outcome.kind is not SolveEnd.CONVERGED]
+        texts = (("the response jumped", places), ("no solution was found", gaps))
+        return "".join(f"; {text} at {', '.join(map(say, values))}" for text, values in texts if values)
 
     def advance(self) -> Outcome[BranchEnd] | None:
         """The next value; why the branch ends, or None."""
@@ -110,8 +107,10 @@ class _NaturalSweep:
         if solution.converged:
             value = self._targets[self.done]
             solution = self._step(value, options.refinements)
-            if not solution.converged:
+            if not solution.converged and path.place(value)[0].simpler() is None:
                 solution = _by_arc_length(path, builder, solution, value, self._stop, options)
+            if not solution.converged:
+                solution = self._behind_gap(solution)
             self._solution = solution
             self.done += 1
         if not solution.converged:
@@ -120,6 +119,25 @@ class _NaturalSweep:
             end = BranchEnd.JUMPED if self.notes else BranchEnd.REACHED
             return end.say(f" {path.say(self._stop)}{self.notes}")
         return None
+
+    def _behind_gap(self, failed: Solution) -> Solution:
+        """The solution at the first of four values that has one, and from there, if possible, the one that failed."""
+        path, builder, options = self._path, self.builder, self._options
+        values = self._targets[self.done : self.done + 4].tolist()
+        last = max((i for i, p in enumerate(builder.points) if p.outcome.kind is SolveEnd.CONVERGED), default=None)
+        result = None if last is None else arc_length.beyond(path, builder.x[last], values, options.newton)
+        if result is None:
+            return failed
+        value, solution = result
+        at = builder.value[-1]
+        back = newton.solve(*path.place(at), solution.state.x, options.newton)
+        if back.converged:
+            builder.truncate(len(builder.value) - 1)
+            builder.add(at, back)
+            self._jumps.append(at)
+        builder.add(value, solution)
+        self.done += values.index(value)
+        return solution
 
     def _step(self, value: float, halvings: int) -> Solution:
         """One step to `value`, through points in between where it fails or does not lead back."""
@@ -138,11 +156,10 @@ class _NaturalSweep:
     def _leads_back(self, value: float, state: State) -> bool:
         """Whether a step to a value, where it is far from the extrapolation, comes back to the point before.
 
-        It does where that is near the tangent at its end, else where it is solved from there
-        """
+        It does where that is near the tangent at its end, else where it is solved from there"""
         builder, rules, path, x = self.builder, self._options.rules, self._path, state.x
         origin, before, last = builder.value[-1], builder.x[-1], len(builder.value) - 1
-        first = max(builder.folds[-1] + 1 if builder.folds else 0, last - EXTRAPOLATION_DEGREE)
+        first = max(builder.stretch, last - EXTRAPOLATION_DEGREE)
         step = np.linalg.norm(x - before)
         if last - first < 1:
             return True
@@ -166,7 +183,7 @@ def _by_arc_length(
         width=arc_length.Options.width * abs((stop - origin) / (value - previous_value)),
         bounds=(min(origin, value), max(origin, value)),
         guess=builder.x[-2],
-        max_points=rules.max_fold_points if path.place(value)[0].simpler() is None else rules.max_corner_points,
+        max_points=rules.max_fold_points,
         newton=options.newton,
     )
     curve = arc_length.follow(path, previous_value, value, way)
@@ -192,11 +209,10 @@ def predict(builder: BranchBuilder, value: float, least_spacing: float = Natural
     """Extrapolation of the last points to a value of the parameter: (n_pair, n_component, n_coeff) [m].
 
     Points closer together than half of the step, as halved steps leave them, would blow up their differences; those
-    before a fold lie on another leg of the curve.
-    """
+    before a fold lie on another leg of the curve."""
     spacing = least_spacing * abs(value - builder.value[-1])
     chosen = [len(builder.value) - 1]
-    for i in reversed(range(builder.folds[-1] + 1 if builder.folds else 0, chosen[0])):
+    for i in reversed(range(builder.stretch, chosen[0])):
         if len(chosen) > EXTRAPOLATION_DEGREE:
             break
         if abs(builder.value[i] - builder.value[chosen[-1]]) >= spacing:

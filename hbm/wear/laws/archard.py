@@ -1,9 +1,6 @@
 """Archard wear law: worn volume is the coefficient times normal force times slip distance.
 
-Source  Archard 1953. Coefficient k = K / H [1/Pa]; k = mu alpha equals the energy law in full slip.
-"""
-
-from __future__ import annotations
+Source  Archard 1953. Coefficient k = K / H [1/Pa]; k = mu alpha equals the energy law in full slip."""
 
 from dataclasses import dataclass
 
@@ -17,7 +14,7 @@ from tribodyn.hbm.wear.law import Exposure
 class Parameters:
     """The law's own numbers."""
 
-    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0)
+    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0, usual=(0.0, 1e-9))
     """Worn volume per normal force and slip distance, k = K / H; 1 m3/J is 1/Pa."""
 
 

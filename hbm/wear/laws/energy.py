@@ -1,9 +1,6 @@
 """Energy wear law: worn volume is the coefficient times the friction work.
 
-Source  Fouvry et al. 2003; Tamatam 2021, eq. 3.29: v_w = Z alpha E / A. Coefficient alpha [m3/J].
-"""
-
-from __future__ import annotations
+Source  Fouvry et al. 2003; Tamatam 2021, eq. 3.29: v_w = Z alpha E / A. Coefficient alpha [m3/J]."""
 
 from dataclasses import dataclass
 
@@ -17,7 +14,7 @@ from tribodyn.hbm.wear.law import Exposure
 class Parameters:
     """The law's own numbers."""
 
-    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0)
+    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0, usual=(0.0, 1e-9))
     """Worn volume per friction work, alpha."""
 
 

@@ -4,10 +4,7 @@ A pair that opens and closes is compressed anew after every impact; the normal f
 W = integral of N dv over dv > 0, which is k v_max^2 / 2 for one impact on a linear spring. A pair that never opens
 is not struck and does not wear. Coefficient [m3/J].
 Source  ours, in the spirit of impact wear proportional to impact energy (Rabinowicz 1965); Tamatam 2021, chapter 6,
-names the wear of a leaf seal by chattering as the next step and gives no law
-"""
-
-from __future__ import annotations
+names the wear of a leaf seal by chattering as the next step and gives no law"""
 
 from dataclasses import dataclass
 
@@ -23,7 +20,7 @@ from tribodyn.refusal import Refusal
 class Parameters:
     """The law's own numbers."""
 
-    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0)
+    coefficient: float = number("m3/J", role="wear_coefficient", low=0.0, usual=(0.0, 1e-9))
     """Worn volume per work of impacts."""
 
 
@@ -45,8 +42,7 @@ def loading_work(force: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Work of a force along a periodic path where it is positive: what a spring takes up before giving it back.
 
     force, displacement : (..., n_samples) of one period [N], [m]
-    Returns (...) [J]; trapezoidal rule, exact for a linear spring between samples
-    """
+    Returns (...) [J]; trapezoidal rule, exact for a linear spring between samples"""
     path = np.roll(displacement, -1, axis=-1) - displacement
     mean = 0.5 * (force + np.roll(force, -1, axis=-1))
     return np.maximum(mean * path, 0.0).sum(axis=-1)

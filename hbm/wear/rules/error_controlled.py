@@ -2,10 +2,7 @@
 
 dw/dZ = r(w) relaxes a pressure peak thousands of times faster than the contact as a whole wears: explicit steps must
 resolve the former or oscillate from node to node. Steps along the balance are implicit (balance_step), those in time
-linearly implicit (marched_step); a companion of lower order gives the error that their length follows.
-"""
-
-from __future__ import annotations
+linearly implicit (marched_step); a companion of lower order gives the error that their length follows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -44,8 +41,7 @@ class Rule(WearRule):
     with_growth : whether rows have the growth of perturbations; "machine" depends on it, nothing else does
     `step_error` of a row is its estimate over the tolerance. The last touch of a vibrating contact does not end in
     finite time: LEAST_PRELOAD_SHARE ends the run where `lost_below` does not.
-    Raises  Refusal where the wear law wears pairs that do no friction work
-    """
+    Raises  Refusal where the wear law wears pairs that do no friction work"""
 
     SCHEME = StepScheme.IMPLICIT
     COST = StepCost(23, 0.05, -0.4, 40)  # it searches for higher peaks

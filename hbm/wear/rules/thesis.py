@@ -1,9 +1,6 @@
 """The wear rule of the thesis: explicit steps of Z cycles, as many as let the deepest pair wear by a given depth.
 
-Source  Tamatam 2021, eq. 3.29-3.31 and figure 3.6.
-"""
-
-from __future__ import annotations
+Source  Tamatam 2021, eq. 3.29-3.31 and figure 3.6."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Words of `prove` that serve the shrouded bladed disk: prove blade."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal
 
@@ -30,8 +28,7 @@ def blade(
     speed
         Highest speed of a Campbell diagram, such as 6000rpm; no diagram by default.
     out
-        Folder of tables and pictures; results/blade_study by default.
-    """
+        Folder of tables and pictures; results/blade_study by default."""
     from proof.cases.blade import study as blade_study
     from proof.cases.blade.few_sectors import FEW_SECTORS
     from tribodyn.workflows.studies.wheels.unequal_sectors import mistuned

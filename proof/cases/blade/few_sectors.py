@@ -1,7 +1,5 @@
 """A wheel of eight small coarse blades, few enough to be solved as a whole (ours)."""
 
-from __future__ import annotations
-
 FEW_SECTORS = (  # ours: a wheel of eight small blades, coarse
     "wheel.sectors=8",
     "wheel.engine_order=2",

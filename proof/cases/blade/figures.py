@@ -24,8 +24,7 @@ SHOWN_DIAMETERS = 15  # in the thesis's figure 4.11
 def diagram_figure(families: Mapping[str, np.ndarray]) -> Figure:
     """Frequencies over nodal diameters, free and stuck (figure 4.11), and how far the thesis shows them.
 
-    families : "free" and "stuck" (n_diameter, family) [Hz]
-    """
+    families : "free" and "stuck" (n_diameter, family) [Hz]"""
     figure = plot_nodal_diameters(families)
     figure.axes[0].axvline(SHOWN_DIAMETERS, color=INK, lw=0.8, ls=":")
     return figure
@@ -49,8 +48,7 @@ def orders_figure(curves: Mapping[int, Curve]) -> Figure:
 def forces_figure(curves: Mapping[float, Curve]) -> Figure:
     """Responses to rising excitation at fixed preload, per force, between free and stuck (figure 4.13).
 
-    curves : by amplitude of the force [N]
-    """
+    curves : by amplitude of the force [N]"""
     with plot_axes(7.6, 4.8) as (figure, axes):
         kilo = 1e-3
         item, first = next(iter(curves.items()))

@@ -1,10 +1,7 @@
 """The study of the shrouded bladed disk: ./tribodyn prove blade study.
 
 Figures 4.11 to 4.17 and table 4.4 of the thesis with ours: nodal diameters, engine orders, rising excitation, wear
-until the shrouds are lost for several wear steps; and a Campbell diagram where a highest speed is given.
-"""
-
-from __future__ import annotations
+until the shrouds are lost for several wear steps; and a Campbell diagram where a highest speed is given."""
 
 import csv
 import time
@@ -16,7 +13,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from proof.cases.blade import figures as blade_figures
-from proof.problems import delta_max, follow_adaptive, linear_references, result_of, wear as wear_down, worn
+from proof.problems import delta_max, linear_references, result_of, wear as wear_down, worn
 from proof.wear_steps import published_wear_steps
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
@@ -26,7 +23,7 @@ from tribodyn.workflows.result.result import References
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.wheels.wheel_model import Wheel, build as build_wheel, campbell, critical_speeds
+from tribodyn.workflows.studies.wheels.wheel_model import Wheel, build as build_wheel, campbell, critical_speeds, follow
 
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4
@@ -39,8 +36,7 @@ class Extent:
 
     orders : engine orders; loads : factors on the scene's excitation; tolerance : of the curves between their points
     steps : largest depths of a wear step over delta_max, the finest last; shown : the one whose course is drawn
-    frames : worn states that maps and curves are drawn of; speeds : of the Campbell diagram up to the highest
-    """
+    frames : worn states that maps and curves are drawn of; speeds : of the Campbell diagram up to the highest"""
 
     orders: tuple[int, ...] = (1, 2, 3, 5, 8, 12, 20)
     loads: tuple[float, ...] = (0.02, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 20.0)
@@ -116,7 +112,7 @@ def reduction_error(blade: Wheel) -> dict[str, np.ndarray]:
 
 def respond(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Curve:
     """The response over a range [Hz]."""
-    return Curve(follow_adaptive(balance, frequency, tolerance), linear_references(balance, *frequency))
+    return Curve(follow(balance, frequency, tolerance), linear_references(balance, *frequency))
 
 
 def span(blade: Wheel, order: int) -> tuple[float, float]:

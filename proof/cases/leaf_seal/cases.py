@@ -2,10 +2,7 @@
 
 Published are normalised values; their units are ours and stand here and in the scene: one unit of force is 1 kPa of
 pressure, one of static liner displacement 0.5 mm (it tilts the leaf by a quarter of a degree), one of harmonic liner
-displacement 20 um; K_n = 25 and K_spring = 1 are the stiffnesses that the fit found.
-"""
-
-from __future__ import annotations
+displacement 20 um; K_n = 25 and K_spring = 1 are the stiffnesses that the fit found."""
 
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Words of `prove` that serve the leaf seal: prove leaf."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path
@@ -13,27 +11,26 @@ from tribodyn.workflows.command.word import Flag, Json, make_room
 
 
 def leaf(
-    work: Literal["fit", "check", "study", "accuracy"],
+    work: Literal["fit", "check", "study"],
     *,
     out: Path | None = None,
     resume: Flag = False,
     as_json: Json = False,
 ) -> None:
-    """Of the leaf seal: the fit of its dimensions, its parameter study, its accuracy.
+    """Of the leaf seal: the fit of its dimensions and its parameter study.
 
     Parameters
     ----------
     work
         fit looks for the dimensions that give the published frequency ratios, check shows those of the scene; study
-        runs some thirty configurations; accuracy holds 1 to 9 harmonics against time integration.
+        runs some thirty configurations.
     out
-        Folder of tables and pictures; results/leaf_study or results/leaf_accuracy by default.
+        study: folder of tables and pictures; results/leaf_study by default.
     resume
         Resume a study with what is complete in its folder.
     as_json
-        Print JSON for machines.
-    """
-    from proof.cases.leaf_seal import accuracy, fit, study
+        Print JSON for machines."""
+    from proof.cases.leaf_seal import fit, study
     from tribodyn.workflows.scene.source import read_scene
 
     make_room(out)
@@ -47,9 +44,6 @@ def leaf(
     if work == "study":
         full = study.whole(folder, resume, tell)
         message, record = full.text(), full.record()
-    elif work == "accuracy":
-        computed = accuracy.compute(folder)
-        message, record = computed.text(), computed.record()
     else:
         item = (
             fit.of_scene(read_scene("leaf_seal_thesis").mesh_scene) if work == "check" else fit.search(report_progress)

@@ -1,7 +1,5 @@
 """Pictures of the leaf seal in the manner of the thesis's figures 6.5 to 6.14, and the summary of the study."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -34,8 +32,7 @@ def patch_of(response: LeafResponse) -> Patch:
 def response_figure(response: LeafResponse, low: float, high: float) -> Figure:
     """Harmonics 0 and 1 of the three published nodes between the free and the stuck leaf (figures 6.6 and 6.9).
 
-    low, high : range of the linear references [Hz]
-    """
+    low, high : range of the linear references [Hz]"""
     branch, balance = response.branch, response.balance
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(11, 9.5), layout="constrained")
@@ -85,8 +82,7 @@ def draw_curve(
 def contact_figure(shown: Sequence[tuple[str, LeafResponse, int]]) -> Figure:
     """Mean pressure, status, share of the cycle in contact and impact velocity at points of curves (6.10 to 6.14).
 
-    shown : title, response and point of each column
-    """
+    shown : title, response and point of each column"""
     patch = patch_of(shown[0][1])
     states = [response.state(point) for _, response, point in shown]
     chatters = [response.chatter(point) for _, response, point in shown]

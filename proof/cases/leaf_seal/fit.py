@@ -7,10 +7,7 @@ The published columns contradict each other a little: a spring cannot lower a fr
 1.53 when springs are added, and soft springs that lift the leaf at 0.19 cannot raise mode 3 from 1.00 to 1.35. All 28
 numbers count alike; what remains is what the table allows. It allows several leaves: searches that start elsewhere end
 elsewhere, with errors that the numbers do not tell apart. The scene's own leaf is one of them, and is kept as long as
-none fits better by more than that.
-"""
-
-from __future__ import annotations
+none fits better by more than that."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -49,8 +46,7 @@ Dimensions = dict[str, float]
 def columns(leaf: JointSprings, spring: float, contact: float) -> np.ndarray:
     """Ten frequencies [Hz] alone, on springs, and on springs with stuck contact: (3, 10).
 
-    spring : of each pin [N/m]; contact : of both patches together [N/m]
-    """
+    spring : of each pin [N/m]; contact : of both patches together [N/m]"""
     stuck = leaf.model.interface.stiffness(0.0, contact)
     none, all_ = ({name: value for name in leaf.springs} for value in (0.0, spring))
     return np.array([leaf.modes(*state)[0] for state in ((none,), (all_,), (all_, stuck))])
@@ -61,8 +57,7 @@ class Fit:
     """A fitted leaf.
 
     parameters : of the part; spring : of each pin [N/m]; contact : of both patches together [N/m]
-    unit : the frequency that counts as one [Hz]; columns : (3, 10) [Hz], as the rows of PUBLISHED
-    """
+    unit : the frequency that counts as one [Hz]; columns : (3, 10) [Hz], as the rows of PUBLISHED"""
 
     parameters: Dimensions
     spring: float
@@ -198,8 +193,7 @@ def fit(scene: MeshScene, pin_column: int, start: Sequence[float] | None = None,
     """Fit the shape of the leaf by least squares over all ratios; the same numbers at every run.
 
     start : in the order of SHAPE, whose starts are taken where None
-    Every shape gets its own best unit and stiffnesses, so that only the shape is searched for.
-    """
+    Every shape gets its own best unit and stiffnesses, so that only the shape is searched for."""
     first = dimensions(scene)
     lower, typical, upper, scale = (np.array(column) for column in zip(*SHAPE.values(), strict=True))
     begin = typical if start is None else np.clip(start, lower, upper)
@@ -233,8 +227,7 @@ def shape_of(p: Dimensions) -> tuple[float, ...]:
 def search(tell: Callable[[str], None]) -> Fit:
     """Fit from the scene's own leaf, and afresh for every column the pins may stand in; what is chosen.
 
-    tell : called with a sentence on every fit
-    """
+    tell : called with a sentence on every fit"""
     scene = read_scene("leaf_seal_thesis").mesh_scene
     with threadpool_limits(1):
         first = dimensions(scene)

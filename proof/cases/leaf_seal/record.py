@@ -1,7 +1,5 @@
 """What is kept of one configuration of the leaf seal's study, to resume a stopped study and to draw it again."""
 
-from __future__ import annotations
-
 import json
 import re
 import zipfile
@@ -15,7 +13,7 @@ from proof.cases.leaf_seal.cases import Case
 from proof.cases.leaf_seal.response import LINER_NODE, LeafResponse
 from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.workflows.result.store import replacing as write_whole
+from tribodyn.output_file import replacing as write_whole
 from tribodyn.workflows.scene.schema import Scene
 
 COLUMNS = (
@@ -33,8 +31,7 @@ class Record:
 
     numbers : of COLUMNS; only group, value and end where nothing was solved
     frequency : (n_point,) [Hz]; amplitude : (n_point,) [m]; stable : (n_point,) bool
-    response : None where the record was read from a file
-    """
+    response : None where the record was read from a file"""
 
     case: Case
     numbers: dict[str, Any]

@@ -1,7 +1,5 @@
 """The response of one configuration of the leaf seal: curve with folds, stability, chosen points, chattering, wear."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,8 +30,7 @@ class LeafResponse:
     """A configuration and its response curve.
 
     springs : name of a pin, which is also an output, -> stiffness [N/m]; seat : bearing area of a pin [m2]
-    seconds : processor time of model and curve [s]
-    """
+    seconds : processor time of model and curve [s]"""
 
     part: Part
     balance: HarmonicBalance
@@ -59,8 +56,7 @@ class LeafResponse:
         """Five points as the thesis picks them: linear, three where contact is lost for a while, linear again.
 
         The middle one is where most pairs separate and the leaf moves most; the outer ones lie well outside of the
-        range of frequencies in which anything separates. Where nothing does, the points lie around the peak.
-        """
+        range of frequencies in which anything separates. Where nothing does, the points lie around the peak."""
         branch = self.branch
         height = branch.amplitude(LINER_NODE)
         peak = int(np.argmax(height))
@@ -109,8 +105,7 @@ class LeafResponse:
 def respond(file: SceneFile) -> LeafResponse:
     """Build the model of a configuration and follow its response as far as it goes, see Branch.end.
 
-    Raises  SolveFailed where not even the first point of the curve is found
-    """
+    Raises  SolveFailed where not even the first point of the curve is found"""
     start = time.process_time()
     scene = file.mesh_scene
     model = build(file, Progress())

@@ -2,10 +2,7 @@
 
 Some thirty configurations, one response curve each, with folds, stability and chattering; a table, the summary of all
 curves, and for the scene itself the pictures of the thesis. A configuration that fails is told and left behind; every
-one that is done is kept, so that a stopped study can be resumed.
-"""
-
-from __future__ import annotations
+one that is done is kept, so that a stopped study can be resumed."""
 
 import csv
 import time
@@ -35,8 +32,7 @@ def sizes(response: LeafResponse) -> str:
     balance = response.balance
     pairs, basis = balance.contact.n_pair, balance.basis
     state = response.state(0)
-    assert state.cycle.jacobian is not None
-    arrays = (state.x, state.cycle.force, state.cycle.jacobian, state.g, state.residual)
+    arrays = (state.x, state.cycle.force, state.cycle.slope, state.g, state.residual)
     kilobytes = sum(array.nbytes for array in arrays) / 1024
     return (
         f"{balance.model.system.n_dof} DOFs; {balance.n_unknown} unknowns = {pairs} pairs x "
@@ -59,8 +55,7 @@ def study(
 ) -> list[Record]:
     """Solve configurations; each is kept and told as soon as it is done.
 
-    resume : take from the folder what is complete there and of the same scene
-    """
+    resume : take from the folder what is complete there and of the same scene"""
     records: list[Record] = []
     for case in chosen:
         scene = read_scene("leaf_seal_thesis", case.overrides).scene

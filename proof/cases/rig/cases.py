@@ -2,10 +2,7 @@
 
 Frequencies before and after the fit of the joints, the prescribed height, energy per cycle against shaker force, wear
 to the loss of the preload for three mating heights, responses and loops at five stages of wear, and whether these
-cycles are those that time integration finds.
-"""
-
-from __future__ import annotations
+cycles are those that time integration finds."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -62,8 +59,7 @@ class Study:
     cycles : harmonics -> shaker force [N] -> cycle; tight : the cycle under STUCK_PRELOAD
     apart : largest relative difference of the response without contact to the open rig's
     runs : one per mating height; the first is that of the scene, whose stages these are
-    other : the first one with the other reading of the harmonics; seconds : of processor time
-    """
+    other : the first one with the other reading of the harmonics; seconds : of processor time"""
 
     before: np.ndarray
     after: np.ndarray
@@ -85,8 +81,7 @@ class Study:
 def compute(file: SceneFile, tell: Callable[[str], None]) -> Study:
     """Everything, for the rig's scene or one like it; minutes. tell : called with a sentence on what is under way.
 
-    Raises  NoSolution where a state or a wear step was not found
-    """
+    Raises  NoSolution where a state or a wear step was not found"""
     clock = time.process_time()
     with threadpool_limits(1):
         scene = file.mesh_scene

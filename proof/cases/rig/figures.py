@@ -1,9 +1,6 @@
 """The thesis's figures 5.26 to 5.31 redrawn with ours, and table 5.3 as a picture.
 
-Published numbers are marked where the text gives them; the curves of the lost figures are not drawn.
-"""
-
-from __future__ import annotations
+Published numbers are marked where the text gives them; the curves of the lost figures are not drawn."""
 
 from collections.abc import Callable
 from pathlib import Path

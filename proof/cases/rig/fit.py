@@ -8,10 +8,7 @@
 4. Modal damping to the energies of table 5.3, all five forces.
 5. Wear coefficient to the published life and friction work. Both go with its inverse, so that one wear run tells it.
    The published coefficient, measured as slope of volume over work, stays in the scene.
-What is found stands in scenes/rig.toml, marked "fit"; nothing is written there by a fit.
-"""
-
-from __future__ import annotations
+What is found stands in scenes/rig.toml, marked "fit"; nothing is written there by a fit."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
@@ -100,8 +97,7 @@ def fit_damping(rig: Rig) -> Identification:
 def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
     """Wear coefficient to the published life and friction work; `run` was done with `coefficient` [m3/J].
 
-    Raises  ValueError where the run did not end with the preload lost
-    """
+    Raises  ValueError where the run did not end with the preload lost"""
     if not run.lost:
         raise Refusal(f"a wear coefficient needs a run that loses its preload, but this one: {run.end}")
     final = np.array([run.history.cycles[-1], run.spent[-1]])
@@ -115,8 +111,7 @@ def run(
 ) -> dict[str, Identification]:
     """Every fit by its name: to joints, height and damping, and on demand of the column and by a whole wear run.
 
-    tell : called with a sentence on what is under way
-    """
+    tell : called with a sentence on what is under way"""
     fits = {}
     file = read_scene(scene, overrides)
     check(file)

@@ -1,10 +1,7 @@
 """Open and stuck frequencies of the fretting rig as functions of the stiffness of its joints.
 
 The rig is reduced once with the nodes of all joints kept, so that a change of joint springs costs a dense eigenvalue
-problem. Modes are told apart by how the beam moves: tangential and normal bending, twisting.
-"""
-
-from __future__ import annotations
+problem. Modes are told apart by how the beam moves: tangential and normal bending, twisting."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

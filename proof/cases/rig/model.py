@@ -36,8 +36,7 @@ class Cycle:
 
     energy : dissipated [J]; slip : amplitude of the mean sliding displacement of the patch, half of its range [m]
     preload : static normal force of the contact [N]; reaction : static force of the platform's screws [N]
-    amplitude : of the scene's response [m]
-    """
+    amplitude : of the scene's response [m]"""
 
     state: State
     energy: float

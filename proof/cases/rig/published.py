@@ -1,7 +1,5 @@
 """What is published about the fretting rig: Tamatam 2021, chapter 5. The numbers of its text; figures are lost."""
 
-from __future__ import annotations
-
 Modes = tuple[tuple[str, float], ...]
 
 OPEN: Modes = (

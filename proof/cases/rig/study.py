@@ -1,7 +1,5 @@
 """The fretting rig beside the published experiment and simulation: ./tribodyn prove rig study."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,8 +12,7 @@ def run(
 ) -> tuple[rig_table.Table, list[Path]]:
     """Compute the study of the rig of a scene with changes, and write its table and pictures into a folder.
 
-    tell : called with a sentence on what is under way
-    """
+    tell : called with a sentence on what is under way"""
     file = read_scene(scene, overrides)
     rig_model.check(file)
     study = rig_cases.compute(file, tell)

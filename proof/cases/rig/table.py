@@ -1,7 +1,5 @@
 """One table of the fretting rig: every published number and trend, and ours."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 

@@ -1,12 +1,10 @@
 """The rig in time: does its harmonic balance describe the motion that the equations have?"""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from proof.cases.rig.model import Cycle, Rig
-from proof.problems import verify_in_time
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options as TimeOptions
+from tribodyn.hbm.time.verify import verify
 from tribodyn.workflows.run.settings import OUTPUT
 
 STEPS, PERIODS, DRIFT = 1024, 200, 1e-5  # per period; periods to settle in; of the state over one period
@@ -17,8 +15,7 @@ class InTime:
     """Time integration beside the balance: energy per cycle [J], preload [N], and how the integration ended.
 
     amplitude : of the balance's response over that in time, less one
-    The numbers are those of the last period, periodic or not; None where there is none.
-    """
+    The numbers are those of the last period, periodic or not; None where there is none."""
 
     energy: float | None
     preload: float | None
@@ -31,7 +28,7 @@ def in_time(rig: Rig, cycle: Cycle) -> InTime:
     """Integrate from a solved cycle to the periodic motion nearby."""
     options = TimeOptions(STEPS, tolerance=DRIFT, max_periods=PERIODS)
     try:
-        result = verify_in_time(rig.model().balance, cycle.state, options)
+        result = verify(rig.model().balance, cycle.state, options)
     except IntegrationFailed as failure:
         return InTime(None, None, None, str(failure))
     amplitude = result.amplitude[OUTPUT]

@@ -2,10 +2,7 @@
 
 Two preloads differ: the static force of the vibrating contact, which hammers once it lifts off in each cycle and then
 carries a mean force without any interference, and the force that is left when the shaker stops. The second one is the
-static preload of the thesis; a run here ends where that is lost.
-"""
-
-from __future__ import annotations
+static preload of the thesis; a run here ends where that is lost."""
 
 import time
 from collections.abc import Callable
@@ -28,8 +25,7 @@ class RigWear:
 
     shift : mating height over that of the scene [m]; rest : (n_row,) preload when the shaker stops [N]
     area : (n_pair,) [m2]; points : (n_pair, 2) along the beam and along the sliding direction [m]
-    end : sentence that says why the run ended; seconds : of processor time
-    """
+    end : sentence that says why the run ended; seconds : of processor time"""
 
     shift: float
     history: WearHistory
@@ -81,8 +77,7 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     """Wear the rig by the rule of its scene until the preload at rest has fallen to the scene's `lost_below`.
 
     shift : mating height over that of the scene [m]; tell : called with a sentence when the run is done
-    Raises  NoSolution where a wear step fails
-    """
+    Raises  NoSolution where a wear step fails"""
     clock = time.process_time()
     rig = rig.with_mating_height(shift).with_keys("wear.end_at=at_rest")
     balance = rig.model().balance
@@ -102,8 +97,7 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
 def loop(balance: HarmonicBalance, history: WearHistory, row: int) -> tuple[np.ndarray, np.ndarray]:
     """Mean sliding displacement of the patch [m] and whole friction force [N] over the cycle of a row.
 
-    balance : the unworn problem
-    """
+    balance : the unworn problem"""
     current = worn(balance, history.depth[row])
     x, f = current.history(state_at(current, float(history.omega[row]), history.displacement[row]))
     share = balance.model.interface.area / balance.model.interface.area.sum()

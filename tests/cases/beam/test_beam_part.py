@@ -43,15 +43,12 @@ def test_patch_has_the_grid_of_the_thesis(tmp_path):
     assert weights.sum() == pytest.approx(0.02 * 0.02)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"n_patch": 3, "n_length": 2, "n_height": 1},
-        {"n_patch": 11, "n_length": 7, "n_height": 3, "height_grading": 3.0, "grading": 5.0},
-        {"length": 0.31, "width": 0.06, "height": 0.01, "patch_length": 0.15, "n_length": 3, "n_height": 2},
-    ],
-)
+@pytest.mark.parametrize("changes", [
+    {},
+    {"n_patch": 3, "n_length": 2, "n_height": 1},
+    {"n_patch": 11, "n_length": 7, "n_height": 3, "height_grading": 3.0, "grading": 5.0},
+    {"length": 0.31, "width": 0.06, "height": 0.01, "patch_length": 0.15, "n_length": 3, "n_height": 2},
+])  # fmt: skip
 def test_named_nodes_stand_where_they_should(tmp_path, changes):
     p = beam.Parameters(**changes)
     mesh, node_sets = read(tmp_path, **changes)
@@ -78,19 +75,16 @@ def test_first_frequency_converges_to_the_solid_block(tmp_path):
     assert default == pytest.approx(416.06, rel=4e-3)
 
 
-@pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
-        ({"length": 0.0}, r"geometry\.length is 0\.0: give a number above zero"),
-        ({"height": float("nan")}, r"geometry\.height is nan"),
-        ({"grading": -1.0}, r"geometry\.grading is -1\.0"),
-        ({"n_patch": 12}, r"geometry\.n_patch is 12: give an odd number of nodes, 11 or 13"),
-        ({"n_patch": 1}, r"geometry\.n_patch is 1: give a whole number of at least 3"),
-        ({"n_height": 1.5}, r"geometry\.n_height is 1\.5: give a whole number"),
-        ({"n_length": True}, r"geometry\.n_length is True"),
-        ({"patch_length": 0.1}, r"geometry\.patch_length is 0\.1: keep it below half"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "sentence"), [
+    ({"length": 0.0}, r"geometry\.length is 0\.0: give a number above zero"),
+    ({"height": float("nan")}, r"geometry\.height is nan"),
+    ({"grading": -1.0}, r"geometry\.grading is -1\.0"),
+    ({"n_patch": 12}, r"geometry\.n_patch is 12: give an odd number of nodes, 11 or 13"),
+    ({"n_patch": 1}, r"geometry\.n_patch is 1: give a whole number of at least 3"),
+    ({"n_height": 1.5}, r"geometry\.n_height is 1\.5: give a whole number"),
+    ({"n_length": True}, r"geometry\.n_length is True"),
+    ({"patch_length": 0.1}, r"geometry\.patch_length is 0\.1: keep it below half"),
+])  # fmt: skip
 def test_bad_parameters_are_refused_in_a_sentence(changes, sentence):
     with pytest.raises(ValueError, match=sentence) as caught:
         beam.Parameters(**changes)

@@ -68,15 +68,12 @@ def test_shroud_opens_beside_the_contact_face(sector):
     assert (distance[:, [0, 3]] > 1.9 * p.clearance).all()
 
 
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        ({"shroud_length": 0.02}, r"geometry.shroud_length is 0.02: give more than 0.02459 m"),
-        ({"disk_radius": 0.24}, r"geometry.disk_radius is 0.24: give 0 for no disk, or a radius below 0.22 m"),
-        ({"root_fill": 1.2}, r"geometry.root_fill is 1.2: give a number from 0.1 to 0.99"),
-        ({"n_up": 1}, r"geometry.n_up is 1: give a whole number of at least 2"),
-    ],
-)
+@pytest.mark.parametrize(("change", "sentence"), [
+    ({"shroud_length": 0.02}, r"geometry.shroud_length is 0.02: give more than 0.02459 m"),
+    ({"disk_radius": 0.24}, r"geometry.disk_radius is 0.24: give 0 for no disk, or a radius below 0.22 m"),
+    ({"root_fill": 1.2}, r"geometry.root_fill is 1.2: give a number from 0.1 to 0.99"),
+    ({"n_up": 1}, r"geometry.n_up is 1: give a whole number of at least 2"),
+])  # fmt: skip
 def test_what_cannot_be_is_one_sentence(change, sentence):
     with pytest.raises(ValueError, match=sentence):
         blade.Parameters(**change)

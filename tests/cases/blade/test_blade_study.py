@@ -1,7 +1,5 @@
 """The study of the bladed disk, coarse: its tables and pictures, the Campbell diagram, the mistuned wheel."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The bladed disk from its scene: wear to loss of contact, the field of the sector, its pictures, bad scenes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.linalg as sla
@@ -95,8 +93,7 @@ def test_left_and_right_face_agree(finished):
 def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
     """Item 5, from the unreduced stiffness and the static field alone: what the two shrouds of a blade are pushed with.
 
-    Equal preload and shear on both faces; over the wheel the shrouds turn nothing, so the roots take no torque
-    """
+    Equal preload and shear on both faces; over the wheel the shrouds turn nothing, so the roots take no torque"""
     model = built(folder)
     wheel, patch, wear = finished.facts.around, finished.patch, finished.wear
     _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
@@ -214,23 +211,22 @@ def test_rotation_leads_to_the_left(finished):
     assert wheel.turn == pytest.approx(rotation((1, 0, 0), 2 * np.pi / 40))
 
 
-@pytest.mark.parametrize(
-    ("override", "sentence"),
-    [
-        ("contact.opposite=", "the contact needs one group, the right face, and its opposite, the left one"),
-        ("reduction.relative=true", "reduction.relative has no meaning for a sector of a wheel"),
-        ("motion.shroud_right.direction=z", "motion has no meaning for a sector of a wheel"),
-        ("wheel.sectors=1", "wheel.sectors: expected a value at least 2"),
-        ("wheel.sectors=39", "wheel.sectors = 39, but the part is made for n_blades = 40"),
-        ("wheel.axis=-x", "faces do not meet"),
-        ('loads.static={p = {group = "tip", opposite = "clamp", pressure = 1}}', "opposite only with value and direc"),
-        ('loads.static={p = {group = "tip", opposite = "no", direction = "y", value = 1}}', "has no node set 'no'"),
-        ("geometry.disk_radius=0.15", r"wheel.seam is missing, .* give wheel.seam = \["),
-        ("wheel.speed=6000", "unstable at rest: its stress and spin softening"),
-        ("wheel.engine=2", r"unknown key wheel.engine \(did you mean engine_order\?\)"),
-        ('wheel.seam=["cyclic_right", "cyclic_left"]', "the mesh has no .*cyclic_right"),
-    ],
-)
+@pytest.mark.parametrize(("override", "sentence"), [
+    ("contact.opposite=", "the contact needs one group, the right face, and its opposite, the left one"),
+    ("reduction.relative=true", "reduction.relative has no meaning for a sector of a wheel"),
+    ("motion.shroud_right.direction=z", "motion has no meaning for a sector of a wheel"),
+    ("wheel.sectors=1", "wheel.sectors: expected a value at least 2"),
+    ("wheel.sectors=39", "2 pi / 39 does not bring .*: give wheel.sectors = 40"),
+    ("wheel.axis=-x", "swap the two faces, or let wheel.axis point the other way"),
+    ('loads.static={p = {group = "tip", opposite = "clamp", pressure = 1}}', "opposite only with value and direc"),
+    ('loads.static={p = {group = "tip", opposite = "no", direction = "y", value = 1}}', "has no node set 'no'"),
+    ("geometry.disk_radius=0.15", r"wheel.seam is missing, .* give wheel.seam = \["),
+    ('loads.static.spin={direction = "x", speed = "9 Hz"}', "spin: a wheel turns at wheel.speed, .*: give that"),
+    ('loads.static.weight={direction = "z", acceleration = 9.81}', "weight: .* across wheel.axis would turn"),
+    ("wheel.speed=6000", "unstable at rest: its stress and spin softening"),
+    ("wheel.engine=2", r"unknown key wheel.engine \(did you mean engine_order\?\)"),
+    ('wheel.seam=["cyclic_right", "cyclic_left"]', "the mesh has no .*cyclic_right"),
+])  # fmt: skip
 def test_bad_scenes_end_with_one_sentence(override, sentence, folder):
     with pytest.raises(ValueError, match=sentence):
         built(folder, override)

@@ -1,8 +1,5 @@
 """The Brake-Reuss beam on a coarse mesh: apart, pressed together, along its backbone; with rough faces too."""
 
-from __future__ import annotations
-
-import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -13,7 +10,7 @@ import scipy.linalg as sla
 
 import tribodyn as td
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
-from tests.helpers.command import leave
+from tests.helpers.command import printed_record, refusal
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.time import ring_down as time_ring_down
@@ -26,12 +23,10 @@ __all__ = ["chromium"]
 
 FORCE = 3 * 12249.0
 COARSE = [
-    "contacts.lap.vertices_only=true",
-    "reduction.cutoff=5 kHz",
-    *(f"bodies.{half}.n_length=4" for half in ("lower", "upper")),
-    *(f"bodies.bolt_{i}.n_grip=2" for i in (1, 2, 3)),
+    "contacts.lap.vertices_only=true", "reduction.cutoff=5 kHz",
+    *(f"bodies.{half}.n_length=4" for half in ("lower", "upper")), *(f"bodies.bolt_{i}.n_grip=2" for i in (1, 2, 3)),
     *(f"bodies.{ring}_{i}.n_across=1" for ring in ("washer", "disk") for i in (1, 2, 3)),
-]
+]  # fmt: skip
 WAVY = ["contacts.lap.gap_map=waviness.csv", "response.frequency=['170 Hz', '205 Hz']"]
 SCENES = {"plain": ("brb", []), "flat": ("brb_flat", []), "wavy": ("brb_flat", WAVY)}  # faces of the lap
 
@@ -107,9 +102,7 @@ def test_the_command_gives_rows_by_modal_amplitude(capsys: pytest.CaptureFixture
         str(tmp_path),
         "--json",
     ]  # beside what is published
-    code, out, err = leave(words, capsys)
-    assert code == 0, err
-    record = json.loads(out)
+    record = printed_record(words, capsys)
     rows = record["rows"]
     assert record["published"]["source"] == "Porter and Brake 2023"
     first, last = record["published"]["rows"][0], record["published"]["rows"][-1]
@@ -124,17 +117,13 @@ def test_the_command_gives_rows_by_modal_amplitude(capsys: pytest.CaptureFixture
     assert td.scene_names().count("brb_flat") == 1
 
 
-def test_the_beam_rings_down_from_one_amplitude_to_the_other(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch
-):
+def test_the_beam_rings_down_from_one_amplitude_to_the_other(capsys, tmp_path, monkeypatch):
     """From --to down to --from, along the backbone of faces that have yielded: frequency 0.1 %, damping 3 %."""
     model, follow, rows = built("flat"), time_ring_down.ring_down, []
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)
     monkeypatch.setattr(time_ring_down, "ring_down", lambda *arguments: rows.append(follow(*arguments)) or rows[-1])
     words = ["--from", "11um", "--to", "16um", "--points", "8", "--steps", "96", "--out", str(tmp_path), "--json"]
-    code, out, err = leave(["curve", "ring-down", "brb_flat", *words], capsys)
-    assert code == 0, err
-    record = json.loads(out)
+    record = printed_record(["curve", "ring-down", "brb_flat", *words], capsys)
     assert record["largest_frequency_difference"] < 1e-3
     assert record["largest_decrement_difference"] < 0.03
     assert record["largest_decrement_difference"] < record["largest_damping_difference"]
@@ -143,9 +132,7 @@ def test_the_beam_rings_down_from_one_amplitude_to_the_other(
     assert np.ptp(swing[:96]) / 2 == pytest.approx(16e-6, rel=0.03)
     assert 10.5e-6 < np.ptp(swing[-96:]) / 2 < 11.1e-6
     assert rows[0].last < 11.1e-6
-    code, out, err = leave(["curve", "ring-down", "brb_flat", "--from", "60um", "--to", "40um"], capsys)
-    assert code == 2
-    assert "--from below --to" in err
+    assert "--from below --to" in refusal(["curve", "ring-down", "brb_flat", "--from", "60um", "--to", "40um"], capsys)
 
 
 def test_references_of_a_beam_that_hangs_free_are_those_of_its_dynamic_stiffness():

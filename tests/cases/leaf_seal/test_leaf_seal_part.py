@@ -92,19 +92,16 @@ def test_pins_and_watched_nodes(tmp_path):
     assert abs(at["middle"][0, 1]) < p.height / 8
 
 
-@pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
-        ({"angle": 4.0}, "geometry.angle"),
-        ({"height": 1.2}, "geometry.height"),
-        ({"pin_column": 10}, "geometry.pin_column"),
-        ({"pin_height": 0.03}, "geometry.pin_height"),
-        ({"pin_height": float("nan")}, "geometry.pin_height"),
-        ({"bow": float("inf")}, "geometry.bow"),
-        ({"n_row": 4}, "geometry.n_row"),
-        ({"thickness": 0.0}, "geometry.thickness"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "sentence"), [
+    ({"angle": 4.0}, "geometry.angle"),
+    ({"height": 1.2}, "geometry.height"),
+    ({"pin_column": 10}, "geometry.pin_column"),
+    ({"pin_height": 0.03}, "geometry.pin_height"),
+    ({"pin_height": float("nan")}, "geometry.pin_height"),
+    ({"bow": float("inf")}, "geometry.bow"),
+    ({"n_row": 4}, "geometry.n_row"),
+    ({"thickness": 0.0}, "geometry.thickness"),
+])  # fmt: skip
 def test_bad_dimensions_are_refused_in_one_sentence(changes, sentence):
     with pytest.raises(ValueError, match=sentence):
         leaf_seal.Parameters(**changes)

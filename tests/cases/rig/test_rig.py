@@ -1,7 +1,5 @@
 """The fretting rig: its prescribed height, its fits, and a coarse run of the study beside the published experiment."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -205,16 +203,13 @@ def test_the_study_compares_every_number_and_draws(tmp_path, capsys, monkeypatch
     assert text.count("\n|") >= len(record["numbers"]) + len(record["trends"])
 
 
-@pytest.mark.parametrize(
-    ("override", "words"),
-    [
-        ("wear.at=peak", 'need wear at one frequency, wear.at = "290 Hz"'),
-        ("wear=", "need wear at one frequency"),
-        ("prescribed=", r"need one table under prescribed, \[prescribed.platform\]"),
-        ("springs.seat_along=", r"need the joint \[springs.seat_along\]"),
-        ("harmonics.kept=auto", "need harmonics that are named"),
-    ],
-)
+@pytest.mark.parametrize(("override", "words"), [
+    ("wear.at=peak", 'need wear at one frequency, wear.at = "290 Hz"'),
+    ("wear=", "need wear at one frequency"),
+    ("prescribed=", r"need one table under prescribed, \[prescribed.platform\]"),
+    ("springs.seat_along=", r"need the joint \[springs.seat_along\]"),
+    ("harmonics.kept=auto", "need harmonics that are named"),
+])  # fmt: skip
 def test_a_scene_that_is_not_this_rig_is_one_sentence(override, words):
     with pytest.raises(ValueError, match=words):
         Rig.of(scene_file.read("rig_thesis", (override,)))

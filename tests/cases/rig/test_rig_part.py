@@ -42,14 +42,11 @@ def test_joint_faces_match_but_share_no_nodes(tmp_path):
     np.testing.assert_allclose(seat[:, np.lexsort(seat)], root[:, np.lexsort(root)], atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"n_contact_length": 3, "n_contact_width": 5, "longest": 0.1, "n_root": 1, "n_half": 1},
-        {"free_length": 0.25},
-    ],
-)
+@pytest.mark.parametrize("changes", [
+    {},
+    {"n_contact_length": 3, "n_contact_width": 5, "longest": 0.1, "n_root": 1, "n_half": 1},
+    {"free_length": 0.25},
+])  # fmt: skip
 def test_named_points_stand_where_they_should(tmp_path, changes):
     p = rig.Parameters(**changes)
     mesh, node_sets = read(tmp_path, **changes)
@@ -70,14 +67,9 @@ def test_clamped_beam_has_the_frequency_of_a_cantilever(tmp_path):
     mesh, node_sets = read(tmp_path)
     E, rho, p = 193e9, 8000.0, rig.Parameters()
     part = fem_part.build(
-        mesh,
-        node_sets,
-        Material(E, 0.29, rho),
-        [Clamp("column"), Clamp("beam_root"), Clamp("platform")],
-        [ContactFaces("upper_contact", (0, 1, 0), "lower_contact")],
-        {"shaker": NodalForce("shaker", (0, 1, 0))},
-        {},
-    )
+        mesh, node_sets, Material(E, 0.29, rho), [Clamp("column"), Clamp("beam_root"), Clamp("platform")],
+        [ContactFaces("upper_contact", (0, 1, 0), "lower_contact")], {"shaker": NodalForce("shaker", (0, 1, 0))}, {},
+    )  # fmt: skip
     result = linear_modes(part, None, 1)[0][0]
     full = 3.516 / (2 * np.pi) * np.sqrt(E / rho / 12) * p.thickness / p.free_length**2
     missing = p.slot_length * p.slot_height * 0.9  # less the upper specimen

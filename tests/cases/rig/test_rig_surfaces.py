@@ -1,7 +1,5 @@
 """Height maps that a scene names: sound ones are taken, damaged ones mended and told, garbage ends with exit code 2."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -55,16 +53,12 @@ def spikes(share):
     return damage
 
 
-@pytest.mark.parametrize(
-    ("damage", "repairs"),
-    [
-        (lambda z: z, ()),
-        (holes(0.03), ("points without height",)),
-        (spikes(0.002), ("spikes up to 0.0001", "points without height")),
-        (lambda z: z + 2e-2 * np.linspace(0, 2e-3, z.shape[0])[:, None], ()),
-    ],
-    ids=["sound", "holes", "spikes", "tilted"],
-)
+@pytest.mark.parametrize(("damage", "repairs"), [
+    (lambda z: z, ()),
+    (holes(0.03), ("points without height",)),
+    (spikes(0.002), ("spikes up to 0.0001", "points without height")),
+    (lambda z: z + 2e-2 * np.linspace(0, 2e-3, z.shape[0])[:, None], ()),
+], ids=["sound", "holes", "spikes", "tilted"])  # fmt: skip
 def test_a_measured_face_is_taken_and_each_repair_is_told(damage, repairs, tmp_path, capsys):
     code, out, err = run(write(tmp_path, damage), capsys)
     assert code == 0, err

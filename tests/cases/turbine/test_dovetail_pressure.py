@@ -1,10 +1,7 @@
 """Pressure on the flanks of the dovetail against CalculiX: same corner and edge nodes, other elements, other contact.
 
 CalculiX solves 20-node hexahedra with a contact of surfaces; ours are 27-node hexahedra with contact at node pairs. The
-sides of the disk are held and only the blade's own contact acts, so that both solve the same body under rotation.
-"""
-
-from __future__ import annotations
+sides of the disk are held and only the blade's own contact acts, so that both solve the same body under rotation."""
 
 import json
 import shutil
@@ -34,7 +31,6 @@ def model() -> modelling.Model:
 @pytest.fixture(scope="module")
 def ours(model: modelling.Model) -> dict[str, dict[str, Any]]:
     """Resultant, moment about the origin, and mean pressure of each place along the flank over that of the flank."""
-    assert model.part is not None
     solved = newton.solve_from_rest(
         model.balance.with_load(0.0), 2 * np.pi * 800, newton.NewtonOptions(tolerance=1e-10)
     )
@@ -60,7 +56,6 @@ def ours(model: modelling.Model) -> dict[str, dict[str, Any]]:
 
 def calculated(model: modelling.Model, ours: dict[str, dict[str, Any]], folder: Path) -> dict[str, Any]:
     """The same by CalculiX."""
-    assert model.part is not None
     mesh = model.part.mesh
     pairs = [
         calculix.Pair(
@@ -124,9 +119,7 @@ def test_pressure_on_the_flanks_is_that_of_calculix(ours: dict[str, dict[str, An
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
-def test_calculix_gives_what_is_recorded(
-    model: modelling.Model, ours: dict[str, dict[str, Any]], tmp_path: Path
-) -> None:
+def test_calculix_gives_what_is_recorded(model, ours, tmp_path):
     fresh, recorded = calculated(model, ours, tmp_path), json.loads(RECORDED.read_text(encoding="utf-8"))
     compare(ours, fresh, 0.03)
     for name, item in fresh.items():

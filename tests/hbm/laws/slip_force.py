@@ -2,10 +2,7 @@
 
 It is written as a user writes a law: no other file knows it, its number has another name than those of the shipped
 laws, and it has no more than its step. All tests of contact laws must accept it.
-Source  Jenkins element with a constant limit, as Iwan 1966 combines many
-"""
-
-from __future__ import annotations
+Source  Jenkins element with a constant limit, as Iwan 1966 combines many"""
 
 from dataclasses import dataclass
 

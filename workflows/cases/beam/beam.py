@@ -1,7 +1,5 @@
 """Cantilever over a square contact patch under its free end (thesis 4.2)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,8 +22,7 @@ class Parameters:
     n_height : elements through the height
     grading : middle over edge element length on the patch; above 1 is finer towards the patch boundary
     length_grading : longest element at mid-span over shortest at the clamp and at the patch
-    height_grading : middle over outer element height; above 1 is finer towards the bottom and the top
-    """
+    height_grading : middle over outer element height; above 1 is finer towards the bottom and the top"""
 
     length: float = 0.2
     width: float = 0.02
@@ -51,8 +48,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     """Write the mesh.
 
     Groups: volume "beam"; surfaces "clamp", "contact"; points "static_load" (mid-span, middle of the top face),
-    "shaker" (mid-span, middle of the side y = width), "response" (middle of the patch)
-    """
+    "shaker" (mid-span, middle of the side y = width), "response" (middle of the patch)"""
     p = parameters
     middle, patch_start = p.length / 2, p.length - p.patch_length
     n_root = min(max(round(p.n_length * middle / patch_start), 1), p.n_length - 1)

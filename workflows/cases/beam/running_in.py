@@ -1,10 +1,7 @@
 """Example of a user's wear law: the energy law whose coefficient falls while the faces run in.
 
 In a scene in the same folder: law = "running_in.py" in [wear]. A fresh face wears `ratio` times as fast as
-one that has lost a depth well above `depth`; both are further keys of [wear].
-"""
-
-from __future__ import annotations
+one that has lost a depth well above `depth`; both are further keys of [wear]."""
 
 from dataclasses import dataclass
 

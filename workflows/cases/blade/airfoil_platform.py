@@ -3,10 +3,7 @@
 The sections are cambered, blunt at both edges, turned by their stagger.
 
 Rows i run from front to rear, columns j from left to right; corner (i, j) of the 4 x 4 corners belongs to blocks on
-all its sides, so blocks meet node to node by construction.
-"""
-
-from __future__ import annotations
+all its sides, so blocks meet node to node by construction."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,8 +18,7 @@ Names = Mapping[tuple[int, int], Mapping[str, str]]
 @dataclass(frozen=True)
 class Section:
     """chord, thickness : [m]; camber : height of the mean line over the chord; edge : thickness at the leading and the
-    trailing edge over that at mid-chord; stagger : angle from x to the chord [rad].
-    """
+    trailing edge over that at mid-chord; stagger : angle from x to the chord [rad]."""
 
     chord: float
     thickness: float
@@ -33,8 +29,7 @@ class Section:
     def at(self, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions x, y [m] at fractions u of the chord and v of the thickness, centred on the mean line.
 
-        Mean line and thickness are parabolas: no sharp edge folds a cell
-        """
+        Mean line and thickness are parabolas: no sharp edge folds a cell"""
         bulge = 4 * u * (1 - u)
         slope = 4 * self.camber * (1 - 2 * u)
         offset = (v - 0.5) * self.thickness * (self.edge + (1 - self.edge) * bulge)
@@ -61,8 +56,7 @@ class Platform:
     def position(self, i: int, j: int, p: np.ndarray) -> np.ndarray:
         """Map (n, 3) fractions (rearwards, rightwards, upwards) of block (i, j) into space [m].
 
-        Source  Coons patch whose one curved edge is that of the section (Gordon and Hall 1973)
-        """
+        Source  Coons patch whose one curved edge is that of the section (Gordon and Hall 1973)"""
         weights = [np.stack([1 - t, t]) for t in p.T]
         straight = np.einsum("an,bn,cn,cabx->nx", *weights, self.corners[:, i : i + 2, j : j + 2])
         a, b = p[:, 0], p[:, 1]
@@ -96,8 +90,7 @@ class Platform:
         """The nine blocks with uniform cells.
 
         n_row, n_column : elements of the three rows and columns; n_up : elements upwards
-        names : (i, j) -> names of sides of that block
-        """
+        names : (i, j) -> names of sides of that block"""
         return [
             Block(unit(n_row[i]), unit(n_column[j]), unit(n_up), volume, names.get((i, j), {}), self.mapping(i, j))
             for i in range(3)
@@ -109,8 +102,7 @@ def platform(section: Section, heights: tuple[float, float], left_edge: np.ndarr
     """Platform around a section from its left and right edge.
 
     heights : z of the section at bottom and top [m]
-    left, right : (2, 4, 3) points of the edges at bottom and top, from front to rear [m]
-    """
+    left, right : (2, 4, 3) points of the edges at bottom and top, from front to rear [m]"""
     corners = np.empty((2, 4, 4, 3))
     corners[:, :, 0], corners[:, :, 3] = left_edge, right_edge
     u, v = np.array([0.0, 1.0])[:, None], np.array([0.0, 1.0])[None, :]

@@ -1,10 +1,7 @@
 """Sector of a shrouded bladed disk: root block, tapered and twisted airfoil, tip shroud, disk if wanted (thesis 4.3).
 
 The wheel turns about x, the blade stands along z. Left is the side of positive rotation (towards -y), where the next
-blade stands: left faces turned back by one pitch are right faces. The dimensions are ours; the thesis's are lost.
-"""
-
-from __future__ import annotations
+blade stands: left faces turned back by one pitch are right faces. The dimensions are ours; the thesis's are lost."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,8 +37,7 @@ class Parameters:
         along the chord
     n_span, n_through : elements along the span and through the airfoil
     n_side, n_end : elements of the platforms beside the airfoil and before and behind it
-    n_root, n_disk : elements of the root block and of the disk along the radius
-    """
+    n_root, n_disk : elements of the root block and of the disk along the radius"""
 
     n_blades: int = 40
     hub_radius: float = 0.25
@@ -115,8 +111,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     Groups: volumes "root", "airfoil", "shroud", and "disk" where there is one; surfaces "shroud_right", "shroud_left",
     "clamp" (under the root, or the bore of the disk), "cyclic_right", "cyclic_left" (of the disk); points
     "couple_leading", "couple_trailing" (edges of the airfoil), "excitation" (mid-span, mid-chord), "tip" (top of the
-    shroud)
-    """
+    shroud)"""
     p = parameters
     rows = (p.n_end, p.n_along - 1, p.n_end)
     columns = (p.n_side, p.n_through, p.n_side)

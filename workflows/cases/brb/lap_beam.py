@@ -1,10 +1,7 @@
 """Half of a beam with a bolted lap joint: full height up to the lap, half the height with a row of holes in the lap.
 
 The lap lies about the origin, its face on the plane z = 0. Turned by half a turn about y, the same part is the other
-half, and the nodes of both laps meet.
-"""
-
-from __future__ import annotations
+half, and the nodes of both laps meet."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,8 +22,7 @@ class Parameters:
     hole, pad : diameters of the holes and of the disks about them under the washers [m]
     n_side : elements along each side of the field about a hole; n_pad, n_field : from hole to rim of the pad, and on to
     the border of the field; n_lap : through the lap; n_end : along the strips at both ends of the lap
-    n_length, grading : along the full beam, the last over the first one next to the lap
-    """
+    n_length, grading : along the full beam, the last over the first one next to the lap"""
 
     length: float = 0.42
     width: float = 25.4e-3
@@ -56,8 +52,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     """Write the mesh.
 
     Groups: volume "beam"; surfaces "lap", "end", "pad_1" ... below the holes from the end of the beam on; points
-    "tip" in the middle of the end, "top" above it
-    """
+    "tip" in the middle of the end, "top" above it"""
     p = parameters
     half, side, row = p.height / 2, p.width / 2, p.holes * p.pitch / 2
     y = np.linspace(-side, side, p.n_side + 1)

@@ -1,10 +1,7 @@
 """Leaf seal of a combustor: a thin annular sector with curved contact patches along two edges (thesis 6.2).
 
 The leaf stands in the plane x (circumferential), y (radial, up), z (axial): z = 0 is the face that touches nozzle and
-liner, z = thickness the face that the pressure pushes. The origin lies in the middle of the sector at mid-height.
-"""
-
-from __future__ import annotations
+liner, z = thickness the face that the pressure pushes. The origin lies in the middle of the sector at mid-height."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,8 +24,7 @@ class Parameters:
     pin_height : of the two pins above mid-height [m]; pin_width : radial width of the seat of a pin's spring [m]
     pin_column : column of nodes of the pins, counted from either end, 0 is the end itself
     n_column : nodes along each patch, n_row : across it, both odd (nine-node faces); thesis 21 x 3
-    n_web : elements between a patch and a pin, above and below; n_thickness : elements through the thickness
-    """
+    n_web : elements between a patch and a pin, above and below; n_thickness : elements through the thickness"""
 
     radius: float = 0.5
     angle: float = 0.4
@@ -71,8 +67,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     Groups: volume "leaf"; surfaces "upper_contact", "lower_contact", "front" (the rest of z = 0) and "back"; points
     "left_pin", "right_pin" (three nodes across each spring seat, mid-thickness), "left_hole", "right_hole" (their
     middles), "upper_centre" (middle of the upper patch), "middle" (of the leaf, the nearest node) and "lower_corner"
-    (outermost node of the lower edge, x > 0), all three on z = 0
-    """
+    (outermost node of the lower edge, x > 0), all three on z = 0"""
     p = parameters
     half = p.angle / 2
     columns = np.linspace(-half, half, (p.n_column + 1) // 2)

@@ -8,10 +8,7 @@ and table; their places are the named surfaces and points. Joints that the drawi
 The thesis gives the free length, the section, the contact face and its grid; its drawings are lost, so all other
 dimensions are ours. The upper specimen hangs in a slot at the free end so that the contact lies at mid-height, on the
 axis of the beam: twisting hardly feels the closed contact in the thesis (840 Hz open, 868 Hz stuck), while a contact
-below the beam would couple the two.
-"""
-
-from __future__ import annotations
+below the beam would couple the two."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -32,8 +29,7 @@ class Shapes:
     head_depth, head_x, head_y : of the separator below the lower specimen, and how much it widens along x and y [-]
     limb_depth : vertical extent of the two limbs of the separator, at 45 degrees to the normal (thesis 5.2.1)
     plate_side, plate_depth : of the moving platform; screws, pins : their places below it
-    cover_depth : of the cover plate; column_above : of the column over the beam
-    """
+    cover_depth : of the cover plate; column_above : of the column over the beam"""
 
     shank: float = 0.010
     specimen_side: float = 0.020
@@ -71,8 +67,7 @@ class Parameters:
     column_height : of the beam's lower edge above the table [m], ours
     shaker_distance : from the column to the shaker [m], ours
     longest : longest element along the free length [m]
-    n_root, n_half : elements along the seat, over half of the beam's height
-    """
+    n_root, n_half : elements along the seat, over half of the beam's height"""
 
     free_length: float = 0.310
     height: float = 0.060
@@ -145,8 +140,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     Groups: volumes "column", "beam", "upper_specimen", "lower_specimen", "separator", "platform"; surfaces
     "column_base", "column_seat" and "beam_root" (matching), "upper_contact", "lower_contact" (larger, with the matching
     grid in its middle); points "shaker", "accelerometer" (free end), "screws" (six below the platform), "pins" (two),
-    and "low", "middle", "high" followed by 1 to 4 at quarters of the length before the slot, for mode shapes
-    """
+    and "low", "middle", "high" followed by 1 to 4 at quarters of the length before the slot, for mode shapes"""
     blocks.write(path, _column(parameters), _beam(parameters), _platform(parameters))
 
 

@@ -3,10 +3,7 @@
 Three bodies that touch but are not joined: "disk", "blade" and "damper", each a volume of the mesh. The wheel turns
 about x, the blade stands along z; left is the side of positive rotation, as in cases.blade, whose airfoil and shroud
 the blade has. Its root hangs on two flanks that look outwards; its platforms and their neighbours leave a gap between
-them that narrows outwards, in which the damper lies like a wedge. The dimensions are ours.
-"""
-
-from __future__ import annotations
+them that narrows outwards, in which the damper lies like a wedge. The dimensions are ours."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -58,8 +55,7 @@ class Parameters:
     n_platform, n_neck : elements of the platform and the neck of the root along the radius
     n_flank : of a flank of the root along the radius, and of its bulb
     n_axial : elements of the disk along the axis; n_slot, n_post : of the slot's flank, and from slot to seam
-    n_disk : elements of the disk below the slot along the radius; n_damper : of the damper along the axis
-    """
+    n_disk : elements of the disk below the slot along the radius; n_damper : of the damper along the axis"""
 
     n_blades: int = 24
     hub_radius: float = 0.2
@@ -181,8 +177,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     Groups: volumes "disk", "blade", "damper"; surfaces of the disk "slot_right", "slot_left" (flanks), "clamp" (bore),
     "cyclic_right", "cyclic_left"; of the blade "flank_right", "flank_left", "platform_right", "platform_left",
     "shroud_right", "shroud_left"; of the damper "wedge_right", "wedge_left"; points of the blade "excitation"
-    (mid-span, mid-chord), "tip" (top of the shroud)
-    """
+    (mid-span, mid-chord), "tip" (top of the shroud)"""
     blocks.write(path, _disk(parameters), _blade(parameters), _damper(parameters))
 
 

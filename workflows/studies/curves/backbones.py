@@ -36,8 +36,7 @@ class AmplitudeRange:
     """From which amplitude to which, of which mode.
 
     start, stop : of the observed displacement [m], or where `modal` of the mass-normalised mode [m kg^0.5]
-    mode : its number about the static equilibrium, from 0; points : where the backbone bends little
-    """
+    mode : its number about the static equilibrium, from 0; points : where the backbone bends little"""
 
     start: float
     stop: float
@@ -67,8 +66,7 @@ class AmplitudeRange:
 class SceneBackbone(StudyResult):
     """The backbone of a scene.
 
-    balance : of the scene; mode : its points; published : of the same mode by others, None for none
-    """
+    balance : of the scene; mode : its points; published : of the same mode by others, None for none"""
 
     name: str
     balance: HarmonicBalance
@@ -176,8 +174,7 @@ def backbone(
     stop : amplitude to end at, such as 1mm
     mode : number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default
     points : points where the backbone bends little; there are more elsewhere. 40 or those of [backbone] by default
-    Raises  Refusal for what cannot be; SolveFailed where not even the first point is found
-    """
+    Raises  Refusal for what cannot be; SolveFailed where not even the first point is found"""
     file, report = read_scene(scene, overrides), reporter(progress)
     range_ = AmplitudeRange.of(file, start, stop, mode, points)
     published = published_backbone(file)
@@ -201,8 +198,7 @@ def follow_mode(
 def differences_from(mode: Backbone, published: PublishedBackbone) -> dict[str, Any]:
     """A published backbone for machines, and ours at those of its amplitudes that ours has reached.
 
-    shift : change of the frequency from the first of these amplitudes on, of that frequency
-    """
+    shift : change of the frequency from the first of these amplitudes on, of that frequency"""
     reached = mode.modal_amplitude[mode.converged]
     inside = (published.modal_amplitude >= reached.min()) & (published.modal_amplitude <= reached.max())
     a = published.modal_amplitude[inside]

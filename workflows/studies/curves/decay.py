@@ -1,7 +1,5 @@
 """A free decay of a scene in time from its nonlinear mode, and what its output says beside the backbone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -39,8 +37,7 @@ class Decay(StudyResult):
 
     mode : the backbone, converged to its last point; decay : from there
     expected : (n_point,) logarithmic decrement over 2 pi that the backbone says, see `hbm.time.decrement`
-    target : amplitude at which the decay shall end [m]
-    """
+    target : amplitude at which the decay shall end [m]"""
 
     mode: Backbone
     decay: RingDown
@@ -49,7 +46,7 @@ class Decay(StudyResult):
 
     def at(self, values: np.ndarray) -> np.ndarray:
         """Values (n_point,) along the backbone at the amplitudes of the decay, nan beyond its ends."""
-        backbone_mode = PchipInterpolator(np.log(self.mode.first_harmonic), values, extrapolate=False)
+        backbone_mode = PchipInterpolator(np.log(self.mode.amplitude), values, extrapolate=False)
         return np.asarray(backbone_mode(np.log(self.decay.amplitude)))
 
     @property
@@ -67,7 +64,7 @@ class Decay(StudyResult):
             "amplitude_m": d.amplitude,
             "frequency_hz": d.omega / (2 * np.pi),
             "damping": d.damping,
-            "other_modes": d.rest,
+            "remainder": d.rest,
             "backbone_frequency_hz": self.at(self.mode.omega) / (2 * np.pi),
             "backbone_decrement": self.at(self.expected),
             "backbone_damping": self.at(self.mode.damping),
@@ -96,7 +93,8 @@ class Decay(StudyResult):
                 ("amplitude", f"{first['amplitude_m']:.4g} -> {last['amplitude_m']:.4g} m"),
                 ("frequency", f"{first['frequency_hz']:.6g} -> {last['frequency_hz']:.6g} Hz"),
                 ("damping", f"{100 * first['damping']:.4g} -> {100 * last['damping']:.4g} %"),
-                ("other modes", f"{100 * first['other_modes']:.3g} -> {100 * last['other_modes']:.3g} % of it"),
+                ("remainder", f"{100 * first['remainder']:.3g} -> {100 * last['remainder']:.3g} % of it"),
+                ("", "harmonics above 3 and other modes"),
                 ("from the backbone", f"frequency at most {frequency} off"),
                 ("", f"damping at most {of_decrement} off its decrement"),
                 ("", f"and {damping} off its damping ratio, which counts otherwise"),
@@ -116,18 +114,18 @@ class Decay(StudyResult):
         with axes_of(7.2, 7.6, rows=3, share=False) as (figure, (top, upper, lower)):
             top.plot(1e3 * d.time, scale * d.displacement, color=BLUE, lw=0.7)
             top.set(xlabel="time / ms", ylabel=f"displacement / {unit}", title="Free decay")
-            upper.plot(scale * self.mode.first_harmonic, self.mode.frequency, color=BLUE, label="backbone")
+            upper.plot(scale * self.mode.amplitude, self.mode.frequency, color=BLUE, label="backbone")
             upper.plot(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="free decay")
             upper.set(ylabel="frequency / Hz")
             upper.legend()
-            lower.plot(scale * self.mode.first_harmonic, 100 * self.expected, color=BLUE, label="its decrement")
+            lower.plot(scale * self.mode.amplitude, 100 * self.expected, color=BLUE, label="its decrement")
             curve = 100 * self.mode.damping
-            lower.plot(scale * self.mode.first_harmonic, curve, color=BLUE, ls="--", label="its damping ratio")
+            lower.plot(scale * self.mode.amplitude, curve, color=BLUE, ls="--", label="its damping ratio")
             lower.plot(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
             lower.set(xlabel=f"amplitude / {unit}", ylabel="damping ratio / %")
             lower.set_ylim(bottom=0)
             for axes in (upper, lower):
-                log_axis(axes.xaxis, self.mode.first_harmonic.min(), self.mode.first_harmonic.max())
+                log_axis(axes.xaxis, self.mode.amplitude.min(), self.mode.amplitude.max())
             lower.legend()
         return figure
 
@@ -159,8 +157,7 @@ def ring_down(
     steps : time steps per period
     impulse : let it begin at rest with a hammer's blow of this size on the harmonic load, such as "0.1 N s", instead of
         in the mode; the amplitude at which it begins then follows, and other modes ring along
-    Raises  Refusal for what cannot be; SolveFailed where the backbone ends before the amplitude asked for
-    """
+    Raises  Refusal for what cannot be; SolveFailed where the backbone ends before the amplitude asked for"""
     file, report = read_scene(scene, overrides), reporter(progress)
     if impulse is not None:
         return _struck(file, start, mode or 0, points or 40, periods, steps, impulse, report)
@@ -175,7 +172,7 @@ def ring_down(
             balance = marked
             swung = _reached(follow_mode(file, balance, range_, report))
         with report.stage("free decay"):
-            least = float(swung.first_harmonic[0])
+            least = float(swung.amplitude[0])
             swing = time_ring_down.ring_down(balance, swung, periods, steps, least)
             return Decay(swung, swing, decrement(balance, swung), least)
 

@@ -4,8 +4,6 @@ The peak is found by a scan of the response range once, then each value starts f
 arc length once, then followed along its own line (hbm.continuation.fold_curve), round the cusps where two folds meet.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,8 +42,7 @@ class Track(StudyResult):
 
     kind : "peak" or "fold"; name, unit : of the number that changes; value : (n,) of it
     frequency : (n,) [Hz]; amplitude : (n,) of the response [m]; cusps : indices of points where a line of folds turns
-    end : why and where it ends; its text is a sentence
-    """
+    end : why and where it ends; its text is a sentence"""
 
     kind: str
     name: str
@@ -113,8 +110,7 @@ def track(
     fold : number of the fold to follow, 1 for that of the highest frequency; the peak by default
     points : values of the peak (21), or the most that a line of folds may have (500)
     worn : folder of the result whose last depth is a wear of one
-    Raises  Refusal for what cannot be; SolveFailed where not even the first point is found
-    """
+    Raises  Refusal for what cannot be; SolveFailed where not even the first point is found"""
     ends = [_end(option, value, against) for option, value in (("--from", start), ("--to", stop))]
     if ends[0] == ends[1]:
         raise Refusal("--from and --to are the same: give two values to go from and to")

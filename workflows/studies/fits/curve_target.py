@@ -31,8 +31,7 @@ class Curve(Table):
     resonance : take each run of a response as a point of a backbone; control : the runs that are meant, all by default
     error, frequency_error : relative standard deviations of damping or of a response's amplitude, and of the frequency
         of a backbone; where they are given they go before those of the file or of the fit of a resonance
-    weight : of all its points together with the other numbers
-    """
+    weight : of all its points together with the other numbers"""
 
     file: str
     facts: dict[str, str] = Field(default_factory=dict)
@@ -78,10 +77,10 @@ class CurveTarget:
                 k not in self.table.model_fields_set for k in ("frequency_error", "error")
             ]
             errors = np.where(measured_errors, run.errors, [self.table.frequency_error, self.table.error])
-            for kind, (values, column, unit) in self._columns(run).items():
+            for kind, (values, column, unit) in self._columns(run, run).items():
                 for x, value, error in zip(self._places(run), values, errors[:, column], strict=True):
                     weight = self.table.weight * FULL / float(error)
-                    points.append(MeasuredNumber(f"{self.name} {x} {kind}", float(value), unit, weight, float(error)))
+                    points.append(MeasuredNumber(f"{self.name} {x} {kind}", float(value), unit, weight))
         return points
 
     def _places(self, run: Run) -> list[str]:
@@ -89,15 +88,17 @@ class CurveTarget:
             return [f"{1e6 * a:.3g} um" for a in run.amplitude]
         return [f"{f:.5g} Hz" for f in run.frequency]
 
-    def _columns(self, run: Run) -> dict[str, tuple[np.ndarray, int, str]]:
+    def _columns(self, run: Run, measured: Run) -> dict[str, tuple[np.ndarray, int, str]]:
         if self.measured.kind == "response":
-            return {"amplitude": (run.amplitude, 1, "m")}
+            turned = np.angle(run.displacement / measured.displacement) if self.measured.phased else np.zeros(0)
+            phase = {"e^phase": (np.exp(turned), 1, "")} if self.measured.phased else {}
+            return {"amplitude": (run.amplitude, 1, "m"), **phase}
         return {"frequency": (run.frequency, 0, "Hz"), "damping": (run.damping, 1, "")}
 
     def values(self, file: SceneFile, model: modelling.Model) -> np.ndarray:
         """(n,) what a scene says to the numbers; raises SolveFailed where it does not reach a point."""
         pairs = compare_runs(file, model, self.measured, Progress())
-        numbers = np.concatenate([v for run in pairs for v, *_ in self._columns(run.computed).values()])
+        numbers = np.concatenate([v for run in pairs for v, *_ in self._columns(run.computed, run.measured).values()])
         if missing := np.sum(~np.isfinite(numbers)):
             raise SolveFailed(f"curves.{self.name}: the scene does not reach {missing} of its points")
         return numbers

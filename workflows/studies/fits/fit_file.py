@@ -1,9 +1,6 @@
 """The file of a fit: which numbers of a scene are sought, within bounds, and what was measured.
 
-A measured number is the frequency of a linear mode, or any quantity of a cycle or of the wear, by its name.
-"""
-
-from __future__ import annotations
+A measured number is the frequency of a linear mode, or any quantity of a cycle or of the wear, by its name."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,7 +17,6 @@ from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.scene.wear import At
 from tribodyn.workflows.studies.fits.curve_target import Curve
-from tribodyn.workflows.studies.many.distributions import Distribution
 
 LINEAR_MODES = ("open frequency", "stuck frequency")  # natural frequencies, contact absent or closed and stuck
 NumberText = float | str
@@ -31,17 +27,13 @@ class ParameterTable(Table):
 
     keys : of the scene, section.key; several get the same value
     low, high : bounds, with a unit or in SI; start : one or more to begin from, the scene's own value by default
-    ratio : count in ratios, for a positive number known to its order only; by default where both bounds are above 0
-    prior : distribution that was known before, for a posterior; evenly between the bounds by default, of its logarithm
-        where it counts in ratios
-    """
+    ratio : count in ratios, for a positive number known to its order only; by default where both bounds are above 0"""
 
     keys: Annotated[tuple[str, ...], Field(min_length=1)]
     low: NumberText
     high: NumberText
     start: tuple[NumberText, ...] = ()
     ratio: StrictBool | None = None
-    prior: Distribution | None = None
 
 
 class Target(Table):
@@ -51,8 +43,7 @@ class Target(Table):
     mode : number of a frequency, from 1
     at : of a quantity of a cycle: a frequency, "peak" or a ratio to it; left out, the contact is at rest
     load : factor on the harmonic loads of the scene
-    left : share of the first preload at which the wear ends
-    """
+    left : share of the first preload at which the wear ends"""
 
     of: str
     mode: Annotated[StrictInt, Field(ge=1)] | None = None
@@ -95,25 +86,20 @@ class Target(Table):
 class MeasuredTarget(Target):
     """A measured number.
 
-    value : with a unit or in SI; weight : of its relative error in a fit
-    error : its standard deviation, relative, for a posterior
-    """
+    value : with a unit or in SI; weight : of its relative error in a fit"""
 
     value: NumberText
     weight: Annotated[Number, Field(gt=0)] = 1.0
-    error: Annotated[Number, Field(gt=0)] | None = None
 
 
 class FitTables(Table):
-    """What is sought, what was measured, and what shall be predicted, by names of the user's choice.
+    """What is sought and what was measured, by names of the user's choice.
 
-    curves : measured curves, which may take the place of measured numbers
-    """
+    curves : measured curves, which may take the place of measured numbers"""
 
     parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
     measured: dict[str, MeasuredTarget]
     curves: dict[str, Curve] = Field(default_factory=dict)
-    predict: dict[str, Target] = Field(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod

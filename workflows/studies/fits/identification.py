@@ -1,19 +1,17 @@
 """Fit named parameters to measured numbers, within bounds, and say how well the numbers determine them.
 
 Nothing is tuned in silence: a fit keeps the predictions before and after it, which parameters ended at a bound, how
-each number depends on each parameter, and how far the numbers leave the parameters open.
-"""
-
-from __future__ import annotations
+each number depends on each parameter, and how far the numbers leave the parameters open."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolverFailure
 
 AT_BOUND = 1e-3  # of the width of the bounds: nearer than this counts as at the bound
 OPEN = 0.3  # relative standard error beyond which a parameter counts as not determined
@@ -54,14 +52,12 @@ class FitParameter:
 class MeasuredNumber:
     """A measured number, above 0.
 
-    weight : of its logarithmic residual ln(predicted / measured); error : its relative standard deviation, where known
-    """
+    weight : of its logarithmic residual ln(predicted / measured)"""
 
     name: str
     value: float
     unit: str = ""
     weight: float = 1.0
-    error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,7 @@ class Identification:
     origin, values : (n_parameter,) before and after; before, after : (n_measured,) predictions there
     sensitivity : (n_measured, n_parameter) d ln(predicted) / d ln(parameter), or / d parameter in widths of its bounds
     deviation : (n_parameter,) standard error in the same units, from what the fit leaves; inf where nothing tells
-    """
+    roughness : how many times wider these are than the curvature of the sum of squares at the best fit says"""
 
     parameters: tuple[FitParameter, ...]
     measured: tuple[MeasuredNumber, ...]
@@ -82,6 +78,7 @@ class Identification:
     deviation: np.ndarray
     evaluations: int
     origin: np.ndarray
+    roughness: float = 1.0
 
     @property
     def rms(self) -> float:
@@ -124,7 +121,7 @@ class Identification:
                 }
                 for i, m in enumerate(self.measured)
             ],
-            "rms": self.rms, "evaluations": self.evaluations,
+            "rms": self.rms, "evaluations": self.evaluations, "roughness": self.roughness,
         }  # fmt: skip
 
     def report(self) -> str:
@@ -146,6 +143,9 @@ class Identification:
             numbers = "".join(f"{value:11.4g}" for value in (m.value, self.before[i], self.after[i]))
             lines.append(f"{called[i]:{wide}}{numbers}{error:>10}   {'':14}{slopes}")
         lines.append(f"root mean square of the errors: {100 * self.rms:.2f} %; {self.evaluations} evaluations")
+        if round(self.roughness, 1) > 1:
+            text = f"the sum of squares is bumpy or bent beside the best fit: the errors are {self.roughness:.2g} times"
+            lines.append(f'{text} those of its curvature; harmonics.transitions = "located" makes it smooth')
         return "\n".join(lines)
 
 
@@ -158,12 +158,15 @@ def fit(
 ) -> Identification:
     """Least squares of logarithmic residuals, from every combination of starts; the best is kept.
 
+    What is not fitted to rounding is fitted from one and two thirds of the way between the bounds too, and tried along
+    the axes of its error ellipsoid up to eight standard errors away: what is better there is where a fit starts
+    anew, and the errors are those of the flattest parabola from the best fit to one of these points.
+
     predict : parameters by name -> (n_measured,) predictions, above 0
     slopes : parameters by name -> (n_measured, n_parameter) derivatives of the predictions made last
     before : the parameters as they were, for the report; the first starts by default
     Raises  Refusal where a prediction at a start is not a positive number, or a measured number is not
-    Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
-    """
+    Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares"""
     parameters, measured = tuple(parameters), tuple(measured)
     target, weight = np.array([[m.value, m.weight] for m in measured]).T
     if not (target > 0).all():
@@ -202,10 +205,29 @@ def fit(
         return np.asarray(slopes(values) * scale * (weight / last[1])[:, None])
 
     low, high = np.array([p.scaled(p.low) for p in parameters]), np.array([p.scaled(p.high) for p in parameters])
-    starts = product(*([p.scaled(value) for value in p.starts] for p in parameters))
     within = low + 1e-6 * (high - low), high - 1e-6 * (high - low)
-    ends = (least_squares(residual, np.clip(x, *within), slope, (low, high), xtol=1e-6) for x in starts)
-    best = min(ends, key=lambda solution: float(solution.cost))
+
+    def end(start: np.ndarray) -> OptimizeResult:
+        return least_squares(residual, np.clip(start, *within), slope, (low, high), xtol=1e-6)
+
+    starts = product(*([p.scaled(value) for value in p.starts] for p in parameters))
+    best, roughness = min((end(np.array(x)) for x in starts), key=_squares), 1.0
+    if len(target) > len(parameters) and _squares(best) > 1e-8 * len(target):  # else it fits to rounding
+        for share in (1 / 3, 2 / 3):
+            with suppress(SolverFailure):
+                best = min(best, end(low + share * (high - low)), key=_squares)
+        for _ in range(2 * len(parameters)):
+            lowest, at, curvature = _squares(best), best.x, 1.0
+            for way, parabola in _ways(best, low, high):
+                with suppress(SolverFailure):
+                    squares = float(np.sum(residual(best.x + way) ** 2))
+                    rise = max(squares - _squares(best), 0.0)
+                    curvature = min(curvature, rise / parabola if parabola > 0 else 1.0)
+                    lowest, at = min((lowest, at), (squares, best.x + way), key=lambda trial: trial[0])
+            if at is best.x:
+                break
+            best = min(best, end(at), key=_squares)
+        roughness = float(np.sqrt(1 / curvature)) if curvature > 0 else np.inf
     return Identification(
         parameters,
         measured,
@@ -213,10 +235,28 @@ def fit(
         predicted_first,
         target * np.exp(best.fun / weight),
         best.jac / weight[:, None],
-        _deviation(best.jac, float(np.sum(best.fun**2))),
+        roughness * _deviation(best.jac, _squares(best)),
         count,
         np.array([first_values[p.name] for p in parameters]),
+        roughness,
     )
+
+
+def _squares(solution: OptimizeResult) -> float:
+    return float(np.sum(solution.fun**2))
+
+
+def _ways(best: OptimizeResult, low: np.ndarray, high: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """Steps (n_parameter,) of 2, 4 and 8 standard errors within the bounds, the others following along their
+    correlations, and the rise of a sum of squares that is a parabola."""
+    n, k = best.jac.shape
+    covariance = np.linalg.pinv(best.jac.T @ best.jac) * _squares(best) / (n - k)
+    ways = []
+    for i, row in enumerate(covariance):
+        for errors in (-8, -4, -2, 2, 4, 8):
+            way = np.clip(best.x + errors * row / max(np.sqrt(row[i]), 1e-300), low, high) - best.x
+            ways.append((way, float(np.sum((best.jac @ way) ** 2))))
+    return ways
 
 
 def _deviation(slope: np.ndarray, squares: float) -> np.ndarray:

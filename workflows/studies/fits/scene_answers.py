@@ -33,8 +33,7 @@ Side = tuple[str, float, "SceneAnswers", "SceneAnswers"]
 class SceneAnswers:
     """What one scene says; cycles and wear runs that several numbers share are solved once.
 
-    near : a scene that differs little, from whose cycles those of this one are found
-    """
+    near : a scene that differs little, from whose cycles those of this one are found"""
 
     def __init__(self, file: SceneFile, model: modelling.Model, neighbour: SceneAnswers | None = None):
         self.file, self.model, self._near_points = file, model, {} if neighbour is None else neighbour._points
@@ -54,8 +53,7 @@ class SceneAnswers:
         """Derivatives of a number by parameters.
 
         sides : name of each, step, and the scene a step above and a step below
-        Raises  NoDerivative where a number has none, or none but by running again
-        """
+        Raises  NoDerivative where a number has none, or none but by running again"""
         if target.mode is not None:
             pairs = [[scene._frequency(target.of == "stuck frequency", target.mode) for scene in s[2:]] for s in sides]
             return [(up - down) / (2 * side[1]) for (up, down), side in zip(pairs, sides, strict=True)]
@@ -151,6 +149,7 @@ class SceneAnswers:
         worn = WornContact(
             run, self.model.reduced.interface.area, contact.gap, contact.components, self.model.balance.basis,
             {joint.name: slice(int(joint.rows[0]), int(joint.rows[-1]) + 1) for joint in contact.joints}, life_share,
+            places=self.model.balance.places, shares=tuple(duty.share for duty in self.file.scene.wear.duties),
         )  # fmt: skip
         if not quantity.grows:
             return float(quantity.value(worn) or 0.0)

@@ -1,6 +1,4 @@
-"""Fit the numbers of a scene to measured ones (study identify), or sample what these leave open (study posterior)."""
-
-from __future__ import annotations
+"""Fit the numbers of a scene to measured ones."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -15,16 +13,13 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import model_cache, modelling
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
-from tribodyn.workflows.studies.fits import posterior as posteriors
 from tribodyn.workflows.studies.fits.curve_target import CurveTarget
 from tribodyn.workflows.studies.fits.fit_file import FitTables, NumberText, ParameterTable, Target, read
 from tribodyn.workflows.studies.fits.identification import FitParameter, Identification, MeasuredNumber, fit
-from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.fits.scene_answers import SceneAnswers, Side
-from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
 from tribodyn.workflows.studies.study_result import StudyResult
 
 UNITS = ("m", "N", "N/m", "Pa", "kg/m3", "m3/J", "Hz", "rad", "s", "1/s", "")  # of keys of a scene
@@ -35,8 +30,7 @@ DIFFERENCE = 1e-3  # step of a parameter, over it or the width of its bounds
 class Fit(StudyResult):
     """The numbers of a scene that fit the measured ones best.
 
-    identification : with their errors; changes : overrides "section.key=value" that put them into the scene
-    """
+    identification : with their errors; changes : overrides "section.key=value" that put them into the scene"""
 
     identification: Identification
     changes: tuple[str, ...]
@@ -58,15 +52,14 @@ def identify(
 
     scene : name of a scene or a .toml file; nothing is written into it
     task : file with the numbers that are looked for and those that were measured, as cases/rig/rig.fit.toml
-    Raises  SceneError for a key that is no number of the scene, Refusal for bounds that cannot be, SolveFailed
-    """
+    Raises  SceneError for a key that is no number of the scene, Refusal for bounds that cannot be, SolveFailed"""
     return best(read_scene(scene, overrides), read(task), reporter(progress))
 
 
 def best(file: SceneFile, task: FitTables, progress: Progress) -> Fit:
     """The fit of a scene that was read."""
     scene_fit = SceneFit(file, task, progress)
-    scene_values = {name: value_of(file.mesh_scene, table.keys[0]) for name, table in task.parameters.items()}
+    scene_values = {name: value_of(file.scene, table.keys[0]) for name, table in task.parameters.items()}
     defined = {name: value for name, value in scene_values.items() if value is not None}
     initial = defined if len(defined) == len(scene_fit.parameters) else None
     with threadpool_limits(1), model_cache.memory_cache():
@@ -80,56 +73,15 @@ def best(file: SceneFile, task: FitTables, progress: Progress) -> Fit:
     return Fit(identification, tuple(scene_fit.changes(identification.named(), digits=6)))
 
 
-def posterior(
-    scene: Source,
-    task: AnyPath | Mapping[str, Any],
-    *,
-    trials: int = 100,
-    seed: int = 0,
-    overrides: Overrides = (),
-    progress: Report = None,
-) -> Posterior:
-    """Sample what measured numbers, each with its error, leave of the numbers of a scene, and what follows from them.
-
-    scene : name of a scene or a .toml file; nothing is written into it
-    task : file with the numbers that are looked for and those that were measured, as for `identify`
-    trials : runs of the scene that it may take
-    seed : seed of the samples
-    Raises  Refusal: what is asked for cannot be; SolveFailed: most trials fail
-    """
-    tables = read(task)
-    scene_fit = SceneFit(read_scene(scene, overrides), tables, reporter(progress))
-    all_targets = {**scene_fit.targets, **tables.predict}
-    units = {name: target.unit for name, target in tables.predict.items()}
-    priors = {
-        name: scene_fit.prior(name, target.prior)
-        for name, target in tables.parameters.items()
-        if target.prior is not None
-    }
-    with threadpool_limits(1), model_cache.memory_cache():
-        return posteriors.sample(
-            scene_fit.parameters,
-            scene_fit.measured,
-            lambda values: scene_fit.trial(values, all_targets),
-            units,
-            priors,
-            trials,
-            seed,
-        )
-
-
 class SceneFit:
     """A scene whose numbers are fitted: its trials and their derivatives."""
 
     def __init__(self, file: SceneFile, task: FitTables, progress: Progress):
-        doubled = set(task.measured) & set(task.predict)
-        if doubled:
-            raise SceneError(f"predict.{min(doubled)}: a measured number has this name, give another one")
         self.file, self._task, self._progress = file, task, progress
-        self.parameters = [parameter(name, table, self.file.mesh_scene) for name, table in task.parameters.items()]
+        self.parameters = [parameter(name, table, self.file.scene) for name, table in task.parameters.items()]
         self.measured = [
             MeasuredNumber(name, _si(f"measured.{name}.value", table.value, (table.unit,))[0],
-                     table.unit, table.weight, table.error)
+                     table.unit, table.weight)
             for name, table in task.measured.items()
         ]  # fmt: skip
         curves = {f"curves.{name}": CurveTarget.of(name, table, file) for name, table in task.curves.items()}
@@ -180,16 +132,8 @@ class SceneFit:
         file = self.file.changed(*self.changes(values))
         return SceneAnswers(file, modelling.build(file, Progress()), self._last)
 
-    @staticmethod
-    def prior(name: str, table: Distribution) -> Marginal:
-        """A distribution that was known before."""
-        try:
-            return Marginal.of(table)
-        except Refusal as error:
-            raise SceneError(f"parameters.{name}.prior: {error}") from None
 
-
-def parameter(name: str, table: ParameterTable, scene: MeshScene) -> FitParameter:
+def parameter(name: str, table: ParameterTable, scene: Scene) -> FitParameter:
     """A number that is looked for, in SI units."""
     low, unit = _si(f"parameters.{name}.low", table.low, UNITS)
     units = (unit,) if isinstance(table.low, str) else UNITS
@@ -209,11 +153,10 @@ def parameter(name: str, table: ParameterTable, scene: MeshScene) -> FitParamete
     return FitParameter(name, low, high, starts, unit, ratio)
 
 
-def value_of(scene: MeshScene, key: str) -> float | None:
+def value_of(scene: Scene, key: str) -> float | None:
     """The number of a scene at a key "section.key" in SI units; None for a key that is left out.
 
-    Raises  SceneError for a key that is not a number
-    """
+    Raises  SceneError for a key that is not a number"""
     table: Any = scene.model_dump()
     for part in filter(None, (table.get("geometry"), *table.get("bodies", {}).values())):
         part |= part["parameters"]

@@ -26,8 +26,7 @@ class Quantile:
 
     low, high : of the wanted confidence, from the surrogate and the runs that are missing
     low_in_all, high_in_all : with the model's own error as well; the same where that is not known
-    at_least : runs ended before what they were to tell, or survived, and the quantile may be one of theirs
-    """
+    at_least : runs ended before what they were to tell, or survived, and the quantile may be one of theirs"""
 
     share: float
     value: float
@@ -75,8 +74,7 @@ class LifeFit:
 
         Where runs were added about a quantile, the surrogate's ends stand alone: those runs have shown it how the
         number varies there, and counting would take hundreds of drawn runs to be as sure.
-        at : the share among runs that have the number; draws : of the quantile, by the surrogate
-        """
+        at : the share among runs that have the number; draws : of the quantile, by the surrogate"""
         low, high = np.quantile(draws, [0.5 - confidence / 2, 0.5 + confidence / 2])
         if share == self.share_sought:
             return float(low), float(high)
@@ -89,8 +87,7 @@ class LifeFit:
         """Whether a quantile may belong to values of which only a lower bound is known.
 
         So where its upper end reaches one of them, and where as many parts as its share leaves may have such values:
-        the surrogate is smooth, and a part that survives is not a part that lives a little longer
-        """
+        the surrogate is smooth, and a part that survives is not a part that lives a little longer"""
         if not self.open:
             return False
         share_open = stats.beta.ppf(

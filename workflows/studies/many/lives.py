@@ -1,7 +1,5 @@
 """The distribution of a life, or of another number, over what scatters: runs, quantiles, and what to measure next."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -12,7 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.quantity import names_with_error
+from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
@@ -45,8 +45,7 @@ class LifeDistribution(StudyResult):
     explained : share of the variance that the surrogate explains where runs are left out
     scatter : standard deviation of the number's logarithm; of the number itself where it is not always above 0
     model_error : relative, None where it is not known; model_error_of : where it is from, or why it is not known
-    values, weights : (n,) in order: the expected distribution
-    """
+    values, weights : (n,) in order: the expected distribution"""
 
     name: str
     number: str
@@ -130,10 +129,9 @@ def lives(
     folder : folder of lives.json, lives.png and the study's tables; results/NAME by default
     rare : share of the parts whose value is wanted as well, and that runs are added for, such as 1e-4
     workers : processes; as many as there are cores by default
-    scheduler : address of a scheduler of dask.distributed, or "local" for one of its own
+    scheduler : address of a scheduler of dask.distributed, or "local": processes here
     resume : take the runs that the folder holds already, and do the others
-    Raises  Refusal: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler
-    """
+    Raises  Refusal: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler"""
     plan = study_file.read(study)
     runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, resume)
     return _distribution(plan, runner, rare)
@@ -167,11 +165,11 @@ def _distribution(study: ParameterStudy, runner: Runner, rare: float | None) -> 
         added += [space.run_of(point) for point in points]
     folder = runner.folder
     if study_pictures.shown(table):
-        table.plot().savefig(folder / "study.png")
+        write_figure(table.plot(), folder / "study.png")
     error, source = _model_error(study, middle, table, folder, runner.progress)
     distribution = _result(study, table, life_fit, sample, shares, error, source)
-    (folder / "lives.json").write_text(json.dumps(distribution.record(), indent=2) + "\n", encoding="utf-8")
-    distribution.plot().savefig(folder / "lives.png")
+    write_text(folder / "lives.json", json.dumps(distribution.record(), indent=2) + "\n")
+    write_figure(distribution.plot(), folder / "lives.png")
     return distribution
 
 
@@ -179,8 +177,7 @@ def _scaling(study: ParameterStudy) -> list[tuple[str, ...]]:
     """Keys that vary whose common factor a life may be in proportion to the reciprocal of.
 
     So the wear coefficient, that rates are in proportion to; and all loads together, of a contact whose forces are in
-    proportion to displacements and whose depth counts beside them. Two runs say whether it is so in a scene
-    """
+    proportion to displacements and whose depth counts beside them. Two runs say whether it is so in a scene"""
     if study.lives.number != LIFE or study.correlations:
         return []
     numbers = smooth_numbers(scene_file.read(study.scene, study.settings.set).scene)

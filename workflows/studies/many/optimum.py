@@ -6,10 +6,7 @@ along the trade, and a small share of their sum, are made small. A run promises 
 on the best allowed one. Most of it, for a t that none of these passes, with all limits kept, is a problem of nonlinear
 programming; sequential quadratic programming solves it on the processes, from the best of 256 places.
 Source  SLSQP of SciPy: Kraft 1988; weights: Knowles 2006, doi 10.1109/TEVC.2005.851274; a process for every aim:
-    Daulton, Balandat and Bakshy 2020
-"""
-
-from __future__ import annotations
+    Daulton, Balandat and Bakshy 2020"""
 
 import json
 from collections.abc import Mapping
@@ -20,6 +17,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from tribodyn.output_file import write_text
+from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError
@@ -43,8 +42,7 @@ class Optimum(StudyResult):
 
     table : of all runs; front : rows of the table that no other allowed one beats in all aims, by the first aim
     best : row of the one nearest to the best of every aim, each between its ends on the front; the best of one aim
-    bounded : by aim, rows of which only a lower bound is known, such as lives that did not end
-    """
+    bounded : by aim, rows of which only a lower bound is known, such as lives that did not end"""
 
     name: str
     aims: tuple[Aim, ...]
@@ -125,10 +123,9 @@ def optimise(
     study : the .toml file of a study that draws from ranges, or its tables; its table [optimise] has what is wanted
     folder : folder of optimum.json, optimum.png and the study's tables; results/NAME by default
     workers : processes; as many as there are cores by default
-    scheduler : address of a scheduler of dask.distributed, or "local" for one of its own
+    scheduler : address of a scheduler of dask.distributed, or "local": processes here
     resume : take the runs that the folder holds already, and what was proposed, and do the others
-    Raises  Refusal: what is asked for cannot be; SolveFailed: no run keeps the limits, a lost scheduler
-    """
+    Raises  Refusal: what is asked for cannot be; SolveFailed: no run keeps the limits, a lost scheduler"""
     plan = study_file.read(study)
     runner = Runner(studies.place(plan, folder), reporter(progress), workers, scheduler, resume)
     return _search(plan, runner)
@@ -164,8 +161,8 @@ def _search(study: ParameterStudy, runner: Runner) -> Optimum:
     best = int(front[chebyshev(evaluated.aims[front], np.ones(len(settings.aims)), low, high).argmin()])
     bounded = {aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in settings.aims}
     optimum = Optimum(study.name, settings.aims, table, tuple(int(row) for row in front), best, bounded)
-    (runner.folder / "optimum.json").write_text(json.dumps(optimum.record(), indent=2) + "\n", encoding="utf-8")
-    optimum.plot().savefig(runner.folder / "optimum.png")
+    write_text(runner.folder / "optimum.json", json.dumps(optimum.record(), indent=2) + "\n")
+    write_figure(optimum.plot(), runner.folder / "optimum.png")
     return optimum
 
 

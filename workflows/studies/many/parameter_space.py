@@ -26,8 +26,7 @@ class ParameterSpace:
     """What varies, in SI units.
 
     study : every key of which varies by a distribution
-    ratios : keys whose coordinates are logarithms whatever their distributions
-    """
+    ratios : keys whose coordinates are logarithms whatever their distributions"""
 
     study: ParameterStudy
     ratios: tuple[str, ...] = ()
@@ -50,8 +49,7 @@ class ParameterSpace:
 
         wide : factor on the standard normal variables behind the points, above 1 for rare values
         Returns values (n, k) in SI units, weights (n,)
-        Source  importance sampling with a scaled normal density: Bucher 1988, doi 10.1016/0167-4730(88)90020-3
-        """
+        Source  importance sampling with a scaled normal density: Bucher 1988, doi 10.1016/0167-4730(88)90020-3"""
         k = len(self.keys)
         share = np.clip(qmc.Sobol(k, seed=np.random.default_rng(seed)).random_base2(exponent), 1e-12, 1 - 1e-12)
         normal = stats.norm.ppf(share)
@@ -113,8 +111,7 @@ def runs(study: ParameterStudy) -> list[dict[str, Any]]:
     """The values of the keys, run by run: as the lists have them, drawn ones in SI units.
 
     A key with a list in a design that draws takes its values with equal chances.
-    Raises  SceneError where correlations contradict each other
-    """
+    Raises  SceneError where correlations contradict each other"""
     keys = list(study.varied)
     lists = [values for values in study.varied.values() if not isinstance(values, Marginal)]
     if study.settings.design == "grid":

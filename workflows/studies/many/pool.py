@@ -1,7 +1,5 @@
 """Runs of a study in the processes of a pool, where one that dies takes no other run with it, or on many machines."""
 
-from __future__ import annotations
-
 import gc
 import logging
 import os
@@ -26,7 +24,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
-LOCAL = "local"
+LOCAL = "local"  # the processes of this machine, which nobody else can reach: they take work through pipes
 WAIT = "20s"  # for a scheduler to answer
 _always = ExitStack()  # what a process of the pool is within as long as it lives
 
@@ -37,8 +35,7 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], RunRow
     """Rows as they come, made by `solve` of a module; a run whose process died ATTEMPTS times is lost.
 
     The death of one process ends the whole pool. Nobody tells which run killed it, so all that were under way are
-    repeated one at a time: a run is lost by a death of its own only.
-    """
+    repeated one at a time: a run is lost by a death of its own only."""
     # Gmsh, once used in this process, sets this to the default: a pipe to a dead process would end the study
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python begins
@@ -113,19 +110,15 @@ def _stop(pool: ProcessPoolExecutor) -> None:
         process.join()
 
 
-def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callable[[Work], RunRow]) -> Iterator[RunRow]:
+def on_cluster(tasks: Sequence[Work], address: str, solve: Callable[[Work], RunRow]) -> Iterator[RunRow]:
     """Rows as they come, by dask.distributed; all that is distributed about a study is its work.
 
-    address : of a scheduler, such as tcp://host:8786, or "local" for a cluster of `workers` processes of its own
-    Raises  Refusal: no scheduler answers there; SolveFailed: the scheduler was lost on the way
-    """
+    address : of a scheduler, such as tls://host:8786; what it sends is unpickled, so it must be the user's own
+    Raises  Refusal: no scheduler answers there; SolveFailed: the scheduler was lost on the way"""
     distributed = package("distributed")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told in one sentence
-    cluster = None
-    if address == LOCAL:
-        cluster = distributed.LocalCluster(workers, threads_per_worker=1, dashboard_address=None)
     try:
-        client = distributed.Client(cluster or address, timeout=WAIT, set_as_default=False)
+        client = distributed.Client(address, timeout=WAIT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise Refusal(f"--scheduler {address}: no scheduler answers there ({error})") from None
     try:
@@ -140,5 +133,3 @@ def on_cluster(tasks: Sequence[Work], address: str, workers: int, solve: Callabl
                 raise SolveFailed(f"the scheduler at {address} was lost")
     finally:
         client.close()
-        if cluster is not None:
-            cluster.close()

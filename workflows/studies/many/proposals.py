@@ -1,7 +1,5 @@
 """Propose the next run of an optimisation: surrogates of aims and limits, expected improvement."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,8 +23,7 @@ class EvaluatedRuns:
     share : (n, k) places of the runs in the unit cube
     aims : (n, m) values to be made small; excess : (n, q) by which limits are passed, below 0 where they are kept.
         A run that failed has nan in both
-    slopes : (n, m + q, k) derivatives of both by coordinates, nan where they are not known
-    """
+    slopes : (n, m + q, k) derivatives of both by coordinates, nan where they are not known"""
 
     share: np.ndarray
     aims: np.ndarray
@@ -83,8 +80,7 @@ def propose(evaluated: EvaluatedRuns, scale: Callable[[np.ndarray], np.ndarray],
     scale : places (n, k) -> coordinates (n, k) that surrogates are fitted in
     Returns the place and the improvement of the one aim expected there, inf of several aims, where no run is allowed,
         and where few runs without derivatives are solved: then it lies far from all others. A second aim is weighed
-        anew for every run
-    """
+        anew for every run"""
     share, m = evaluated.share, evaluated.aims.shape[1]
     draw = np.random.default_rng([seed, len(share)])
     columns, solved = np.concatenate([evaluated.aims, evaluated.excess], axis=1), evaluated.solved
@@ -141,8 +137,7 @@ def promised(least: float, value: np.ndarray | float, deviation: np.ndarray) -> 
     """Logarithm of what a normal number lies below `least` by, 0 where it does not, on average; -value without least.
 
     Source  expected improvement: Jones, Schonlau and Welch 1998, doi 10.1023/A:1008306431147, eq. 15; its logarithm
-        far below: Ament et al. 2023
-    """
+        far below: Ament et al. 2023"""
     if not np.isfinite(least):
         return -np.broadcast_to(value, deviation.shape)
     deviation = np.maximum(deviation, np.finfo(float).tiny)
@@ -159,8 +154,7 @@ def promised(least: float, value: np.ndarray | float, deviation: np.ndarray) -> 
 def _fitted(points: np.ndarray, column: np.ndarray, slopes: np.ndarray, solved: np.ndarray) -> Surrogate:
     """A process through the runs that are solved; one that failed counts as worse than expected there by a deviation.
 
-    Source  Forrester, Sobester and Keane 2006, doi 10.1098/rspa.2005.1608
-    """
+    Source  Forrester, Sobester and Keane 2006, doi 10.1098/rspa.2005.1608"""
     surrogate = Surrogate.fitted(points[solved], column[solved], slopes[solved], is_small=True)
     for point in points[~solved]:
         mean, deviation = surrogate.mean_and_deviation(point[None])

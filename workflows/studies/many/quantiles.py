@@ -25,8 +25,7 @@ POINTS = 2**12  # of the Sobol indices, a power of two
 class Sample:
     """Points of the distribution with what the surrogate expects there, in the order of that.
 
-    points : (n, k) values; coordinates : (n, k); weight : (n,), sums to 1; mean, deviation : (n,)
-    """
+    points : (n, k) values; coordinates : (n, k); weight : (n,), sums to 1; mean, deviation : (n,)"""
 
     points: np.ndarray
     coordinates: np.ndarray
@@ -57,8 +56,7 @@ def drawn(sample: Sample, surrogate: Surrogate, share: float, draws: int = DRAWS
     """(draws,) values of a quantile, one for each function that the surrogate may stand for.
 
     Points that lie on their side of the quantile for sure keep their expected values; of the others MOST, evenly over
-    their order, are drawn jointly.
-    """
+    their order, are drawn jointly."""
     middle = sample.quantile(share)
     neighbours = np.flatnonzero(np.abs(sample.mean - middle) < ZONE * sample.deviation)
     if len(neighbours) < 2:
@@ -92,8 +90,7 @@ def counted(
 
     values, said : (n, m) runs drawn from the distribution, and what the others say of each, m equally likely ones of
         each where a factor of them is known exactly; none were added on purpose
-    Source  Angelopoulos et al. 2023, doi 10.1126/science.adi6000: prediction-powered quantiles
-    """
+    Source  Angelopoulos et al. 2023, doi 10.1126/science.adi6000: prediction-powered quantiles"""
     thinned = sample.mean[:: max(len(sample.mean) // GRID, 1)]
     at = np.unique(np.concatenate([thinned, values.ravel(), predictions.ravel()]))
     run_values, remaining = (
@@ -114,8 +111,7 @@ def next_runs(sample: Sample, surrogate: Surrogate, share: float, count: int) ->
     """(count, k) points whose runs would say most about a quantile: on either side of it, and not near each other.
 
     Source  active learning with the chance of a wrong sign, as in Echard, Gayton, Lemaire 2011, doi
-    10.1016/j.strusafe.2011.01.002; several at a time by taking expected values as found (kriging believer)
-    """
+    10.1016/j.strusafe.2011.01.002; several at a time by taking expected values as found (kriging believer)"""
     middle = sample.quantile(share)
     candidates = np.argsort(-_gain(sample.weight, sample.mean, sample.deviation, middle))[:MAX_DRAWS]
     chosen: list[int] = []
@@ -139,8 +135,7 @@ class Influence:
     """What one key does to a number.
 
     first : share of the variance that goes when the key is known exactly; total : that stays when all others are known
-    left : standard deviation over what it is now, if the key were known exactly, sqrt(1 - first)
-    """
+    left : standard deviation over what it is now, if the key were known exactly, sqrt(1 - first)"""
 
     key: str
     first: float
@@ -159,8 +154,7 @@ def influences(space: ParameterSpace, mean: Callable[[np.ndarray], np.ndarray], 
     Where keys are correlated, `first` counts what the others share with a key, and `total` does not: an index of what
     is independent, with the key as the first and as the last one of the Gaussian copula.
     Source  Saltelli et al. 2010, doi 10.1016/j.cpc.2009.09.018; correlated: Mara and Tarantola 2012, doi
-    10.1016/j.ress.2011.08.008
-    """
+    10.1016/j.ress.2011.08.008"""
     k = len(space.keys)
     if not space.study.correlations:
         first, total = _indices(space, mean, seed)

@@ -1,7 +1,5 @@
 """One run of a study, in any process, and its row in the table."""
 
-from __future__ import annotations
-
 import hashlib
 import threading
 import time
@@ -64,8 +62,7 @@ class RunRow:
     """Row of one run in the table of a study.
 
     key : of the task; sentence : how it ended; numbers : by column, SI units, what there is none of is left out
-    status : complete, failed in a solve, refused as a scene, stopped by a defect, or lost with its process
-    """
+    status : complete, failed in a solve, refused as a scene, stopped by a defect, or lost with its process"""
 
     run: int
     key: str
@@ -104,8 +101,7 @@ def solve(task: StudyRun) -> RunRow:
 def outcome_of(error: Exception) -> tuple[Status, str]:
     """How a run ended by an exception: refused as bad input, failed in a solve, or stopped by a defect of the program.
 
-    The sentence of a defect has its type and place.
-    """
+    The sentence of a defect has its type and place."""
     if isinstance(error, (Refusal, OSError)):
         return "refused", str(error)
     if isinstance(error, MemoryError):
@@ -124,8 +120,7 @@ def slope_column(number: str, key: str) -> str:
 def numbers_of(result: Result) -> dict[str, float]:
     """The numbers of a result by column: those of its summary, and of its verdict where it has one.
 
-    A response that is highest at an end of its range, or whose peak was not found, has no peak.
-    """
+    A response that is highest at an end of its range, or whose peak was not found, has no peak."""
     numbers: dict[str, float | None] = {
         answer.column: answer.value for answer in answers_of(result) if answer.is_peak and answer.value is not None
     }

@@ -136,8 +136,7 @@ class ParameterStudy:
     """A study that was read and checked.
 
     varied : key of the scene -> values, or the distribution that they are drawn from
-    folder : where the path of its scene begins
-    """
+    folder : where the path of its scene begins"""
 
     name: str
     settings: StudySettings

@@ -1,7 +1,5 @@
 """Run a study: read its file, solve the runs that its folder lacks, write its table."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +10,7 @@ import tomli_w
 
 from tribodyn.hbm.threads import limited, usable
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.pictures.figures import write_figure
 from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress, Report, reporter
@@ -31,8 +30,7 @@ class Runner:
 
     folder : of rows, tables and pictures; workers : processes, as many as there are cores where None
     scheduler : see pool.on_cluster, none where empty; resume : take the rows that `folder` holds of the same runs
-    retry : but those of failed runs
-    """
+    retry : but those of failed runs"""
 
     folder: Path
     progress: Progress
@@ -64,11 +62,10 @@ def grid(
     study : a .toml file with [study] and [vary], or its tables as a dict
     folder : folder of tables and pictures; results/NAME by default
     workers : processes; as many as there are cores by default
-    scheduler : address of a scheduler of dask.distributed, such as tcp://host:8786, or "local" for one of its own
+    scheduler : address of a scheduler of dask.distributed, such as tls://host:8786, or "local": processes here
     resume : take the runs that the folder holds already, and do the others
     retry : resume, and do failed runs again
-    Raises  Refusal: the study asks for what cannot be; SolveFailed: the scheduler was lost
-    """
+    Raises  Refusal: the study asks for what cannot be; SolveFailed: the scheduler was lost"""
     plan = study_file.read(study)
     return run(plan, Runner(place(plan, folder), reporter(progress), workers, scheduler, resume or retry, retry))
 
@@ -89,8 +86,7 @@ def run(
 
     added : values of runs beyond those of the design; drawn : whether pictures are wanted
     inside : one worker is this process itself, where few runs are done at a time and starting another would cost more
-    Raises  Refusal: the study asks for what cannot be; SolveFailed: the scheduler was lost
-    """
+    Raises  Refusal: the study asks for what cannot be; SolveFailed: the scheduler was lost"""
     if not (runner.scheduler or inside):
         pool.prepared()  # imports while the runs are read
     folder, varied = runner.folder, [*parameter_space.runs(study), *added]
@@ -104,7 +100,7 @@ def run(
             if rows:
                 write(study_table := table(study.name, varied, rows, folder), folder)
         if drawn and study_pictures.shown(study_table):
-            study_table.plot().savefig(folder / "study.png")
+            write_figure(study_table.plot(), folder / "study.png")
     return study_table
 
 
@@ -131,14 +127,15 @@ def finish(
         progress.say(f"{len(finished_rows)} of {len(tasks) + refused} {noun} are done already")
     remaining = [task for task in tasks if task.number not in rows]
     count = runner.workers or usable(sys.maxsize)
+    elsewhere = scheduler not in ("", pool.LOCAL)
     if remaining:
-        where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(remaining))} processes"
+        where = f"the workers of {scheduler}" if elsewhere else f"{min(count, len(remaining))} processes"
         progress.say(f"{len(remaining)} {noun} on {where}, one thread for each")
     with progress.track(f"{len(remaining)} {noun}") as advance:
         if not remaining:
             coming: Iterator[RunRow] = iter(())
-        elif scheduler:
-            coming = pool.on_cluster(remaining, scheduler, count, solve)
+        elif elsewhere:
+            coming = pool.on_cluster(remaining, scheduler, solve)
         else:
             coming = (
                 _in_this_process(remaining, solve) if inside and count == 1 else pool.finished(remaining, count, solve)

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from tribodyn.hbm.quantity import StatedQuantity, names_with_error, quantities_of
+from tribodyn.output_file import cell, replacing, set_aside
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.result.store import replacing, set_aside
 from tribodyn.workflows.studies.many import study_pictures
 from tribodyn.workflows.studies.many.distributions import si
 from tribodyn.workflows.studies.many.run_task import RUN, RunRow, Status
@@ -37,8 +37,7 @@ class StudyTable(StudyResult):
 
     columns : name -> (n_run,) of numbers in SI units, nan where there is none, or of texts; run, status and sentence,
         then the keys that vary, then what was computed
-    varied : names of the keys; folder : of its files, None where there are none
-    """
+    varied : names of the keys; folder : of its files, None where there are none"""
 
     name: str
     columns: Mapping[str, np.ndarray]
@@ -57,8 +56,7 @@ class StudyTable(StudyResult):
     def bounded(self, number: str) -> tuple[np.ndarray, np.ndarray]:
         """A number of the runs, nan where there is none; and that of runs where it is a lower bound only.
 
-        Both (n_run,). A life that did not end within its run counts as the cycles that the run came to
-        """
+        Both (n_run,). A life that did not end within its run counts as the cycles that the run came to"""
         lived = number == LIFE and "cycles" in self.columns
         if number not in self.computed and not lived:
             raise Refusal(f'{self.name} has no number "{number}": there are {", ".join(self.computed) or "none"}')
@@ -87,8 +85,7 @@ class StudyTable(StudyResult):
     def influence(self) -> dict[str, dict[str, float]]:
         """Spearman's rank correlation of computed numbers with the keys that vary, over the complete runs.
 
-        Number -> key -> correlation; what does not vary or has fewer than FEWEST values is left out
-        """
+        Number -> key -> correlation; what does not vary or has fewer than FEWEST values is left out"""
         correlations: dict[str, dict[str, float]] = {}
         for number in self.computed:
             for key in self.varied if not number.startswith("d ") else ():
@@ -149,8 +146,7 @@ def table(
 ) -> StudyTable:
     """The table of the runs that are finished.
 
-    varied : values of the keys, run by run; rows : by the number of the run, from 1
-    """
+    varied : values of the keys, run by run; rows : by the number of the run, from 1"""
     numbers = sorted(rows)
     columns = {RUN: np.array(numbers, int)}
     for column, of in ((STATUS, "status"), (SENTENCE, "sentence")):
@@ -183,7 +179,7 @@ def write(study: StudyTable, folder: Path) -> None:
     """Write study.csv; the same table gives the same bytes."""
     with replacing(folder / "study.csv") as path, path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(study.columns)
+        writer.writerow(map(cell, study.columns))
         for i in range(len(study.columns[RUN])):
             writer.writerow([_cell(column[i]) for column in study.columns.values()])
 
@@ -191,7 +187,7 @@ def write(study: StudyTable, folder: Path) -> None:
 def _cell(value: Any) -> str:
     if isinstance(value, (float, np.floating)):
         return "" if np.isnan(value) else repr(float(value))
-    return str(value)
+    return str(cell(value) if isinstance(value, str) else value)
 
 
 class Journal:

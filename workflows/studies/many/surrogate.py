@@ -1,8 +1,7 @@
 """A Gaussian process through runs of a study, by their values and, where these are known, their derivatives.
 
 It knows how far it may be off, and is held to that by leaving runs out. Covariance: Matern 5/2 with a length for each
-coordinate, a linear trend, and noise.
-"""
+coordinate, a linear trend, and noise."""
 
 from __future__ import annotations
 
@@ -30,8 +29,7 @@ def covariance(log: np.ndarray, a: np.ndarray, i: np.ndarray, b: np.ndarray, j: 
 
     log : logarithms of variance, trend, noise and the k lengths
     i (n,), j (m,) : the coordinate that it is the derivative by, -1 for a value
-    Source  Rasmussen and Williams 2006, eq. 4.17; derivatives: section 9.4
-    """
+    Source  Rasmussen and Williams 2006, eq. 4.17; derivatives: section 9.4"""
     variance, trend, length = np.exp(log[0]), np.exp(log[1]), np.exp(log[3:])
     d = (a[:, None] - b[None]) / length
     r = np.sqrt(5 * np.einsum("nmk,nmk->nm", d, d))
@@ -74,8 +72,7 @@ class Surrogate:
     log : see `covariance`, in the scale of values less `middle`, over `width`
     points : (n, k); values : (n,); slopes : (n, k) derivatives, nan where they are not known
     laws : directions along which the values are known to be linear; the process is through what these leave
-    stretch : factor on its standard deviation, so that it accounts for the runs when they are left out one by one
-    """
+    stretch : factor on its standard deviation, so that it accounts for the runs when they are left out one by one"""
 
     log: np.ndarray
     points: np.ndarray
@@ -101,8 +98,7 @@ class Surrogate:
 
         is_small : where fewer than FEWEST numbers are known, a process that is nearly linear
         Raises  Refusal where fewer are known, and `is_small` is not asked for
-        Source  Rasmussen and Williams 2006, eq. 2.30
-        """
+        Source  Rasmussen and Williams 2006, eq. 2.30"""
         slopes = np.full(points.shape, np.nan) if slopes is None else slopes
         by_law = len(values) + int(np.isfinite(slopes).sum())
         if by_law < FEWEST and not is_small:
@@ -166,8 +162,7 @@ class Surrogate:
     def _leaving_out(self) -> tuple[np.ndarray, np.ndarray]:
         """Variance (n,) of each run's value where the others alone are known, and by how much they miss it.
 
-        Source  Rasmussen and Williams 2006, eq. 5.12, for a run's value and its derivatives together
-        """
+        Source  Rasmussen and Williams 2006, eq. 5.12, for a run's value and its derivatives together"""
         root, alpha = self._conditioned
         inverse, run = sla.cho_solve((root, True), np.eye(len(root))), self._rows[0]
         spread, missed = np.empty(len(self.values)), np.empty(len(self.values))

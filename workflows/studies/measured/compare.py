@@ -1,7 +1,5 @@
 """Compare a measurement with a scene: both overlaid, with the scatter of the measurement and a band of inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,8 +53,7 @@ class MeasurementComparison(StudyResult):
     """A measurement and a scene.
 
     name : of the scene; measured : in its directions, repeated runs as their mean
-    runs : every run with what the scene computes; band : the same of every change of the scene, by the change
-    """
+    runs : every run with what the scene computes; band : the same of every change of the scene, by the change"""
 
     name: str
     measured: Measurement
@@ -127,6 +124,7 @@ class MeasurementComparison(StudyResult):
         return {
             "scene": self.name, "measurement": self.measured.source, "kind": self.measured.kind, "rows": rows,
             "peaks": self.peaks(), "largest": self.largest(), "outside": self._outside(),
+            "unused": [*self.measured.unused],
         }  # fmt: skip
 
     def _outside(self) -> int:
@@ -160,8 +158,9 @@ class MeasurementComparison(StudyResult):
             table.append(f"{row['run'][:20]:20}" + "".join(f"{cell:>13}" for cell in cells))
         off = {n.removesuffix("_difference"): v for n, v in self.largest().items() if v is not None}
         table += named_lines((f"{shown[n].word} off", f"{shown[n].off(v, '')} at most") for n, v in off.items())
-        outside = self._outside()
-        return [*table, *named_lines([("outside", f"{outside} points, not reached")] if outside else [])]
+        outside, unused = self._outside(), self.measured.unused
+        table += named_lines([("outside", f"{outside} points, not reached")] if outside else [])
+        return [*table, *named_lines([("left out", "; ".join(unused))] if unused else [])]
 
     def write(self, folder: Path) -> list[Path]:
         """Write compare.csv and compare.png."""
@@ -218,8 +217,7 @@ def compare(
     resonance : take each run of a response as one point of a backbone, its resonance; so are runs of constant response
     band : compute it again with this changed, such as "contact.friction=0.4", or several keys joined by ";"; the range
         of all is the band of the inputs; can be repeated
-    Raises  Refusal for a measurement that cannot be read or does not belong to the scene; SolveFailed
-    """
+    Raises  Refusal for a measurement that cannot be read or does not belong to the scene; SolveFailed"""
     report = reporter(progress)
     measured = read(Path(measurement), dict(_named(text) for text in facts))
     files = changed(scene, overrides, band)

@@ -1,7 +1,5 @@
 """Compute the response of a scene at the points of a measurement."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,8 +22,7 @@ SAME_FREQUENCY = 1e-5  # relative difference of frequencies that a universal fil
 class ComparedRun:
     """A measured run, and what a scene computes beside it.
 
-    computed : at the points of the run, nan where the scene does not reach; curve : all that was computed
-    """
+    computed : at the points of the run, nan where the scene does not reach; curve : all that was computed"""
 
     measured: Run
     computed: Run
@@ -39,8 +36,7 @@ def compare_runs(
 
     Of a response each run is computed with the force that it has at its largest amplitude, where contacts slip most;
     the measured amplitude is taken in proportion to it.
-    Raises  Refusal, SolveFailed: what the scene cannot compute
-    """
+    Raises  Refusal, SolveFailed: what the scene cannot compute"""
     if measured.kind == "modes":
         table = file.scene.backbone
         omega, ratio = FreeVibration(model.balance, table.mode if table else 0, measured.output).about_rest()
@@ -67,7 +63,7 @@ def _backbone(file: SceneFile, model: modelling.Model, measured: Measurement, pr
     damping = decrement(model.balance, mode) if measured.decay else mode.damping
     force = np.full(len(mode.omega), np.nan)
     if measured.force_at_output(file.scene):
-        force = 2 * damping * mode.omega**2 * mode.modal_amplitude**2 / mode.amplitude
+        force = 2 * damping * mode.omega**2 * mode.modal_amplitude**2 / mode.reference_amplitude
     return _run(mode.frequency[good], mode.first_harmonic[good], damping[good], force[good])
 
 
@@ -115,8 +111,7 @@ def _at_frequency(curve_run: Run, run: Run) -> np.ndarray:
     """(n,) complex displacement at the frequencies of a run, nan beyond the ends.
 
     Between computed points 1 / x goes straight: that of one mode is a parabola in frequency. Where a curve with folds
-    has several values, the one nearest to the measured amplitude is taken.
-    """
+    has several values, the one nearest to the measured amplitude is taken."""
     hertz, inverse = curve_run.frequency, 1 / curve_run.displacement
     best = np.full(len(run.frequency), np.nan, complex)
     for i, (f, measured) in enumerate(zip(run.frequency, run.amplitude, strict=True)):

@@ -8,11 +8,11 @@ frequency and damping change with its amplitude, fitted to the force over the di
 
 is linear in m, m w_0^2 and 2 m zeta w_0. Along a curve of constant response a does not change and both are constants;
 along one of constant force both are parabolas in a.
-Source  single nonlinear mode: Szemplinska-Stupnicka, JSV 63 (1979) 475; as a fit in this form ours
-"""
+Source  single nonlinear mode: Szemplinska-Stupnicka, JSV 63 (1979) 475; as a fit in this form ours"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -23,10 +23,37 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.load_tables import HarmonicLoad
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.units import parse_unit
 
 OUTPUT = "response"  # name of the first output of a scene
+ORDERS = ("m", "m/s", "m/s2")  # by the derivative of the displacement
 Kind = Literal["response", "backbone", "modes"]
 BENT = 2.0  # of the largest over the least amplitude of a run, from which on frequency and damping are parabolas in it
+
+
+@dataclass(frozen=True)
+class ResponseUnit:
+    """order : of the derivative of the displacement; factor : to SI units; per_force : whether it is per force"""
+
+    order: int
+    factor: float
+    per_force: bool
+
+    @classmethod
+    def parsed(cls, text: str) -> ResponseUnit:
+        """A unit such as mm/s2, g or (m/s^2)/N; raises Refusal."""
+        unit = parse_unit(plain_unit(text))
+        for per_force in (False, True):
+            for order, base in enumerate(ORDERS):
+                target = parse_unit(f"{base}/N" if per_force else base)
+                if unit.dimension == target.dimension:
+                    return cls(order, float(unit.factor / target.factor), per_force)
+        raise Refusal(f"expected a displacement, velocity or acceleration, or one per force, not {text}")
+
+
+def plain_unit(label: str) -> str:
+    """A unit as the program knows it: of analysers g is the standard gravity."""
+    return re.sub(r"\bsec(?![a-zA-Z])", "s", re.sub(r"\bg(?![a-zA-Z])", "gn", label.strip().replace("**", "^")))
 
 
 @dataclass(frozen=True)
@@ -60,8 +87,7 @@ class Measurement:
     source : file; output : of a scene that they belong to; order : of the measured derivative of the displacement
     direction, force_direction : as in a scene, None where not said; position : (3,) [m] or None
     per_force : displacement is [m/N]; phased : its phase was measured, against the force or, `timed`, against t = 0
-    decay : damping is a logarithmic decrement over 2 pi, of a free decay
-    """
+    decay : damping is a logarithmic decrement over 2 pi, of a free decay; unused : clauses on what is left out"""
 
     kind: Kind
     runs: tuple[Run, ...]
@@ -75,12 +101,12 @@ class Measurement:
     phased: bool = False
     timed: bool = False
     decay: bool = False
+    unused: tuple[str, ...] = ()
 
     def on(self, scene: Scene) -> Measurement:
         """The measurement in the directions of a scene's output and force, in metres, its phase against the force.
 
-        Raises  Refusal: the scene has no such output, force or direction
-        """
+        Raises  Refusal: the scene has no such output, force or direction"""
         outputs = outputs_of(scene)
         if self.output not in outputs:
             raise Refusal(f'output = "{self.output}": the scene has {", ".join(outputs)}; give output = NAME')
@@ -90,8 +116,8 @@ class Measurement:
         if self.kind != "response":
             return self
         load, force = driving_load(scene)
-        if load.direction is not None:
-            sign *= _sign(self.force_direction, load.direction, "the force")
+        if (direction := getattr(load, "direction", None)) is not None:
+            sign *= _sign(self.force_direction, direction, "the force")
         factor = sign * (abs(force) if self.per_force else 1.0) * (abs(force) / force if self.timed else 1.0)
         forces = [np.where(np.isfinite(run.force), run.force, abs(force)) for run in self.runs]
         runs = (
@@ -103,7 +129,7 @@ class Measurement:
         """Whether the one force of a scene acts where and along what the output observes."""
         loads = [*scene.loads.harmonic.values()]
         observed = outputs_of(scene)[self.output]
-        where = [entry.model_dump(include={"group", "direction", "dof"}) for entry in (observed, *loads)]
+        where = [entry.model_dump(include={"group", "direction", "dofs", "vector"}) for entry in (observed, *loads)]
         return len(where) == 2 and where[0] == where[1]
 
     def check_position(self, scene: Scene, part: Part | None) -> None:
@@ -200,8 +226,7 @@ def prepared(measured: Measurement, scene: Scene, resonance: bool) -> Measuremen
 def resonances(measured: Measurement) -> Measurement:
     """Each run of a response as a point of a backbone; runs of one control become one, by amplitude.
 
-    Raises  Refusal where a run has no force or no phase, or no resonance
-    """
+    Raises  Refusal where a run has no force or no phase, or no resonance"""
     if not measured.phased or any(not np.isfinite(run.force).all() for run in measured.runs) or measured.per_force:
         raise Refusal("the resonance of a run needs its force and its phase in every row")
     by_control: dict[str, list[Run]] = {}
@@ -221,8 +246,7 @@ def _joined(control: str, points: list[Run]) -> Run:
 def resonance(run: Run) -> Run:
     """The point of a run at its largest amplitude, at resonance where that is constant; its force is that of resonance.
 
-    Raises  Refusal where no resonance is within the run
-    """
+    Raises  Refusal where no resonance is within the run"""
     omega, a = 2 * np.pi * run.frequency, run.amplitude
     stiffness, s = run.force / run.displacement, a / a.max() - 1
     bent = len(a) > 10 and a.max() > BENT * a.min()

@@ -1,7 +1,5 @@
 """Flutter of a scene's wheel: eigenvalues by nodal diameter in the flow, and limit cycles by friction."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,8 +34,7 @@ class Flutter(StudyResult):
     """What a flow does to a wheel.
 
     eigenvalues : index of the wave, above 0 with the rotation -> eigenvalue with contacts stuck [1/s]
-    cycles : index of a wave that flutters -> its limit cycles, and why there may be others, or none
-    """
+    cycles : index of a wave that flutters -> its limit cycles, and why there may be others, or none"""
 
     name: str
     eigenvalues: dict[int, complex]
@@ -112,8 +109,7 @@ def flutter(
     start : amplitude of the response from which limit cycles are looked for, such as 1um; none by default
     stop : amplitude up to which they are looked for
     points : points of the backbone between these amplitudes
-    Raises  SceneError for a scene without [wheel] or [flow]; Refusal where one end alone is given
-    """
+    Raises  SceneError for a scene without [wheel] or [flow]; Refusal where one end alone is given"""
     file = read_scene(scene, overrides)
     return of_scene(file, start, stop, points)
 

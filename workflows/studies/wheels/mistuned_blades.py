@@ -12,7 +12,7 @@ from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation import highest_peak
-from tribodyn.hbm.continuation.branch import Branch, amplitude
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.linear.travelling_wave import at_sector
@@ -56,8 +56,7 @@ class MistunedBlades:
     """The wheel of a scene, ready for any pattern.
 
     part : the sector; reduced : its reduction, with the shapes in which sectors may deviate among its outputs
-    wheel : sectors alike, ready to deviate in these
-    """
+    wheel : sectors alike, ready to deviate in these"""
 
     file: SceneFile
     part: Part
@@ -116,8 +115,7 @@ class MistunedBlades:
     def peak(self, pattern: Pattern) -> tuple[OperatingPoint, int]:
         """The highest peak of any blade, and which blade; solves of the whole search are counted.
 
-        Raises  SolveFailed where the response is not followed to its end, rises there, or its peak is not found
-        """
+        Raises  SolveFailed where the response is not followed to its end, rises there, or its peak is not found"""
         scene = self.file.scene
         balance, names = self.balance(pattern), [f"{OUTPUT}@{n}" for n in range(self.wheel.n_sectors)]
         low, high = settings.response_range(scene)
@@ -131,7 +129,7 @@ class MistunedBlades:
         )
 
         def tall(branch: Branch) -> np.ndarray:
-            return amplitude(branch.response[:, [branch.output_names.index(name) for name in names]])
+            return np.column_stack([branch.amplitude(name) for name in names])
 
         def is_past_peak(branch: Branch) -> bool:
             return tall(branch).argmax() // len(names) not in (0, len(branch.omega) - 1)
@@ -164,10 +162,10 @@ def asked_of(file: SceneFile) -> Mistuning:
 
 
 def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
-    """The stiffness (n, n) of the reduced sector that deviates: all of it, or that of one body."""
+    """The elastic stiffness (n, n) of the reduced sector that deviates: all of it, or that of one body."""
     reduced: ReducedSector = wheel.reduced
     if body is None:
-        return np.asarray(reduced.sector.system.stiffness)
+        return wheel.elastic
     bodies = [body_of_mesh.name for body_of_mesh in getattr(wheel.part.mesh, "bodies", ()) if body_of_mesh.name]
     if body not in bodies:
         raise SceneError(unknown_key(f"mistuning.body: {body}", bodies))
@@ -177,7 +175,7 @@ def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
     nodes[find_group(wheel.part.node_sets, body)] = True
     free_dofs = np.flatnonzero(np.repeat(nodes, 3)[wheel.part.free])
     basis = reduced.origin.basis[free_dofs]
-    return np.asarray(basis.T @ (wheel.full.system.stiffness[free_dofs][:, free_dofs] @ basis))
+    return np.asarray(basis.T @ (wheel.part.system.stiffness[free_dofs][:, free_dofs] @ basis))
 
 
 def _hertz(omega: float) -> str:

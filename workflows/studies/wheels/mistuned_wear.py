@@ -1,7 +1,5 @@
 """The wear of one wheel of blades that differ: every blade's contacts wear by their own work, and feed back."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.continuation.operating_condition import AtPeakRatio, OperatingCondition
+from tribodyn.hbm.harmonics import amplitude
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.hbm.wear.wear_loop import evolve
@@ -31,7 +29,7 @@ from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import where_it_can_be, write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels.mistuned_blades import MistunedBlades, asked_of
-from tribodyn.workflows.studies.wheels.wheel_model import wheel_table
+from tribodyn.workflows.studies.wheels.wheel_model import wheel_scene
 
 IMAGES = 32  # of a film
 
@@ -42,8 +40,7 @@ class MistunedWear(StudyResult):
 
     blades : the wheel; number : of its pattern; history : of all pairs, sector by sector; blade : whose peak is tracked
     volume : (n_row, N) worn by then at the contacts of every sector [m3]; heights : (n_row, N) amplitudes [m]
-    preload : (n_row, N) mean normal force of the contacts of every sector [N]; formats : of films
-    """
+    preload : (n_row, N) mean normal force of the contacts of every sector [N]; formats : of films"""
 
     blades: MistunedBlades
     number: int
@@ -126,8 +123,7 @@ def pattern_wear(
     scene : name of a scene with [wheel], [mistuning] and [wear], or a .toml file
     pattern : number of the pattern, from 1
     formats : formats of a film, gif or mp4: made of the worn wheel over one cycle; none by default
-    Raises  SceneError where the scene lacks a table; SolveFailed
-    """
+    Raises  SceneError where the scene lacks a table; SolveFailed"""
     file, report = read_scene(scene, overrides), reporter(progress)
     wear_settings = file.mesh_scene.wear
     asked_of(file)
@@ -154,7 +150,7 @@ def pattern_wear(
     per = (len(history.cycles), n, -1)
     volume = (history.depth * area).reshape(per).sum(axis=2)
     preload = history.normal_force.reshape(per).sum(axis=2)
-    heights = amplitude(history.response[:, rows])
+    heights = amplitude(history.response[:, rows], balance.basis.harmonics)
     return MistunedWear(blades, pattern, blade, history, volume, heights, preload, tuple(formats))
 
 
@@ -169,9 +165,8 @@ def write_wheel(
 ) -> list[Path]:
     """Write mistuned_wheel.png, and a film over one cycle in some formats; returns their paths.
 
-    Raises  Refusal for a part that has no mesh of one kind; RenderingUnavailable
-    """
-    mesh, info = part_mesh(blades.part), wheel_table(blades.file)
+    Raises  Refusal for a part that has no mesh of one kind; RenderingUnavailable"""
+    mesh, info = part_mesh(blades.part), wheel_scene(blades.file).wheel
     if mesh is None:
         raise Refusal("this part has bodies of different elements: its wheel cannot be drawn")
     wheel = Around(info.sectors, info.engine_order, np.array(info.axis, float))

@@ -1,10 +1,7 @@
 """Patterns of blades that differ, drawn at random: the amplification of each, with contact on every blade.
 
 Each pattern is a run of the studies' engine: rows are on disk as they come, and a killed study resumes. The wheel is
-meshed and reduced once in every process.
-"""
-
-from __future__ import annotations
+meshed and reduced once in every process."""
 
 import time
 from dataclasses import dataclass, replace
@@ -15,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
-from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.figures import axes_of, write_figure
 from tribodyn.workflows.pictures.theme import BLUE, GREY, INK, ORANGE, RED
 from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.run.checkpoint import alone_in
@@ -27,7 +24,7 @@ from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, outcome_o
 from tribodyn.workflows.studies.many.study_runs import Runner, finish
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels.mistuned_blades import MistunedBlades, asked_of
-from tribodyn.workflows.studies.wheels.wheel_model import wheel_table
+from tribodyn.workflows.studies.wheels.wheel_model import wheel_scene
 
 
 def whitehead(n_sectors: int) -> float:
@@ -79,8 +76,7 @@ def solve(task: PatternRun) -> RunRow:
 class Patterns(StudyResult):
     """Result of all patterns of a scene.
 
-    rows : by number, of all that were asked for; n_sectors : of the wheel; folder : of table and picture
-    """
+    rows : by number, of all that were asked for; n_sectors : of the wheel; folder : of table and picture"""
 
     name: str
     n_sectors: int
@@ -183,11 +179,10 @@ def patterns(
     folder : folder of the table and its picture, in which rows are as they come; results/NAME by default
     workers : processes; as many as there are cores by default
     resume : take the rows that the folder holds of the same patterns
-    Raises  SceneError
-    """
+    Raises  SceneError"""
     file, report = read_scene(scene, overrides), reporter(progress)
     folder = Path("results") / file.name if folder is None else Path(folder)
-    mistuning, wheel = asked_of(file), wheel_table(file)
+    mistuning, wheel = asked_of(file), wheel_scene(file).wheel
     runner = Runner(folder, report, workers, resume=resume, retry=resume)
     folder.mkdir(parents=True, exist_ok=True)
     rows: dict[int, RunRow] = {}
@@ -200,5 +195,5 @@ def patterns(
     seconds = [row.seconds for row in result.rows]
     write_columns({**runs, **columns, "seconds": seconds}, folder / "patterns.csv")
     if result.complete:
-        result.plot().savefig(folder / "mistuning.png")
+        write_figure(result.plot(), folder / "mistuning.png")
     return result

@@ -1,10 +1,7 @@
 """A mistuned wheel: sectors whose stiffnesses deviate, what cyclic symmetry of one sector cannot say.
 
 The same reduced sector as for a travelling wave, once for every sector and each with its own stiffness, joined at the
-contacts to one real model of the whole wheel. Memory and time grow with the number of sectors.
-"""
-
-from __future__ import annotations
+contacts to one real model of the whole wheel. Memory and time grow with the number of sectors."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -43,8 +40,7 @@ class MistunedSectors(StudyResult):
     """Responses of a wheel, and of the same wheel with all sectors alike.
 
     stiffness : (n_sectors,) factors; heights : (n_point, n_sectors) amplitudes of the wheel at its points [m]
-    peak : derivatives of the largest amplitude and its frequency by every factor, or why there are none
-    """
+    peak : derivatives of the largest amplitude and its frequency by every factor, or why there are none"""
 
     stiffness: np.ndarray
     branch: Branch
@@ -112,8 +108,7 @@ def deviations(n_sectors: int, spread: float, seed: int) -> np.ndarray:
     """Factors (n_sectors,) on the stiffness, drawn from a normal distribution, then shifted and scaled.
 
     Their mean is one and their standard deviation is `spread`, exactly; the same seed gives the same factors.
-    Raises  Refusal for a spread that makes a factor zero or less
-    """
+    Raises  Refusal for a spread that makes a factor zero or less"""
     drawn = np.random.default_rng(seed).normal(size=n_sectors)
     drawn -= drawn.mean()
     return checked(1 + spread * drawn / drawn.std(), n_sectors)
@@ -130,16 +125,16 @@ def checked(factors: Sequence[float] | np.ndarray, n_sectors: int) -> np.ndarray
 
 
 def stiffer(wheel: wheels.Wheel, balance: HarmonicBalance) -> Iterator[ParameterChange]:
-    """What the factor on the stiffness of every sector does to the balance of a whole wheel, which is linear.
+    """What the factor on the elastic stiffness of every sector does to the balance of a whole wheel, which is linear.
 
-    Raises  NoDerivative for Rayleigh's damping of two modes, which may be a pair of the wheel that parts
-    """
+    Raises  NoDerivative for Rayleigh's damping of two modes, which may be a pair of the wheel that parts"""
     base, model, damping = BalanceInputs.of(balance), balance.model, wheel.scene.damping
     if damping.ratios is not None:
         raise NoDerivative("damping.ratios goes by two modes of the wheel: give damping.modal, or mass and stiffness")
     of_modes = None if damping.modal is None else modal_damping_towards(model.system, damping.modal)
+    elastic = wheel.elastic
     for n, P in enumerate(sector_maps(wheel.reduced.sector)):
-        change = P.T @ (wheel.reduced.sector.system.stiffness @ P)
+        change = P.T @ (elastic @ P)
         changed = replace(model.system, stiffness=model.system.stiffness + change)
         if damping.given:
             damped = of_modes(change) if of_modes else (damping.stiffness or 0.0) * change
@@ -161,11 +156,11 @@ def mistuned(
     """Solve all sectors of a wheel at once, their stiffnesses a little apart, beside sectors alike.
 
     scene : name of a scene with a [wheel], or a .toml file
-    stiffness : factor on the stiffness of every sector, such as "1.02, 0.99, 1, 0.98"; drawn by default
+    stiffness : factor on the elastic stiffness of every sector, as blades pinged at rest tell, such as "1.02, 0.99, 1";
+        the stress of a wheel that turns stays; drawn by default
     spread : standard deviation of the factors that are drawn, such as "2 %"
     seed : seed of the draw; the same seed gives the same factors
-    Raises  SceneError for a scene without [wheel], Refusal for factors that cannot be, SolveFailed
-    """
+    Raises  SceneError for a scene without [wheel], Refusal for factors that cannot be, SolveFailed"""
     file = read_scene(scene, overrides)
     with limited(file.scene.solver.threads):
         wheel = wheels.build(file)

@@ -21,7 +21,8 @@ from tribodyn.workflows.run import joints, modelling, sector as sectors
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.schema import MeshScene, has_wheel
+from tribodyn.workflows.scene.wheel_scene import WheelScene
 from tribodyn.workflows.scene.wheel_tables import WheelTable
 
 MAX_POINTS = 1000  # of a response
@@ -44,12 +45,20 @@ class Wheel:
     @property
     def table(self) -> WheelTable:
         """The table [wheel] of the scene."""
-        return wheel_table(self.file)
+        return wheel_scene(self.file).wheel
 
     @property
     def n_sectors(self) -> int:
         """Number of sectors."""
         return self.reduced.sector.n_sectors
+
+    @property
+    def elastic(self) -> np.ndarray:
+        """(n, n) stiffness of the reduced sector without that of its stress at speed and spin softening [N/m]."""
+        if self.full.prestress is None:
+            return np.asarray(self.reduced.sector.system.stiffness)
+        basis = self.reduced.origin.basis
+        return np.asarray(basis.T @ (self.part.system.stiffness @ basis))
 
     @property
     def springs(self) -> np.ndarray:
@@ -59,8 +68,7 @@ class Wheel:
     def diagram(self, diameters: Sequence[int], families: int, stuck: bool, full: bool = False) -> np.ndarray:
         """Frequencies (n_diameter, families) [Hz] of nodal diameters, of the reduced or of the full sector.
 
-        nan where the contact is open and rotation carries away what only it holds
-        """
+        nan where the contact is open and rotation carries away what only it holds"""
         sector = self.full if full else self.reduced.sector
         try:
             return nodal_diameters(sector, diameters, families, self.springs if stuck else None)
@@ -93,12 +101,11 @@ class Wheel:
     def whole_wheel(self, stiffness: Sequence[float] | None = None) -> HarmonicBalance:
         """The balance of all sectors at once, outputs and loads named "<name>@<sector>".
 
-        stiffness : (n_sectors,) factor on the stiffness of each sector, such as blades that differ: what a travelling
-            wave of one sector cannot say
-        """
+        stiffness : (n_sectors,) factor on the elastic stiffness of each sector, such as blades that differ: what a
+            travelling wave of one sector cannot say"""
         wave = self.wave()
         springs = np.tile(wave.contact.stiffness, (self.n_sectors, 1))
-        model = wheel_model(self.reduced, stiffness)
+        model = wheel_model(self.reduced, stiffness, self.elastic)
         model = model.with_damping(partial(modelling.damping_matrix, self.scene, springs))
         load = on_wheel(wave.excitation, self.table.engine_order, self.n_sectors)
         return HarmonicBalance.of(model, wave.contact.repeat(self.n_sectors), wave.basis, load, wave.omega_max)
@@ -114,8 +121,7 @@ class Wheel:
 def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Branch:
     """The response over a range [Hz], its points as dense as the tolerance of the curve between them asks.
 
-    Raises  SolveFailed where the curve does not come to the end of the range
-    """
+    Raises  SolveFailed where the curve does not come to the end of the range"""
     low, high = (2 * np.pi * hertz for hertz in frequency)
     options = adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS)
     branch = adaptive.follow(balance, low, high, options)
@@ -126,20 +132,20 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
 
 def build(file: SceneFile) -> Wheel:
     """Mesh, assemble and reduce the sector of a scene; raises SceneError for a scene without a wheel."""
-    wheel_table(file)
     return assembled(file, modelling.part_of(file, Progress()))
 
 
-def wheel_table(file: SceneFile) -> WheelTable:
-    """The table [wheel] of a scene; raises SceneError for a scene without it."""
-    if file.mesh_scene.wheel is None:
+def wheel_scene(file: SceneFile) -> WheelScene:
+    """The scene of a wheel; raises SceneError for another one."""
+    scene = file.mesh_scene
+    if not has_wheel(scene):
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
-    return file.mesh_scene.wheel
+    return scene
 
 
 def assembled(file: SceneFile, part: Part) -> Wheel:
     """Reduce the sector of a scene with a wheel."""
-    scene = file.mesh_scene
+    scene = wheel_scene(file)
     full = sectors.sector(scene, part)
     return Wheel(file, part, full, sectors.reduced(scene, full))
 
@@ -149,8 +155,7 @@ def campbell(
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Speeds (n_speed,), and frequencies (n_speed, n_order, families) of each engine order's wave, free and stuck [Hz].
 
-    highest : speed [Hz]; count : speeds from rest to it
-    """
+    highest : speed [Hz]; count : speeds from rest to it"""
     speeds = np.linspace(0.0, highest, count)
     frequencies: dict[str, list[np.ndarray]] = {"free": [], "stuck": []}
     for speed in speeds:

@@ -1,7 +1,5 @@
 """The modes of a wheel as tables and pictures: nodal diameters, SAFE and Campbell diagrams."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -29,8 +27,7 @@ class WheelModes(StudyResult):
 
     families : "free" and "stuck" (n_diameter, family) [Hz]; slow, fast : range of speeds [Hz], None for none
     speeds : (n_speed,) of the Campbell diagram [Hz]; waves : "free" and "stuck" (n_speed, n_order, family) [Hz]
-    formats : of the pictures
-    """
+    formats : of the pictures"""
 
     name: str
     n_sectors: int
@@ -130,8 +127,7 @@ def modes(
     families : modes of each nodal diameter
     speeds : speeds of the Campbell diagram, from rest to the highest
     formats : formats of the pictures, png, pdf or svg; can be repeated
-    Raises  SceneError for a scene without a wheel; Refusal for what cannot be
-    """
+    Raises  SceneError for a scene without a wheel; Refusal for what cannot be"""
     slow, fast = start, stop
     if slow is not None and fast is None:
         raise Refusal("--from: give --to, the highest speed, too")

@@ -1,0 +1,1 @@
+"""Damage to all input, and how the runs end."""

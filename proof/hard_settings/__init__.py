@@ -1,0 +1,1 @@
+"""The solver at its numerical extremes."""

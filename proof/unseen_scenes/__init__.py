@@ -1,0 +1,1 @@
+"""Stated errors of scenes drawn at random."""

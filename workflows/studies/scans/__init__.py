@@ -1,0 +1,1 @@
+"""Scans of worn faces: what wore, and the wear coefficient."""
