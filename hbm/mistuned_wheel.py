@@ -15,10 +15,8 @@ from tribodyn.hbm.contact.joint import Joint, JointSet
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.mistuned_compliance import MistunedCompliance
 from tribodyn.hbm.linear.nominal_wheel import NominalWheel
-from tribodyn.reduction.linear import stuck_dynamic_stiffness
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.reduction.sector_reduction import ReducedSector
-from tribodyn.reduction.wave_model import WaveModel, as_wave, travelling_wave
+from tribodyn.reduction.wave_model import WaveModel, as_wave
 from tribodyn.refusal import Refusal
 
 Change = Callable[[Joint, np.ndarray], Joint]
@@ -118,52 +116,3 @@ class MistunedWheel:
             sector_balance.load_factor,
             at_rest,
         )
-
-    def coordinates(
-        self, balance: HarmonicBalance, displacement: np.ndarray, force: np.ndarray, omega: float
-    ) -> list[list[np.ndarray]]:
-        """Waves of the wheel's motion: complex amplitudes (n,) of the coordinates of every index, by harmonic [m].
-
-        balance : of this wheel; displacement, force : of its contacts (n_contact, n_coeff) [m], [N]; omega : [rad/s]
-        Sector n moves by the sum over the indices j of exp(-i 2 pi j n / N) times what wave j does"""
-        a, basis, k = self.nominal, balance.basis, balance.reference_stiffness
-        compliance = cast(MistunedCompliance, balance.compliance)
-        pushed = np.zeros((len(basis.harmonics), a.n_sectors, a.n_port), complex)
-        g = basis.to_complex(k[:, None] * displacement - force)
-        pushed[:, :, a.contacts] = g.T.reshape(len(basis.harmonics), a.n_sectors, -1)
-        vibrates = np.array(basis.harmonics) > 0
-        pushed[:, :, a.loads] = np.where(vibrates, balance.load_factor, 1.0)[:, None, None] * compliance.force
-        pushed[:, :, a.ports] = compliance.at(omega).deviating(pushed)
-        waves = np.fft.ifft(pushed, axis=1)
-        springs, amplitudes = self.wave.reference_stiffness, []
-        for h, of_harmonic in zip(basis.harmonics, waves, strict=True):
-            s, each = 1j * h * omega, []
-            for index, wave in enumerate(of_harmonic):
-                system, B = self.model.at_index(index)
-                B = np.asarray(B)
-                dynamic = stuck_dynamic_stiffness(system, B, springs, s)
-                loads = np.array([system.loads[name] for name in a.load_names]).reshape(-1, len(dynamic))
-                ports = np.array([system.outputs[name] for name in self.ports]).reshape(-1, len(dynamic))
-                total = B.conj().T @ wave[a.contacts] + wave[a.loads] @ loads + wave[a.ports] @ ports.conj()
-                each.append(np.linalg.solve(dynamic, total))
-            amplitudes.append(each)
-        return amplitudes
-
-    def full_displacement(
-        self,
-        reduced: ReducedSector,
-        balance: HarmonicBalance,
-        displacement: np.ndarray,
-        force: np.ndarray,
-        omega: float,
-    ) -> np.ndarray:
-        """Displacement of every DOF of the full sector, of all sectors (N, n_full, n_coeff), each in its own frame [m].
-
-        reduced : that the wave is made of, the ports among its outputs; the others as `coordinates`"""
-        waves = self.coordinates(balance, displacement, force, omega)
-        all_waves = travelling_wave(reduced, 1)  # whose harmonic j is the wave of index j
-        amplitudes = [
-            np.fft.fft(np.stack([all_waves.reconstruct(q, index) for index, q in enumerate(each)]), axis=0)
-            for each in waves
-        ]
-        return balance.basis.to_real(np.stack(amplitudes, axis=-1))

@@ -1,9 +1,8 @@
 """Numbers that a run can state: what one is computed from, what it declares, and how it is found by its name.
 
-A quantity is a file `hbm/quantities/<name>.py` that ends with `QUANTITY = ...`, one of the five classes below. Which
-class says what the number belongs to: a solved cycle, a worn contact, a response curve, a fold of it or a nonlinear
-mode. No other file names a quantity: summary, JSON, text, report, errors, columns of studies and derivatives are loops
-over them."""
+A quantity is a file `hbm/quantities/<name>.py` that ends with `QUANTITY = ...`, one of the three classes below. Which
+class says what the number belongs to: a solved cycle, a worn contact or a response curve. No other file names a
+quantity: summary, JSON, text, report, errors, columns of studies and derivatives are loops over them."""
 
 from __future__ import annotations
 
@@ -13,23 +12,17 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
-
-import numpy as np
+from typing import Any, TypeVar
 
 from tribodyn import declarations
 from tribodyn.hbm.quantity_sources import MotionInTime, Slopes, SolvedCurve, SolvedCycle, WornContact
 from tribodyn.plugins import PluginKind
 from tribodyn.refusal import Refusal
 
-if TYPE_CHECKING:
-    from tribodyn.hbm.continuation.free_vibration import ModePoint
-
 __all__ = [
     "CurveQuantity",
     "CycleQuantity",
     "ErrorKind",
-    "ModeQuantity",
     "MotionInTime",
     "Slopes",
     "SolvedCurve",
@@ -122,26 +115,6 @@ class CurveQuantity(StatedQuantity):
     """A number of a whole response curve; value : SolvedCurve -> number, None where there is none."""
 
     value: Callable[[SolvedCurve], float | None]
-
-
-@dataclass(frozen=True)
-class FoldQuantity(StatedQuantity):
-    """A number of a fold of a response curve.
-
-    value : frequency of the fold [rad/s] -> number; slope : the same -> derivative of the number by that frequency"""
-
-    value: Callable[[float], float]
-    slope: Callable[[float], float] | None = None
-
-
-@dataclass(frozen=True)
-class ModeQuantity(StatedQuantity):
-    """A number of a nonlinear mode.
-
-    value : ModePoint -> number; tangent : (ModePoint, change of the unknowns of a mode) -> change of the number"""
-
-    value: Callable[[ModePoint], float]
-    tangent: Callable[[ModePoint, np.ndarray], float] | None = None
 
 
 Kinds = TypeVar("Kinds", bound=StatedQuantity)

@@ -131,10 +131,6 @@ print(bone)
 decay = td.studies.ring_down("beam", 1e-7, 1e-6, points=6, periods=10, steps=64, overrides=UNWORN)
 print(decay)
 
-# td.studies.track
-line = td.studies.track("beam", "load", 1.0, 1.2, points=3, overrides=UNWORN)
-print(line.value, line.frequency, line.amplitude)
-
 # td.studies.derivatives
 print(td.studies.derivatives("beam", overrides=UNWORN))
 

@@ -40,12 +40,6 @@ class CycleNumber:
     by_omega: float = 0.0
     quantity: CycleQuantity | None = None
 
-    @classmethod
-    def zero(cls, balance: HarmonicBalance, state: State) -> CycleNumber:
-        """A number that nothing moves."""
-        zero = np.zeros_like(state.flat)
-        return cls("", 0.0, zero, zero, np.zeros_like(balance.outputs(state)))
-
     @property
     def moves_with_state(self) -> bool:
         """Whether it depends on more than the frequency."""
@@ -59,7 +53,8 @@ def cycle_numbers(
 
     output : the observed one; wear : joint -> wear coefficient [m3/J]
     A number that is zero, such as the work where all pairs stick, is left out: it has no relative derivative"""
-    cycle, zero = SolvedCycle.of(balance, state, output, wear), CycleNumber.zero(balance, state)
+    cycle = SolvedCycle.of(balance, state, output, wear)
+    at_contact, at_outputs = np.zeros_like(state.flat), np.zeros_like(balance.outputs(state))
     joints = [joint.name for joint in balance.contact.joints] if len(balance.contact.joints) > 1 else []
     numbers = []
     for quantity in quantities_of(CycleQuantity):
@@ -71,9 +66,9 @@ def cycle_numbers(
                 by_x, by_force, by_response = (
                     default if slope is None else slope.reshape(default.shape)
                     for slope, default in (
-                        (slopes.by_x, zero.by_x),
-                        (slopes.by_force, zero.by_force),
-                        (slopes.by_response, zero.by_response),
+                        (slopes.by_x, at_contact),
+                        (slopes.by_force, at_contact),
+                        (slopes.by_response, at_outputs),
                     )
                 )
                 numbers.append(CycleNumber(name, float(value), by_x, by_force, by_response, slopes.by_omega, quantity))
@@ -82,12 +77,11 @@ def cycle_numbers(
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """The derivatives of some numbers at one solution; at a fold, the change of the balance along its null vector."""
+    """The derivatives of some numbers at one solution."""
 
     balance: HarmonicBalance
     state: State
     numbers: tuple[CycleNumber, ...]
-    at_fold: bool = False
 
     @cached_property
     def effects(self) -> ParameterEffects:
@@ -134,20 +128,12 @@ class Gradient:
         solutions, weights = [], []
         for q, through in zip(self.numbers, basis.to_real(at_contact.transpose(1, 0, 2)), strict=True):
             right = q.by_x + self._force_transposed(q.by_force) + self._departure_transposed(through)
-            solutions.append(self._solve_transposed(right + self._border))
+            solutions.append(self._solve_transposed(right))
             weights.append(q.by_force - through - point.transposed(solutions[-1]))
         l = basis.to_complex(np.array(solutions))
         harmonics = enumerate(zip(systems, observed, strict=True))
         v = [output_part + s.adjoint(s.B.conj().T @ l[:, :, i].T) for i, (s, output_part) in harmonics]
         return np.reshape(solutions, (-1, *shape)), v, np.reshape(weights, (-1, *shape))
-
-    @cached_property
-    def _border(self) -> np.ndarray:
-        """A row and column that make the transpose regular at a fold, where it has a solution without right-hand side;
-        zero elsewhere."""
-        shape = self.state.flat.shape
-        border = np.random.default_rng(0).normal(size=shape) if self.at_fold else np.zeros(shape)
-        return border / max(float(np.linalg.norm(border)), 1.0)
 
     def _force_transposed(self, v: np.ndarray) -> np.ndarray:
         """(df/dx)^T v."""
@@ -159,9 +145,8 @@ class Gradient:
         return self.balance.reference_stiffness[:, None] * v - self._force_transposed(v)
 
     def _residual_transposed(self, v: np.ndarray) -> np.ndarray:
-        """(I - G dg/dx)^T v, bordered."""
-        point, border = self.balance.at(self.state.omega), self._border
-        return v - self._departure_transposed(point.transposed(v)) + np.vdot(border, v) * border
+        """(I - G dg/dx)^T v."""
+        return v - self._departure_transposed(self.balance.at(self.state.omega).transposed(v))
 
     def _solve_transposed(self, right: np.ndarray) -> np.ndarray:
         """l of a right-hand side: by GMRES, refined."""

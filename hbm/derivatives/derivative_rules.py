@@ -20,7 +20,6 @@ class DerivativeRules:
     adjoint_products: int = 400
     gap_step: float = 1e-6  # over the largest displacement
     curve_step: float = 2e-4  # half widths from a peak to two points of the gradient along the curve
-    fold_tolerance: float = 1e-5  # arc length to the fold; tangents are known to a tenth of it
     max_steps: int = 12  # to a peak, and the first of them over the frequency
     first_step: float = 1e-5
     peak_tolerance: float = 1e-7  # half widths between a peak and its prediction

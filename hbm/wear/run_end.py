@@ -56,15 +56,10 @@ def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) 
     if not rows or "n" not in problem.balance.contact.components or not problem.balance.basis.has_static:
         return None
     contact, normal = problem.balance.contact, problem.normal_force(state)
-    size = contact.n_pair // problem.copies
     for name in problem.wearing:
         pairs = contact.joint(name).rows
-        first, present = (
-            np.bincount(pairs // size, force[pairs], problem.copies) for force in (rows[0].normal_force, normal)
-        )
-        lost = np.flatnonzero(present < problem.lost_below * first)
-        if len(lost):
-            return f"{name}@{lost[0]}" if problem.copies > 1 else name
+        if normal[pairs].sum() < problem.lost_below * rows[0].normal_force[pairs].sum():
+            return name
     return None
 
 

@@ -50,7 +50,6 @@ class WearProblem:
     lost_below : contact counts as lost when the preload falls below this share of its first value; the last touch
         of a vibrating contact wears ever more slowly, so that the time until it ends has no limit (see README)
     any_joint : whether a single joint whose preload has fallen below that share ends the run
-    copies : of one contact, one behind the other, whose joints then count by themselves: those of a wheel's sectors
     lost_below_at_rest : the run ends when the preload without the harmonic loads falls to this share of its first
         value, see hbm.wear.preload_at_rest; None: it is not looked at"""
 
@@ -61,7 +60,6 @@ class WearProblem:
     lost_below: float = 0.0
     lost_below_at_rest: float | None = None
     any_joint: bool = False
-    copies: int = 1
 
     def __post_init__(self) -> None:
         shares = [duty.share for duty in self.mission]

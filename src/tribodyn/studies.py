@@ -7,7 +7,6 @@ from tribodyn.geometry.height_map import HeightMap as HeightMap
 from tribodyn.workflows.studies.convergence import Convergence as Convergence, converge as converge
 from tribodyn.workflows.studies.curves.backbones import SceneBackbone as SceneBackbone, backbone as backbone
 from tribodyn.workflows.studies.curves.decay import Decay as Decay, ring_down as ring_down
-from tribodyn.workflows.studies.curves.tracking import Track as Track, track as track
 from tribodyn.workflows.studies.fits.scene_fit import Fit as Fit, identify as identify
 from tribodyn.workflows.studies.forces import Forces as Forces, forces as forces
 from tribodyn.workflows.studies.inspection import Inspection as Inspection

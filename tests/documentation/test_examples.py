@@ -12,7 +12,7 @@ import tribodyn as td
 
 FILE = Path(__file__).parents[2] / "docs" / "reference" / "examples.py"
 GRIDS = {"td.studies.trade", "td.studies.converge"}  # take minutes: shown in studies_in_python.md
-WHEELS = {"td.wheel.flutter", "td.wheel.pattern_wear"}  # take minutes: shown in wheels.md and flutter.md
+WHEELS = {"td.wheel.flutter"}  # takes minutes: shown in flutter.md
 
 
 def functions() -> set[str]:

@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.helpers.contact_draws import EVENT_BASED, LAWS, law_id, law_numbers
-from tests.helpers.continuation_models import Lifting
 from tests.helpers.verification_models import interface, modal_damping, random_structure
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
@@ -15,11 +14,9 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import contact_law
 from tribodyn.hbm.contact.contact_law import ContactParameters
 from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.derivatives.adjoint_gradient import Gradient, cycle_numbers
 from tribodyn.hbm.derivatives.cycle_derivatives import at_frequency, at_peak, peak_moves
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
-from tribodyn.hbm.derivatives.fold_derivatives import at_fold
 from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterChange
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -141,24 +138,6 @@ def test_a_peak_that_is_a_corner_follows_first_slip():
     np.testing.assert_allclose(result.slopes[:2, 0], np.array([1 / (2 * np.pi), tip]) / slider / 0.2, rtol=5e-6)
     with pytest.raises(NoDerivative, match="peak is a corner of the curve"):
         peak_moves(balance, state, "tip", ())
-
-
-def test_a_fold_moves_as_folds_found_anew_and_tells_both_sides_of_a_corner():
-    balance, h = Lifting().balance((0, 1, 2, 3), transitions="located"), 1e-6
-    branch = arc_length.follow(balance, 0.9, 4.0)
-    at, posed = branch.folds[0], BalanceInputs.of(balance)
-    state = balance.evaluate(branch.omega[at], balance.shaped(branch.contact[at]))
-
-    def sides(upper, lower):
-        return tuple(replace(posed, contact=balance.contact.with_gap(balance.contact.gap + s)) for s in (upper, lower))
-
-    changes = [ParameterChange("gap", h, *sides(h, -h)), ParameterChange("twice above zero", h, *sides(2 * h, -h))]
-    result = at_fold(balance, state, changes)
-    refined, current = (at_fold(balance.with_gap(balance.contact.gap + s), state, ()).values[0] for s in (1e-4, -1e-4))
-    slope = (refined - current) / 2e-4
-    np.testing.assert_allclose([result.slopes[0, 0], result.by_gap[0, 0]], slope, rtol=1e-6)
-    assert result.corner.tolist() == [False, True]
-    np.testing.assert_allclose([result.above[0, 1], result.below[0, 1]], [2 * slope, slope], rtol=2e-4)
 
 
 def test_an_adjoint_that_is_no_solution_is_refused(monkeypatch):

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from tests.helpers import small_wheel as small
-from tribodyn.fem.cyclic_symmetry import sector_maps
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.contact_law import SLIPS, ContactParameters
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.harmonics import HarmonicBasis, amplitude
-from tribodyn.hbm.linear import recovery, travelling_wave as waves
+from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.mistuned_wheel import MistunedWheel
 from tribodyn.reduction import nominal_modes
 from tribodyn.reduction.linear_damping import modal_damping
@@ -129,29 +128,6 @@ def test_friction_and_gap_that_differ_by_blade_are_the_dense_wheel(reduced):
         d = np.random.default_rng(0).normal(size=solution.state.flat.shape)
         shifted = d - ours.at(solution.state.omega).apply(linear.departure_slope(d))
         assert apart(linear.dense() @ d.ravel(), shifted.ravel()) < 1e-10
-
-
-def test_every_node_moves_as_on_the_dense_wheel(reduced):
-    """The field of the full sector, static and vibrating, of all sectors, slipping."""
-    deviation, n_pair = 0.5 * DIFFERENT, len(springs(reduced))
-    dense = whole(reduced, deviation, np.full(8 * n_pair, 0.3))
-    refined = newton.solve_from_rest(dense, 2 * np.pi * 250, EXACT)
-    wheel = on_sector(reduced)
-    ours = wheel.balance(deviation)
-    current = newton.solve(ours, 2 * np.pi * 250, refined.state.x, EXACT).state
-    assert (current.cycle.status & SLIPS).any()
-    flat = current.cycle.force.reshape(current.flat.shape)
-    K = np.asarray(reduced.sector.system.stiffness)
-    made_of = nominal_modes.with_ports(reduced, K, nominal_modes.orthonormal(K, np.eye(len(K)), 1e-13))
-    result = wheel.full_displacement(made_of, ours, current.flat, flat, current.omega)
-    state = refined.state
-    q = recovery.coordinates(dense, state.flat, state.cycle.force.reshape(state.flat.shape), state.omega)
-    maps = sector_maps(reduced.sector)
-    basis = reduced.origin.basis
-    expected = np.stack([BASIS.to_real(np.stack([basis @ (P @ amplitude) for amplitude in q], axis=-1)) for P in maps])
-    assert result.shape == expected.shape
-    for part in (slice(0, 1), slice(1, None)):
-        assert apart(result[..., part], expected[..., part]) < 1e-6
 
 
 def test_sectors_alike_are_the_wave(reduced):

@@ -31,27 +31,20 @@ class Duffing:
         stiffness = 1 - omega**2 + 0.75 * self.cubic * amplitude**2
         return (stiffness**2 + (2 * self.zeta * omega) ** 2) * amplitude**2 / self.force**2 - 1
 
-    def folds(self, low: float = 0.6, high: float = 4.9, factor: float = 1.0) -> np.ndarray:
-        """Frequencies between two at which the cubic in the squared amplitude has a double root, at a load factor."""
+    def folds(self, low: float = 0.6, high: float = 4.9) -> np.ndarray:
+        """Frequencies between two at which the cubic in the squared amplitude has a double root."""
 
         def discriminant(omega):
             a = (0.75 * self.cubic) ** 2
             b = 1.5 * self.cubic * (1 - omega**2)
             c = (1 - omega**2) ** 2 + (2 * self.zeta * omega) ** 2
-            d = -((self.force * factor) ** 2)
+            d = -(self.force**2)
             return 18 * a * b * c * d - 4 * b**3 * d + b * b * c * c - 4 * a * c**3 - 27 * a * a * d * d
 
         omega = np.linspace(low, high, 20001)  # two folds nearer than its points are not seen
         value = discriminant(omega)
         changes = np.flatnonzero(value[1:] * value[:-1] < 0)
         return np.array([brentq(discriminant, omega[i], omega[i + 1], xtol=1e-15, rtol=1e-14) for i in changes])
-
-    @property
-    def cusp(self) -> float:
-        """Load factor at which both folds meet: the first two derivatives by the squared amplitude vanish."""
-        root = 2 * self.zeta / np.sqrt(27 / 64)  # u / omega, with u = 0.75 cubic amplitude^2 times 4/3
-        omega = 0.5 * (9 / 8 * root + np.sqrt((9 / 8 * root) ** 2 + 4))
-        return float(0.75 * (root * omega) ** 1.5 / np.sqrt(self.cubic) / self.force)
 
 
 class Lifting:

@@ -10,7 +10,7 @@ import tribodyn as td
 from tests.helpers.coarse_scenes import BEAM, BLADE, RIG
 from tests.helpers.command import refusal
 from tests.helpers.steps_again import elasticity_anew, exactly
-from tribodyn.hbm.derivatives import cycle_derivatives, fold_derivatives
+from tribodyn.hbm.derivatives import cycle_derivatives
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
@@ -223,58 +223,6 @@ def test_at_the_end_of_its_table_a_temperature_has_no_derivative():
         td.studies.derivatives("beam", overrides=overrides, only=("contact.temperature",))
 
 
-LEAF = ("geometry.n_column=7", "geometry.pin_column=2", "response.frequency=['120 Hz', '190 Hz']")
-
-
-def test_a_fold_follows_the_laws_of_scaling_and_folds_found_anew():
-    """All stiffness times c: time goes by 1 / sqrt(c) at c times the loads; so does all mass at the same motion."""
-    file = scene_file.read("leaf_seal", LEAF)
-    computed = td.studies.derivatives(file, of="fold")
-    rows = {key: row[0] for key, row in computed.elasticities.items()}
-    assert computed.derivatives.names == ("fold_frequency",)
-    stiffness, loads = (
-        sum(row for key, row in rows.items() if key.endswith(end)) for end in (("stiffness", "young"), "pressure")
-    )
-    np.testing.assert_allclose([stiffness, loads, rows["material.density"]], [0.5, 0.0, -0.5], atol=2e-5)
-    value, h = keys(file.scene), 2e-5
-
-    def again(factor):
-        changed = file.changed(f"damping.modal={value['damping.modal'] * factor!r}")
-        with limited(1):
-            balance = ParameterVariation(changed, Progress()).model.balance
-            return fold_derivatives.at_fold(balance, computed.derivatives.state, ()).values[0]
-
-    difference = (again(1 + h) - again(1 - h)) / (2 * h) / computed.derivatives.values[0]
-    assert rows["damping.modal"] == pytest.approx(difference, rel=1e-5)
-
-
-MODE = {"of": "mode", "amplitude": 5e-4, "overrides": COARSE["beam"]}
-
-
-def test_a_mode_follows_the_laws_of_scaling():
-    """At the same motion time goes by 1 / sqrt(c) where all stiffness and the static load are c times, by sqrt(c) where
-    all mass is."""
-    computed = td.studies.derivatives("beam", **MODE)
-    assert computed.derivatives.names == ("mode_frequency", "damping")
-    assert computed.lines()[0].endswith(f"damping {computed.derivatives.values[1]:.6g}")
-    stiffer = sum(
-        row for key, row in computed.elasticities.items() if key.endswith(("_stiffness", "young", "press.value"))
-    )
-    np.testing.assert_allclose(stiffer, [0.5, 0.0], atol=3e-5)  # young by differences of 1e-3
-    np.testing.assert_allclose(computed.elasticities["material.density"], [-0.5, 0.0], atol=1e-5)
-
-
-@pytest.mark.slow
-def test_derivatives_of_a_mode_are_those_of_modes_found_anew():
-    computed = td.studies.derivatives("beam", **MODE, only=("contact.friction",))
-    values, h = [], 1e-4
-    for friction in (0.5 * (1 + h), 0.5 * (1 - h)):
-        changed = MODE | {"overrides": (*COARSE["beam"], f"contact.friction={friction!r}")}
-        values.append(td.studies.derivatives("beam", **changed, only=("damping.modal",)).derivatives.values)
-    difference = (values[0] - values[1]) / (2 * h) / computed.derivatives.values
-    np.testing.assert_allclose(computed.elasticities["contact.friction"], difference, rtol=1e-5)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("scene", "overrides"), [("beam", AT_800_HZ), ("blade", BLADE)], ids=["beam", "blade"])
 def test_the_laws_of_scaling_hold_for_a_life(scene, overrides):
@@ -313,9 +261,7 @@ def test_derivatives_of_the_blades_life_are_those_of_its_steps_taken_again(site,
 
 
 @pytest.mark.parametrize(("words", "sentence"), [
-    (("--of", "mode"), "give --amplitude of the mode, or backbone.modal_amplitude in the scene"),
-    (("--amplitude", "1 mm"), "--amplitude is that of --of mode"),
-    (("--of", "life", "--set", "wear.at=800 Hz", "--at", "1 Hz"), "--at a frequency of --of response or fold"),
+    (("--of", "life", "--set", "wear.at=800 Hz", "--at", "1 Hz"), "--at is a frequency of --of response"),
     (("--only", "contact.color"), "contact.color is no number that a response depends on"),
 ])  # fmt: skip
 def test_what_is_missing_is_one_sentence(capsys, words, sentence):
@@ -323,7 +269,5 @@ def test_what_is_missing_is_one_sentence(capsys, words, sentence):
 
 
 def test_quantities_of_a_call_have_units_as_on_the_command_line():
-    with pytest.raises(td.SceneError, match="--amplitude is that of --of mode"):
-        td.studies.derivatives("beam", amplitude="20um")
     with pytest.raises(ValueError, match="expected a frequency"):
         td.studies.derivatives("beam", at="20 um")

@@ -11,7 +11,7 @@ from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.wheel_tables import Mistuning
-from tribodyn.workflows.studies.wheels import mistuned_blades, mistuned_wear, patterns
+from tribodyn.workflows.studies.wheels import mistuned_blades, patterns
 
 CHANGED = {
     '["400 Hz", "404 Hz"]': '["750 Hz", "880 Hz"]',
@@ -79,24 +79,6 @@ def test_blades_alike_amplify_nothing(scene: Path) -> None:
     result, _ = blades.peak(mistuned_blades.Pattern(0, none, none, none))
     assert result.amplitude == pytest.approx(blades.tuned.amplitude, rel=1e-4)
     assert result.state.omega == pytest.approx(blades.tuned.state.omega, rel=1e-4)
-
-
-def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) -> None:
-    """Worn volume differs by blade, is that of its own work, and changes whose amplitude is how large."""
-    computed = mistuned_wear.pattern_wear(scene, 1)
-    assert len(computed.history.cycles) == 3
-    volume = computed.volume[-1]
-    assert volume.min() >= 0
-    assert np.ptp(volume) > 0.05 * volume.max() > 0
-    work = computed.history.work[:-1].sum(axis=0).reshape(6, -1).sum(axis=1)
-    np.testing.assert_allclose(volume, 1e-13 * work, rtol=1e-6)
-    assert np.abs(computed.heights[-1] / computed.heights[0] - 1).max() > 1e-4
-    table, _, drawn = computed.write(tmp_path)
-    assert table.read_text(encoding="utf-8").startswith("cycles,peak_frequency_Hz,amplitude_m@0")
-    states = computed.state(0), computed.state(-1)
-    tips = np.linalg.norm(np.linalg.norm(states[1].displacement[..., 1:], axis=-1), axis=-1).max(axis=1)
-    assert np.corrcoef(tips, states[1].heights)[0, 1] > 0.9  # who vibrates most does so in the picture too
-    assert drawn.stat().st_size > 50_000
 
 
 def test_what_cannot_be_is_one_sentence(scene: Path, tmp_path: Path) -> None:

@@ -5,9 +5,7 @@ from cyclopts import App
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.curves.backbones import backbone
 from tribodyn.workflows.studies.curves.decay import ring_down
-from tribodyn.workflows.studies.curves.tracking import track
 
 app = App(name="curve")
 app.command(word(backbone, "curve backbone"))
 app.command(word(ring_down, "curve ring-down"))
-app.command(word(track, "curve track"))

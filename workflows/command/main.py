@@ -36,7 +36,7 @@ WORDS = {  # word -> where it is, its help on the page of all of them
     "verify": ("verify_word:verify", "Check a result against direct time integration."),
     "report": ("scene_words:report", "Write one HTML file that shows results."),
     "export": ("scene_words:export", "Write a result in the formats of other programs."),
-    "curve": ("curve_words:app", "Follow curves: backbone, ring-down, track."),
+    "curve": ("curve_words:app", "Follow curves: backbone, ring-down."),
     "wheel": ("wheel_words:app", "Wheels: modes, flutter, mistuned blades and patterns of them."),
     "study": ("study_words:app", "Studies: grid, lives, optimise, identify, converge, asperities and more."),
 }  # fmt: skip

@@ -4,7 +4,6 @@ from cyclopts import App
 
 from tribodyn.workflows.command.word import word
 from tribodyn.workflows.studies.wheels.flutter import flutter
-from tribodyn.workflows.studies.wheels.mistuned_wear import pattern_wear
 from tribodyn.workflows.studies.wheels.patterns import patterns
 from tribodyn.workflows.studies.wheels.unequal_sectors import mistuned
 from tribodyn.workflows.studies.wheels.wheel_modes import modes
@@ -14,4 +13,3 @@ app.command(word(modes, "wheel modes"))
 app.command(word(flutter, "wheel flutter"))
 app.command(word(mistuned, "wheel mistuned"))
 app.command(word(patterns, "wheel patterns"))
-app.command(word(pattern_wear, "wheel pattern-wear"))

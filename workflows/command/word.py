@@ -120,7 +120,7 @@ class Option:
 def word(study: Callable[..., Any], words: str, *, into: Into = "results") -> Callable[..., None]:
     """Make the function behind a word of the command line.
 
-    words : such as "curve track", printed in the command that resumes
+    words : such as "curve backbone", printed in the command that resumes
     into : default folder of tables and pictures where --out is not given: results/NAME, the folder of the result, its
         pictures/, the folder of the file, or none"""
     hints = get_type_hints(study, include_extras=True)

@@ -1,10 +1,8 @@
-"""Pictures of a wheel, drawn off-screen with pyvista: all blades, each with its phase, or its own motion if mistuned.
+"""Pictures of a wheel, drawn off-screen with pyvista: all blades, each with its phase.
 
 A wave repeats every blade one phase later, in its own turned frame: what one blade does, the others do."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
 import matplotlib as mpl
 import numpy as np
@@ -15,10 +13,9 @@ from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import view as drawing
-from tribodyn.workflows.pictures.figures import heading, length_unit, named, present, scale_bar
-from tribodyn.workflows.pictures.offscreen import check
+from tribodyn.workflows.pictures.figures import heading, length_unit, present, scale_bar
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, with_room
-from tribodyn.workflows.pictures.theme import BLUE, INK, LAYOUT, MOTION_MAP, ORANGE, STYLE
+from tribodyn.workflows.pictures.theme import LAYOUT, MOTION_MAP, STYLE
 from tribodyn.workflows.result.contact_states import shown_states
 from tribodyn.workflows.result.model_facts import Around
 from tribodyn.workflows.result.result import PartMesh, Result
@@ -66,14 +63,10 @@ def wheel_picture(result: Result, wheel: Around, deformation: float | None = Non
             (image,), corner = with_room([blades.shot(static, motion[:, blades.nodes], scale, largest)])
             show(axes, image, blades.camera, "xyz", corner)
             axes.set_title(f"{state.label}\nvibration × {scale:g}")
-            _bar(figure, axes, largest)
+            unit, factor = length_unit(largest)
+            scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")
         heading(figure, result, f"wheel of {wheel.sectors} sectors, engine order {wheel.engine_order}")
     return figure
-
-
-def _bar(figure: Figure, axes: Any, largest: float) -> None:
-    unit, factor = length_unit(largest)
-    scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")
 
 
 def instants(wheel: Around, harmonics: tuple[int, ...], displacement: np.ndarray) -> Iterator[np.ndarray]:
@@ -84,82 +77,6 @@ def instants(wheel: Around, harmonics: tuple[int, ...], displacement: np.ndarray
     functions = basis.functions(np.zeros(1))[0] * (basis.order > 0)
     for n in range(wheel.sectors):
         yield at_sector(basis, displacement, wheel.engine_order, wheel.sectors, n) @ functions
-
-
-@dataclass(frozen=True)
-class WheelState:
-    """What is shown of a wheel.
-
-    label : its title; displacement : (N, n_node, 3, n_coeff) of every blade in its own frame [m]
-    heights : (N,) amplitude of the response of every blade [m]; volume : (N,) worn at the contacts of every blade [m3]
-    """
-
-    label: str
-    displacement: np.ndarray
-    heights: np.ndarray
-    volume: np.ndarray
-
-
-class MistunedWheelFilm:
-    """A film over one cycle: a column for each state, the wheel above, amplitude and wear of every blade below.
-
-    count : instants, evenly over the period, the first one that of the largest swing
-    Colours and factor of exaggeration are the same in all. Raises  RenderingUnavailable"""
-
-    name = "mistuned_wheel"
-
-    def __init__(
-        self, scene: str, wheel: Around, part: PartMesh, harmonics: tuple[int, ...], states: Sequence[WheelState],
-        count: int = 1,
-    ):  # fmt: skip
-        check()
-
-        self.count, self._states, self._sectors = count, tuple(states), wheel.sectors
-        self._blades = BladeSurface(wheel, part)
-        nodes = self._blades.nodes
-        self._static, self._swings = [], []
-        for state in states:
-            displacement = state.displacement[:, nodes]
-            self._static.append(part.points[nodes] + drawing.at_rest(displacement, harmonics))
-            self._swings.append(drawing.cycle(displacement, harmonics))
-        sizes = [np.linalg.norm(swing, axis=2) for swing in self._swings]
-        self._largest = max(float(size.max()) for size in sizes)
-        self._first = int(sizes[-1].max(axis=(0, 1)).argmax())
-        self._scale = drawing.nice(2 * self._blades.size / 12 / self._largest) if self._largest > 0 else 1.0
-        with mpl.rc_context(STYLE):
-            self.figure = Figure(figsize=(5.0 * len(states) + 0.4, 7.4), layout="constrained")
-            self._draw(scene)
-
-    def show(self, number: int) -> None:
-        """Put an instant into the figure."""
-        for at, axes in enumerate(self._views):
-            axes.images[0].set_data(self._shot(at, number))
-
-    def _draw(self, scene: str) -> None:
-        rows: Any = self.figure.subplots(
-            3, len(self._states), squeeze=False, height_ratios=(4.2, 1.0, 1.0), sharey="row", sharex=False
-        )
-        of_height, by_height = length_unit(max(float(state.heights.max()) for state in self._states))
-        self._views = list(rows[0])
-        blades = np.arange(self._sectors)
-        for at, (state, (view, upper, lower)) in enumerate(zip(self._states, rows.T, strict=True)):
-            view.imshow(self._shot(at, 0))
-            view.axis("off")
-            view.set_title(f"{state.label}\nvibration × {self._scale:g}")
-            _bar(self.figure, view, self._largest)
-            upper.bar(blades, by_height * state.heights, color=BLUE, width=0.8)
-            upper.axhline(by_height * state.heights.mean(), color=INK, lw=0.8, ls="--")
-            lower.bar(blades, 1e9 * state.volume, color=ORANGE, width=0.8)
-            lower.set_xlabel("blade")
-            if at == 0:
-                upper.set_ylabel(f"amplitude\n/ {of_height}")
-                lower.set_ylabel("worn volume\n/ mm³")
-        self.figure.suptitle(named(scene, f"wheel of {self._sectors} mistuned blades"), x=0.01, ha="left")
-
-    def _shot(self, at: int, number: int) -> np.ndarray:
-        instants = self._swings[at].shape[-1]
-        motion = self._swings[at][..., (self._first + number * instants // self.count) % instants]
-        return self._blades.shot(self._static[at], motion, self._scale, self._largest)
 
 
 def _repeated(faces: np.ndarray, n_point: int, count: int) -> np.ndarray:

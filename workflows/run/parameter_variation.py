@@ -51,8 +51,8 @@ NODES = 1e-4
 class ParameterVariation:
     """A scene with its model, and the inputs of its balance for another value of one of its numbers."""
 
-    def __init__(self, file: SceneFile, progress: Progress, step: float = STEP):
-        self.file, self.scene, self.step = file, file.scene, step
+    def __init__(self, file: SceneFile, progress: Progress):
+        self.file, self.scene = file, file.scene
         part = plain = None
         if isinstance(self.scene, MeshScene):
             with progress.stage("mesh, mass and stiffness, reduction"):
@@ -79,7 +79,7 @@ class ParameterVariation:
         """The problems a step above and below a value of a key."""
         number, needs_reduction = self.numbers[key], self._has_preload_steps or self.is_reduced_again(key)
         linear = self._scales(key) or self.is_linear(key)
-        step = (REBUILT if needs_reduction or linear else self.step) * abs(value)
+        step = (REBUILT if needs_reduction or linear else STEP) * abs(value)
         if moves_nodes(number):
             self.nodes_moved(key)  # or refused
             step = (4 if needs_reduction else 1) * NODES * abs(value) if needs_reduction or self._sector else step
@@ -88,7 +88,7 @@ class ParameterVariation:
             far = self.inputs(key, value + 2 * step), self.inputs(key, value - 2 * step)
         touching = None
         if (needs_reduction or linear) and not self._has_preload_steps and is_seen_by_contact(number):
-            small = self.step * abs(value)
+            small = STEP * abs(value)
             up, down = (replace(self.base, contact=self._contact(key, value + side)) for side in (small, -small))
             touching = ParameterChange(key, small, up, down)
         return ParameterChange(key, step, self.inputs(key, value + step), self.inputs(key, value - step), far, touching)

@@ -1,1 +1,1 @@
-"""Work on one scene beyond a run: tracking, backbones, identification."""
+"""Work on one scene beyond a run: backbones, identification."""

@@ -1,4 +1,4 @@
-"""Exact derivatives at a point of a response, a mode or a life, by keys of a scene."""
+"""Exact derivatives at a point of a response or a life, by keys of a scene."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -8,13 +8,10 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.continuation.free_vibration import FreeVibration
-from tribodyn.hbm.continuation.nonlinear_modes import Backbone
-from tribodyn.hbm.derivatives import cycle_derivatives, fold_derivatives, mode_derivatives
+from tribodyn.hbm.derivatives import cycle_derivatives
 from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.derivatives.derivative_table import Derivatives
 from tribodyn.hbm.derivatives.parameter_change import ParameterChange
-from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.quantity import CycleQuantity, with_error
 from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
@@ -44,18 +41,6 @@ def changes_of(
             without[key] = str(reason)
 
 
-def of_mode(
-    varying: ParameterVariation, mode: Backbone, changes: Iterator[ParameterChange], modal: bool
-) -> Derivatives:
-    """At the last point of a backbone."""
-    if mode.end.kind is not BranchEnd.REACHED:
-        raise NoDerivative(f"the backbone {mode.end}")
-    problem = FreeVibration(varying.model.balance, mode.number, mode.output)
-    x = varying.model.balance.shaped(mode.contact[-1])
-    point = problem.at(x, mode.omega[-1], mode.damping[-1], mode.modal_amplitude[-1])
-    return mode_derivatives.at_mode(problem, point, changes, settings.newton_options(varying.scene), modal)
-
-
 def life_share(scene: Scene) -> float:
     """Of the first preload, where the life that a result states ends."""
     return LIFE_SHARE if scene.wear is None else scene.wear.lost_below or LIFE_SHARE
@@ -76,22 +61,16 @@ def of_branch(
     branch: Branch,
     changes: Iterator[ParameterChange],
     at: float | None = None,
-    fold: bool = False,
     output: str = settings.OUTPUT,
 ) -> Derivatives:
-    """At a frequency [Hz], or along the highest peak of a response, or fold of it."""
+    """At a frequency [Hz], or along the highest peak of a response."""
     options = settings.newton_options(scene)
-    points = np.isin(np.arange(len(branch.omega)), branch.folds) if fold else branch.converged
-    if not points.any():
-        raise NoDerivative("the response has no fold")
     fits = branch.amplitude(output) if at is None else -np.abs(branch.frequency - at)
-    nearest = int(np.argmax(np.where(points, fits, -np.inf)))
-    if at is None and not fold and nearest in (0, len(branch.omega) - 1):
+    nearest = int(np.argmax(np.where(branch.converged, fits, -np.inf)))
+    if at is None and nearest in (0, len(branch.omega) - 1):
         raise NoDerivative(branch.no_peak(output))
     x = balance.shaped(branch.contact[nearest])
-    state = balance.evaluate(branch.omega[nearest] if at is None or fold else 2 * np.pi * at, x)
-    if fold:
-        return fold_derivatives.at_fold(balance, state, changes, options)
+    state = balance.evaluate(branch.omega[nearest] if at is None else 2 * np.pi * at, x)
     take = cycle_derivatives.at_peak if at is None else cycle_derivatives.at_frequency
     return take(balance, state, output, changes, wear_run.coefficients(scene), options)
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 from tribodyn.workflows.pictures.figures import save
-from tribodyn.workflows.pictures.offscreen import RenderingUnavailable
 from tribodyn.workflows.result.number_format import write_columns
 
 
@@ -28,12 +26,3 @@ def write_files(
         write_columns(columns, folder / f"{name}.csv")
         written.append(folder / f"{name}.csv")
     return [*written, *(path for name, figure in pictures.items() for path in save(figure, folder / name, formats))]
-
-
-def where_it_can_be(draw: Callable[[], list[Path]]) -> list[Path]:
-    """Files of what is rendered; where this machine cannot, none, and a sentence on standard error."""
-    try:
-        return draw()
-    except RenderingUnavailable as reason:
-        print(reason, file=sys.stderr)
-        return []

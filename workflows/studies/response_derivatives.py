@@ -20,23 +20,18 @@ from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.theme import CYCLE, GREY
 from tribodyn.workflows.run import pipeline, response_curve, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.parameter_variation import STEP, ParameterVariation
+from tribodyn.workflows.run.parameter_variation import ParameterVariation
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.scene_numbers import geometry_keys, keys
-from tribodyn.workflows.scene.fields import Frequency, Length
+from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
-from tribodyn.workflows.studies.curves import backbones
-from tribodyn.workflows.studies.curves.backbones import AmplitudeRange
-from tribodyn.workflows.studies.derivatives_at_points import changes_of, life_share, of_branch, of_life, of_mode
+from tribodyn.workflows.studies.derivatives_at_points import changes_of, life_share, of_branch, of_life
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 
 SHOWN = 12  # parameters in the picture
-# step of a number of the contact under a mode: eigenvectors round, the beam's law of scaling is 4e-5 off with 1e-6
-OF_MODE = 1e-4
-DECADES = 100.0  # from which amplitude below the wanted one a mode is followed
 MICROMETRE = 1e-6
 
 
@@ -77,7 +72,7 @@ class ResponseDerivatives(StudyResult):
 
     @property
     def _first(self) -> int:
-        """The first number that moves at a fixed frequency: amplitude, life, or frequency of a fold or mode."""
+        """The first number that moves at a fixed frequency: amplitude or life."""
         return int(np.argmax(self.derivatives.above.any(axis=1)))
 
     @property
@@ -170,9 +165,8 @@ class ResponseDerivatives(StudyResult):
 def derivatives(
     scene: Source,
     *,
-    of: Literal["response", "fold", "mode", "life"] = "response",
+    of: Literal["response", "life"] = "response",
     at: Frequency | None = None,
-    amplitude: Length | None = None,
     only: tuple[str, ...] = (),
     overrides: Overrides = (),
     progress: Report = None,
@@ -183,15 +177,12 @@ def derivatives(
     is reduced anew, such as the stiffness of one body of several, take four reductions each.
 
     scene : name of a scene or a .toml file
-    of : the response; the frequency of its fold; frequency and damping of the nonlinear mode of [backbone]; the life by
-        [wear], which ends at `wear.lost_below`, with the largest depth and the volume that are worn then
-    at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too. The fold
-        next to it; that of the largest amplitude by default
-    amplitude : of the observed displacement in the mode, which stays; the last modal one of [backbone] by default
+    of : the response; the life by [wear], which ends at `wear.lost_below`, with the largest depth and the volume that
+        are worn then
+    at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too
     only : keys of the scene to look at, such as contact.friction; all by default
     Raises  SceneError for a key that is no such number; SolveFailed where there is no derivative, as at a fold"""
     file, at = read_scene(scene, overrides), None if at is None else to_si(at, "Hz")
-    amplitude = None if amplitude is None else to_si(amplitude, "m")
     numbers, moving = keys(file.scene), geometry_keys(file.scene)
     if of == "life":
         if file.scene.wear is None:
@@ -202,27 +193,22 @@ def derivatives(
         raise SceneError(
             f"{unknown[0]} is no number that a response depends on: these are {', '.join(numbers | moving)}"
         )
-    if (amplitude is not None and of != "mode") or (at is not None and of in ("mode", "life")):
-        raise SceneError("--amplitude is that of --of mode, and --at a frequency of --of response or fold")
-    if of == "mode" and amplitude is None and file.scene.backbone is None:
-        raise SceneError("give --amplitude of the mode, or backbone.modal_amplitude in the scene")
+    if at is not None and of == "life":
+        raise SceneError("--at is a frequency of --of response")
     values = {key: value for key, value in (numbers | moving).items() if key in (only or numbers)}
     with limited(file.scene.solver.threads):
-        return _of_scene(file, of, amplitude if of == "mode" else at, values, None if only else {}, reporter(progress))
+        return _of_scene(file, of, at, values, None if only else {}, reporter(progress))
 
 
 def _of_scene(
     file: SceneFile, of: str, at: float | None, values: Mapping[str, float], without: dict[str, str] | None, report: Any
 ) -> ResponseDerivatives:
-    """Of a scene that was read; at : frequency [Hz], or the amplitude of a mode [m]; wanted : key -> value; without :
+    """Of a scene that was read; at : frequency [Hz]; wanted : key -> value; without :
     see `changes_of`."""
-    varying = ParameterVariation(file, report, OF_MODE if of == "mode" else STEP)
+    varying = ParameterVariation(file, report)
     balance, clock = varying.model.balance, process_time()
     find: Callable[[Iterator[ParameterChange]], Derivatives]
-    if of == "mode":
-        range_ = AmplitudeRange.of(file, None if at is None else at / DECADES, at, None, None)
-        find = partial(of_mode, varying, backbones.follow_mode(file, balance, range_, report), modal=at is None)
-    elif of == "life":
+    if of == "life":
         with report.track("wear") as advance:
             worn = wear_run.worn_out(file, varying.model, life_share(file.scene))
         find = partial(of_life, varying, worn, values=values)
@@ -230,7 +216,7 @@ def _of_scene(
         with report.track("frequency response") as advance:
             branch = response_curve.follow_response(file.scene, balance, advance)
         pipeline.check_branch(branch)
-        find = partial(of_branch, file.scene, balance, branch, at=at, fold=of == "fold")
+        find = partial(of_branch, file.scene, balance, branch, at=at)
     solved = process_time()
     with report.track("derivatives") as advance:
         try:

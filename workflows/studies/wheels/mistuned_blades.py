@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from tribodyn.fem.constraints import find_group
-from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.continuation import highest_peak
@@ -55,12 +54,9 @@ def drawn(mistuning: Mistuning, n_sectors: int, number: int) -> Pattern:
 class MistunedBlades:
     """The wheel of a scene, ready for any pattern.
 
-    part : the sector; reduced : its reduction, with the shapes in which sectors may deviate among its outputs
-    wheel : sectors alike, ready to deviate in these"""
+    wheel : sectors alike, ready to deviate in some shapes"""
 
     file: SceneFile
-    part: Part
-    reduced: ReducedSector
     wheel: MistunedWheel
 
     @classmethod
@@ -71,12 +67,11 @@ class MistunedBlades:
         K = deviating(wheel, table.body)
         loads = sorted({name for _, name in wheel.wave().excitation.loads})
         shapes = reduction.nominal_shapes(wheel.reduced, wheel.springs, K, table.families, loads, table.left_out)
-        reduced = reduction.with_ports(wheel.reduced, K, shapes)
-        wave = replace(wheel, reduced=reduced).wave()
+        wave = replace(wheel, reduced=reduction.with_ports(wheel.reduced, K, shapes)).wave()
         if table.friction and not wave.contact.has_friction:
             raise SceneError("mistuning.friction: no contact of this scene has friction: leave it out")
         ports = tuple(reduction.port_name(k) for k in range(shapes.shape[1]))
-        return cls(file, wheel.part, reduced, MistunedWheel(wave, ports))
+        return cls(file, MistunedWheel(wave, ports))
 
     def pattern(self, number: int) -> Pattern:
         """The pattern of this number, from 1; it depends on the seed of the scene and its number alone."""
