@@ -58,7 +58,8 @@ class StatedQuantity:
     by_joint, by_place : whether each named contact, or each place of the part, has its own
     relative : whether its changes count over its value
     error : how its error is found; rank : place in tables, ascending
-    headline : whether the short summary gives it; digits : significant ones of a value whose error is not known"""
+    headline : whether the short summary gives it; digits : significant ones of a value whose error is not known
+    where : what the value is of -> node or name of the place of the part whose stress it is, "" or None for none"""
 
     title: str
     unit: str
@@ -70,6 +71,7 @@ class StatedQuantity:
     rank: int = 99
     headline: bool = True
     digits: int = 3
+    where: Callable[[Any], int | str] | None = None
     name: str = ""
 
     @property
@@ -85,14 +87,12 @@ class CycleQuantity(StatedQuantity):
     value : SolvedCycle -> number, None where the cycle does not hold it
     slopes : SolvedCycle -> Slopes, for exact derivatives; in_time : MotionInTime -> the number along it, and the least
         one that a difference counts over
-    at_rest : whether it has a value without vibration
-    where : SolvedCycle -> node or name of the place of the part whose number it is, None for a number of no place"""
+    at_rest : whether it has a value without vibration"""
 
     value: Callable[[SolvedCycle], float | None]
     slopes: Callable[[SolvedCycle], Slopes] | None = None
     in_time: Callable[[MotionInTime], tuple[float, float]] | None = None
     at_rest: bool = False
-    where: Callable[[SolvedCycle], int | str] | None = None
 
 
 @dataclass(frozen=True)

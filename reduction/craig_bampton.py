@@ -75,9 +75,7 @@ def craig_bampton(
     stiffness = _symmetric(stiffness)
     mass = _congruent(basis, M)  # A.6
     mass[n_m:, n_m:] = np.eye(len(squares))
-    turning = None
-    if system.gyroscopic is not None:
-        turning = _congruent(basis, system.gyroscopic, -1.0)
+    turning = None if system.gyroscopic is None else _congruent(basis, system.gyroscopic, -1.0)
 
     reduced = SecondOrderSystem(
         mass,
@@ -160,11 +158,12 @@ def with_static_shapes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Modes joined by the static shapes of forces, as far as they lack these, by the method of Rayleigh and Ritz.
 
-    omega (k,) [rad/s], phi (n_full, k) : modes of K, M; forces : each (n_full, j), those of zero add nothing
+    omega (k,) [rad/s], phi (n_full, k) : modes of K, M; forces : each (n_full, j), columns of zero add nothing
     factor : of K; K itself is not asked for: K times a static shape is its force, and times a mode M phi omega^2
     Returns shapes (n_full, n) of unit modal mass, orthogonal in mass and stiffness, and squares of frequencies (n,)
         ascending: the modes come first"""
-    pushed = csc_matrix(hstack([csc_matrix((len(phi), 0)), *(force for force in forces if abs(force).max() > 0)]))
+    pushed = csc_matrix(hstack([csc_matrix((len(phi), 0)), *forces]))
+    pushed = pushed[:, np.flatnonzero(abs(pushed).sum(axis=0))]
     if not pushed.shape[1]:
         return phi, omega**2
     k, n, step = len(omega), len(omega) + pushed.shape[1], LIMITS.static_at_once

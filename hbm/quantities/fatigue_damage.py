@@ -3,10 +3,20 @@
 from tribodyn.hbm.quantity import ErrorKind, WearQuantity, WornContact
 
 
+def sums(worn: WornContact) -> dict[str, float]:
+    """Place -> its sum, of those with an S-N line."""
+    return {name: float(p.miner_sum()[1][-1]) for name, p in worn.fatigue.items() if p.strength.knee}
+
+
 def value(worn: WornContact) -> float | None:
-    """The sum; None where no place has an S-N line."""
-    sums = [float(place.miner_sum()[1][-1]) for place in worn.fatigue.values() if place.strength.knee]
-    return max(sums, default=None)
+    """The largest sum; None where no place has an S-N line."""
+    return max(sums(worn).values(), default=None)
+
+
+def where(worn: WornContact) -> str:
+    """Its place, "" for none."""
+    of_place = sums(worn)
+    return max(of_place, key=of_place.__getitem__, default="")
 
 
 def applies(worn: WornContact) -> bool:
@@ -16,4 +26,5 @@ def applies(worn: WornContact) -> bool:
 
 QUANTITY = WearQuantity(
     "Miner's sum of fatigue", "", value, error=ErrorKind.DURATION, rank=29, grows=True, headline=False, applies=applies,
+    where=where,
 )  # fmt: skip

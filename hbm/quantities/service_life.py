@@ -15,10 +15,15 @@ def value(worn: WornContact) -> float | None:
     return min(lives(worn).values(), default=None) if applies(worn) else None
 
 
+def where(worn: WornContact) -> str:
+    """The place that ends first, "" where the contact does."""
+    ends = lives(worn)
+    return min(ends, key=ends.__getitem__, default="")
+
+
 def remark(worn: WornContact) -> str:
     """What ends first."""
-    ends = lives(worn)
-    name = min(ends, key=ends.__getitem__)
+    name = where(worn)
     if not name:
         return "until the contact is lost"
     course = "Miner's sum is 1" if worn.fatigue[name].strength.knee else "the endurance limit is reached"
@@ -32,5 +37,5 @@ def applies(worn: WornContact) -> bool:
 
 QUANTITY = WearQuantity(
     "cycles until contact or endurance is lost", "cycles", value, error=ErrorKind.DURATION, rank=22, remark=remark,
-    applies=applies,
+    applies=applies, where=where,
 )  # fmt: skip

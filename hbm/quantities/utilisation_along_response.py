@@ -3,13 +3,24 @@
 from tribodyn.hbm.quantity import CurveQuantity, SolvedCurve
 
 
-def value(curve: SolvedCurve) -> float | None:
-    """The largest of the places at the converged points; None where no strength is known."""
-    if curve.basis is None:
-        return None
+def utilisations(curve: SolvedCurve) -> dict[str, float]:
+    """Place whose strength is known -> its largest at the converged points."""
+    if curve.basis is None or not curve.branch.converged.any():
+        return {}
     points, basis = curve.branch.response[curve.branch.converged], curve.basis
-    uses = [p.utilisation(p.stress(points, basis), basis) for p in curve.places if p.strength is not None]
-    return max((float(use.max()) for use in uses if use.size), default=None)
+    judged = [place for place in curve.places if place.strength is not None]
+    return {place.name: float(place.utilisation(place.stress(points, basis), basis).max()) for place in judged}
 
 
-QUANTITY = CurveQuantity("largest utilisation in fatigue along the response", "", value, rank=43)
+def value(curve: SolvedCurve) -> float | None:
+    """The largest of the places; None where no strength is known."""
+    return max(utilisations(curve).values(), default=None)
+
+
+def where(curve: SolvedCurve) -> str:
+    """Its place, "" for none."""
+    of_place = utilisations(curve)
+    return max(of_place, key=of_place.__getitem__, default="")
+
+
+QUANTITY = CurveQuantity("largest utilisation in fatigue along the response", "", value, rank=43, where=where)

@@ -8,6 +8,7 @@ import pytest
 import tribodyn as td
 from tests.helpers.small_decks import ENDING, Shape, bricks
 from tribodyn.fem.stress import nodal_stress
+from tribodyn.hbm import newton
 from tribodyn.hbm.fatigue import largest_von_mises, utilisation, von_mises
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
@@ -112,6 +113,22 @@ def test_places_have_the_stress_of_the_field(run: td.Result, path: Path) -> None
     np.testing.assert_allclose(strain, expected, atol=0.03 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize(
+    ("change", "off"),
+    [("method=residual_flexibility", 2e-3), ("interface_modes=60", 0.05)],
+)
+def test_other_reductions_have_the_same_stress(run: td.Result, path: Path, change: str, off: float) -> None:
+    """That of the contact DOFs as they are, though a pair lies on the clamp and has no traction."""
+    best = int(np.argmax(run.response.height("response")))
+    balance = modelling.build(scene_file.read(path, (f"reduction.{change}",)), Progress(), run.harmonics).balance
+    state = newton.solve_from_rest(balance, run.response.omega[best]).state
+    rows = [balance.compliance.output_names.index(name) for name in run.response.output_names]
+    stress, exact = balance.outputs(state)[rows], run.response.response[best]
+    for place in run.facts.places:
+        a, b = stress[place.rows], exact[place.rows]
+        np.testing.assert_allclose(a, b, atol=off * np.abs(b).max())
+
+
 def test_errors_margins_and_words(run: td.Result) -> None:
     stated = run.verdict.statements
     assert stated["stress"].stated
@@ -190,6 +207,7 @@ def test_worn_by_two_duties(path: Path) -> None:
     assert largest_von_mises(place.stress(balance.outputs(state), basis), basis) == pytest.approx(of_time, rel=1e-2)
 
 
+STEEL = ("fatigue.steel.endurance_limit=40 MPa", "fatigue.steel.strength=600 MPa")
 ELBOW = """
 [decks.elbow]
 file = "elbow.inp"
@@ -239,7 +257,35 @@ def test_a_sharp_corner_is_not_stated(radius: float, point: tuple[float, ...], t
     (tmp_path / "elbow.inp").write_text(cards, encoding="utf-8")
     place = f"[stress.places.corner]\npoint = {[f'{x} mm' for x in point]}\n"
     (tmp_path / "elbow.toml").write_text(ELBOW + place, encoding="utf-8")
-    run = td.run(tmp_path / "elbow.toml", overrides=("verdict.in_time=false", "harmonics.kept=[0, 1]"))
+    overrides = ("verdict.in_time=false", "harmonics.kept=[0, 1]")
+    run = td.run(tmp_path / "elbow.toml", overrides=overrides)
     statement = run.verdict.statements["stress"]
     assert statement.stated == (radius > 0)
     assert radius or "(20, 4, 0) mm is at a re-entrant edge, 5" in statement.reason
+    if not radius:
+        with pytest.raises(Refusal, match=r"fatigue\.steel.*fatigue\.ALL"):
+            td.run(tmp_path / "elbow.toml", overrides=(*overrides, *STEEL))
+
+
+def test_no_life_follows_from_a_stress_without_bound(path: Path) -> None:
+    """At the border of a clamp neither damage nor life is stated, nor the utilisation along the response."""
+    overrides = (
+        "verdict.in_time=false",
+        "pictures.renders=false",
+        "wear.coefficient=2e3 um3/J",
+        "wear.step=0.5 um",
+        "wear.rule=thesis",
+        "wear.max_steps=1",
+        "fatigue.material.knee=1e6",
+        "fatigue.material.exponent=4",
+        "fatigue.material.endurance_limit=40 MPa",
+        "stress.places.root.point=['0 mm', '10 mm', '4 mm']",
+    )
+    run = td.run(path, overrides=overrides)
+    for name in ("stress", "utilisation", "service_life", "fatigue_damage", "utilisation_along_response"):
+        statement = run.verdict.statements[name]
+        assert statement.status == Status.UNBOUNDED
+        assert statement.reason.startswith("(0, 10, 4) mm is at the border of a clamp")
+    lines = text.brief(run)
+    assert not any("Miner's sum is 1" in line for line in lines)
+    assert any("service life        not reported" in line for line in lines)

@@ -10,13 +10,16 @@ from math import log
 from time import process_time
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.fatigue import largest_von_mises
 from tribodyn.hbm.quantity import (
+    CurveQuantity,
     CycleQuantity,
     ErrorKind,
     SolvedCycle,
     StatedQuantity,
     WearQuantity,
     of_wear_with_error,
+    quantities_of,
     with_error,
 )
 from tribodyn.refusal import Refusal, SolverFailure
@@ -25,7 +28,7 @@ from tribodyn.workflows.errors.change_table import ChangeTable, measure_changes
 from tribodyn.workflows.errors.operating_states import OperatingState, place_of_peak, relative_change
 from tribodyn.workflows.errors.refinement_limits import DEFAULT, RefinementLimits
 from tribodyn.workflows.errors.time_comparison import MotionDifference
-from tribodyn.workflows.result.answers import worn_contact
+from tribodyn.workflows.result.answers import solved_curve, worn_contact
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.verdict import MeasuredChange, Refinement, Statement, Status, Verdict
 from tribodyn.workflows.run import settings
@@ -55,7 +58,8 @@ def judge(
                 table.rows += time_comparison.changes_along_wear(file, model.balance, result, table.wear_harmonics)
     known = None if table.first is None else table.first.values | table.in_time
     cycle_quantities = [q for q in with_error(CycleQuantity) if known is None or q.name in known]
-    quantities = (*cycle_quantities, *of_wear_with_error(worn_contact(result)))
+    of_curve = [quantity for quantity in quantities_of(CurveQuantity) if unbounded(quantity, table)]
+    quantities = (*cycle_quantities, *of_wear_with_error(worn_contact(result)), *of_curve)
     statements = {quantity.name: _statement(quantity, table, comparison) for quantity in quantities}
     return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock, table.worn_ratio)
 
@@ -90,7 +94,8 @@ def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionD
         value = None if first is None else (first.values | table.in_time).get(quantity.name)
     else:
         worn_through = worn_contact(result) if result.wear_steps else None
-        value = None if worn_through is None else quantity.value(worn_through)
+        source = solved_curve(result) if isinstance(quantity, CurveQuantity) else worn_through
+        value = None if source is None else quantity.value(source)
     if value is None:
         reason = table.reason or "no state was solved"
         if isinstance(quantity, WearQuantity):
@@ -131,7 +136,7 @@ def _statement(quantity: StatedQuantity, table: ChangeTable, comparison: MotionD
         if difference := comparison.contradicts({name: error for name in names}):
             reason = f"of the contact before wear, by {difference:.1%}"
             return Statement(value, error, dominated, comparison.status, reason)
-    if isinstance(quantity, CycleQuantity) and (singularity := unbounded(quantity, table)):
+    if singularity := unbounded(quantity, table):
         return Statement(value, None, dominated, Status.UNBOUNDED, singularity)
     if error is None:
         return Statement(value, None, dominated, Status.NOT_KNOWN, reason_unknown)
@@ -161,21 +166,31 @@ def total_error(
     return max(limits.total(change, ratio), least) + truncation + size(Refinement.OTHER_MOTION), ""
 
 
-def unbounded(quantity: CycleQuantity, table: ChangeTable, least: float = 0.02) -> str:
-    """Why a stress has no value that finer meshes come to; "" for others.
+def unbounded(quantity: StatedQuantity, table: ChangeTable, least: float = 0.02) -> str:
+    """Why a number of the stress has no value that finer meshes come to; "" for others. One of a wear or a response
+    has none where the stress before wear grows at the place that decides it.
 
     least : exponent of its growth with the number of elements along an edge, which comes to 0.3 at the border of a
         clamp and to 0.46 at a re-entrant right angle
     Source  Williams, J. Applied Mechanics 19 (1952) 526"""
-    last, rows = table.last, [row for row in table.of(quantity.name) if row.refinement == Refinement.MESH]
-    if quantity.where is None or last is None or last.balance.stress is None or table.ratio is None or not rows:
+    first, last, ratio = table.first, table.last, table.ratio
+    if quantity.where is None or first is None or last is None or last.balance.stress is None or ratio is None:
         return ""
-    value, refined = rows[0].value or 0.0, rows[0].refined or 0.0
-    if min(value, refined) <= 0 or log(refined / value) / log(table.ratio) < least:
+    cycles = [SolvedCycle.of(each.balance, each.point.state, settings.OUTPUT) for each in (first, last)]
+    if isinstance(quantity, CycleQuantity):
+        where, rows = quantity.where(cycles[1]), table.of(quantity.name)
+        values = [(row.value or 0.0, row.refined or 0.0) for row in rows if row.refinement == Refinement.MESH]
+    else:
+        source = solved_curve(table.result) if isinstance(quantity, CurveQuantity) else worn_contact(table.result)
+        where = "" if source is None else quantity.where(source)
+        places = [(place, cycle) for cycle in cycles for place in cycle.places if place.name == where]
+        stress = [float(largest_von_mises(place.stress(c.response, c.basis), c.basis)) for place, c in places]
+        values = [(stress[0], stress[1])] if stress else []
+    value, refined = values[0] if values else (0.0, 0.0)
+    if min(value, refined) <= 0 or log(refined / value) / log(ratio) < least:
         return ""
-    where = quantity.where(SolvedCycle.of(last.balance, last.point.state, settings.OUTPUT))
     place = last.balance.stress.singularity(where)
-    growth = f"{abs(refined / value - 1):.0%} {'more' if refined > value else 'less'} on a mesh {table.ratio:.3g} times"
+    growth = f"{abs(refined / value - 1):.0%} {'more' if refined > value else 'less'} on a mesh {ratio:.3g} times"
     return f"{place}, {growth} as fine: round it, or name a place away from it" if place else ""
 
 

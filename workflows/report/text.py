@@ -21,12 +21,18 @@ WIDTH = 16  # of the names in a summary
 
 def brief(result: Result) -> list[str]:
     """The summary of a result: model, response, wear, errors, warnings, each number with the digits it has."""
-    answers = [answer for answer in answers_of(result) if answer.value is not None and answer.quantity.headline]
+    statements = {} if result.verdict is None else result.verdict.statements
+    unbounded = {name for name, statement in statements.items() if statement.status == Status.UNBOUNDED}
+    answers = [
+        answer
+        for answer in answers_of(result)
+        if answer.value is not None and answer.quantity.headline and answer.quantity.name not in unbounded
+    ]
     groups = {
         "model": _model_lines(result),
         "response": [*_cycle_lines(result, answers), *_curve_lines(result, answers)],
         "wear": _wear_lines(answers),
-        "errors": _error_lines({} if result.verdict is None else result.verdict.statements),
+        "errors": _error_lines(statements),
     }
     state = result.state.split(":")[0]
     lines = [f"{result.provenance['scene_name']}: {state}, {result.facts.seconds:.0f} s"]

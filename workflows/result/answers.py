@@ -176,10 +176,16 @@ def _of_wear(result: Result) -> Iterator[Answer]:
 
 
 def _of_curve(result: Result) -> Iterator[Answer]:
-    spread, branch = None if result.bounds is None else result.bounds.spread, result.response
-    curve = None if branch is None else SolvedCurve(branch, spread, _basis(result), result.facts.places)
+    curve, statements = solved_curve(result), _statements(result)
     for quantity in quantities_of(CurveQuantity):
-        yield Answer(quantity, "", RUN, None if curve is None else quantity.value(curve))
+        value = None if curve is None else quantity.value(curve)
+        yield Answer(quantity, "", RUN, value, statements.get(quantity.name))
+
+
+def solved_curve(result: Result) -> SolvedCurve | None:
+    """The response curve of a result, None where it has none."""
+    spread, branch = None if result.bounds is None else result.bounds.spread, result.response
+    return None if branch is None else SolvedCurve(branch, spread, _basis(result), result.facts.places)
 
 
 def _joints(result: Result) -> list[str]:

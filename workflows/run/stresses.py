@@ -31,8 +31,10 @@ from tribodyn.hbm.fatigue import (
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.reduction.omitted_modes import OmittedModes
+from tribodyn.refusal import Refusal
 from tribodyn.workflows.result.result import Fields, Stress
 from tribodyn.workflows.run import part_reduction
+from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.stress_tables import FatigueTable
 
@@ -68,9 +70,12 @@ def with_stress(scene: MeshScene, part: Part, balance: HarmonicBalance, folder: 
 
     folder : of the files of the scene"""
     material, names = part_reduction.material(scene, part.mesh), balance.compliance.output_names
+    known = material_names(scene, part.mesh, material)
+    for key in scene.fatigue:
+        if scene.decks and not any(key in solid for solid in known):
+            raise Refusal(unknown_key(f"fatigue.{key}", [f"fatigue.{name}" for solid in known for name in solid]))
     strengths = [
-        next((strength_of(scene.fatigue[name]) for name in names_of_material if name in scene.fatigue), None)
-        for names_of_material in material_names(scene, part.mesh, material)
+        next((strength_of(scene.fatigue[name]) for name in solid if name in scene.fatigue), None) for solid in known
     ]
     heat = temperature(scene, part, folder)
     places = []
