@@ -35,7 +35,7 @@ class Options:
     max_periods : periods after which to give up; patience : periods without a smaller drift after which to give up
     accelerate : mix the states of past periods (Anderson) instead of waiting for the transient to decay; finds
         unstable periodic motions, too, from which a plain march would leave. A slider that never slips in the periodic
-        motion then stands where the load path of the balance left it, else where the transient did
+        motion then stands where the load path of the balance left it; else, or when rigid, where the transient did
     contact : accuracy of the contact's equations, see `coupled_pairs.Contact`
     rigid : unilateral contact and Coulomb friction without the springs of the contact, see `rigid_contact`"""
 

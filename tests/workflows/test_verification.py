@@ -57,6 +57,12 @@ def with_harmonics(folder: Path, highest: int, hertz: float) -> verification.Tim
     return verify(store.load(folder / "result.h5"), hertz, overrides=override, steps=512, progress=Progress())
 
 
+def test_sliders_that_stick_without_springs_stay_where_they_came_to_rest(folder: Path) -> None:
+    """Put back on the load path of the balance each period, they let no motion repeat itself."""
+    comparison = verify(folder, 640.0, law="rigid", steps=128, overrides=["loads.harmonic.shake.value=1 kN"])
+    assert comparison.integration.motion.periodic
+
+
 @pytest.mark.slow
 def test_a_machine_leaves_an_unstable_motion(folder: Path) -> None:
     """For one that never repeats itself, with eleven times the energy.

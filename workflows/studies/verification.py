@@ -224,7 +224,7 @@ def verify(
     result : folder or file of a result
     at : frequency such as 410Hz; the peak of the response, or the frequency of the row, by default
     row : wear row whose depth the contact has; unworn by default
-    steps : time steps per period; 256 or 32 for each harmonic by default
+    steps : time steps per period; 256 or 32 for each harmonic by default, twice as many for a rigid contact
     law : of the contact in time: that of the scene, or without its springs (unilateral contact, Coulomb friction)
     allow_scripts : run Python files and drawings (.geo) that its scene names
     Raises  Refusal: the result has no such row or no solution to start from; SolveFailed: no balance solution"""
@@ -262,7 +262,7 @@ def held_against(
             solution = _walk(balance, omega, target, x, settings.newton_options(scene))
         if not solution.converged:
             raise SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
-        steps = steps or steps_of(balance)
+        steps = steps or (2 if rigid else 1) * steps_of(balance)
         with progress.stage("time integration"):
             options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS, rigid=rigid)
             integration = march.verify(balance, solution.state, options)
