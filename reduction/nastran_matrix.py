@@ -5,7 +5,7 @@ it is sparse. A DMIG entry labels its rows by grid point and component; scalar p
 
 import codecs
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -140,30 +140,6 @@ def _string(first: int, row: int | None = None) -> tuple[int, int]:
     if length < 1:
         raise Refusal("a string without length")
     return length, row
-
-
-def write_op4(path: Path, matrices: Mapping[str, np.ndarray]) -> None:
-    """Write dense matrices (m, n), real or complex, as a binary OUTPUT4 file in double precision, bit for bit.
-
-    Raises  Refusal for a name that Nastran does not take"""
-    with path.open("wb") as file:
-
-        def record(words: list[int], body: bytes) -> None:
-            mark = np.int32(4 * len(words) + len(body)).astype("<i4").tobytes()
-            file.write(mark + np.array(words, "<i4").tobytes() + body + mark)
-
-        for name, matrix in matrices.items():
-            if not re.fullmatch(r"[A-Z][A-Z0-9]{0,7}", name):
-                raise Refusal(f"{name} is no name for Nastran: a letter and up to seven letters or digits")
-            n_row, n_column = matrix.shape
-            square = n_row == n_column and np.array_equal(matrix, matrix.T)
-            form = 6 if square else 1 if n_row == n_column else 2
-            records = np.asarray(matrix, complex if np.iscomplexobj(matrix) else float)
-            record([n_column, n_row, form, 4 if np.iscomplexobj(records) else 2], f"{name:8s}".encode())
-            for k, column in enumerate(records.T, start=1):
-                body = np.ascontiguousarray(column).astype(records.dtype.newbyteorder("<")).tobytes()
-                record([k, 1, len(body) // 4], body)
-            record([n_column + 1, 1, 2], np.array([1.0], "<f8").tobytes())
 
 
 def holds_dmig(path: Path) -> bool:

@@ -13,7 +13,7 @@ from pyyeti.nastran import bulk, op4
 from tribodyn import matrices as own
 from tribodyn.reduction.foreign import ForeignMatrices, from_arrays, read_matrices, reduced_model
 from tribodyn.reduction.matrix_files import read_array, read_matrix, variables
-from tribodyn.reduction.nastran_matrix import read_op4, write_op4
+from tribodyn.reduction.nastran_matrix import read_op4
 
 N_NODE = 5
 LABELS = [(10 * node + 7, component) for node in range(N_NODE) for component in (1, 2, 3)]
@@ -169,7 +169,7 @@ def test_every_format_gives_the_same_structure(reader, tmp_path):
         assert [matrices.dof((node, axis)) for node in (47, 7) for axis in (1, 2, 3)] == [12, 13, 14, 0, 1, 2]
 
 
-def test_op4_is_read_and_written_as_another_program_does_bit_for_bit(tmp_path):
+def test_op4_is_read_bit_for_bit_as_another_program_writes_it(tmp_path):
     rng = np.random.default_rng(1)
     sparse = rng.normal(size=(7, 7)) * (rng.random((7, 7)) < 0.4)
     expected = {"A": sparse + sparse.T, "B": rng.normal(size=(7, 3)), "Z": np.zeros((3, 3)), "C": sparse * (1 - 2j)}
@@ -177,13 +177,7 @@ def test_op4_is_read_and_written_as_another_program_does_bit_for_bit(tmp_path):
         op4.write(str(tmp_path / "a.op4"), expected, binary=binary, endian=order, sparse=kind, digits=16)
         read = read_op4(tmp_path / "a.op4")
         assert all(np.array_equal(read[name].toarray(), matrix) for name, matrix in expected.items()), (binary, kind)
-    write_op4(tmp_path / "b.op4", expected)
-    for read in (
-        op4.read(str(tmp_path / "b.op4")),
-        {n.lower(): m.toarray() for n, m in read_op4(tmp_path / "b.op4").items()},
-    ):
-        assert all(np.array_equal(read[name.lower()], matrix) for name, matrix in expected.items())
-    assert read_array(tmp_path / "b.op4", "B").shape == (7, 3)
+    assert read_array(tmp_path / "a.op4", "B").shape == (7, 3)
 
 
 def test_dmig_keeps_grid_points_components_and_scalar_points(tmp_path):

@@ -216,7 +216,7 @@ def export(
         Folder or file of a result.
     to
         Formats, one or several: vtk (series for ParaView), csv, mat, uff (tables and curves), mesh (worn part
-        with its fields), npz, abaqus (reduced matrices).
+        with its fields), npz, matlab (reduced matrices).
     out
         Folder, in which each format gets a folder of its own; export/ beside the result by default.
     mesh_ending

@@ -1,15 +1,12 @@
 """The formats that `tribodyn export` knows, by name; the reduced model for other solvers is written here."""
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.io import savemat
 
 from tribodyn.fem.system import dense
-from tribodyn.reduction import nastran_matrix
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.export import result_tables, vtk
@@ -56,68 +53,14 @@ def write_npz(result: Result, folder: Path) -> list[Path]:
     return [path]
 
 
-def _symmetric(matrices: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """M, K, C without the rounding of their reduction, so that they come back bit for bit."""
-    return matrices | {
-        name: (matrices[name] + matrices[name].conj().T) / 2 for name in ("M", "K", "C") if name in matrices
-    }
-
-
 def write_matlab(result: Result, folder: Path) -> list[Path]:
     """reduced.mat with the same variables as reduced.npz, which a scene's [model] reads again."""
     model, path = reduced_model(result), folder / "reduced.mat"
-    components = np.array(model.interface.components, dtype=object)
-    savemat(path, _symmetric(arrays(model)) | {"components": components}, long_field_names=True, do_compression=True)
+    matrices = arrays(model) | {"components": np.array(model.interface.components, dtype=object)}
+    for name in {"M", "K", "C"} & matrices.keys():  # without the rounding of the reduction, to come back bit for bit
+        matrices[name] = (matrices[name] + matrices[name].conj().T) / 2
+    savemat(path, matrices, long_field_names=True, do_compression=True)
     return [path]
-
-
-def write_op4(result: Result, folder: Path) -> list[Path]:
-    """reduced.op4, with M, K, C, B, AREA, GAP, LOADS and OUTPUTS in binary, and reduced.json, which names columns."""
-    model = reduced_model(result)
-    matrices = _symmetric(arrays(model))
-    blocks: dict[str, np.ndarray] = {name: matrices[name] for name in ("M", "K", "C", "B") if name in matrices}
-    blocks |= {"AREA": matrices["contact_area"][:, None], "GAP": matrices["contact_gap"][:, None]}
-    about: dict[str, Any] = {"components": model.interface.components, "units": "SI"}
-    about["contact"] = "x = B q, row pair * n_component + component"
-    for kind in ("load", "output"):
-        names = [name for name in matrices if name.startswith(f"{kind}_")]
-        about[f"{kind}s"] = [name.removeprefix(f"{kind}_") for name in names]
-        if names:
-            blocks[f"{kind}s".upper()] = np.column_stack([matrices[name] for name in names])
-    nastran_matrix.write_op4(folder / "reduced.op4", blocks)
-    (folder / "reduced.json").write_text(json.dumps(about, indent=2), encoding="utf-8")
-    return [folder / "reduced.op4", folder / "reduced.json"]
-
-
-def write_abaqus(result: Result, folder: Path) -> list[Path]:
-    """reduced_M.inp, reduced_K.inp, reduced_C.inp as *MATRIX INPUT reads them, and reduced.inp that assembles them.
-
-    Coordinate i of the model is degree of freedom 1 of node i + 1; the lower triangle of a symmetric matrix is written.
-    Raises  ValueError for the complex matrices of a wheel"""
-    model, written, called = reduced_model(result), [], []
-    matrices = _symmetric(arrays(model))
-    if np.iscomplexobj(matrices["K"]):
-        raise Refusal("abaqus: the matrices of a wheel are complex, which Abaqus does not take; export npz")
-    words = {"K": "STIFFNESS", "M": "MASS", "C": "VISCOUS DAMPING"}
-    for name in words:
-        if name not in matrices:
-            continue
-        path = folder / f"reduced_{name}.inp"
-        lower = np.tril(matrices[name])
-        rows, columns = np.nonzero(lower)
-        with path.open("w", encoding="ascii") as file:
-            for i, j in zip(rows, columns, strict=True):
-                file.write(f"{i + 1},1,{j + 1},1,{lower[i, j]:.16e}\n")
-        written.append(path)
-        called.append(name)
-    top = folder / "reduced.inp"
-    lines = ["*HEADING", f"reduced model of {result.provenance['scene_name']}, SI units", "*NODE, NSET=COORDINATES"]
-    lines += [f"{i + 1}, {float(i)}, 0., 0." for i in range(len(matrices["K"]))]
-    for name in called:
-        lines.append(f"*MATRIX INPUT, NAME={name}, INPUT=reduced_{name}.inp, TYPE=SYMMETRIC")
-    lines.append("*MATRIX ASSEMBLE, " + ", ".join(f"{words[name]}={name}" for name in called))
-    top.write_text("\n".join([*lines, ""]), encoding="ascii")
-    return [*written, top]
 
 
 FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
@@ -131,8 +74,6 @@ FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
     ),
     "npz": ("reduced matrices for NumPy, and for a scene's [model]", write_npz),
     "matlab": ("reduced matrices for MATLAB, and for a scene's [model]", write_matlab),
-    "op4": ("reduced matrices, Nastran OUTPUT4", write_op4),
-    "abaqus": ("reduced matrices, Abaqus *MATRIX INPUT", write_abaqus),
 }
 
 

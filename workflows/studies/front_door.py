@@ -170,7 +170,7 @@ def export(
 ) -> list[Path]:
     """Write a result in the formats of other programs, each into a folder of its name; the files written.
 
-    to : of vtk, csv, mat, uff, mesh, npz, matlab, op4, abaqus; mesh_ending : format of the mesh
+    to : of vtk, csv, mat, uff, mesh, npz, matlab; mesh_ending : format of the mesh
     allow_scripts : run Python files and drawings that the scene names, for matrices"""
     from tribodyn.workflows.export import formats
 
