@@ -50,7 +50,6 @@ KINDS = {
     "part": "The part at its largest swing; the contact is outlined.",
     "contact": "Both faces of the contact, opened like a book.",
     "contact_*": "The same of one contact among several.",
-    "exploded": "The bodies apart, their contacts in colour.",
     "wheel": "All blades at one instant.",
     "film_wear": "Depth, status and pressure over wear.",
     "film_cycle": "One cycle: the part in motion and the status of every pair.",

@@ -45,7 +45,6 @@ class SolveEnd(End):
     NOT_HELD = "nothing holds a body from"
     SITE_NOT_FOUND = "the motion sought was not found in"
     AT_FOLD = "the curve turns back at a fold,"
-    INTEGRATION_FAILED = "time integration failed:"
     NOT_PERIODIC = "not periodic after"
 
 

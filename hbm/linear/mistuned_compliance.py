@@ -130,11 +130,6 @@ class MistunedPoint:
         reaction = self._reaction(waves[:, :, self.compliance.nominal.ports])
         return np.asarray(fft.fft(waves - np.matmul(self._from_shapes, reaction[..., None])[..., 0], axis=1))
 
-    def deviating(self, force: np.ndarray) -> np.ndarray:
-        """Forces (n_harmonic, N, r) of the deviating stiffness on its shapes, under forces (n_harmonic, N, n_port)."""
-        displacement = self._displaced(force)[:, :, self.compliance.nominal.ports]
-        return -self.compliance.deviation[:, None] * displacement
-
     def _reaction(self, waves: np.ndarray) -> np.ndarray:
         """Waves of the forces that deviating stiffness adds, from the waves of what sectors alike do (n_h, N, r)."""
         n_h, N, r = waves.shape

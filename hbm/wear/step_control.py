@@ -7,7 +7,6 @@ import numpy as np
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 
 STEP_RATIO_LIMITS = (0.2, 3.0)  # limits of the ratio of one step to the one before
-UNKNOWN = 0.5  # estimated relative error from which on a number of cycles is no statement
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import WearProblem
-from tribodyn.workflows.scene import scene_file
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +41,11 @@ def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str)
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
 
 
-def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
-    law = str(scene_file.CASES / "beam" / "running_in.py")
-    base = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
+def test_a_law_file_of_ones_own_is_taken_by_both_rules(tmp_path: Path) -> None:
+    """The law of the tutorial."""
+    law, page = tmp_path / "running_in.py", Path(__file__).parents[2] / "docs" / "tutorials" / "own_law.md"
+    law.write_text(page.read_text(encoding="utf-8").partition("```python running_in.py\n")[2].partition("```")[0])
+    base = wear_problem(wear=JointWear.of(str(law), coefficient=4e-10))
     fine = evolve(thesis.Rule(base, 1.5e-6))
     worn = evolve(error_controlled.Rule(base, Tolerance(0.02, 2e-4)))
     assert life(worn) == pytest.approx(life(fine), rel=0.015)

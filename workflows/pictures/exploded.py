@@ -1,18 +1,12 @@
-"""Bodies drawn apart, each moved off the one it touches along the normal of their faces: the exploded view."""
+"""Where bodies stand apart, each moved off the one it touches along the normal of their faces: the exploded view."""
 
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from tribodyn.workflows.pictures import view as drawing
-from tribodyn.workflows.pictures.figures import heading, length_unit, present, pressure_unit, scale_bar
-from tribodyn.workflows.pictures.opened import FieldPaint
-from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, trimmed, with_room
-from tribodyn.workflows.pictures.theme import BODIES, LAYOUT, PRESSURE_MAP, STYLE, WEAR_MAP
-from tribodyn.workflows.result.contact_states import shown_states
+from tribodyn.workflows.pictures.figures import present
 from tribodyn.workflows.result.faces import bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Result
 
@@ -23,15 +17,11 @@ class Explosion:
 
     gap : between two bodies, of the size of the faces that touch
     one_way : of the area of touching faces; a smaller sum of their normals is a bore, which has no direction
-    touch : of the size of the smaller body; faces nearer than this touch
-    flat : width over height from which on two views stand one above the other
-    rise : slope that the bodies are looked at with, from above and from below"""
+    touch : of the size of the smaller body; faces nearer than this touch"""
 
     gap: float = 0.8
     one_way: float = 0.3
     touch: float = 1e-3
-    flat: float = 2.2
-    rise: float = 0.65
 
 
 EXPLOSION = Explosion()
@@ -105,47 +95,3 @@ def _touching(first: Any, second: Any) -> tuple[np.ndarray, float]:
     is_near = np.abs(np.asarray(middles["implicit_distance"])) < reach
     area = np.asarray(small.compute_cell_sizes(length=False, volume=False).cell_data["Area"])[is_near]
     return sign * (area @ np.asarray(small.cell_data["Normals"])[is_near]), float(area.sum())
-
-
-def exploded_picture(result: Result) -> Figure:
-    """All bodies apart, from two sides; the contacts are coloured by wear depth, or by pressure where nothing wears."""
-    part = present(result.part)
-    state, offset, body = shown_states(result)[-1], explosion_offsets(result), bodies(part)
-    points = (part.points + offset)[body >= 0]
-    pressure = np.zeros(len(state.depth)) if state.pressure is None else state.pressure
-    worn = bool(state.depth.max() > 0)
-    unit, factor = (length_unit if worn else pressure_unit)(float((state.depth if worn else pressure).max()))
-    values, map_ = (factor * state.depth, WEAR_MAP) if worn else (factor * pressure, PRESSURE_MAP)
-    limits = (0.0, float(values.max()))
-    layers = []
-    for b in range(body.max() + 1):
-        shell = _shell(part, body == b)
-        shell.points += offset[np.flatnonzero(body == b)[0]]
-        layers.append(Layer(shell, color=BODIES[b % len(BODIES)]))
-    for meeting in meetings_of(result):
-        lift = LAYOUT.lift * float(np.sqrt(meeting.patch.area.sum()))
-        for face in meeting.faces:
-            points_on_face = face.points + lift * face.outward + offset[face.nodes[0]]
-            layers += FieldPaint(values[meeting.pairs], limits, map_)(meeting.patch, points_on_face)
-    towards, up = drawing.looking(result)
-    axis = up / np.linalg.norm(up)
-    level = towards - (towards @ axis) * axis
-    level /= np.linalg.norm(level)
-    with mpl.rc_context({**STYLE, "axes.grid": False}):
-        shots, cameras = [], []
-        for side in (level + EXPLOSION.rise * axis, level - EXPLOSION.rise * axis):
-            cameras.append(frame(points, side, up, LAYOUT.exploded[0] / LAYOUT.exploded[1]))
-            shots.append(shoot(View(layers), cameras[-1], LAYOUT.exploded))
-        images, corner = with_room(trimmed(shots))
-        long = images[0].shape[1] > EXPLOSION.flat * images[0].shape[0]
-        wide = 7.0 if long else 5.0
-        tall = wide * images[0].shape[0] / images[0].shape[1]
-        size = (wide, 2 * tall + 1.6) if long else (2 * wide + 0.2, tall + 1.4)
-        figure = Figure(figsize=size, layout="constrained")
-        grid = figure.subplots(*(2, 1) if long else (1, 2))
-        for axes, image, camera in zip(grid, images, cameras, strict=True):
-            show(axes, image, camera, "xyz", corner)
-        label = f"{'total wear depth' if worn else 'mean pressure'} / {unit}, {state.label}"
-        scale_bar(figure, list(grid), map_, *limits, label)
-        heading(figure, result, "bodies apart, from two sides")
-    return figure

@@ -70,7 +70,7 @@ def draw_scene(scene: MeshScene, part: Part, path: Path) -> Path:
     offscreen.check()
     import pyvista as pv
 
-    view = pv.Plotter(off_screen=True, window_size=LAYOUT.exploded)
+    view = pv.Plotter(off_screen=True, window_size=LAYOUT.scene)
     view.set_background(PAPER)
     size, legend = float(np.linalg.norm(np.ptp(part.points, axis=0))), []
     for number, piece in enumerate(pieces(part.mesh)):
@@ -99,7 +99,7 @@ def draw_scene(scene: MeshScene, part: Part, path: Path) -> Path:
             view.add_mesh(arrow, color=colour)
             legend.append((f"{kind} load {name}", colour))
     for number, (label, colour) in enumerate(legend, 1):
-        view.add_text(label, position=(16, LAYOUT.exploded[1] - 26 * number), font_size=9, color=colour)
+        view.add_text(label, position=(16, LAYOUT.scene[1] - 26 * number), font_size=9, color=colour)
     view.add_axes(color=INK)
     view.view_isometric()
     view.screenshot(str(path))

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
-from tribodyn.workflows.pictures import exploded, maps, offscreen, opened as book, view as drawing
+from tribodyn.workflows.pictures import maps, offscreen, opened as book, view as drawing
 from tribodyn.workflows.pictures.figures import (
     heading,
     length_unit,
@@ -62,8 +62,6 @@ def figures(
     for contact in book.contacts(result):
         name = f"contact_{contact.name}" if contact.name else "contact"
         pictures[name] = partial(contact_picture, result, contact, wear)
-    if result.part is not None and int(bodies(result.part).max()) > 0:
-        pictures["exploded"] = partial(exploded.exploded_picture, result)
     wheel = result.facts.around
     if wheel is not None and result.fields is not None:
         from tribodyn.workflows.pictures import render_wheel  # only wheels need it
