@@ -36,7 +36,7 @@ class Layout:
     dpi : dots per inch of figures, film_dpi : of films
     narrowest : inches of a figure of maps, below which a legend of all states does not fit
     column, least : inches of a column of views, and of the narrowest figure of them
-    view : pixels of a view of the part, wheel : of a wheel, book : of an opened contact, scene : of a scene before its run
+    view : pixels of a view of the part, wheel : of a wheel, book : of an opened contact, scene : of a scene not yet run
     film : inches of a film; film_part, film_contact : pixels of the views in it; rate : images per second of a film
     images : of a film, fewer where there are fewer wear steps; samples : instants of a cycle in maps of its motion
     instants : of a cycle, among which that of the largest swing is found
