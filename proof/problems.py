@@ -13,11 +13,10 @@ from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import impact
 from tribodyn.hbm.wear.wear_loop import evolve
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.result.result import Patch, References, Result
 from tribodyn.workflows.run import references, response_curve, settings, wear_run
-from tribodyn.workflows.run.description import described
-from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.pipeline import described
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 

@@ -18,10 +18,9 @@ from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth,
 from tribodyn.hbm.wear.step_events import RULES as EVENT_RULES, OvertakingEvent, PreloadEvent, cycles_to_loss_at_rest
 from tribodyn.hbm.wear.step_memory import StepMemory, predicted_cycles
 from tribodyn.hbm.wear.step_trial import NoSolution, StepTrial, accurate_step
-from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, assess, worn_state
 from tribodyn.hbm.wear.wear_rows import row_of
 from tribodyn.hbm.wear.wear_rule import WearStep
-from tribodyn.hbm.wear.wear_state import WearState, assess, worn_state
 
 
 @dataclass(frozen=True)

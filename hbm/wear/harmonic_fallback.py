@@ -12,8 +12,7 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.resonance_peak import AtPeak
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.history import LARGEST_SHIFT, WearRow
-from tribodyn.hbm.wear.wear_problem import WearProblem
-from tribodyn.hbm.wear.wear_state import WearState, worn_state
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, worn_state
 
 LEAST_HARMONIC = 3  # up to which harmonics are kept where no solution with more follows
 

@@ -13,10 +13,9 @@ from tribodyn.hbm.wear.step_control import Tolerance, expected_life, growth, loc
 from tribodyn.hbm.wear.step_events import OvertakingEvent, PreloadEvent, cycles_to_loss_at_rest
 from tribodyn.hbm.wear.step_memory import StepMemory, predicted_cycles
 from tribodyn.hbm.wear.step_trial import NoSolution, StepTrial, accurate_step
-from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, assess, follow_balance, worn_state
 from tribodyn.hbm.wear.wear_rows import row_of
 from tribodyn.hbm.wear.wear_rule import WearStep
-from tribodyn.hbm.wear.wear_state import WearState, assess, follow_balance, worn_state
 
 # first depth of a step, and the shortest: the scatter of the rates is no error that shorter steps lower; both over the
 # tolerance on depth

@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency
-from tribodyn.hbm.wear.wear_problem import WearProblem
-from tribodyn.hbm.wear.wear_state import WearState, assess
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, assess
 
 
 class PreloadAtRest:

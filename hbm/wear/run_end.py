@@ -6,8 +6,7 @@ import numpy as np
 
 from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.hbm.wear.history import WearRow
-from tribodyn.hbm.wear.wear_problem import WearProblem
-from tribodyn.hbm.wear.wear_state import WearState
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState
 
 FADED_SHARE = 1e-3  # share of the first friction work per cycle below which wear may have faded out
 ENDLESS = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs

@@ -20,8 +20,7 @@ from tribodyn.hbm.wear import harmonic_fallback, law as wear_law
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.step_memory import StepMemory
-from tribodyn.hbm.wear.wear_problem import WearProblem
-from tribodyn.hbm.wear.wear_state import WearState, worn_state
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, worn_state
 from tribodyn.refusal import Refusal
 
 GAMMA = 1 - 1 / np.sqrt(2)

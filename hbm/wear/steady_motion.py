@@ -23,8 +23,7 @@ from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.hbm.wear.step_control import Tolerance, expected_life
-from tribodyn.hbm.wear.wear_problem import WearProblem
-from tribodyn.hbm.wear.wear_state import Means, WearState, wear_of
+from tribodyn.hbm.wear.wear_problem import Means, WearProblem, WearState, wear_of
 from tribodyn.refusal import Refusal
 
 GAMMA = 1 - 1 / np.sqrt(2)

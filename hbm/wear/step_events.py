@@ -16,8 +16,7 @@ from tribodyn.hbm.wear.history import LIFE_SHARE, WearRow
 from tribodyn.hbm.wear.run_end import first_preload
 from tribodyn.hbm.wear.step_memory import StepMemory
 from tribodyn.hbm.wear.step_trial import StepTrial
-from tribodyn.hbm.wear.wear_problem import WearProblem
-from tribodyn.hbm.wear.wear_state import WearState
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from tribodyn.hbm.outcome import Outcome, WearEnd
-from tribodyn.hbm.wear.wear_state import WearState
+from tribodyn.hbm.wear.wear_problem import WearState
 
 if TYPE_CHECKING:
     from tribodyn.hbm.wear.step_events import OvertakingEvent, PreloadEvent

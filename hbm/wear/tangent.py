@@ -38,9 +38,8 @@ from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear.sdirk_stages import GAMMA, FrequencySearch, initial_guess, solve_first_stage
 from tribodyn.hbm.wear.step_memory import StepMemory
-from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, assess, wear_of
 from tribodyn.hbm.wear.wear_rows import state_of
-from tribodyn.hbm.wear.wear_state import WearState, assess, wear_of
 from tribodyn.hbm.wear.worn_cycle import WornCycle
 
 

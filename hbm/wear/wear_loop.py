@@ -10,9 +10,9 @@ from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear.run_end import reason_to_stop
+from tribodyn.hbm.wear.wear_problem import WearState, assess
 from tribodyn.hbm.wear.wear_rows import state_of
 from tribodyn.hbm.wear.wear_rule import WearRule, WearStep
-from tribodyn.hbm.wear.wear_state import WearState, assess
 
 LOCATED = 1e-3  # of depth and cycles, within which the end of a run is located in its last step
 

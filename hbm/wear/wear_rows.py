@@ -9,8 +9,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.history import WearRow
-from tribodyn.hbm.wear.wear_problem import WearProblem
-from tribodyn.hbm.wear.wear_state import WearState, worn_state
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, worn_state
 
 
 def row_of(

@@ -13,9 +13,8 @@ from typing import ClassVar, Self
 from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.hbm.wear.history import StepScheme, WearHistory, WearRow
 from tribodyn.hbm.wear.step_control import StepError, first_order_error
-from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState
 from tribodyn.hbm.wear.wear_rows import row_of
-from tribodyn.hbm.wear.wear_state import WearState
 from tribodyn.plugins import PluginKind
 
 

@@ -16,8 +16,7 @@ from tribodyn.hbm.derivatives.parameter_change import BalanceInputs, ParameterCh
 from tribodyn.hbm.derivatives.parameter_effects import ParameterEffects
 from tribodyn.hbm.wear.implicit_stage import work_slope
 from tribodyn.hbm.wear.sdirk_stages import depth_per_work
-from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
-from tribodyn.hbm.wear.wear_state import WearState, wear_of
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem, WearState, wear_of
 
 if TYPE_CHECKING:
     from tribodyn.hbm.wear.tangent import Tangent

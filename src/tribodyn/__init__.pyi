@@ -1,13 +1,16 @@
 # The names of the front door, each with its home: read by type checkers, and by __init__.py when a name is first used.
 from tribodyn import matrices as matrices, plot as plot, studies as studies, wheel as wheel
 from tribodyn.hbm.wear.law import Exposure as Exposure
+from tribodyn.refusal import SolveFailed as SolveFailed
 from tribodyn.version import __version__ as __version__
 from tribodyn.workflows.result.result import Result as Result
 from tribodyn.workflows.result.store import ResultError as ResultError, load as load
-from tribodyn.workflows.run.failure import SolveFailed as SolveFailed
 from tribodyn.workflows.run.modelling import Model as Model
-from tribodyn.workflows.scene.scene_file import SceneError as SceneError, SceneFile as SceneFile
-from tribodyn.workflows.scene.source import read_scene as read_scene
+from tribodyn.workflows.scene.scene_file import (
+    SceneError as SceneError,
+    SceneFile as SceneFile,
+    read_scene as read_scene,
+)
 from tribodyn.workflows.studies.front_door import (
     build as build,
     export as export,

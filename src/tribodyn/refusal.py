@@ -16,3 +16,7 @@ class Refusal(ValueError):
 
 class SolverFailure(RuntimeError):
     """A solver that did not reach its solution: where and why; the command ends with exit code 3."""
+
+
+class SolveFailed(SolverFailure):
+    """A solve did not converge; the message has where and why, and the result file holds what came before."""

@@ -21,8 +21,7 @@ from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.hbm.wear.wear_loop import evolve
-from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
-from tribodyn.hbm.wear.wear_state import assess
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem, assess
 
 SHARE, STEP, LOADS = 0.2, 1e-6, ("press", "shake")
 AT = AtFrequency("tip", 420.0, EXACT)

@@ -20,7 +20,7 @@ from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.period_search import Period, PeriodSearch, PerturbedMotion, perturb
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
-from tribodyn.hbm.wear import law as wear_law, wear_state
+from tribodyn.hbm.wear import law as wear_law, wear_problem as wear_state
 from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.rules import error_controlled

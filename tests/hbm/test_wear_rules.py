@@ -23,8 +23,7 @@ from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.rules import error_controlled, thesis
 from tribodyn.hbm.wear.step_control import Tolerance, local_error, measured_error
 from tribodyn.hbm.wear.wear_loop import evolve
-from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
-from tribodyn.hbm.wear.wear_state import assess
+from tribodyn.hbm.wear.wear_problem import Duty, WearProblem, assess
 
 
 @pytest.fixture(scope="module", autouse=True)

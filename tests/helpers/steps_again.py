@@ -7,8 +7,8 @@ import numpy as np
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear.history import StepScheme
 from tribodyn.hbm.wear.sdirk_stages import FrequencySearch, initial_guess, solve_stages
+from tribodyn.hbm.wear.wear_problem import assess
 from tribodyn.hbm.wear.wear_rows import state_of
-from tribodyn.hbm.wear.wear_state import assess
 
 EXACT = NewtonOptions(tolerance=1e-12)
 

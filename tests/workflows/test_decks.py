@@ -12,7 +12,7 @@ from tribodyn.fem.modes import modes
 from tribodyn.fem.part import Part
 from tribodyn.workflows.pictures import view
 from tribodyn.workflows.run import modelling, planning, scene_assembly
-from tribodyn.workflows.run.description import part_mesh
+from tribodyn.workflows.run.pipeline import part_mesh
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import convergence
 

@@ -15,8 +15,8 @@ from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear import tangent
 from tribodyn.hbm.wear.wear_loop import evolve
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.run import references, settings, wear_run
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.parameter_variation import ParameterVariation
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.scene_numbers import geometry_keys, keys, with_value

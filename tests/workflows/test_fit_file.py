@@ -15,9 +15,9 @@ from tests.helpers.fits import fit_by_differences, plain, predict
 from tests.helpers.matrix_scene import matrix_folder
 from tests.helpers.pages import ROOT, fences
 from tests.helpers.structures import BLOCKS
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.run import modelling
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file, scene_fit

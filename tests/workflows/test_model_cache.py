@@ -14,8 +14,8 @@ from tests.helpers.structures import BLOCKS, STACK
 from tribodyn.workflows.run import model_cache, modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.fields import REDUCTION
 from tribodyn.workflows.scene.scene_values import values_through
-from tribodyn.workflows.scene.stages import REDUCTION
 
 TINY = ("geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=4", "response.points=6",
         "harmonics.kept=[0, 1]", "wear.max_steps=1", "verdict.enabled=false")  # fmt: skip

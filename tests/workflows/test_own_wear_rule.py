@@ -23,7 +23,7 @@ import numpy as np
 from tribodyn.declarations import number
 from tribodyn.hbm.wear.wear_rows import row_of
 from tribodyn.hbm.wear.wear_rule import WearRule, WearStep
-from tribodyn.hbm.wear.wear_state import assess
+from tribodyn.hbm.wear.wear_problem import assess
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,20 @@ from tests.helpers.wheel_scene import FLOW, WHEEL
 from tribodyn.workflows.run import checkpoint, joints, modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.fields import PARAMETERS, Table
+from tribodyn.workflows.scene.fields import (
+    CONTACT,
+    DRAW,
+    LOADS,
+    PARAMETERS,
+    PART,
+    REDUCTION,
+    SOLVE,
+    SceneStage,
+    Table,
+    stage_of,
+)
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_values import SceneValue, scene_values, values_through
-from tribodyn.workflows.scene.stages import CONTACT, DRAW, LOADS, PART, REDUCTION, SOLVE, SceneStage, stage_of
 from tribodyn.workflows.scene.wheel_scene import WheelScene
 
 WEAR = '[wear]\ncoefficient = "2e3 um3/J"\nstep = "5 %"\n'

@@ -20,8 +20,8 @@ import tribodyn as td
 from tests.helpers import dying
 from tests.helpers.command import leave, printed_text
 from tribodyn.hbm.linear import compliance
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.run import model_cache, modelling
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.many import parameter_space, pool, run_task, study_file, study_pictures
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, solve

@@ -9,13 +9,12 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from tribodyn.output_file import printable
-from tribodyn.refusal import Refusal, SolverFailure
+from tribodyn.refusal import Refusal, SolveFailed, SolverFailure
 from tribodyn.workflows.command.word import QUIET, Flag, Json, Overrides, make_room
 from tribodyn.workflows.report import text
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import console_progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import front_door

@@ -19,11 +19,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from cyclopts import Parameter
 
 from tribodyn.output_file import printable
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.result import store
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress
-from tribodyn.workflows.scene import source
+from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Quantity
 from tribodyn.workflows.studies.study_result import DefectInRuns, StudyResult
 
@@ -69,7 +68,7 @@ class Option:
 
     @property
     def _kind(self) -> Any:
-        if self.hint == source.Source:
+        if self.hint == scene_file.Source:
             return str
         return Path if PathLike[str] in get_args(self.hint) else None
 

@@ -26,12 +26,11 @@ from tribodyn.hbm.quantity import (
     with_error,
 )
 from tribodyn.hbm.wear.history import LIFE_SHARE
-from tribodyn.refusal import Refusal, SolverFailure
+from tribodyn.refusal import Refusal, SolveFailed, SolverFailure
 from tribodyn.workflows.errors.refinement_limits import RefinementLimits
 from tribodyn.workflows.result.answers import EVENT_SAMPLES
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, response_curve, settings, wear_run
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 

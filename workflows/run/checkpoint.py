@@ -14,11 +14,11 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.model_facts import ModelFacts
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.scene.fields import DRAW
 from tribodyn.workflows.scene.file_digests import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.scene_values import scene_values
 from tribodyn.workflows.scene.schema import Scene
-from tribodyn.workflows.scene.stages import DRAW
 
 _ABSENT = object()
 

@@ -31,11 +31,11 @@ from tribodyn.hbm.threads import limited, usable
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.version import package_version
 from tribodyn.workflows.run import joints, part_reduction
+from tribodyn.workflows.scene.fields import PART
 from tribodyn.workflows.scene.file_digests import code, digests, files_named
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.scene_values import values_through
 from tribodyn.workflows.scene.schema import MeshScene
-from tribodyn.workflows.scene.stages import PART
 
 FOLDER = "TRIBODYN_CACHE"  # variable of the environment: another folder, or "off"
 ROOM = 4e9  # bytes of all entries: ten of the Brake-Reuss beam, the largest scene that comes along

@@ -26,13 +26,13 @@ from tribodyn.workflows.run import joints, matrix_model, modelling, part_reducti
 from tribodyn.workflows.run.part_changes import difference, moves_evenly, scaled
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.scene_numbers import is_loaded_alike, is_seen_by_contact, moves_nodes, with_value
+from tribodyn.workflows.scene.fields import CONTACT, REDUCTION
 from tribodyn.workflows.scene.load_tables import SpringTable, Vibrates
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.part_tables import Meshed
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.scene_values import smooth_numbers
 from tribodyn.workflows.scene.schema import MeshScene, Scene, has_wheel
-from tribodyn.workflows.scene.stages import CONTACT, REDUCTION
 from tribodyn.workflows.scene.structure_tables import BoltTable
 
 if TYPE_CHECKING:

@@ -15,11 +15,11 @@ from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.wear_loop import evolve
 from tribodyn.hbm.wear.wear_problem import Duty, WearProblem
 from tribodyn.hbm.wear.wear_rule import RuleSettings, WearRule
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.result.model_facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import references, settings
 from tribodyn.workflows.run.checkpoint import Keeper
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.full_fields import with_shown
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Advance

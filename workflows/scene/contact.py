@@ -13,8 +13,18 @@ from tribodyn import declarations
 from tribodyn.hbm.contact import contact_law
 from tribodyn.refusal import Refusal
 from tribodyn.text_file import text_of
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table, TemperatureChange
-from tribodyn.workflows.scene.stages import CONTACT, PART, SMOOTH, SceneStage
+from tribodyn.workflows.scene.fields import (
+    CONTACT,
+    PART,
+    SMOOTH,
+    Angle,
+    Direction,
+    Length,
+    SceneStage,
+    Stiffness,
+    Table,
+    TemperatureChange,
+)
 from tribodyn.workflows.scene.user_files import LawTable, folder_of, is_user_file, user_file
 
 

@@ -1,18 +1,66 @@
-"""Kinds of values in a scene file: quantities with units, directions, tables, and the sentence on an unknown key."""
+"""Kinds of values in a scene file: quantities with units, directions, tables, and the sentence on an unknown key.
+
+A field carries the stage of a run that reads it first, and other marks, in its metadata. Cached parts and reductions,
+resumption, derivatives and parameter variation follow from these marks."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import Enum, IntEnum
 from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic.fields import FieldInfo
 
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.stages import PART, SceneStage, stage_of
 from tribodyn.workflows.scene.units import to_si
+
+
+class SceneStage(IntEnum):
+    """Stages in the order in which they run; a change of a field leaves the outcome of all earlier ones as it is."""
+
+    PART = 1
+    REDUCTION = 2
+    CONTACT = 3
+    LOADS = 4
+    SOLVE = 5
+    WEAR = 6
+    STUDY = 7  # errors of the finished result, and studies of the same model
+    DRAW = 8  # pictures, titles, and how a result is reported
+
+
+class Mark(Enum):
+    """What else a field may say of itself.
+
+    RESUMABLE : a run may be resumed with another value
+    SMOOTH : the response depends on it smoothly, so that it has derivatives"""
+
+    RESUMABLE = "resumable"
+    SMOOTH = "smooth"
+
+
+PART, REDUCTION, CONTACT, LOADS, SOLVE, WEAR, STUDY, DRAW = SceneStage
+RESUMABLE, SMOOTH = Mark
+
+
+def stage_of(field: FieldInfo) -> SceneStage | None:
+    """The stage in the metadata of a field; None for one that holds tables, whose fields have theirs."""
+    return next((mark for mark in marks_of(field) if isinstance(mark, SceneStage)), None)
+
+
+def marks_of(field: FieldInfo) -> list[Any]:
+    """All that a field carries in its metadata."""
+    return [*field.metadata, *_inner_metadata(field.annotation)]
+
+
+def _inner_metadata(annotation: Any) -> list[Any]:
+    """Metadata inside a type, as in `Annotated[float, SOLVE] | None`."""
+    inner = [mark for part in get_args(annotation) for mark in _inner_metadata(part)]
+    return [*getattr(annotation, "__metadata__", ()), *inner]
+
 
 IN_UNIT = "in_unit"  # attribute of the validator of a quantity
 PARAMETERS = "parameters"  # field in which a table gathers the keys that its part declares

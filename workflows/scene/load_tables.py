@@ -10,6 +10,10 @@ from pydantic import Field, StrictInt, model_validator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.fields import (
+    LOADS,
+    PART,
+    REDUCTION,
+    SMOOTH,
     Acceleration,
     Angle,
     Direction,
@@ -22,7 +26,6 @@ from tribodyn.workflows.scene.fields import (
     TemperatureChange,
     quantity,
 )
-from tribodyn.workflows.scene.stages import LOADS, PART, REDUCTION, SMOOTH
 
 KINDS = ("value", "pressure", "moment", "acceleration", "base_acceleration", "speed", "temperature")
 

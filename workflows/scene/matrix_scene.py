@@ -11,11 +11,10 @@ from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ContactTable
-from tribodyn.workflows.scene.fields import Direction, Force, Number, Quantity, Table
+from tribodyn.workflows.scene.fields import LOADS, PART, SMOOTH, Direction, Force, Number, Quantity, Table
 from tribodyn.workflows.scene.load_tables import Loads, Vibrates
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.solution_tables import Reduction, Response
-from tribodyn.workflows.scene.stages import LOADS, PART, SMOOTH
 from tribodyn.workflows.scene.units import to_si
 
 Dof = int | tuple[int, int | str]

@@ -11,8 +11,7 @@ from pydantic import Field, PrivateAttr, StrictInt, ValidationInfo, model_valida
 from tribodyn.declarations import read
 from tribodyn.geometry import parts
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Direction, Number, Table, UsualRange, quantity, refuse_slips
-from tribodyn.workflows.scene.stages import PART, SMOOTH
+from tribodyn.workflows.scene.fields import PART, SMOOTH, Direction, Number, Table, UsualRange, quantity, refuse_slips
 from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers, optional_user_file, user_file
 
 

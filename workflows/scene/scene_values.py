@@ -6,8 +6,17 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from tribodyn.workflows.scene.fields import PARAMETERS, Table, UsualRange
-from tribodyn.workflows.scene.stages import RESUMABLE, SMOOTH, SOLVE, SceneStage, marks_of, stage_of
+from tribodyn.workflows.scene.fields import (
+    PARAMETERS,
+    RESUMABLE,
+    SMOOTH,
+    SOLVE,
+    SceneStage,
+    Table,
+    UsualRange,
+    marks_of,
+    stage_of,
+)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from pydantic import Field, ValidationError, ValidationInfo, model_validator
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
 from tribodyn.workflows.scene.contact_numbers import needs_asperities, with_asperities, with_numbers_by_temperature
-from tribodyn.workflows.scene.fields import Table, unknown_key
+from tribodyn.workflows.scene.fields import DRAW, REDUCTION, SceneStage, Table, unknown_key
 from tribodyn.workflows.scene.load_tables import HarmonicLoad, Loads, Motion, Prescribed, SpringTable, StaticLoad
 from tribodyn.workflows.scene.part_tables import Geometry, SolidMaterial
 from tribodyn.workflows.scene.solution_tables import (
@@ -30,7 +30,6 @@ from tribodyn.workflows.scene.solution_tables import (
     Solver,
     VerdictOptions,
 )
-from tribodyn.workflows.scene.stages import DRAW, REDUCTION, SceneStage
 from tribodyn.workflows.scene.stress_tables import FatigueTable, GaugeTable, StressPlaceTable, StressTable
 from tribodyn.workflows.scene.structure_tables import (
     GROUND,

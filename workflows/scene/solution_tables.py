@@ -21,8 +21,22 @@ from pydantic import (
 from tribodyn.declarations import read
 from tribodyn.hbm import continuation
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table, UsualRange, quantity
-from tribodyn.workflows.scene.stages import DRAW, PART, REDUCTION, RESUMABLE, SMOOTH, SOLVE, STUDY
+from tribodyn.workflows.scene.fields import (
+    DRAW,
+    PART,
+    REDUCTION,
+    RESUMABLE,
+    SMOOTH,
+    SOLVE,
+    STUDY,
+    Direction,
+    Frequency,
+    Length,
+    Number,
+    Table,
+    UsualRange,
+    quantity,
+)
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.user_files import folder_of, is_user_file, numbers, optional_user_file, user_file
 

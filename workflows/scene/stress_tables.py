@@ -7,8 +7,17 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StrictInt, model_validator
 
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Direction, Length, Number, Pressure, Table, TemperatureChange
-from tribodyn.workflows.scene.stages import DRAW, PART, STUDY
+from tribodyn.workflows.scene.fields import (
+    DRAW,
+    PART,
+    STUDY,
+    Direction,
+    Length,
+    Number,
+    Pressure,
+    Table,
+    TemperatureChange,
+)
 
 Strength = Annotated[Pressure, Field(gt=0)]
 Factor = Annotated[Number, Field(gt=0, le=1)]

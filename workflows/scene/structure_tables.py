@@ -12,9 +12,20 @@ from pydantic import BeforeValidator, Field, StrictInt, model_validator
 from tribodyn.geometry.sources.face_rules import FacetRule
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.contact import FaceContact
-from tribodyn.workflows.scene.fields import Angle, Direction, Force, Length, Stiffness, Table, quantity, refuse_slips
+from tribodyn.workflows.scene.fields import (
+    LOADS,
+    PART,
+    SMOOTH,
+    Angle,
+    Direction,
+    Force,
+    Length,
+    Stiffness,
+    Table,
+    quantity,
+    refuse_slips,
+)
 from tribodyn.workflows.scene.part_tables import Meshed
-from tribodyn.workflows.scene.stages import LOADS, PART, SMOOTH
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import JointWearTable
 

@@ -11,8 +11,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationE
 from tribodyn.declarations import Role, read
 from tribodyn.hbm.wear import law as wear_law, wear_rule
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Frequency, Number, Table
-from tribodyn.workflows.scene.stages import DRAW, RESUMABLE, WEAR, SceneStage
+from tribodyn.workflows.scene.fields import DRAW, RESUMABLE, WEAR, Frequency, Number, SceneStage, Table
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.user_files import (
     LawTable,

@@ -7,8 +7,8 @@ from typing import Any
 from pydantic import model_validator
 
 from tribodyn.refusal import Refusal
+from tribodyn.workflows.scene.fields import LOADS, REDUCTION, SceneStage
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
-from tribodyn.workflows.scene.stages import LOADS, REDUCTION, SceneStage
 from tribodyn.workflows.scene.wheel_tables import FlowTable, Mistuning, WheelTable, operating_line
 
 

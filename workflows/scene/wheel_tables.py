@@ -8,8 +8,18 @@ import numpy as np
 from pydantic import Field, StrictBool, StrictInt, TypeAdapter, ValidationError, model_validator
 
 from tribodyn.refusal import Refusal
-from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table, UsualRange
-from tribodyn.workflows.scene.stages import PART, REDUCTION, SMOOTH, STUDY
+from tribodyn.workflows.scene.fields import (
+    PART,
+    REDUCTION,
+    SMOOTH,
+    STUDY,
+    Direction,
+    Frequency,
+    Length,
+    Number,
+    Table,
+    UsualRange,
+)
 
 
 class WheelTable(Table, stage=REDUCTION):

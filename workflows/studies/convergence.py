@@ -27,7 +27,7 @@ from tribodyn.workflows.errors.ladder_table import (
 from tribodyn.workflows.pictures.theme import GREY, STYLE
 from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
+from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, override_texts
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 

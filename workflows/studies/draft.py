@@ -19,7 +19,7 @@ from tribodyn.geometry.sources.face_rules import outline
 from tribodyn.output_file import write_text
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene.json_schema import json_schema
-from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.scene.scene_file import AnyPath
 from tribodyn.workflows.studies.study_result import StudyResult
 
 SCHEMA = "scene.schema.json"

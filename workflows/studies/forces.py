@@ -19,12 +19,11 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.hbm.threads import limited
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.run import modelling, part_reduction, scene_assembly, scene_loads, settings
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.scene_file import Overrides, SceneFile, Source, read_scene
 from tribodyn.workflows.scene.schema import MeshScene
-from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.study_result import StudyResult
 
 TOLERANCE = 1e-12  # of the contact at rest: the balance of forces is to be seen to 1e-8

@@ -18,8 +18,7 @@ from tribodyn.workflows.run import checkpoint, modelling, pipeline, planning
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, SceneFile, Source, read_scene
 
 
 def scene_names() -> list[str]:

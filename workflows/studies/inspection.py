@@ -24,7 +24,7 @@ from tribodyn.workflows.run import deck_materials, deck_source, decks, modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
-from tribodyn.workflows.scene.source import AnyPath, Overrides, read_scene
+from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, read_scene
 from tribodyn.workflows.scene.structure_tables import DeckTable
 from tribodyn.workflows.studies.study_result import StudyResult
 

@@ -16,16 +16,15 @@ from tribodyn.hbm.derivatives.derivative_table import Derivatives
 from tribodyn.hbm.derivatives.parameter_change import ParameterChange
 from tribodyn.hbm.quantity import CycleQuantity, StatedQuantity, WearQuantity
 from tribodyn.hbm.threads import limited
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.theme import CYCLE, GREY
 from tribodyn.workflows.run import pipeline, response_curve, wear_run
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.parameter_variation import ParameterVariation
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.scene_numbers import geometry_keys, keys
 from tribodyn.workflows.scene.fields import Frequency
-from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import Overrides, SceneError, SceneFile, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.studies.derivatives_at_points import changes_of, life_share, of_branch, of_life
 from tribodyn.workflows.studies.files import write_files

@@ -21,7 +21,7 @@ from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import FreeMotion, march_freely
 from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearRow
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.errors.time_comparison import steps_of
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
@@ -30,11 +30,10 @@ from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.store import ResultSource, result_of
 from tribodyn.workflows.run import modelling, settings
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene.fields import Frequency
+from tribodyn.workflows.scene.scene_file import Overrides, override_texts
 from tribodyn.workflows.scene.schema import Scene
-from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 

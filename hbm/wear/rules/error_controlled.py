@@ -18,10 +18,9 @@ from tribodyn.hbm.wear.marched_step import marched_step
 from tribodyn.hbm.wear.steady_motion import SteadyMotion, with_growth
 from tribodyn.hbm.wear.step_control import StepError, Tolerance, measured_error
 from tribodyn.hbm.wear.step_memory import StepMemory, predicted_cycles
-from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState
 from tribodyn.hbm.wear.wear_rows import row_of
 from tribodyn.hbm.wear.wear_rule import RuleSettings, StepCost, WearRule, WearStep
-from tribodyn.hbm.wear.wear_state import WearState
 
 # of the first preload, where a run ends at the latest: below it the last touch is noise of Newton's tolerance
 LEAST_PRELOAD_SHARE = 1e-4

@@ -10,10 +10,9 @@ import numpy as np
 
 from tribodyn.declarations import number
 from tribodyn.hbm.wear.history import StepScheme, WearRow
-from tribodyn.hbm.wear.wear_problem import WearProblem
+from tribodyn.hbm.wear.wear_problem import WearProblem, WearState, assess
 from tribodyn.hbm.wear.wear_rows import row_of
 from tribodyn.hbm.wear.wear_rule import RuleSettings, StepCost, WearRule, WearStep
-from tribodyn.hbm.wear.wear_state import WearState, assess
 from tribodyn.refusal import Refusal
 
 

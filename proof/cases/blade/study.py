@@ -21,8 +21,7 @@ from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.workflows.pictures.wheel_diagrams import campbell as plot_campbell
 from tribodyn.workflows.result.result import References
 from tribodyn.workflows.run.settings import OUTPUT
-from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.scene.source import read_scene
+from tribodyn.workflows.scene.scene_file import SceneError, read_scene
 from tribodyn.workflows.studies.wheels.wheel_model import Wheel, build as build_wheel, campbell, critical_speeds, follow
 
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector

@@ -31,7 +31,7 @@ def leaf(
     as_json
         Print JSON for machines."""
     from proof.cases.leaf_seal import fit, study
-    from tribodyn.workflows.scene.source import read_scene
+    from tribodyn.workflows.scene.scene_file import read_scene
 
     make_room(out)
     folder = out or Path("results") / f"leaf_{work}"

@@ -18,8 +18,8 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from proof.joint_springs import JointSprings, joint_springs
+from tribodyn.workflows.scene.scene_file import read_scene
 from tribodyn.workflows.scene.schema import MeshScene
-from tribodyn.workflows.scene.source import read_scene
 
 PUBLISHED = {
     "leaf alone": (0.00, 0.00, 1.00, 1.71, 2.44, 3.96, 4.78, 5.73, 6.00, 7.11),

@@ -14,7 +14,7 @@ from tribodyn.hbm.contact.contact_law import SEPARATES, STICKS
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.stability.branch_stability import BranchStability, stability_along
 from tribodyn.hbm.wear.laws.impact import loading_work
-from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.run.modelling import build
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.settings import OUTPUT

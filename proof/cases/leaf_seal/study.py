@@ -20,7 +20,7 @@ from proof.cases.leaf_seal.record import COLUMNS, STRUCK_POINT, Record
 from proof.cases.leaf_seal.response import LeafResponse, respond
 from tribodyn.style import STATUS
 from tribodyn.workflows.run.memory import peak as peak_memory
-from tribodyn.workflows.scene.source import read_scene
+from tribodyn.workflows.scene.scene_file import read_scene
 
 MAPS = ("inclination", "bow")  # parameters whose contact is drawn
 LINEAR_POINT = 4  # of the chosen five

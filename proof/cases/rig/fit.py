@@ -23,8 +23,7 @@ from proof.cases.rig.wear import RigWear, wear_down
 from tests.helpers.fits import fit_by_differences as identify
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import model_cache
-from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.source import read_scene
+from tribodyn.workflows.scene.scene_file import SceneFile, read_scene
 from tribodyn.workflows.studies.fits.identification import FitParameter, Identification, MeasuredNumber
 
 RIGID = 1e11  # stiffness beyond which no published frequency changes by one in a thousand [N/m]

@@ -10,12 +10,11 @@ from proof.problems import cycle_at
 from tests.helpers.fits import plain
 from tribodyn.hbm.balance import State
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.run.modelling import Model, build
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.scene_file import SceneError, SceneFile, read_scene
 from tribodyn.workflows.scene.schema import MeshScene
-from tribodyn.workflows.scene.source import read_scene
 
 PLATFORM, SHAKER = "platform", "shaker"  # names in the scene
 TIED = {

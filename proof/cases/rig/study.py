@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from proof.cases.rig import cases as rig_cases, figures as rig_figures, model as rig_model, table as rig_table
-from tribodyn.workflows.scene.source import read_scene
+from tribodyn.workflows.scene.scene_file import read_scene
 
 
 def run(

@@ -15,18 +15,16 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import nonlinear_modes
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions
 from tribodyn.hbm.threads import limited
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.maps import backbone_maps
 from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.run import modelling, settings
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Length
-from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import Overrides, SceneFile, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 

@@ -16,16 +16,14 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time import ring_down as time_ring_down
 from tribodyn.hbm.time.decrement import decrement
 from tribodyn.hbm.time.ring_down import RingDown
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
 from tribodyn.workflows.pictures.theme import BLUE, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.run import modelling, settings
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene.fields import Length, quantity
-from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import Overrides, SceneFile, Source, read_scene
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, follow_mode
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult

@@ -9,9 +9,8 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, StrictBool, ValidationInfo, model_validator
 
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.run import modelling
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile

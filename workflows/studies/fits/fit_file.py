@@ -14,7 +14,7 @@ from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
-from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.scene.scene_file import AnyPath
 from tribodyn.workflows.scene.wear import At
 from tribodyn.workflows.studies.fits.curve_target import Curve
 

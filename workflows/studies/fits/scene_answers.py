@@ -19,9 +19,8 @@ from tribodyn.hbm.quantity import WearQuantity
 from tribodyn.hbm.quantity_sources import SolvedCycle, WornContact
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.run import joints, modelling, settings, wear_run
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.wear import Place
 from tribodyn.workflows.studies.fits.curve_target import CurveTarget

@@ -12,9 +12,8 @@ from tribodyn.hbm.derivatives.derivative_rules import NoDerivative
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.run import model_cache, modelling
 from tribodyn.workflows.run.progress import Progress, Report, reporter
-from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, SceneError, SceneFile, Source, read_scene
 from tribodyn.workflows.scene.schema import Scene
-from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.studies.fits.curve_target import CurveTarget
 from tribodyn.workflows.studies.fits.fit_file import FitTables, NumberText, ParameterTable, Target, read

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.studies.many import quantiles
 from tribodyn.workflows.studies.many.parameter_space import ParameterSpace
 from tribodyn.workflows.studies.many.quantiles import Sample

@@ -18,9 +18,8 @@ from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.load_tables import StaticLoad
 from tribodyn.workflows.scene.matrix_scene import DofLoad
-from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
 from tribodyn.workflows.scene.scene_values import smooth_numbers
-from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import quantiles, study_file, study_pictures, study_runs as studies
 from tribodyn.workflows.studies.many.life_fit import PROBED, LifeFit, Quantile, half_width, quantile_of
 from tribodyn.workflows.studies.many.parameter_space import ParameterSpace

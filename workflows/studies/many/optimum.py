@@ -18,11 +18,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.output_file import write_text
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.pictures.figures import write_figure
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
 from tribodyn.workflows.studies.many import study_file, study_pictures, study_runs as studies
 from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.parameter_space import ParameterSpace

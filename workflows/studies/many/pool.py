@@ -18,9 +18,8 @@ from typing import TypeVar
 from threadpoolctl import threadpool_limits
 
 from tribodyn.extras import package
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.run import model_cache
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory

@@ -12,8 +12,7 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from tribodyn.refusal import Refusal
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
-from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal, NumberWithUnit, si
 
 LISTED = ("grid", "list")

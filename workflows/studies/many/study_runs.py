@@ -15,8 +15,7 @@ from tribodyn.workflows.run import model_cache
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.scene.scene_file import AnyPath, SceneError
 from tribodyn.workflows.studies.many import parameter_space, pool, study_file, study_pictures
 from tribodyn.workflows.studies.many.pool import Work
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, solve

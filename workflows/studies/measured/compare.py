@@ -15,8 +15,7 @@ from tribodyn.workflows.pictures.theme import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.number_format import named_lines
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, SceneFile, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.measured.computed_runs import ComparedRun, compare_runs
 from tribodyn.workflows.studies.measured.measurement import Measurement, Run, prepared

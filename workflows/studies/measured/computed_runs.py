@@ -8,8 +8,8 @@ from scipy.interpolate import PchipInterpolator
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.time.decrement import decrement
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.run import modelling, response_curve
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, follow_mode

@@ -14,7 +14,7 @@ from tribodyn.workflows.pictures.figures import axes_of, length_unit
 from tribodyn.workflows.pictures.theme import BLUE, CYCLE, GREY, ORANGE
 from tribodyn.workflows.result.number_format import measured, named_lines
 from tribodyn.workflows.scene.fields import Frequency, Number, quantity
-from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.scene.scene_file import AnyPath
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.measured.channels import NONE, Channels, read_channels
 from tribodyn.workflows.studies.measured.loop_cycles import ForceSeries, LoopCycles

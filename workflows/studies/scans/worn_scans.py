@@ -17,7 +17,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.text_file import text_of
 from tribodyn.workflows.result.number_format import measured, named_lines
 from tribodyn.workflows.scene.fields import Length, quantity
-from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.scene.scene_file import AnyPath
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.scans.wear_coefficient import WearCoefficient, regression

@@ -20,8 +20,7 @@ from tribodyn.workflows.pictures.theme import BLUE, GREY, RED
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Length
-from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import Overrides, SceneError, SceneFile, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels import wheel_model as wheels

@@ -18,9 +18,8 @@ from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.hbm.mistuned_wheel import MistunedWheel
 from tribodyn.reduction import nominal_modes as reduction
 from tribodyn.reduction.sector_reduction import ReducedSector
-from tribodyn.refusal import Refusal
+from tribodyn.refusal import Refusal, SolveFailed
 from tribodyn.workflows.run import settings
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile

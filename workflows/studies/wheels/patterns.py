@@ -18,8 +18,7 @@ from tribodyn.workflows.result.number_format import write_columns
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import AnyPath, Overrides, SceneFile, Source, read_scene
 from tribodyn.workflows.studies.many.run_task import RunRow, StudyRun, outcome_of
 from tribodyn.workflows.studies.many.study_runs import Runner, finish
 from tribodyn.workflows.studies.study_result import StudyResult

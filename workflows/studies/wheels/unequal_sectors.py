@@ -25,7 +25,7 @@ from tribodyn.workflows.pictures.figures import axes_of, length_unit
 from tribodyn.workflows.pictures.theme import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.fields import Number, quantity
-from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import Overrides, Source, read_scene
 from tribodyn.workflows.studies.derivatives_at_points import of_branch
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.response_derivatives import ResponseDerivatives

@@ -17,8 +17,8 @@ from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.linear.travelling_wave import on_wheel
 from tribodyn.reduction.sector_reduction import ReducedSector, nodal_diameters
 from tribodyn.reduction.wave_model import travelling_wave, wheel_model
+from tribodyn.refusal import SolveFailed
 from tribodyn.workflows.run import joints, modelling, sector as sectors
-from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, has_wheel

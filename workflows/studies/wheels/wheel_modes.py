@@ -13,7 +13,7 @@ from tribodyn.refusal import Refusal
 from tribodyn.workflows.pictures import wheel_diagrams
 from tribodyn.workflows.pictures.wheel_diagrams import AGAINST
 from tribodyn.workflows.scene.fields import Frequency
-from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.scene.scene_file import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.study_result import StudyResult
 from tribodyn.workflows.studies.wheels.wheel_model import build, campbell, critical_speeds
